@@ -1,0 +1,170 @@
+//! [`Grid`]: the only row/column ↔ index arithmetic in the crate.
+
+use serde::{Deserialize, Serialize};
+use std::ops::{Index, IndexMut};
+
+/// A dense matrix in row-major order; row 0 is the top row, column 0 the leftmost.
+///
+/// In files it is a list of rows of equal length.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(try_from = "Vec<Vec<T>>", into = "Vec<Vec<T>>")]
+#[serde(bound(serialize = "T: Clone + Serialize", deserialize = "T: Deserialize<'de>"))]
+pub struct Grid<T> {
+    height: usize,
+    width: usize,
+    cells: Vec<T>,
+}
+
+/// Why rows do not make a [`Grid`].
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum GridError {
+    /// There is no cell at all.
+    #[error("expected at least one row with at least one cell, found none")]
+    Empty,
+    /// A row is longer or shorter than the first.
+    #[error("row {row} has {found} cells, expected {expected} as in row 0")]
+    Ragged {
+        /// Index of the offending row, from 0 at the top.
+        row: usize,
+        /// Its length.
+        found: usize,
+        /// Length of row 0.
+        expected: usize,
+    },
+}
+
+impl<T> Grid<T> {
+    /// A grid made of rows, top row first; all rows must have the same length, which is not 0.
+    ///
+    /// # Errors
+    /// [`GridError`] if there is no cell, or a row's length differs from the first's.
+    pub fn from_rows(rows: Vec<Vec<T>>) -> Result<Self, GridError> {
+        let (height, width) = (rows.len(), rows.first().map_or(0, Vec::len));
+        if height == 0 || width == 0 {
+            return Err(GridError::Empty);
+        }
+        if let Some((row, cells)) = rows.iter().enumerate().find(|(_, r)| r.len() != width) {
+            let found = cells.len();
+            return Err(GridError::Ragged { row, found, expected: width });
+        }
+        Ok(Grid { height, width, cells: rows.into_iter().flatten().collect() })
+    }
+
+    /// A grid whose cell (row, column) is `cell(row, column)`.
+    pub fn from_fn(height: usize, width: usize, mut cell: impl FnMut(usize, usize) -> T) -> Self {
+        let cells = (0..height * width).map(|i| cell(i / width, i % width)).collect();
+        Grid { height, width, cells }
+    }
+
+    /// Number of rows.
+    pub fn height(&self) -> usize {
+        self.height
+    }
+
+    /// Number of columns.
+    pub fn width(&self) -> usize {
+        self.width
+    }
+
+    /// Number of cells, height × width.
+    pub fn area(&self) -> usize {
+        self.cells.len()
+    }
+
+    /// The cell, or `None` outside the grid; takes signed indices so that neighbours can be asked for freely.
+    pub fn get(&self, row: isize, column: isize) -> Option<&T> {
+        let (r, c) = (usize::try_from(row).ok()?, usize::try_from(column).ok()?);
+        (r < self.height && c < self.width).then(|| &self.cells[r * self.width + c])
+    }
+
+    /// All cells in row-major order.
+    pub fn cells(&self) -> &[T] {
+        &self.cells
+    }
+
+    /// All cells with their row and column, in row-major order.
+    pub fn iter(&self) -> impl Iterator<Item = ((usize, usize), &T)> {
+        self.cells.iter().enumerate().map(|(i, t)| ((i / self.width, i % self.width), t))
+    }
+
+    /// The rows, top row first.
+    pub fn rows(&self) -> impl Iterator<Item = &[T]> {
+        self.cells.chunks(self.width)
+    }
+
+    /// A grid of the same shape with `f` applied to every cell.
+    pub fn map<U>(&self, f: impl FnMut(&T) -> U) -> Grid<U> {
+        Grid { height: self.height, width: self.width, cells: self.cells.iter().map(f).collect() }
+    }
+}
+
+impl<T: Clone> Grid<T> {
+    /// A grid with the same value in every cell.
+    pub fn filled(height: usize, width: usize, value: T) -> Self {
+        Grid { height, width, cells: vec![value; height * width] }
+    }
+
+    /// The grid mirrored left to right.
+    pub fn mirrored(&self) -> Self {
+        Grid::from_fn(self.height, self.width, |r, c| self[(r, self.width - 1 - c)].clone())
+    }
+}
+
+impl<T> Index<(usize, usize)> for Grid<T> {
+    type Output = T;
+    fn index(&self, (row, column): (usize, usize)) -> &T {
+        debug_assert!(row < self.height && column < self.width);
+        &self.cells[row * self.width + column]
+    }
+}
+
+impl<T> IndexMut<(usize, usize)> for Grid<T> {
+    fn index_mut(&mut self, (row, column): (usize, usize)) -> &mut T {
+        debug_assert!(row < self.height && column < self.width);
+        &mut self.cells[row * self.width + column]
+    }
+}
+
+impl<T> TryFrom<Vec<Vec<T>>> for Grid<T> {
+    type Error = GridError;
+    fn try_from(rows: Vec<Vec<T>>) -> Result<Self, GridError> {
+        Grid::from_rows(rows)
+    }
+}
+
+impl<T: Clone> From<Grid<T>> for Vec<Vec<T>> {
+    fn from(grid: Grid<T>) -> Self {
+        grid.rows().map(<[T]>::to_vec).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rows_of_different_length_are_refused_with_their_place() {
+        let error = Grid::from_rows(vec![vec![1, 2], vec![3]]).unwrap_err();
+        assert_eq!(error, GridError::Ragged { row: 1, found: 1, expected: 2 });
+        assert_eq!(Grid::<u8>::from_rows(vec![]).unwrap_err(), GridError::Empty);
+        assert_eq!(Grid::<u8>::from_rows(vec![vec![]]).unwrap_err(), GridError::Empty);
+    }
+
+    #[test]
+    fn indices_are_row_major_from_the_top_left() {
+        let grid = Grid::from_fn(2, 3, |r, c| 10 * r + c);
+        assert_eq!(grid.cells(), [0, 1, 2, 10, 11, 12]);
+        assert_eq!(grid[(1, 2)], 12);
+        assert_eq!(grid.get(1, 2), Some(&12));
+        assert_eq!((grid.get(-1, 0), grid.get(0, 3)), (None, None));
+        assert_eq!(grid.mirrored().cells(), [2, 1, 0, 12, 11, 10]);
+    }
+
+    #[test]
+    fn json_is_a_list_of_rows() {
+        let grid = Grid::from_fn(2, 2, |r, c| (r, c));
+        let text = serde_json::to_string(&grid).unwrap();
+        assert_eq!(text, "[[[0,0],[0,1]],[[1,0],[1,1]]]");
+        assert_eq!(serde_json::from_str::<Grid<(usize, usize)>>(&text).unwrap(), grid);
+    }
+}

@@ -1,0 +1,7 @@
+//! Floor 0: what every room stands on (index arithmetic, random generators, hashes).
+
+pub mod grid;
+pub mod hash;
+pub mod random;
+
+pub use grid::Grid;

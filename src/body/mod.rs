@@ -1,0 +1,243 @@
+//! Floor 1: bodies. A [`Body`] is a grid of [`Material`]s; it knows nothing of physics or evolution.
+
+pub mod material;
+
+use crate::base::{Grid, hash};
+pub use material::Material;
+use serde::{Deserialize, Serialize};
+use std::fmt;
+use std::str::FromStr;
+
+/// Largest height and width of a body in voxels.
+pub const MAX_SIDE: usize = 64;
+
+/// A robot's body: H × W voxels, row 0 on top. Empty rows and columns count: pixel (row, column) of a stimulus
+/// drives voxel (row, column). In files it is a list of rows of numbers 0…6 (see [`Material`]).
+#[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(try_from = "Grid<Material>", into = "Grid<Material>")]
+pub struct Body(Grid<Material>);
+
+/// How many voxels of a kind a body has: what the archive's descriptor is made of (paper, section "MAP-Elites").
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct VoxelCounts {
+    /// Muscle voxels ("active" in the paper), both phases.
+    pub muscle: usize,
+    /// Sensor voxels, both kinds.
+    pub sensor: usize,
+    /// Voxels that are not empty.
+    pub total: usize,
+}
+
+/// Why something is not a body.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum BodyError {
+    /// The rows do not form a grid.
+    #[error("a body is a list of rows of equal length: {0}")]
+    Shape(#[from] crate::base::grid::GridError),
+    /// The body is larger than [`MAX_SIDE`] on a side.
+    #[error("the body is {height} × {width} voxels, at most {MAX_SIDE} × {MAX_SIDE} are possible")]
+    TooLarge {
+        /// Rows found.
+        height: usize,
+        /// Columns found.
+        width: usize,
+    },
+    /// A character of the text form is not a digit 0…6.
+    #[error("row {row}, column {column}: '{found}' is not a voxel; expected a digit 0…6 (or '.' for empty)")]
+    Voxel {
+        /// Row from the top, from 0.
+        row: usize,
+        /// Column from the left, from 0.
+        column: usize,
+        /// What stood there.
+        found: char,
+    },
+}
+
+impl Body {
+    /// A body from its voxels.
+    ///
+    /// # Errors
+    /// [`BodyError::TooLarge`] above [`MAX_SIDE`] rows or columns.
+    pub fn new(voxels: Grid<Material>) -> Result<Self, BodyError> {
+        let (height, width) = (voxels.height(), voxels.width());
+        if height > MAX_SIDE || width > MAX_SIDE {
+            return Err(BodyError::TooLarge { height, width });
+        }
+        Ok(Body(voxels))
+    }
+
+    /// The voxels, row 0 on top.
+    pub fn voxels(&self) -> &Grid<Material> {
+        &self.0
+    }
+
+    /// Rows, empty ones included.
+    pub fn height(&self) -> usize {
+        self.0.height()
+    }
+
+    /// Columns, empty ones included.
+    pub fn width(&self) -> usize {
+        self.0.width()
+    }
+
+    /// The material at (row, column); empty outside the grid.
+    pub fn at(&self, row: isize, column: isize) -> Material {
+        self.0.get(row, column).copied().unwrap_or(Material::Empty)
+    }
+
+    /// Numbers of muscle, sensor and non-empty voxels.
+    pub fn counts(&self) -> VoxelCounts {
+        let count = |kind: fn(&Material) -> bool| self.0.cells().iter().filter(|m| kind(m)).count();
+        VoxelCounts {
+            muscle: count(|m| m.is_muscle()),
+            sensor: count(|m| m.is_sensor()),
+            total: count(|m| !m.is_empty()),
+        }
+    }
+
+    /// Whether there is a voxel and all voxels hang together through their sides.
+    pub fn is_connected(&self) -> bool {
+        let Some((start, _)) = self.0.iter().find(|(_, m)| !m.is_empty()) else {
+            return false;
+        };
+        let mut reached = Grid::filled(self.height(), self.width(), false);
+        let mut open = vec![start];
+        reached[start] = true;
+        let mut count = 0;
+        while let Some((r, c)) = open.pop() {
+            count += 1;
+            for (dr, dc) in [(0, 1), (1, 0), (0, -1), (-1, 0)] {
+                let (row, column) = (r as isize + dr, c as isize + dc);
+                if !self.at(row, column).is_empty() {
+                    let next = (row as usize, column as usize);
+                    if !std::mem::replace(&mut reached[next], true) {
+                        open.push(next);
+                    }
+                }
+            }
+        }
+        count == self.counts().total
+    }
+
+    /// Whether evolution may use the body: connected, and at least `min_muscles` muscle voxels (paper: three).
+    pub fn is_valid(&self, min_muscles: usize) -> bool {
+        self.counts().muscle >= min_muscles && self.is_connected()
+    }
+
+    /// A short id, the same for the same body: the first ten hexadecimal digits of the hash of its text form.
+    pub fn id(&self) -> String {
+        hash::sha256_hex(self.to_string().as_bytes())[..10].to_string()
+    }
+
+    /// The content hash of the body: equal bodies, and only those, have equal keys.
+    pub fn key(&self) -> [u8; 16] {
+        hash::content_key(self.to_string().as_bytes())
+    }
+
+    /// The body mirrored left to right.
+    pub fn mirrored(&self) -> Self {
+        Body(self.0.mirrored())
+    }
+}
+
+impl TryFrom<Grid<Material>> for Body {
+    type Error = BodyError;
+    fn try_from(voxels: Grid<Material>) -> Result<Self, BodyError> {
+        Body::new(voxels)
+    }
+}
+
+impl From<Body> for Grid<Material> {
+    fn from(body: Body) -> Self {
+        body.0
+    }
+}
+
+/// The text form: one line of digits 0…6 per row.
+impl fmt::Display for Body {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for (i, row) in self.0.rows().enumerate() {
+            if i > 0 {
+                f.write_str("\n")?;
+            }
+            row.iter().try_for_each(|m| write!(f, "{}", m.code()))?;
+        }
+        Ok(())
+    }
+}
+
+/// Reads the text form; lines may be separated by newlines or `/`, and `.` means empty.
+impl FromStr for Body {
+    type Err = BodyError;
+    fn from_str(text: &str) -> Result<Self, BodyError> {
+        let mut rows = Vec::new();
+        for (row, line) in text.trim().split(['\n', '/']).enumerate() {
+            let cells = line.trim().chars().enumerate().map(|(column, found)| {
+                let digit = if found == '.' { Some(0) } else { found.to_digit(10) };
+                digit.and_then(|d| Material::from_code(d as u8)).ok_or(BodyError::Voxel {
+                    row,
+                    column,
+                    found,
+                })
+            });
+            rows.push(cells.collect::<Result<Vec<_>, _>>()?);
+        }
+        Body::new(Grid::from_rows(rows)?)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn body(text: &str) -> Body {
+        text.parse().unwrap()
+    }
+
+    #[test]
+    fn text_form_goes_there_and_back() {
+        let b = body("0123\n4560");
+        assert_eq!(b.to_string(), "0123\n4560");
+        assert_eq!(body(".123/456."), b);
+        assert_eq!(serde_json::to_string(&b).unwrap(), "[[0,1,2,3],[4,5,6,0]]");
+        assert_eq!(serde_json::from_str::<Body>("[[0,1,2,3],[4,5,6,0]]").unwrap(), b);
+    }
+
+    #[test]
+    fn what_is_not_a_body_is_refused_with_its_place() {
+        let error = "012\n078".parse::<Body>().unwrap_err();
+        assert_eq!(error, BodyError::Voxel { row: 1, column: 1, found: '7' });
+        let error = serde_json::from_str::<Body>("[[0,7]]").unwrap_err().to_string();
+        assert!(error.contains('7') && error.contains("0…6"), "{error}");
+        assert!(matches!("01\n0".parse::<Body>(), Err(BodyError::Shape(_))));
+        let row = "2".repeat(65);
+        assert!(matches!(row.parse::<Body>(), Err(BodyError::TooLarge { height: 1, width: 65 })));
+    }
+
+    #[test]
+    fn connected_means_through_sides() {
+        assert!(body("11\n01").is_connected());
+        assert!(!body("10\n01").is_connected());
+        assert!(!body("00\n00").is_connected());
+        assert!(body("111\n101\n111").is_connected());
+    }
+
+    #[test]
+    fn valid_bodies_have_enough_muscles() {
+        assert!(body("343").is_valid(3));
+        assert!(!body("341").is_valid(3));
+        assert!(!body("33.4").is_valid(3));
+    }
+
+    #[test]
+    fn counts_and_ids() {
+        let b = body("0123456");
+        assert_eq!(b.counts(), VoxelCounts { muscle: 2, sensor: 2, total: 6 });
+        assert_eq!(b.id(), body("0123456").id());
+        assert_ne!(b.id(), b.mirrored().id());
+        // The shape counts: the same digits in another arrangement are another body.
+        assert_ne!(body("0123/4560").key(), body("01/23/45/60").key());
+    }
+}

@@ -1,0 +1,3 @@
+//! The morphcog command.
+
+fn main() {}

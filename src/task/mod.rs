@@ -1,0 +1,3 @@
+//! Floor 3: what a robot is asked to do: images, stimuli, protocols, rollouts and their scores.
+
+pub mod recording;

@@ -1,0 +1,58 @@
+//! [`Recording`]: a life kept frame by frame, for pictures.
+
+use crate::base::Grid;
+use crate::body::Body;
+
+/// One stretch of a recording under one stimulus.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Phase {
+    /// Index of the phase's first frame in [`Recording::frames`].
+    pub first_frame: usize,
+    /// What the sensors see: H × W in [0, 1].
+    pub stimulus: Grid<f64>,
+    /// What the image is, for people: "0 (train 1)".
+    pub label: String,
+    /// Signed x displacement of the centre of mass over the phase, voxel lengths (right is positive).
+    pub displacement: f64,
+}
+
+/// One moment: all points of the robot, in voxel lengths; x from the left edge of its starting box, y from the
+/// ground's surface up.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Frame {
+    /// Position [x, y] of every point.
+    pub points: Vec<[f64; 2]>,
+    /// Centre of mass [x, y].
+    pub centre: [f64; 2],
+}
+
+/// One voxel of the robot and the points at its corners.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct VoxelCorners {
+    /// Row in the body, 0 on top.
+    pub row: usize,
+    /// Column in the body.
+    pub column: usize,
+    /// Indices into [`Frame::points`]: top left, top right, bottom right, bottom left (clockwise).
+    pub corners: [usize; 4],
+}
+
+/// A life, one frame per control step (the first before the first step). With a reset between images
+/// ("fresh" protocol) the robot jumps back at the first frame of a phase.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Recording {
+    /// The robot's id or name.
+    pub robot: String,
+    /// Its body.
+    pub body: Body,
+    /// Its voxels with their corners, row-major; fixed for the life.
+    pub voxels: Vec<VoxelCorners>,
+    /// The phases in order, at least one; the first starts at frame 0.
+    pub phases: Vec<Phase>,
+    /// All frames.
+    pub frames: Vec<Frame>,
+    /// Control steps per actuation cycle (50).
+    pub cycle: usize,
+    /// Whether the life ended early as unstable.
+    pub unstable: bool,
+}
