@@ -14,4 +14,5 @@
 
 pub mod base;
 pub mod body;
+pub mod sim;
 pub mod task;

@@ -2,6 +2,7 @@
 
 pub mod grid;
 pub mod hash;
+pub mod lanes;
 pub mod random;
 
 pub use grid::Grid;

@@ -1,0 +1,69 @@
+//! Material, time and stimulus → goal lengths (physics.md, "Actuation").
+
+use super::lattice::Lattice;
+use super::params::Physics;
+use crate::body::Material;
+
+/// Target width of an active voxel at a control step \[rest widths\]; `pixel` in [0, 1] matters to sensors only.
+pub(super) fn target(material: Material, control_step: u64, pixel: f64, physics: &Physics) -> f64 {
+    let cycle = u64::from(physics.cycle_steps);
+    // The period is one step short of the cycle: the sine's first and last values are equal.
+    let angle = std::f64::consts::TAU * (control_step % cycle) as f64 / (cycle - 1) as f64;
+    let muscle =
+        |phase: f64| physics.muscle_low + physics.muscle_swing * (libm::sin(phase + angle) + 1.0) / 2.0;
+    let free = match material {
+        Material::MuscleInPhase => muscle(0.0),
+        Material::MuscleAntiphase => muscle(physics.antiphase),
+        Material::SensorShrink => physics.sensor_shrink_dark - physics.sensor_swing * pixel,
+        Material::SensorExpand => physics.sensor_expand_dark + physics.sensor_swing * pixel,
+        Material::Empty | Material::Rigid | Material::Soft => 1.0,
+    };
+    free.clamp(physics.target_min, physics.target_max)
+}
+
+/// Writes the goals of all actuated sides for a control step. `pixels` holds each active voxel's pixel,
+/// `targets` is memory for one number each.
+pub(super) fn set_goals(
+    lattice: &Lattice,
+    physics: &Physics,
+    control_step: u64,
+    pixels: &[f64],
+    targets: &mut [f64],
+    goals: &mut [f64],
+) {
+    let muscles = [Material::MuscleInPhase, Material::MuscleAntiphase]
+        .map(|material| target(material, control_step, 0.0, physics));
+    for ((voxel, &pixel), slot) in lattice.active.iter().zip(pixels).zip(targets.iter_mut()) {
+        *slot = match voxel.material {
+            Material::MuscleInPhase => muscles[0],
+            Material::MuscleAntiphase => muscles[1],
+            sensor => target(sensor, control_step, pixel, physics),
+        };
+    }
+    for side in &lattice.actuated {
+        let [first, second] = side.voxels;
+        goals[side.goal] = physics.cell_size * ((targets[first] + targets[second]) / 2.0);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn targets_follow_the_specification() {
+        let physics = Physics::default();
+        let at = |material, step, pixel| target(material, step, pixel, &physics);
+        assert_eq!(at(Material::MuscleInPhase, 0, 0.0), 1.1);
+        assert_eq!(at(Material::MuscleInPhase, 50, 0.0), 1.1);
+        // 2π·49/49 is back at the start: the cycle shows that value twice.
+        assert!((at(Material::MuscleInPhase, 49, 0.0) - 1.1).abs() < 1e-15);
+        let both = at(Material::MuscleInPhase, 13, 0.0) + at(Material::MuscleAntiphase, 13, 0.0);
+        assert!((both - 2.2).abs() < 1e-15);
+        assert_eq!(at(Material::SensorShrink, 7, 0.25), 1.35);
+        assert_eq!(at(Material::SensorExpand, 7, 0.25), 0.85);
+        // Values outside the range are clipped, as the published robots' raw pixels were.
+        assert_eq!(at(Material::SensorExpand, 0, 255.0), 1.6);
+        assert_eq!(at(Material::SensorShrink, 0, 255.0), 0.6);
+    }
+}

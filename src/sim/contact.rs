@@ -1,0 +1,186 @@
+//! Contacts of surface voxels with the ground and with each other (physics.md, "Contacts").
+//!
+//! The ground never moves, so it is not simulated: its cells are worked out where a voxel comes down to it.
+
+use super::geometry::{Bounds, Vector, cross, inside};
+use super::lattice::{Lattice, SIDES, SurfaceVoxel};
+use super::neighbours::{Candidate, Neighbours, quad};
+use super::params::Physics;
+use super::state::{Pair, State};
+
+/// For each corner (clockwise from the top left) the corners at the far ends of the two sides that meet there.
+const FAR_ENDS: [[usize; 2]; 4] = [[1, 3], [0, 2], [3, 1], [2, 0]];
+
+/// The edge of a voxel that pushes a point out, with the depth of the point below it.
+struct Edge {
+    /// Its ends as indices of the host's corners.
+    ends: (usize, usize),
+    /// Outward unit normal.
+    normal: Vector,
+    /// Distance of the point to its line \[wu\].
+    depth: f64,
+}
+
+/// The exposed edge of `host` nearest to `p` among those that cross a side of the mover at `p`; first wins a tie.
+fn nearest_edge(
+    p: Vector,
+    far_ends: [Vector; 2],
+    host: &[Vector; 4],
+    exposed: &[bool; 4],
+    physics: &Physics,
+) -> Option<Edge> {
+    let mut nearest: Option<Edge> = None;
+    for (side, &ends) in SIDES.iter().enumerate() {
+        let (a, b) = (host[ends.0], host[ends.1]);
+        let crossed = |far: Vector| cross(a, b, p, far, physics.crossing_epsilon);
+        if !exposed[side] || !(crossed(far_ends[0]) || crossed(far_ends[1])) {
+            continue;
+        }
+        let along = b - a;
+        let length = along.norm();
+        let depth = along.perp(&(p - a)).abs() / length;
+        if nearest.as_ref().is_none_or(|edge| depth < edge.depth) {
+            let unit = along / length;
+            nearest = Some(Edge { ends, normal: Vector::new(-unit.y, unit.x), depth });
+        }
+    }
+    nearest
+}
+
+/// The force on the point that an edge pushes out, without the damping of the edge's own motion; and the two
+/// parts of it that the edge's ends feel: along the normal, and friction.
+struct Push {
+    on_point: Vector,
+    normal_force: f64,
+    friction: Vector,
+}
+
+fn push(edge: &Edge, velocity: Vector, physics: &Physics) -> Push {
+    let n = edge.normal;
+    let force = physics.contact_stiffness * (physics.contact_offset + edge.depth);
+    // The sign of the tangent does not matter: flipping it flips the slip, and tanh is odd.
+    let tangent = Vector::new(-n.y, n.x);
+    let slip = tangent.dot(&velocity);
+    let grip = physics.friction * force * libm::tanh(slip / (physics.friction_slip * force));
+    let friction = tangent * grip;
+    let on_point = n * (force - physics.contact_damping * n.dot(&velocity)) - friction;
+    Push { on_point, normal_force: force, friction }
+}
+
+/// What an end of the edge feels: half of the reaction, and damping of its own motion.
+fn reaction(edge: &Edge, push: &Push, velocity: Vector, physics: &Physics) -> Vector {
+    let n = edge.normal;
+    let along = -push.normal_force / 2.0 - physics.contact_damping / 2.0 * n.dot(&velocity);
+    n * along + push.friction / 2.0
+}
+
+/// Adds all contact forces to `external`.
+pub(super) fn add_contacts(
+    lattice: &Lattice,
+    physics: &Physics,
+    start_column: i64,
+    state: &State,
+    neighbours: &Neighbours,
+    external: &mut Pair,
+) {
+    let mut contacts = Contacts { lattice, physics, state, external };
+    for &voxel in &neighbours.low {
+        contacts.with_ground(&lattice.surface[voxel], start_column);
+    }
+    for candidate in &neighbours.candidates {
+        contacts.with_self(*candidate);
+    }
+}
+
+struct Contacts<'a> {
+    lattice: &'a Lattice,
+    physics: &'a Physics,
+    state: &'a State,
+    external: &'a mut Pair,
+}
+
+impl Contacts<'_> {
+    /// True velocity of a point \[wu/s\]: it sees what the limits moved.
+    fn velocity(&self, point: usize) -> Vector {
+        let state = self.state;
+        let moved =
+            Vector::new(state.x[point] - state.previous_x[point], state.y[point] - state.previous_y[point]);
+        moved / self.physics.time_step
+    }
+
+    fn add(&mut self, point: usize, force: Vector) {
+        self.external.x[point] += force.x;
+        self.external.y[point] += force.y;
+    }
+
+    fn with_self(&mut self, candidate: Candidate) {
+        let (mover, host) = (&self.lattice.surface[candidate.mover], &self.lattice.surface[candidate.host]);
+        let host_quad = quad(host, self.state);
+        let point = mover.corners[candidate.corner];
+        let p = Vector::new(self.state.x[point], self.state.y[point]);
+        if !inside(p, &host_quad) {
+            return;
+        }
+        let mover_quad = quad(mover, self.state);
+        if !Bounds::of(&mover_quad).near(&Bounds::of(&host_quad), 0.0) {
+            return;
+        }
+        let far_ends = FAR_ENDS[candidate.corner].map(|far| mover_quad[far]);
+        if let Some(edge) = nearest_edge(p, far_ends, &host_quad, &host.exposed, self.physics) {
+            let push = push(&edge, self.velocity(point), self.physics);
+            let weight = self.physics.self_contact_weight;
+            self.add(point, push.on_point * weight);
+            self.react(host, &edge, &push, weight);
+        }
+    }
+
+    fn react(&mut self, host: &SurfaceVoxel, edge: &Edge, push: &Push, weight: f64) {
+        for end in [edge.ends.0, edge.ends.1] {
+            let point = host.corners[end];
+            let force = reaction(edge, push, self.velocity(point), self.physics);
+            self.add(point, force * weight);
+        }
+    }
+
+    /// One surface voxel and every ground cell whose box its box meets: its corners in the ground, and the
+    /// ground's corners in it.
+    fn with_ground(&mut self, voxel: &SurfaceVoxel, start_column: i64) {
+        let (physics, cell) = (self.physics, self.physics.cell_size);
+        let (top, bottom) = (f64::from(physics.ground_row) * cell, f64::from(physics.ground_row - 1) * cell);
+        let robot = quad(voxel, self.state);
+        let bounds = Bounds::of(&robot);
+        if bounds.low.y > top || bounds.high.y < bottom {
+            return;
+        }
+        let vertex = |column: i64| column as f64 * cell;
+        let first = (bounds.low.x / cell).floor() as i64 - 1;
+        let last = (bounds.high.x / cell).floor() as i64 + 1;
+        for column in first..=last {
+            let (left, right) = (vertex(column), vertex(column + 1));
+            if left > bounds.high.x || right < bounds.low.x {
+                continue;
+            }
+            let ground = [(left, top), (right, top), (right, bottom), (left, bottom)];
+            let ground = ground.map(|(x, y)| Vector::new(x, y));
+            let has_peg = (start_column + column).rem_euclid(i64::from(physics.peg_spacing)) == 0;
+            for corner in 0..4 {
+                let far = |quad: &[Vector; 4]| FAR_ENDS[corner].map(|end| quad[end]);
+                let (p, g) = (robot[corner], ground[corner]);
+                if inside(p, &ground) {
+                    let exposed = [true, false, !has_peg, false];
+                    if let Some(edge) = nearest_edge(p, far(&robot), &ground, &exposed, physics) {
+                        let point = voxel.corners[corner];
+                        let push = push(&edge, self.velocity(point), physics);
+                        self.add(point, push.on_point);
+                    }
+                }
+                if inside(g, &robot)
+                    && let Some(edge) = nearest_edge(g, far(&ground), &robot, &voxel.exposed, physics)
+                {
+                    let push = push(&edge, Vector::zeros(), physics);
+                    self.react(voxel, &edge, &push, 1.0);
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,98 @@
+//! Plane geometry of contacts: is a point in a voxel, do two segments cross.
+
+use nalgebra::Vector2;
+
+/// A point or direction in the plane \[wu\].
+pub(super) type Vector = Vector2<f64>;
+
+/// Axis-parallel bounding box \[wu\].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Bounds {
+    pub low: Vector,
+    pub high: Vector,
+}
+
+impl Bounds {
+    #[inline]
+    pub fn of(quad: &[Vector; 4]) -> Self {
+        let [a, b, c, d] = quad;
+        Bounds { low: a.inf(b).inf(&c.inf(d)), high: a.sup(b).sup(&c.sup(d)) }
+    }
+
+    /// Whether the boxes overlap when each gap may be up to `slack`; touching counts.
+    #[inline]
+    pub fn near(&self, other: &Bounds, slack: f64) -> bool {
+        self.low.x <= other.high.x + slack
+            && other.low.x <= self.high.x + slack
+            && self.low.y <= other.high.y + slack
+            && other.low.y <= self.high.y + slack
+    }
+
+    /// Whether a point lies in the box widened by `slack`.
+    #[inline]
+    pub fn holds(&self, point: Vector, slack: f64) -> bool {
+        self.near(&Bounds { low: point, high: point }, slack)
+    }
+}
+
+/// Whether `p` lies in the quad (corners clockwise from the top left), boundary included: it is split into the
+/// triangles TL-TR-BR and TL-BR-BL (physics.md, "Inside test").
+#[inline]
+pub(super) fn inside(p: Vector, quad: &[Vector; 4]) -> bool {
+    let [tl, tr, br, bl] = quad.map(|corner| corner - p);
+    let (a, b, c) = (tl.perp(&tr), tr.perp(&br), br.perp(&tl));
+    if c * a >= 0.0 && c * b >= 0.0 {
+        return true;
+    }
+    let (d, e) = (tl.perp(&bl), bl.perp(&br));
+    c * d >= 0.0 && c * e >= 0.0
+}
+
+/// Whether the segments a–b and p–q cross, ends included; those with a cross product below `epsilon` are parallel
+/// and never do.
+#[inline]
+pub(super) fn cross(a: Vector, b: Vector, p: Vector, q: Vector, epsilon: f64) -> bool {
+    let (r, s, w) = (b - a, q - p, p - a);
+    let product = r.perp(&s);
+    if product.abs() < epsilon {
+        return false;
+    }
+    let (along_ab, along_pq) = (w.perp(&s) / product, w.perp(&r) / product);
+    (0.0..=1.0).contains(&along_ab) && (0.0..=1.0).contains(&along_pq)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn square() -> [Vector; 4] {
+        [(0.0, 0.1), (0.1, 0.1), (0.1, 0.0), (0.0, 0.0)].map(|(x, y)| Vector::new(x, y))
+    }
+
+    #[test]
+    fn the_boundary_is_inside() {
+        let quad = square();
+        for p in [(0.05, 0.05), (0.0, 0.0), (0.1, 0.1), (0.05, 0.1), (0.0, 0.03), (0.07, 0.02), (0.02, 0.07)]
+        {
+            assert!(inside(Vector::new(p.0, p.1), &quad), "{p:?}");
+        }
+        for p in [(0.05, 0.1001), (-0.001, 0.05), (0.1001, 0.05), (0.05, -0.001), (0.2, 0.2)] {
+            assert!(!inside(Vector::new(p.0, p.1), &quad), "{p:?}");
+        }
+    }
+
+    #[test]
+    fn segments_cross_at_their_ends_too_and_parallels_never() {
+        let v = Vector::new;
+        let crosses = |a: (f64, f64), b: (f64, f64), p: (f64, f64), q: (f64, f64)| {
+            cross(v(a.0, a.1), v(b.0, b.1), v(p.0, p.1), v(q.0, q.1), 1e-4)
+        };
+        assert!(crosses((0.0, 0.0), (0.1, 0.0), (0.05, -0.1), (0.05, 0.1)));
+        assert!(crosses((0.0, 0.0), (0.1, 0.0), (0.1, 0.0), (0.1, 0.1)));
+        assert!(crosses((0.3, 0.1), (0.3, 0.2), (0.3, 0.2), (0.4, 0.2)));
+        assert!(!crosses((0.0, 0.0), (0.1, 0.0), (0.11, -0.1), (0.11, 0.1)));
+        assert!(!crosses((0.0, 0.0), (0.1, 0.0), (0.0, 0.0), (0.1, 0.0)));
+        // Short segments count as parallel: the limit is on the raw product, not on the angle.
+        assert!(!crosses((0.0, 0.0), (0.009, 0.0), (0.005, -0.005), (0.005, 0.005)));
+    }
+}

@@ -1,0 +1,126 @@
+//! Which contacts are possible: lists that stay complete while no point has moved further than a budget.
+//!
+//! All pairs of surface voxels would be tested in every substep otherwise. A list holds every pair whose boxes
+//! come within twice the budget; until a point has moved by more than the budget, along x or y, since the
+//! lists were made, no other pair can have met. So the lists change nothing but the time it takes.
+
+use super::geometry::{Bounds, Vector};
+use super::lattice::{Lattice, SurfaceVoxel};
+use super::params::Physics;
+use super::state::State;
+
+/// How far a point may move before the lists are made anew \[voxel lengths\].
+const BUDGET: f64 = 0.2;
+
+/// A corner of one surface voxel that may come to lie inside another.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Candidate {
+    /// The voxel whose corner it is, and the corner (clockwise from the top left).
+    pub mover: usize,
+    pub corner: usize,
+    /// The voxel it may enter.
+    pub host: usize,
+}
+
+/// The lists, and the positions at which they were made.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Neighbours {
+    made_x: Vec<f64>,
+    made_y: Vec<f64>,
+    /// Surface voxels that may touch the ground, in order.
+    pub low: Vec<usize>,
+    /// Corners that may enter a voxel, by mover, then host.
+    pub candidates: Vec<Candidate>,
+    /// Pairs of surface voxels, not neighbours in the body, whose boxes may overlap.
+    pub distant: Vec<[usize; 2]>,
+    bounds: Vec<Bounds>,
+}
+
+/// A voxel is larger than the physics allows, or a coordinate is not a number.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct BlownUp;
+
+/// The corners of a surface voxel, clockwise from the top left.
+#[inline]
+pub(super) fn quad(voxel: &SurfaceVoxel, state: &State) -> [Vector; 4] {
+    voxel.corners.map(|point| Vector::new(state.x[point], state.y[point]))
+}
+
+impl Neighbours {
+    /// Makes the lists anew if a point has moved too far since they were made.
+    #[inline(always)]
+    pub fn refresh(&mut self, lattice: &Lattice, physics: &Physics, state: &State) -> Result<(), BlownUp> {
+        if self.made_x.len() == state.x.len() {
+            let moved = |now: &[f64], then: &[f64]| {
+                // `max` would hide a NaN; the sum keeps it, and what is not a small number makes the lists anew.
+                let (mut most, mut sum) = (0.0f64, 0.0f64);
+                for (a, b) in now.iter().zip(then) {
+                    let distance = (a - b).abs();
+                    most = if distance > most { distance } else { most };
+                    sum += distance * 0.0;
+                }
+                most + sum
+            };
+            let most = moved(&state.x, &self.made_x).max(moved(&state.y, &self.made_y));
+            let finite = moved(&state.x, &self.made_x) + moved(&state.y, &self.made_y);
+            if most <= BUDGET * physics.cell_size && finite.is_finite() {
+                return Ok(());
+            }
+        }
+        self.make(lattice, physics, state)
+    }
+
+    #[cold]
+    fn make(&mut self, lattice: &Lattice, physics: &Physics, state: &State) -> Result<(), BlownUp> {
+        let slack = 2.0 * BUDGET * physics.cell_size;
+        self.made_x.clone_from(&state.x);
+        self.made_y.clone_from(&state.y);
+        for (_, corners) in &lattice.voxels {
+            let bounds = Bounds::of(&corners.map(|point| Vector::new(state.x[point], state.y[point])));
+            let extent = bounds.high - bounds.low;
+            let sane = extent.x <= physics.blow_up_extent && extent.y <= physics.blow_up_extent;
+            if !sane || !corners.iter().all(|&p| state.x[p].is_finite() && state.y[p].is_finite()) {
+                return Err(BlownUp);
+            }
+        }
+        self.bounds.clear();
+        self.bounds.extend(lattice.surface.iter().map(|voxel| Bounds::of(&quad(voxel, state))));
+        let ground_top = f64::from(physics.ground_row) * physics.cell_size;
+        self.low.clear();
+        self.candidates.clear();
+        self.distant.clear();
+        for (mover, voxel) in lattice.surface.iter().enumerate() {
+            if self.bounds[mover].low.y <= ground_top + slack {
+                self.low.push(mover);
+            }
+            for (host, other) in lattice.surface.iter().enumerate() {
+                if host == mover || !self.bounds[mover].near(&self.bounds[host], slack) {
+                    continue;
+                }
+                let apart = voxel.row.abs_diff(other.row).max(voxel.column.abs_diff(other.column));
+                if apart > 1 && mover < host {
+                    self.distant.push([mover, host]);
+                }
+                for (corner, point) in voxel.corners.iter().enumerate() {
+                    let place = Vector::new(state.x[*point], state.y[*point]);
+                    if !other.corners.contains(point) && self.bounds[host].holds(place, slack) {
+                        self.candidates.push(Candidate { mover, corner, host });
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether so many distant surface voxels overlap that the life is unstable (physics.md, "Instability").
+    pub fn too_many_overlaps(&self, lattice: &Lattice, physics: &Physics, state: &State) -> bool {
+        let most = physics.unstable_ratio * lattice.surface.len() as f64;
+        // Ordered pairs: each counts twice. Mostly the list itself is too short to be worth looking through.
+        if (2 * self.distant.len()) as f64 <= most {
+            return false;
+        }
+        let bounds = |voxel: usize| Bounds::of(&quad(&lattice.surface[voxel], state));
+        let overlaps = self.distant.iter().filter(|[a, b]| bounds(*a).near(&bounds(*b), 0.0)).count();
+        (2 * overlaps) as f64 > most
+    }
+}

@@ -1,0 +1,189 @@
+//! [`World`]: one life of one robot on flat ground.
+
+use super::actuation;
+use super::contact::add_contacts;
+use super::forces::set_rest_lengths;
+use super::integrator::integrate;
+use super::lattice::Lattice;
+use super::limits::{limit_all, limit_rigid};
+use super::params::Physics;
+use super::state::{Scratch, State};
+use crate::base::Grid;
+use crate::base::lanes::{InstructionSet, Kernel, dispatch};
+
+/// Where a life begins: the grid cell of the lower left corner of the body's box (empty rows and columns count).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Start {
+    /// Column \[voxels\]. Nothing depends on it but the places of the pegs below the ground.
+    pub column: i64,
+    /// Row \[voxels\]; `Physics::ground_row` (2) stands on the ground.
+    pub row: u32,
+}
+
+/// How a life became unstable.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum UnstableReason {
+    /// Too many distant surface voxels overlap (EvoGym's criterion).
+    Overlaps,
+    /// A voxel has blown up, or a coordinate is no number any more.
+    BlownUp,
+}
+
+/// A life ended because it became unstable; it has no displacement.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("unstable in control step {control_step}: {}", match reason {
+    UnstableReason::Overlaps => "too many surface voxels overlap",
+    UnstableReason::BlownUp => "a voxel has blown up",
+})]
+pub struct Unstable {
+    /// The control step in which it happened, from 0.
+    pub control_step: u64,
+    /// What happened.
+    pub reason: UnstableReason,
+}
+
+/// One life: constants, lattice, state and the stimulus of the moment.
+#[derive(Clone, Debug)]
+pub struct World<'a> {
+    physics: &'a Physics,
+    lattice: &'a Lattice,
+    start: Start,
+    state: State,
+    scratch: Scratch,
+    /// The pixel of each active voxel, in [0, 1]; muscles have one too, unused.
+    pixels: Vec<f64>,
+    targets: Vec<f64>,
+    instructions: InstructionSet,
+}
+
+impl<'a> World<'a> {
+    /// A robot at rest, all pixels dark.
+    pub fn new(lattice: &'a Lattice, physics: &'a Physics, start: Start) -> Self {
+        World {
+            physics,
+            lattice,
+            start,
+            state: State::at_rest(lattice, physics, start.row),
+            scratch: Scratch::new(lattice, physics),
+            pixels: vec![0.0; lattice.active.len()],
+            targets: vec![0.0; lattice.active.len()],
+            instructions: InstructionSet::in_use(),
+        }
+    }
+
+    /// Runs on a chosen instruction set instead of the widest; results are the same bits.
+    #[must_use]
+    pub fn with_instructions(mut self, set: InstructionSet) -> Self {
+        self.instructions = set;
+        self
+    }
+
+    /// Begins the life anew; the stimulus stays.
+    pub fn reset(&mut self) {
+        self.state = State::at_rest(self.lattice, self.physics, self.start.row);
+    }
+
+    /// Shows an image: H × W in [0, 1], pixel (row, column) to voxel (row, column); outside it is dark.
+    pub fn set_stimulus(&mut self, stimulus: &Grid<f64>) {
+        for (voxel, pixel) in self.lattice.active.iter().zip(&mut self.pixels) {
+            let (row, column) = voxel.place;
+            *pixel = stimulus.get(row as isize, column as isize).copied().unwrap_or(0.0);
+        }
+    }
+
+    /// One control step.
+    ///
+    /// # Errors
+    /// [`Unstable`] if the life ends in it; the state is then of no use.
+    pub fn step(&mut self) -> Result<(), Unstable> {
+        let (lattice, physics, control_step) = (self.lattice, self.physics, self.state.control_step);
+        let goals = &mut self.scratch.goals;
+        actuation::set_goals(lattice, physics, control_step, &self.pixels, &mut self.targets, goals);
+        let (state, scratch) = (&mut self.state, &mut self.scratch);
+        let steps = ControlStep { lattice, physics, start_column: self.start.column, state, scratch };
+        let outcome = dispatch(self.instructions, steps);
+        outcome.map_err(|reason| Unstable { control_step, reason })?;
+        self.state.control_step += 1;
+        Ok(())
+    }
+
+    /// Control steps lived.
+    pub fn control_step(&self) -> u64 {
+        self.state.control_step
+    }
+
+    /// Centre of mass [x, y] in world units: x from the left edge of the starting box, y from the floor plane. The
+    /// unweighted mean of the points.
+    pub fn centre_of_mass(&self) -> [f64; 2] {
+        let count = self.lattice.points.len().max(1) as f64;
+        let mean = |of: &[f64]| self.lattice.points.iter().map(|&(point, _)| of[point]).sum::<f64>() / count;
+        [mean(&self.state.x), mean(&self.state.y)]
+    }
+
+    /// All points [x, y] in world units (as [`World::centre_of_mass`]), in EvoGym's order of creation.
+    pub fn points(&self) -> impl Iterator<Item = [f64; 2]> + '_ {
+        self.lattice.points.iter().map(|&(point, _)| [self.state.x[point], self.state.y[point]])
+    }
+
+    /// Every non-empty voxel's (row, column) and its corners (top left, top right, bottom right, bottom left) as
+    /// indices into [`World::points`].
+    pub fn voxels(&self) -> impl Iterator<Item = ((usize, usize), [usize; 4])> + '_ {
+        let mut order = vec![0; self.lattice.len];
+        self.lattice.points.iter().enumerate().for_each(|(i, &(point, _))| order[point] = i);
+        self.lattice.voxels.iter().map(move |&(place, corners)| (place, corners.map(|c| order[c])))
+    }
+
+    /// What the life must remember, to go on from it later.
+    pub fn state(&self) -> &State {
+        &self.state
+    }
+}
+
+/// The substeps of a control step, compiled per instruction set.
+struct ControlStep<'a> {
+    lattice: &'a Lattice,
+    physics: &'a Physics,
+    start_column: i64,
+    state: &'a mut State,
+    scratch: &'a mut Scratch,
+}
+
+impl Kernel for ControlStep<'_> {
+    type Output = Result<(), UnstableReason>;
+
+    #[inline(always)]
+    fn run(self) -> Self::Output {
+        let ControlStep { lattice, physics, start_column, state, scratch } = self;
+        for _ in 0..physics.substeps {
+            substep(lattice, physics, start_column, state, scratch)?;
+        }
+        Ok(())
+    }
+}
+
+/// physics.md, "One substep, in this order".
+#[inline(always)]
+fn substep(
+    lattice: &Lattice,
+    physics: &Physics,
+    start_column: i64,
+    state: &mut State,
+    scratch: &mut Scratch,
+) -> Result<(), UnstableReason> {
+    scratch.neighbours.refresh(lattice, physics, state).map_err(|_| UnstableReason::BlownUp)?;
+    let unstable = scratch.neighbours.too_many_overlaps(lattice, physics, state);
+
+    scratch.external.x.fill(0.0);
+    scratch.external.y.copy_from_slice(&scratch.weight);
+    add_contacts(lattice, physics, start_column, state, &scratch.neighbours, &mut scratch.external);
+
+    set_rest_lengths(lattice, physics, &state.x, &state.y, scratch);
+    // Velocities are "true" from here to the next substep's contacts: position now less position then.
+    state.previous_x.copy_from_slice(&state.x);
+    state.previous_y.copy_from_slice(&state.y);
+    integrate(lattice, physics, state, scratch);
+    limit_all(lattice, physics, state, scratch);
+    limit_rigid(lattice, physics, state);
+
+    if unstable { Err(UnstableReason::Overlaps) } else { Ok(()) }
+}

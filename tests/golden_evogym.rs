@@ -1,0 +1,64 @@
+//! Faithful: EvoGym's own trajectories come out of our simulator.
+
+mod common;
+
+use common::{Reference, golden, references};
+use morphcog::sim::{Physics, UnstableReason, World};
+
+/// 1e-6 voxel lengths in world units.
+const TOLERANCE: f64 = 1e-7;
+
+#[test]
+fn every_reference_life_agrees_at_every_control_step_and_stored_point() {
+    let physics = Physics::default();
+    for life in references().iter().filter(|life| life.unstable_at < 0) {
+        let lattice = life.lattice(&physics);
+        let mut world = World::new(&lattice, &physics, life.start());
+        world.set_stimulus(&life.stimulus);
+        assert_eq!(life.com.len() as u64, life.control_steps + 1);
+        let mut worst = compare(&world, life);
+        for _ in 0..life.control_steps {
+            world.step().unwrap();
+            worst = worst.max(compare(&world, life));
+        }
+        println!("{:14} differs by at most {:.1e} voxel lengths", life.name, worst * 10.0);
+        assert!(worst <= TOLERANCE, "{}: {worst:e} world units", life.name);
+    }
+}
+
+/// Greatest difference of centre of mass and points at the world's control step [wu].
+fn compare(world: &World, life: &Reference) -> f64 {
+    let step = world.control_step();
+    let offset = life.start_column as f64 * 0.1;
+    let difference = |ours: [f64; 2], theirs: [f64; 2]| {
+        (ours[0] + offset - theirs[0]).abs().max((ours[1] - theirs[1]).abs())
+    };
+    let mut worst = difference(world.centre_of_mass(), life.com[step as usize]);
+    if let Some(points) = life.points.get(&step) {
+        assert_eq!(world.points().count(), points.len(), "{}", life.name);
+        for (ours, &theirs) in world.points().zip(points) {
+            worst = worst.max(difference(ours, theirs));
+        }
+    }
+    worst
+}
+
+#[test]
+fn the_unstable_life_ends_in_the_same_control_step() {
+    let physics = Physics::default();
+    let life: Reference = golden("unstable_comb");
+    let lattice = life.lattice(&physics);
+    let mut world = World::new(&lattice, &physics, life.start());
+    world.set_stimulus(&life.stimulus);
+    let mut worst = compare(&world, &life);
+    let end = loop {
+        match world.step() {
+            Ok(()) => worst = worst.max(compare(&world, &life)),
+            Err(end) => break end,
+        }
+    };
+    assert_eq!(end.control_step, 70);
+    assert_eq!(end.reason, UnstableReason::Overlaps);
+    assert_eq!(world.control_step() + 1, life.com.len() as u64);
+    assert!(worst <= TOLERANCE, "{worst:e}");
+}
