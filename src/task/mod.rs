@@ -1,3 +1,6 @@
 //! Floor 3: what a robot is asked to do: images, stimuli, protocols, rollouts and their scores.
 
+pub mod evaluation;
+pub mod protocol;
 pub mod recording;
+pub mod rollout;

@@ -1,0 +1,33 @@
+//! [`Protocol`]: how a robot is shown images.
+
+use serde::{Deserialize, Serialize};
+
+/// Whether images share a life.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Life {
+    /// One life per image, from the initial state (the paper's text).
+    Fresh,
+    /// One continuous life: each image in turn, without a reset (the published zero-one runs).
+    Sequential,
+}
+
+/// How a robot is shown images (paper, "Protocol"); keys of a config's section `[protocol]`.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Protocol {
+    /// Whether images share a life. Default fresh.
+    pub life: Life,
+    /// Control steps an image is shown for. Default 500: ten actuation cycles.
+    pub control_steps: u32,
+    /// Grid row of the body's bottom row at the start \[voxels\]. Default 2: on the ground.
+    pub start_row: u32,
+    /// Grid column of its left edge \[voxels\]. Default 493, the paper's; only the pegs below the ground tell columns apart.
+    pub start_column: i64,
+}
+
+impl Default for Protocol {
+    fn default() -> Self {
+        Protocol { life: Life::Fresh, control_steps: 500, start_row: 2, start_column: 493 }
+    }
+}
