@@ -15,4 +15,5 @@
 pub mod base;
 pub mod body;
 pub mod sim;
+pub mod genome;
 pub mod task;
