@@ -16,4 +16,5 @@ pub mod base;
 pub mod body;
 pub mod sim;
 pub mod genome;
+pub mod qd;
 pub mod task;

@@ -103,7 +103,7 @@ mod tests {
     use proptest::prelude::*;
 
     fn read(hidden: &str, edges: &str) -> Result<Cppn, String> {
-        let outputs = vec!["\"squash\""; OUTPUTS].join(",");
+        let outputs = ["\"squash\""; OUTPUTS].join(",");
         let text = format!(r#"{{"version":1,"outputs":[{outputs}],"hidden":[{hidden}],"edges":[{edges}]}}"#);
         serde_json::from_str(&text).map_err(|e| e.to_string())
     }

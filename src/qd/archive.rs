@@ -1,0 +1,245 @@
+//! [`Archive`]: the best solution found so far in every cell.
+
+use serde::{Deserialize, Serialize, Serializer};
+use std::collections::BTreeMap;
+
+/// The best solution of a cell.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Elite<S> {
+    /// Index of its cell, see [`super::DescriptorSpace`].
+    pub cell: usize,
+    /// Its fitness, finite.
+    pub objective: f64,
+    /// What it is.
+    pub solution: S,
+}
+
+/// At most one [`Elite`] per cell (Mouret & Clune 2015). In files a list of elites in the order of their cells.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(try_from = "Vec<Elite<S>>", bound(deserialize = "S: Deserialize<'de>"))]
+pub struct Archive<S> {
+    elites: BTreeMap<usize, Elite<S>>,
+}
+
+/// What became of a solution told to an [`Archive`].
+#[derive(Clone, Debug, PartialEq)]
+pub enum Insertion<S> {
+    /// The cell was empty.
+    New,
+    /// It is strictly fitter than the elite it replaced.
+    Improved {
+        /// The elite that was there.
+        old: Elite<S>,
+    },
+    /// The elite that was there is as fit or fitter.
+    Rejected,
+}
+
+/// Why something cannot be in an archive.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum ArchiveError {
+    /// A fitness that is infinite or not a number.
+    #[error("cell {cell}: the objective is {objective}, expected a finite number")]
+    Objective {
+        /// Index of the cell.
+        cell: usize,
+        /// What was found.
+        objective: f64,
+    },
+    /// Two elites in one cell of a file.
+    #[error("cell {0} holds two elites, expected at most one")]
+    Occupied(usize),
+}
+
+/// Figures of an archive, named as in pyribs.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ArchiveStats {
+    /// Number of elites.
+    pub num_elites: usize,
+    /// Elites per possible cell.
+    pub coverage: f64,
+    /// Σ max(objective − offset, 0): an elite below the offset counts nothing.
+    pub qd_score: f64,
+    /// QD score per possible cell.
+    pub norm_qd_score: f64,
+    /// Largest objective, none in an empty archive.
+    pub obj_max: Option<f64>,
+    /// Mean objective, none in an empty archive.
+    pub obj_mean: Option<f64>,
+}
+
+impl<S> Archive<S> {
+    /// An archive without elites.
+    pub fn new() -> Self {
+        Archive { elites: BTreeMap::new() }
+    }
+
+    /// Puts a solution into its cell if that is empty or its elite is strictly less fit.
+    ///
+    /// # Errors
+    /// [`ArchiveError::Objective`] if the fitness is not finite.
+    pub fn insert(&mut self, new: Elite<S>) -> Result<Insertion<S>, ArchiveError> {
+        let Elite { cell, objective, .. } = new;
+        if !objective.is_finite() {
+            return Err(ArchiveError::Objective { cell, objective });
+        }
+        if self.objective(cell).is_some_and(|incumbent| objective <= incumbent) {
+            return Ok(Insertion::Rejected);
+        }
+        let old = self.elites.insert(cell, new);
+        Ok(old.map_or(Insertion::New, |old| Insertion::Improved { old }))
+    }
+
+    /// The elite of a cell.
+    pub fn get(&self, cell: usize) -> Option<&Elite<S>> {
+        self.elites.get(&cell)
+    }
+
+    /// The fitness to beat in a cell.
+    pub fn objective(&self, cell: usize) -> Option<f64> {
+        self.get(cell).map(|elite| elite.objective)
+    }
+
+    /// Number of elites.
+    pub fn len(&self) -> usize {
+        self.elites.len()
+    }
+
+    /// Whether there is no elite.
+    pub fn is_empty(&self) -> bool {
+        self.elites.is_empty()
+    }
+
+    /// The elites in the order of their cells.
+    pub fn elites(&self) -> impl Iterator<Item = &Elite<S>> {
+        self.elites.values()
+    }
+
+    /// The fittest elite; of equally fit ones the one in the first cell.
+    pub fn best(&self) -> Option<&Elite<S>> {
+        self.elites().reduce(|best, e| if e.objective > best.objective { e } else { best })
+    }
+
+    /// Figures of the archive, of `possible` cells that can be filled; `qd_offset` is the objective that counts
+    /// as nothing in the QD score.
+    pub fn stats(&self, possible: usize, qd_offset: f64) -> ArchiveStats {
+        let (num_elites, cells) = (self.len(), possible.max(1) as f64);
+        // (`sum` of nothing would be −0.)
+        let sum =
+            |term: fn(f64, f64) -> f64| self.elites().fold(0.0, |s, e| s + term(e.objective, qd_offset));
+        let qd_score = sum(|objective, offset| (objective - offset).max(0.0));
+        let total = sum(|objective, _| objective);
+        ArchiveStats {
+            num_elites,
+            coverage: num_elites as f64 / cells,
+            qd_score,
+            norm_qd_score: qd_score / cells,
+            obj_max: self.best().map(|e| e.objective),
+            obj_mean: (num_elites > 0).then(|| total / num_elites as f64),
+        }
+    }
+}
+
+impl<S> Default for Archive<S> {
+    fn default() -> Self {
+        Archive::new()
+    }
+}
+
+impl<S: Serialize> Serialize for Archive<S> {
+    fn serialize<T: Serializer>(&self, serializer: T) -> Result<T::Ok, T::Error> {
+        serializer.collect_seq(self.elites())
+    }
+}
+
+impl<S> TryFrom<Vec<Elite<S>>> for Archive<S> {
+    type Error = ArchiveError;
+    fn try_from(elites: Vec<Elite<S>>) -> Result<Self, ArchiveError> {
+        let mut archive = Archive::new();
+        for elite in elites {
+            let cell = elite.cell;
+            if archive.get(cell).is_some() {
+                return Err(ArchiveError::Occupied(cell));
+            }
+            archive.insert(elite)?;
+        }
+        Ok(archive)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn elite(cell: usize, objective: f64, solution: char) -> Elite<char> {
+        Elite { cell, objective, solution }
+    }
+
+    #[test]
+    fn only_the_strictly_fitter_replace_an_elite() {
+        let mut archive = Archive::new();
+        assert_eq!(archive.insert(elite(3, -1.0, 'a')), Ok(Insertion::New));
+        assert_eq!(archive.insert(elite(3, -1.0, 'b')), Ok(Insertion::Rejected));
+        let old = elite(3, -1.0, 'a');
+        assert_eq!(archive.insert(elite(3, 2.0, 'c')), Ok(Insertion::Improved { old }));
+        assert_eq!(archive.insert(elite(3, 1.0, 'd')), Ok(Insertion::Rejected));
+        assert_eq!((archive.get(3), archive.len()), (Some(&elite(3, 2.0, 'c')), 1));
+    }
+
+    #[test]
+    fn what_is_not_a_number_never_enters() {
+        let mut archive = Archive::new();
+        for objective in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+            assert!(matches!(archive.insert(elite(0, objective, 'a')), Err(ArchiveError::Objective { .. })));
+        }
+        assert!(archive.is_empty());
+    }
+
+    #[test]
+    fn figures_are_those_of_pyribs_with_failures_counting_nothing() {
+        let mut archive = Archive::new();
+        let empty = archive.stats(90, 0.0);
+        assert_eq!((empty.coverage, empty.qd_score, empty.obj_max, empty.obj_mean), (0.0, 0.0, None, None));
+        for (cell, objective) in [(7, 4.0), (2, -3.0), (5, 2.0)] {
+            archive.insert(elite(cell, objective, 'x')).unwrap();
+        }
+        let stats = archive.stats(12, 0.0);
+        assert_eq!((stats.num_elites, stats.coverage), (3, 0.25));
+        assert_eq!((stats.qd_score, stats.norm_qd_score), (6.0, 0.5));
+        assert_eq!((stats.obj_max, stats.obj_mean), (Some(4.0), Some(1.0)));
+        assert_eq!(archive.stats(12, -5.0).qd_score, 9.0 + 2.0 + 7.0);
+    }
+
+    #[test]
+    fn files_hold_a_list_in_the_order_of_cells() {
+        let mut archive = Archive::new();
+        archive.insert(elite(7, 4.0, 'b')).unwrap();
+        archive.insert(elite(2, 0.5, 'a')).unwrap();
+        let text = serde_json::to_string(&archive).unwrap();
+        let first = r#"{"cell":2,"objective":0.5,"solution":"a"}"#;
+        assert_eq!(text, format!(r#"[{first},{{"cell":7,"objective":4.0,"solution":"b"}}]"#));
+        assert_eq!(serde_json::from_str::<Archive<char>>(&text).unwrap(), archive);
+        let twice = serde_json::from_str::<Archive<char>>(&format!("[{first},{first}]")).unwrap_err();
+        assert!(twice.to_string().contains("cell 2 holds two"), "{twice}");
+    }
+
+    proptest! {
+        #[test]
+        fn every_cell_holds_the_first_of_its_fittest(
+            told in prop::collection::vec((0..5usize, -3..3i32), 0..50)
+        ) {
+            let mut archive = Archive::new();
+            for (order, (cell, objective)) in told.iter().enumerate() {
+                archive.insert(Elite { cell: *cell, objective: f64::from(*objective), solution: order }).unwrap();
+            }
+            for cell in 0..5 {
+                let here = || told.iter().enumerate().filter(|(_, t)| t.0 == cell);
+                let best = here().map(|(_, t)| t.1).max();
+                let first = here().find(|(_, t)| Some(t.1) == best).map(|(order, _)| order);
+                prop_assert_eq!(archive.get(cell).map(|e| e.solution), first);
+            }
+            prop_assert!(archive.elites().is_sorted_by_key(|e| e.cell));
+        }
+    }
+}
