@@ -4,3 +4,7 @@ pub mod evaluation;
 pub mod protocol;
 pub mod recording;
 pub mod rollout;
+pub mod direction;
+pub mod grouping;
+pub mod recording;
+pub mod score;

@@ -1,0 +1,76 @@
+//! [`Direction`] and [`Assignment`]: which way a robot walks, and which way it should (paper, section
+//! "Generalization test").
+
+use super::grouping::{Group, Split};
+use super::score::{Answer, fitness_of_assignments, of_split};
+
+/// A way to walk.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Direction {
+    /// Towards smaller x.
+    Left,
+    /// Towards larger x.
+    Right,
+}
+
+impl Direction {
+    /// Where a displacement leads; `None` if it is not larger than `threshold` (paper: 3 voxel lengths).
+    pub fn of(displacement: f64, threshold: f64) -> Option<Self> {
+        let direction = if displacement > 0.0 { Direction::Right } else { Direction::Left };
+        (displacement.abs() > threshold).then_some(direction)
+    }
+}
+
+/// Which way group A is to walk; group B is to walk the other. Fixed by the training answers before any test.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Assignment {
+    /// The way of group A.
+    pub a: Direction,
+}
+
+impl Assignment {
+    /// The assignment under which a robot's training answers are fitter (A left if it makes no difference).
+    pub fn from_training(split: &Split, answers: &[Answer]) -> Self {
+        let (a_right, a_left) = fitness_of_assignments(of_split(split, answers));
+        Assignment { a: if a_right > a_left { Direction::Right } else { Direction::Left } }
+    }
+
+    /// The way a group is to walk.
+    pub fn expected(self, group: Group) -> Direction {
+        match (group, self.a) {
+            (Group::A, way) => way,
+            (Group::B, Direction::Left) => Direction::Right,
+            (Group::B, Direction::Right) => Direction::Left,
+        }
+    }
+
+    /// Whether a displacement is the right answer to an image of a group: farther than `threshold`, the right way.
+    pub fn is_right(self, group: Group, displacement: f64, threshold: f64) -> bool {
+        Direction::of(displacement, threshold) == Some(self.expected(group))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::task::grouping::Grouping;
+    use Direction::{Left, Right};
+    use Group::{A, B};
+
+    #[test]
+    fn directions_are_fixed_by_training_and_short_walks_are_wrong() {
+        let grouping = Grouping::two_groups(&[0], &[1]).unwrap();
+        let split = &grouping.tasks()[0];
+        let fixed = |displacements: [f64; 2]| {
+            let of = |class| Answer { class, displacement: displacements[usize::from(class)] };
+            Assignment::from_training(split, &[of(0), of(1)])
+        };
+        assert_eq!((fixed([-5.0, 8.0]).a, fixed([5.0, -8.0]).a), (Left, Right));
+        // Both right: the shorter walk is the wrong one. No difference: left.
+        assert_eq!((fixed([8.0, 5.0]).a, fixed([5.0, 8.0]).a, fixed([5.0, 5.0]).a), (Right, Left, Left));
+        let a_right = Assignment { a: Right };
+        assert!(a_right.is_right(A, 3.1, 3.0) && a_right.is_right(B, -3.1, 3.0));
+        assert!(!a_right.is_right(A, 3.0, 3.0) && !a_right.is_right(A, -9.0, 3.0));
+        assert_eq!((a_right.expected(A), a_right.expected(B)), (Right, Left));
+    }
+}

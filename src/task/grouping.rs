@@ -1,0 +1,185 @@
+//! [`Grouping`]: which tasks there are: how classes are divided into a group that walks one way and one that
+//! walks the other.
+
+/// One of the two groups of a [`Split`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Group {
+    /// The first, named before the bar.
+    A,
+    /// The second.
+    B,
+}
+
+/// Classes in two groups; "all the same way" is the split with an empty second group.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Split {
+    a: Vec<u8>,
+    b: Vec<u8>,
+}
+
+impl Split {
+    /// The classes of a group.
+    pub fn classes(&self, group: Group) -> &[u8] {
+        match group {
+            Group::A => &self.a,
+            Group::B => &self.b,
+        }
+    }
+
+    /// The group of a class, `None` if it belongs to neither.
+    pub fn group(&self, class: u8) -> Option<Group> {
+        [Group::A, Group::B].into_iter().find(|g| self.classes(*g).contains(&class))
+    }
+
+    /// Whether every class is in one group: no recognition task, but the bin of robots that always walk one way.
+    pub fn is_same_way(&self) -> bool {
+        self.b.is_empty()
+    }
+
+    /// Its name, like `0|123`, `10,11|12` or `same way`.
+    pub fn name(&self) -> String {
+        if self.is_same_way() {
+            return "same way".to_string();
+        }
+        let separator = if self.a.iter().chain(&self.b).all(|c| *c < 10) { "" } else { "," };
+        [&self.a, &self.b].map(|g| g.iter().map(u8::to_string).collect::<Vec<_>>().join(separator)).join("|")
+    }
+}
+
+/// The tasks of a run: one division of classes into two groups, or all there are. With more than one, the task a
+/// robot performs is a dimension of the archive (paper, sections "Fitness" and "MAP-Elites").
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Grouping {
+    tasks: Vec<Split>,
+}
+
+/// Most classes whose splits are all made: 511 of them.
+pub const MAX_CLASSES: usize = 10;
+
+/// Why classes cannot be grouped.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum GroupingError {
+    /// A group without classes.
+    #[error("expected two groups with at least one class each, as in [[0], [1, 2]]; one is empty")]
+    EmptyGroup,
+    /// A class that occurs more than once.
+    #[error("class {0} occurs more than once, expected every class in one group only")]
+    Repeated(u8),
+    /// Too few or too many classes for all splits.
+    #[error("expected 2 to {MAX_CLASSES} classes to split in all ways, found {0}")]
+    Classes(usize),
+}
+
+impl Grouping {
+    /// One task: the classes of `a` walk one way, those of `b` the other.
+    ///
+    /// # Errors
+    /// [`GroupingError`] if a group is empty or a class occurs twice.
+    pub fn two_groups(a: &[u8], b: &[u8]) -> Result<Self, GroupingError> {
+        if a.is_empty() || b.is_empty() {
+            return Err(GroupingError::EmptyGroup);
+        }
+        check_unique(&[a, b].concat())?;
+        Ok(Grouping { tasks: vec![Split { a: a.to_vec(), b: b.to_vec() }] })
+    }
+
+    /// All ways to split the classes in two non-empty groups, 2^(k−1) − 1 for k classes: small first groups come
+    /// first, equally large ones in the order of the classes. (For 0, 1, 2, 3: 0|123, 1|023, 2|013, 3|012, 01|23,
+    /// 02|13, 03|12.) With `same_way_bin`, "all the same way" is one task more, the last.
+    ///
+    /// # Errors
+    /// [`GroupingError`] if a class occurs twice or there are not 2 to [`MAX_CLASSES`] classes.
+    pub fn all_splits(classes: &[u8], same_way_bin: bool) -> Result<Self, GroupingError> {
+        let k = classes.len();
+        if !(2..=MAX_CLASSES).contains(&k) {
+            return Err(GroupingError::Classes(k));
+        }
+        check_unique(classes)?;
+        let subset = |mask: usize| (0..k).filter(|i| mask >> i & 1 == 1).collect::<Vec<_>>();
+        // Of two equal halves, the first group is the one with the first class.
+        let is_first = |s: &Vec<usize>| 2 * s.len() < k || 2 * s.len() == k && s[0] == 0;
+        let mut firsts: Vec<Vec<usize>> = (1..1 << k).map(subset).filter(is_first).collect();
+        firsts.sort_by(|s, t| (s.len(), s).cmp(&(t.len(), t)));
+        let split = |first: Vec<usize>| {
+            let (a, b) = (0..k).partition::<Vec<_>, _>(|i| first.contains(i));
+            let labels = |group: Vec<usize>| group.into_iter().map(|i| classes[i]).collect();
+            Split { a: labels(a), b: labels(b) }
+        };
+        let same_way = same_way_bin.then(|| Split { a: classes.to_vec(), b: Vec::new() });
+        Ok(Grouping { tasks: firsts.into_iter().map(split).chain(same_way).collect() })
+    }
+
+    /// The tasks, in the order of their bins.
+    pub fn tasks(&self) -> &[Split] {
+        &self.tasks
+    }
+
+    /// Whether "all the same way" is a task.
+    pub fn has_same_way_bin(&self) -> bool {
+        self.tasks.iter().any(Split::is_same_way)
+    }
+
+    /// Whether every way to split the classes is a task.
+    pub fn has_all_splits(&self) -> bool {
+        let classes = self.tasks.first().map_or(0, |s| s.a.len() + s.b.len());
+        let splits = self.tasks.iter().filter(|s| !s.is_same_way()).count();
+        (2..=MAX_CLASSES).contains(&classes) && splits == (1 << (classes - 1)) - 1
+    }
+}
+
+fn check_unique(classes: &[u8]) -> Result<(), GroupingError> {
+    let repeated = classes.iter().enumerate().find(|(i, class)| classes[..*i].contains(class));
+    repeated.map_or(Ok(()), |(_, class)| Err(GroupingError::Repeated(*class)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn names(grouping: &Grouping) -> Vec<String> {
+        grouping.tasks().iter().map(Split::name).collect()
+    }
+
+    #[test]
+    fn four_classes_have_the_papers_seven_tasks() {
+        let paper = ["0|123", "1|023", "2|013", "3|012", "01|23", "02|13", "03|12"];
+        let splits = Grouping::all_splits(&[0, 1, 2, 3], false).unwrap();
+        assert_eq!(names(&splits), paper);
+        let with_bin = Grouping::all_splits(&[0, 1, 2, 3], true).unwrap();
+        assert_eq!(names(&with_bin)[..7], paper);
+        assert_eq!(names(&with_bin)[7], "same way");
+        assert!(with_bin.has_same_way_bin() && !splits.has_same_way_bin() && splits.has_all_splits());
+    }
+
+    #[test]
+    fn k_classes_have_half_of_two_to_the_k_splits_all_different() {
+        for k in 2..=MAX_CLASSES as u8 {
+            let grouping = Grouping::all_splits(&(0..k).collect::<Vec<_>>(), false).unwrap();
+            let mut names = names(&grouping);
+            names.sort_unstable();
+            names.dedup();
+            assert_eq!(names.len(), (1 << (k - 1)) - 1);
+        }
+        let three = Grouping::all_splits(&[12, 3, 7], false).unwrap();
+        assert_eq!(names(&three), ["12|3,7", "3|12,7", "7|12,3"]);
+    }
+
+    #[test]
+    fn classes_know_their_group() {
+        let grouping = Grouping::two_groups(&[4, 9], &[1]).unwrap();
+        let split = &grouping.tasks()[0];
+        let groups = [4, 9, 1, 0].map(|class| split.group(class));
+        assert_eq!(groups, [Some(Group::A), Some(Group::A), Some(Group::B), None]);
+        assert_eq!((grouping.tasks().len(), grouping.has_all_splits()), (1, false));
+        assert_eq!(split.name(), "49|1");
+    }
+
+    #[test]
+    fn groupings_that_ask_nothing_are_refused() {
+        assert_eq!(Grouping::two_groups(&[0], &[]), Err(GroupingError::EmptyGroup));
+        assert_eq!(Grouping::two_groups(&[0, 1], &[1]), Err(GroupingError::Repeated(1)));
+        assert_eq!(Grouping::all_splits(&[2, 2], true), Err(GroupingError::Repeated(2)));
+        assert_eq!(Grouping::all_splits(&[2], true), Err(GroupingError::Classes(1)));
+        assert_eq!(Grouping::all_splits(&[0; 11], true), Err(GroupingError::Classes(11)));
+    }
+}
