@@ -8,3 +8,6 @@ pub mod direction;
 pub mod grouping;
 pub mod recording;
 pub mod score;
+pub mod idx;
+pub mod recording;
+pub mod stimulus;

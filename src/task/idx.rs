@@ -1,0 +1,273 @@
+//! The IDX format (<http://yann.lecun.com/exdb/mnist/>): how MNIST and its look-alikes store images and labels.
+//!
+//! A file is a magic number (two zero bytes, the type of the numbers, how many dimensions), the length of every
+//! dimension as a big-endian 32-bit number, and the numbers themselves in row-major order. Here the numbers
+//! are unsigned bytes; images have three dimensions (count, rows, columns), labels one. Counts and sizes are
+//! taken from the header, and the file must hold exactly what its header announces.
+
+use crate::base::hash::sha256_hex;
+use flate2::read::MultiGzDecoder;
+use std::fs::File;
+use std::io::{self, Read};
+use std::path::{Path, PathBuf};
+
+/// More than this in one file (as stored or unpacked, bytes) is refused: it is not a set of images but a
+/// broken header or the wrong file. (MNIST: 47 MB; the whole of EMNIST: 0.6 GB.)
+pub const MAX_BYTES: u64 = 1 << 30;
+
+/// Type code of unsigned bytes in a magic number.
+const UNSIGNED_BYTE: u8 = 0x08;
+
+/// Images of one IDX3 file, all of the same size.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct IdxImages {
+    /// Number of images, at least 1.
+    pub count: usize,
+    /// Rows per image, at least 1.
+    pub height: usize,
+    /// Columns per image, at least 1.
+    pub width: usize,
+    /// All pixels (0 … 255), image after image, row-major from the top left: count × height × width of them.
+    pub pixels: Vec<u8>,
+}
+
+/// What was read, and which bytes on disk it came from.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct IdxFile<T> {
+    /// The decoded content.
+    pub content: T,
+    /// Size of the file as found (compressed, if it is), bytes.
+    pub bytes: u64,
+    /// SHA-256 of the file as found, in hexadecimal.
+    pub sha256: String,
+}
+
+/// Why a file is not the IDX file that was expected. Every message names the file.
+#[derive(Debug, thiserror::Error)]
+pub enum IdxError {
+    /// The file cannot be opened or read.
+    #[error("{}: cannot be read: {source}", file.display())]
+    Io {
+        /// The file.
+        file: PathBuf,
+        /// What the system says.
+        source: io::Error,
+    },
+    /// The gzip stream is broken.
+    #[error("{}: starts like a gzip file but cannot be unpacked: {source}", file.display())]
+    Gzip {
+        /// The file.
+        file: PathBuf,
+        /// What the unpacker says.
+        source: io::Error,
+    },
+    /// The file ends within its header.
+    #[error(
+        "{}: too short: an IDX header of {expected} bytes was expected, the file ends after {found}",
+        file.display()
+    )]
+    Header {
+        /// The file.
+        file: PathBuf,
+        /// Length of the header, bytes.
+        expected: usize,
+        /// How much of it there is.
+        found: usize,
+    },
+    /// The first four bytes are not those of an IDX file of unsigned bytes.
+    #[error(
+        "{}: wrong magic number: expected 00 00 08 {dimensions:02x} (IDX, unsigned bytes, {dimensions} \
+         dimension(s): {what}), found {:02x} {:02x} {:02x} {:02x}",
+        file.display(), found[0], found[1], found[2], found[3]
+    )]
+    Magic {
+        /// The file.
+        file: PathBuf,
+        /// Number of dimensions expected.
+        dimensions: u8,
+        /// What the file should hold.
+        what: &'static str,
+        /// The first four bytes (after unpacking).
+        found: [u8; 4],
+    },
+    /// An IDX file of unsigned bytes, but of another shape (labels where images were expected, say).
+    #[error(
+        "{}: wrong number of dimensions: expected {expected} ({what}), found {found}; \
+         are the image and the label file mixed up?",
+        file.display()
+    )]
+    Dimensions {
+        /// The file.
+        file: PathBuf,
+        /// Number of dimensions expected.
+        expected: u8,
+        /// What the file should hold.
+        what: &'static str,
+        /// Number of dimensions in the magic number.
+        found: u8,
+    },
+    /// A dimension has length 0.
+    #[error("{}: the header says {sizes:?} ({axes}): nothing in it; every size must be at least 1", file.display())]
+    Zero {
+        /// The file.
+        file: PathBuf,
+        /// Lengths of the dimensions, from the header.
+        sizes: Vec<u32>,
+        /// What the dimensions are.
+        axes: &'static str,
+    },
+    /// The header announces more than [`MAX_BYTES`]; nothing of that size has been allocated.
+    #[error(
+        "{}: the header says {sizes:?} ({axes}), which is more than the {MAX_BYTES} bytes accepted; \
+         the header is broken or this is not a set of images",
+        file.display()
+    )]
+    Absurd {
+        /// The file.
+        file: PathBuf,
+        /// Lengths of the dimensions, from the header.
+        sizes: Vec<u32>,
+        /// What the dimensions are.
+        axes: &'static str,
+    },
+    /// The file itself is larger than [`MAX_BYTES`].
+    #[error("{}: has {found} bytes, more than the {MAX_BYTES} accepted; this is not a set of images", file.display())]
+    Large {
+        /// The file.
+        file: PathBuf,
+        /// Its size, bytes.
+        found: u64,
+    },
+    /// Fewer numbers than the header announces.
+    #[error(
+        "{}: too short: {expected} bytes were expected after the header, found {found}; \
+         the file is cut off", file.display()
+    )]
+    Short {
+        /// The file.
+        file: PathBuf,
+        /// Bytes announced after the header.
+        expected: u64,
+        /// Bytes there are.
+        found: u64,
+    },
+    /// More numbers than the header announces.
+    #[error(
+        "{}: too long: {expected} bytes were expected after the header, found more; \
+         the header is wrong or something was appended", file.display()
+    )]
+    Long {
+        /// The file.
+        file: PathBuf,
+        /// Bytes announced after the header.
+        expected: u64,
+    },
+}
+
+impl IdxError {
+    /// Whether the file could not even be opened or read, as opposed to holding the wrong thing.
+    pub fn is_io(&self) -> bool {
+        matches!(self, IdxError::Io { .. })
+    }
+}
+
+/// Reads an IDX3 file of unsigned bytes, raw or gzipped (told apart by content, not by name).
+///
+/// # Errors
+/// [`IdxError`] if the file cannot be read or is anything but exactly such a file.
+pub fn read_images(file: &Path) -> Result<IdxFile<IdxImages>, IdxError> {
+    let stored = read_file(file)?;
+    let (sizes, pixels) = decode::<3>(file, &stored, "images", "count, rows, columns")?;
+    let [count, height, width] = sizes;
+    Ok(with_origin(&stored, IdxImages { count, height, width, pixels }))
+}
+
+/// Reads an IDX1 file of unsigned bytes, raw or gzipped (told apart by content, not by name): one label per image.
+///
+/// # Errors
+/// [`IdxError`] if the file cannot be read or is anything but exactly such a file.
+pub fn read_labels(file: &Path) -> Result<IdxFile<Vec<u8>>, IdxError> {
+    let stored = read_file(file)?;
+    let (_, labels) = decode::<1>(file, &stored, "labels", "count")?;
+    Ok(with_origin(&stored, labels))
+}
+
+/// The header of an IDX file of unsigned bytes with these sizes: magic number and big-endian lengths.
+pub fn header(sizes: &[u32]) -> Vec<u8> {
+    let mut bytes = vec![0, 0, UNSIGNED_BYTE, sizes.len() as u8];
+    bytes.extend(sizes.iter().flat_map(|size| size.to_be_bytes()));
+    bytes
+}
+
+fn with_origin<T>(stored: &[u8], content: T) -> IdxFile<T> {
+    IdxFile { content, bytes: stored.len() as u64, sha256: sha256_hex(stored) }
+}
+
+fn read_file(file: &Path) -> Result<Vec<u8>, IdxError> {
+    let io = |source| IdxError::Io { file: file.to_path_buf(), source };
+    let mut stored = Vec::new();
+    File::open(file).map_err(io)?.take(MAX_BYTES + 1).read_to_end(&mut stored).map_err(io)?;
+    if stored.len() as u64 > MAX_BYTES {
+        let found = std::fs::metadata(file).map_or(stored.len() as u64, |m| m.len());
+        return Err(IdxError::Large { file: file.to_path_buf(), found });
+    }
+    Ok(stored)
+}
+
+/// The lengths of the N dimensions and the numbers.
+fn decode<const N: usize>(
+    file: &Path,
+    stored: &[u8],
+    what: &'static str,
+    axes: &'static str,
+) -> Result<([usize; N], Vec<u8>), IdxError> {
+    let zipped = stored.starts_with(&[0x1f, 0x8b]);
+    let mut content: Box<dyn Read> =
+        if zipped { Box::new(MultiGzDecoder::new(stored)) } else { Box::new(stored) };
+    let file = file.to_path_buf();
+    let broken = |source| IdxError::Gzip { file: file.clone(), source };
+
+    let mut header = Vec::new();
+    content.by_ref().take(4).read_to_end(&mut header).map_err(broken)?;
+    let length = 4 + 4 * N;
+    let Ok(magic) = <[u8; 4]>::try_from(header.as_slice()) else {
+        return Err(IdxError::Header { file, expected: length, found: header.len() });
+    };
+    let dimensions = N as u8;
+    match magic {
+        [0, 0, UNSIGNED_BYTE, found] if found == dimensions => {}
+        [0, 0, UNSIGNED_BYTE, found] => {
+            return Err(IdxError::Dimensions { file, expected: dimensions, what, found });
+        }
+        found => return Err(IdxError::Magic { file, dimensions, what, found }),
+    }
+    content.by_ref().take(4 * N as u64).read_to_end(&mut header).map_err(broken)?;
+    if header.len() < length {
+        return Err(IdxError::Header { file, expected: length, found: header.len() });
+    }
+    let sizes: Vec<u32> =
+        header[4..].as_chunks::<4>().0.iter().map(|bytes| u32::from_be_bytes(*bytes)).collect();
+    if sizes.contains(&0) {
+        return Err(IdxError::Zero { file, sizes, axes });
+    }
+    let product = sizes.iter().try_fold(1u64, |all, &size| all.checked_mul(u64::from(size)));
+    let Some(expected) = product.filter(|&bytes| bytes <= MAX_BYTES) else {
+        return Err(IdxError::Absurd { file, sizes, axes });
+    };
+
+    // Grown by what is really there: a header that lies costs nothing.
+    let mut numbers = Vec::new();
+    content.take(expected + 1).read_to_end(&mut numbers).map_err(broken)?;
+    let found = numbers.len() as u64;
+    if found < expected {
+        return Err(IdxError::Short { file, expected, found });
+    }
+    if found > expected {
+        return Err(IdxError::Long { file, expected });
+    }
+    Ok((std::array::from_fn(|i| sizes[i] as usize), numbers))
+}
+
+#[cfg(test)]
+#[path = "idx_tests.rs"]
+mod tests;

@@ -1,0 +1,197 @@
+//! From an image to what a body's sensors feel: reduction to the body's grid, then encoding (paper, "Task").
+
+use crate::base::Grid;
+use serde::{Deserialize, Serialize};
+
+/// How an image is reduced to the body's grid.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Reduction {
+    /// Every s-th row and column (0, s, 2s, …), as in the paper, where s = 2 takes 28 × 28 to 14 × 14.
+    /// Rows and columns each have their own s; the body's sides must divide the image's.
+    #[default]
+    Stride,
+    /// Each voxel gets the mean of the raw pixel values under it, pixels cut by its edges counting by the
+    /// area they share with it; for bodies of any size. The mean is encoded, not the pixels.
+    Area,
+}
+
+/// How a pixel value becomes a stimulus in [0, 1].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Encoding {
+    /// value / 255: "proportional to the intensity of the pixel" (the paper's text).
+    #[default]
+    Intensity,
+    /// 1 for any value above 0, else 0: what the paper's published robots were evolved on.
+    Saturated,
+    /// 1 if value / 255 is above the level, else 0.
+    Threshold {
+        /// The level, in [0, 1).
+        level: f64,
+    },
+}
+
+/// Why there is no stimulus for this image, body size and encoding.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum StimulusError {
+    /// The body has no rows or no columns.
+    #[error("a body of {height} x {width} voxels has no place for a stimulus; both sides must be at least 1")]
+    Empty {
+        /// Rows of the body.
+        height: usize,
+        /// Columns of the body.
+        width: usize,
+    },
+    /// Keeping every s-th row and column needs sides that divide the image's.
+    #[error(
+        "the body's {axis} ({body}) do not divide the image's ({image}), so no stride takes one to the other; \
+         use the reduction \"area\" or another body size"
+    )]
+    Stride {
+        /// "rows" or "columns".
+        axis: &'static str,
+        /// The body's number of them.
+        body: usize,
+        /// The image's number of them.
+        image: usize,
+    },
+    /// A threshold that no pixel or every pixel would pass.
+    #[error("the threshold's level is {0}, expected a number from 0 up to but below 1")]
+    Level(f64),
+}
+
+/// The stimulus of an image for a body of height × width voxels: one value in [0, 1] per voxel place, row 0 on top.
+///
+/// # Errors
+/// [`StimulusError`] if the body's size does not go with the reduction, or a threshold is out of range.
+pub fn stimulus(
+    image: &Grid<u8>,
+    height: usize,
+    width: usize,
+    reduction: Reduction,
+    encoding: Encoding,
+) -> Result<Grid<f64>, StimulusError> {
+    if height == 0 || width == 0 {
+        return Err(StimulusError::Empty { height, width });
+    }
+    if let Encoding::Threshold { level } = encoding
+        && !(0.0..1.0).contains(&level)
+    {
+        return Err(StimulusError::Level(level));
+    }
+    let reduced = match reduction {
+        Reduction::Stride => strided(image, height, width)?,
+        Reduction::Area => averaged(image, height, width),
+    };
+    Ok(reduced.map(|&value| match encoding {
+        Encoding::Intensity => value / 255.0,
+        Encoding::Saturated => f64::from(value > 0.0),
+        Encoding::Threshold { level } => f64::from(value / 255.0 > level),
+    }))
+}
+
+fn strided(image: &Grid<u8>, height: usize, width: usize) -> Result<Grid<f64>, StimulusError> {
+    let stride = |axis, body, image: usize| {
+        image.is_multiple_of(body).then_some(image / body).ok_or(StimulusError::Stride { axis, body, image })
+    };
+    let rows = stride("rows", height, image.height())?;
+    let columns = stride("columns", width, image.width())?;
+    Ok(Grid::from_fn(height, width, |r, c| f64::from(image[(r * rows, c * columns)])))
+}
+
+/// Area-weighted means, 0 … 255. In units of 1/height of a pixel, a voxel is `image.height()` tall and a pixel
+/// `height`: all overlaps are whole numbers, and one division per voxel is the only rounding.
+fn averaged(image: &Grid<u8>, height: usize, width: usize) -> Grid<f64> {
+    let overlap = |voxel: usize, voxel_side: usize, pixel: usize, pixel_side: usize| {
+        let end = ((voxel + 1) * voxel_side).min((pixel + 1) * pixel_side);
+        end - (voxel * voxel_side).max(pixel * pixel_side)
+    };
+    let (tall, wide) = (image.height(), image.width());
+    Grid::from_fn(height, width, |r, c| {
+        let mut sum = 0u64;
+        for pixel_row in r * tall / height..((r + 1) * tall).div_ceil(height) {
+            for pixel_column in c * wide / width..((c + 1) * wide).div_ceil(width) {
+                let area = overlap(r, tall, pixel_row, height) * overlap(c, wide, pixel_column, width);
+                sum += u64::from(image[(pixel_row, pixel_column)]) * area as u64;
+            }
+        }
+        sum as f64 / (tall * wide) as f64
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use Encoding::{Intensity, Saturated, Threshold};
+    use Reduction::{Area, Stride};
+
+    fn ramp(height: usize, width: usize) -> Grid<u8> {
+        Grid::from_fn(height, width, |r, c| (9 * r + c) as u8)
+    }
+
+    #[test]
+    fn stride_keeps_rows_and_columns_0_2_4() {
+        let image = ramp(28, 28);
+        let grid = stimulus(&image, 14, 14, Stride, Intensity).unwrap();
+        assert!(grid.iter().all(|((r, c), &v)| v == f64::from(image[(2 * r, 2 * c)]) / 255.0));
+        let uneven = stimulus(&image, 28, 7, Stride, Intensity).unwrap();
+        assert_eq!(uneven[(27, 6)], f64::from(image[(27, 24)]) / 255.0);
+    }
+
+    #[test]
+    fn stride_refuses_sides_that_do_not_divide_and_names_the_way_out() {
+        let error = stimulus(&ramp(28, 28), 14, 13, Stride, Intensity).unwrap_err();
+        assert_eq!(error, StimulusError::Stride { axis: "columns", body: 13, image: 28 });
+        assert!(error.to_string().contains("area"), "{error}");
+        assert!(stimulus(&ramp(28, 28), 56, 14, Stride, Intensity).is_err());
+        assert!(stimulus(&ramp(28, 28), 0, 14, Area, Intensity).is_err());
+    }
+
+    #[test]
+    fn encodings_are_the_papers() {
+        let image = Grid::from_rows(vec![vec![0, 1, 128, 255]]).unwrap();
+        let cells = |encoding| stimulus(&image, 1, 4, Stride, encoding).unwrap().cells().to_vec();
+        assert_eq!(cells(Intensity), [0.0, 1.0 / 255.0, 128.0 / 255.0, 1.0]);
+        assert_eq!(cells(Saturated), [0.0, 1.0, 1.0, 1.0]);
+        assert_eq!(cells(Threshold { level: 0.5 }), [0.0, 0.0, 1.0, 1.0]);
+        assert_eq!(cells(Threshold { level: 128.0 / 255.0 }), [0.0, 0.0, 0.0, 1.0]);
+        for level in [1.0, -0.1, f64::NAN] {
+            assert!(stimulus(&image, 1, 4, Stride, Threshold { level }).is_err());
+        }
+    }
+
+    #[test]
+    fn area_averaging_is_exact_and_keeps_the_mean() {
+        let quarter = Grid::from_rows(vec![vec![0, 255], vec![0, 1]]).unwrap();
+        assert_eq!(stimulus(&quarter, 1, 1, Area, Intensity).unwrap().cells(), [256.0 / 4.0 / 255.0]);
+        // The mean is encoded, not the pixels: 64/255 is above 0.25, though only one pixel of four is.
+        let above = |level| stimulus(&quarter, 1, 1, Area, Threshold { level }).unwrap()[(0, 0)];
+        assert_eq!((above(0.25), above(0.26)), (1.0, 0.0));
+        // Three pixels on two voxels: the middle one is shared half and half.
+        let thirds = Grid::from_rows(vec![vec![30, 60, 90]]).unwrap();
+        assert_eq!(stimulus(&thirds, 1, 2, Area, Intensity).unwrap().cells(), [40.0 / 255.0, 80.0 / 255.0]);
+        let image = ramp(28, 28);
+        let mean = |grid: &Grid<f64>| grid.cells().iter().sum::<f64>() / grid.area() as f64;
+        let whole = mean(&stimulus(&image, 28, 28, Area, Intensity).unwrap());
+        for (height, width) in [(1, 1), (5, 13), (14, 14), (27, 3), (40, 56)] {
+            let reduced = stimulus(&image, height, width, Area, Intensity).unwrap();
+            assert!((mean(&reduced) - whole).abs() < 1e-12, "{height} x {width}");
+        }
+    }
+
+    #[test]
+    fn area_averaging_by_a_whole_factor_of_one_is_the_image() {
+        let image = ramp(7, 9);
+        let same = stimulus(&image, 7, 9, Area, Intensity).unwrap();
+        assert_eq!(same, stimulus(&image, 7, 9, Stride, Intensity).unwrap());
+    }
+
+    #[test]
+    fn configs_name_them_in_lower_case() {
+        let read = |text: &str| serde_json::from_str::<Encoding>(text).unwrap();
+        assert_eq!(read("\"saturated\""), Saturated);
+        assert_eq!(read("{\"threshold\":{\"level\":0.5}}"), Threshold { level: 0.5 });
+        assert_eq!(serde_json::to_string(&Area).unwrap(), "\"area\"");
+    }
+}
