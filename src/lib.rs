@@ -17,4 +17,6 @@ pub mod body;
 pub mod sim;
 pub mod genome;
 pub mod qd;
+pub mod run;
 pub mod task;
+pub mod view;

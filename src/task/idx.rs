@@ -5,6 +5,7 @@
 //! are unsigned bytes; images have three dimensions (count, rows, columns), labels one. Counts and sizes are
 //! taken from the header, and the file must hold exactly what its header announces.
 
+use crate::base::Grid;
 use crate::base::hash::sha256_hex;
 use flate2::read::MultiGzDecoder;
 use std::fs::File;
@@ -29,6 +30,15 @@ pub struct IdxImages {
     pub width: usize,
     /// All pixels (0 … 255), image after image, row-major from the top left: count × height × width of them.
     pub pixels: Vec<u8>,
+}
+
+impl IdxImages {
+    /// One image; `None` beyond the last.
+    pub fn image(&self, index: usize) -> Option<Grid<u8>> {
+        let first = index.checked_mul(self.height)?;
+        let rows = self.pixels.chunks(self.width).skip(first).take(self.height);
+        Grid::from_rows(rows.map(<[u8]>::to_vec).collect()).ok()
+    }
 }
 
 /// What was read, and which bytes on disk it came from.

@@ -1,0 +1,3 @@
+//! Floor 5: pictures and the terminal.
+
+pub mod sheet;

@@ -1,0 +1,132 @@
+//! The contact sheet (`morphcog data sheet`): images side by side, to be judged by eye.
+
+use crate::base::Grid;
+use crate::run::data::write_atomically;
+use crate::task::dataset::{Dataset, DatasetError, Split};
+use std::io;
+use std::path::{Path, PathBuf};
+use tiny_skia::{IntSize, Pixmap};
+
+/// Pixels of the picture per pixel of an image.
+const SCALE: usize = 3;
+/// Pixels of the picture between two images and around them.
+const GAP: usize = 4;
+/// Grey of the gaps.
+const PAPER: u8 = 96;
+/// Longest side of a picture, pixels.
+const MAX_SIDE: usize = 16_384;
+
+/// Why there is no contact sheet.
+#[derive(Debug, thiserror::Error)]
+pub enum SheetError {
+    /// An image cannot be had.
+    #[error(transparent)]
+    Dataset(#[from] DatasetError),
+    /// Nothing to show, or too much.
+    #[error(
+        "a sheet of {classes} classes with {samples} images each has no sensible size; ask for 1 to {MAX_SIDE} pixels in each direction"
+    )]
+    Size {
+        /// Number of rows of the sheet.
+        classes: usize,
+        /// Number of columns.
+        samples: usize,
+    },
+    /// The picture cannot be made into a PNG.
+    #[error("the contact sheet cannot be made into a PNG: {0}")]
+    Png(String),
+    /// The picture cannot be written.
+    #[error("{}: cannot be written: {source}", file.display())]
+    Write {
+        /// The file.
+        file: PathBuf,
+        /// What the system says.
+        source: io::Error,
+    },
+}
+
+/// The first `samples` images of every class of a split, one class per row, each image three times its size; grey, 0 black.
+///
+/// # Errors
+/// [`SheetError::Size`] if that is nothing or too large, [`SheetError::Dataset`] if an image cannot be had.
+pub fn contact_sheet(dataset: &Dataset, split: Split, samples: usize) -> Result<Grid<u8>, SheetError> {
+    let classes = dataset.classes(split);
+    let info = dataset.info();
+    let (tall, wide) =
+        info.splits.get(&split).map_or((0, 0), |s| (s.height * SCALE + GAP, s.width * SCALE + GAP));
+    let side = |count: usize, size: usize| {
+        count.checked_mul(size).map(|n| n + GAP).filter(|n| (GAP + 1..=MAX_SIDE).contains(n))
+    };
+    let (Some(height), Some(width)) = (side(classes.len(), tall), side(samples, wide)) else {
+        return Err(SheetError::Size { classes: classes.len(), samples });
+    };
+    let mut sheet = Grid::filled(height, width, PAPER);
+    for (row, &class) in classes.iter().enumerate() {
+        for (column, &index) in dataset.indices_of(split, class).iter().take(samples).enumerate() {
+            let image = dataset.image(split, index)?;
+            for r in 0..image.height() * SCALE {
+                for c in 0..image.width() * SCALE {
+                    sheet[(GAP + row * tall + r, GAP + column * wide + c)] = image[(r / SCALE, c / SCALE)];
+                }
+            }
+        }
+    }
+    Ok(sheet)
+}
+
+/// Writes a grey picture as PNG; the file appears whole or not at all.
+///
+/// # Errors
+/// [`SheetError::Write`] if the file cannot be written.
+pub fn write_png(file: &Path, picture: &Grid<u8>) -> Result<(), SheetError> {
+    let bytes = png(picture)?;
+    write_atomically(file, &bytes).map_err(|source| SheetError::Write { file: file.to_path_buf(), source })
+}
+
+fn png(picture: &Grid<u8>) -> Result<Vec<u8>, SheetError> {
+    let error = |what: &dyn std::fmt::Display| SheetError::Png(what.to_string());
+    let size = u32::try_from(picture.width()).ok().zip(u32::try_from(picture.height()).ok());
+    let size = size.and_then(|(width, height)| IntSize::from_wh(width, height));
+    let rgba = picture.cells().iter().flat_map(|&grey| [grey, grey, grey, 255]).collect();
+    let pixmap = size.and_then(|size| Pixmap::from_vec(rgba, size)).ok_or_else(|| error(&"too large"))?;
+    pixmap.encode_png().map_err(|e| error(&e))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::task::builtin::BuiltinDigits;
+
+    #[test]
+    fn a_sheet_has_a_row_per_class_and_a_column_per_sample() {
+        let digits = BuiltinDigits { classes: vec![7, 2], ..BuiltinDigits::default() };
+        let data = Dataset::builtin(digits, &[Split::Test]).unwrap();
+        let sheet = contact_sheet(&data, Split::Test, 3).unwrap();
+        assert_eq!((sheet.height(), sheet.width()), (2 * 88 + 4, 3 * 88 + 4));
+        // Rows are in ascending order of class: the sevens, at even indices, come second.
+        let image = data.image(Split::Test, 4).unwrap();
+        assert!(image.iter().all(|((r, c), &v)| sheet[(92 + 3 * r, 180 + 3 * c)] == v));
+        assert_eq!(sheet[(0, 0)], PAPER);
+    }
+
+    #[test]
+    fn sheets_of_no_sensible_size_are_refused() {
+        let data = Dataset::load("builtin", &[], &[Split::Train]).unwrap();
+        assert!(matches!(contact_sheet(&data, Split::Train, 0), Err(SheetError::Size { .. })));
+        assert!(matches!(contact_sheet(&data, Split::Train, usize::MAX), Err(SheetError::Size { .. })));
+        assert!(matches!(contact_sheet(&data, Split::Test, 1), Err(SheetError::Size { .. })));
+    }
+
+    #[test]
+    fn the_png_holds_the_picture() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("sheet.png");
+        let picture = Grid::from_fn(5, 7, |r, c| (30 * r + c) as u8);
+        write_png(&file, &picture).unwrap();
+        let read = Pixmap::load_png(&file).unwrap();
+        assert_eq!((read.width(), read.height()), (7, 5));
+        assert!(read.pixels().iter().zip(picture.cells()).all(|(p, &g)| p.red() == g && p.alpha() == 255));
+        let error = write_png(&folder.path().join("no/sheet.png"), &picture).unwrap_err();
+        assert!(error.to_string().contains("no/sheet.png"), "{error}");
+    }
+}
