@@ -14,9 +14,8 @@
 
 pub mod base;
 pub mod body;
-pub mod sim;
 pub mod genome;
 pub mod qd;
 pub mod run;
+pub mod sim;
 pub mod task;
-pub mod view;

@@ -1,3 +1,8 @@
-//! Floor 4: the logic of every command; reports through observers and never prints.
+//! Floor 4: what the commands do, one file per command. Reports through observers, never prints.
 
-pub mod data;
+pub mod config;
+mod error;
+mod toml_text;
+
+pub use config::Config;
+pub use error::{Error, ErrorKind};

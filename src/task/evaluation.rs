@@ -56,6 +56,9 @@ pub struct Evaluation {
 /// Displacement per image, as far as known.
 pub type Known = Vec<Option<f64>>;
 
+/// Whether a robot with these displacements so far may still get into the archive.
+pub type MayWin<'a> = dyn Fn(&[Option<f64>]) -> bool + Sync + Send + 'a;
+
 /// A body to be evaluated.
 pub struct Job<'a> {
     /// The body.
@@ -63,7 +66,7 @@ pub struct Job<'a> {
     /// The image to begin with, where the order is free (fresh lives): the one that limits its parent.
     pub first_image: usize,
     /// Whether it may still get into the archive, given some of its displacements; asked with early stopping only.
-    pub may_win: Box<dyn Fn(&[Option<f64>]) -> bool + Sync + Send + 'a>,
+    pub may_win: Box<MayWin<'a>>,
 }
 
 /// Evaluates jobs, each on all images; results in the jobs' order, the same on any number of threads.

@@ -25,11 +25,36 @@ pub enum Encoding {
     Intensity,
     /// 1 for any value above 0, else 0: what the paper's published robots were evolved on.
     Saturated,
-    /// 1 if value / 255 is above the level, else 0.
-    Threshold {
-        /// The level, in [0, 1).
-        level: f64,
-    },
+    /// 1 if value / 255 is above [`StimulusParams::level`], else 0.
+    Threshold,
+}
+
+/// From image to stimulus; keys of a config's section `[stimulus]`.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct StimulusParams {
+    /// "stride" (default) or "area".
+    pub reduction: Reduction,
+    /// "intensity" (default), "saturated" or "threshold".
+    pub encoding: Encoding,
+    /// For the encoding "threshold": the level, from 0 up to but below 1. Default 0.5.
+    pub level: f64,
+}
+
+impl Default for StimulusParams {
+    fn default() -> Self {
+        StimulusParams { reduction: Reduction::Stride, encoding: Encoding::Intensity, level: 0.5 }
+    }
+}
+
+impl StimulusParams {
+    /// Checks the level.
+    ///
+    /// # Errors
+    /// [`StimulusError::Level`].
+    pub fn validate(&self) -> Result<(), StimulusError> {
+        (0.0..1.0).contains(&self.level).then_some(()).ok_or(StimulusError::Level(self.level))
+    }
 }
 
 /// Why there is no stimulus for this image, body size and encoding.
@@ -69,25 +94,20 @@ pub fn stimulus(
     image: &Grid<u8>,
     height: usize,
     width: usize,
-    reduction: Reduction,
-    encoding: Encoding,
+    params: &StimulusParams,
 ) -> Result<Grid<f64>, StimulusError> {
     if height == 0 || width == 0 {
         return Err(StimulusError::Empty { height, width });
     }
-    if let Encoding::Threshold { level } = encoding
-        && !(0.0..1.0).contains(&level)
-    {
-        return Err(StimulusError::Level(level));
-    }
-    let reduced = match reduction {
+    params.validate()?;
+    let reduced = match params.reduction {
         Reduction::Stride => strided(image, height, width)?,
         Reduction::Area => averaged(image, height, width),
     };
-    Ok(reduced.map(|&value| match encoding {
+    Ok(reduced.map(|&value| match params.encoding {
         Encoding::Intensity => value / 255.0,
         Encoding::Saturated => f64::from(value > 0.0),
-        Encoding::Threshold { level } => f64::from(value / 255.0 > level),
+        Encoding::Threshold => f64::from(value / 255.0 > params.level),
     }))
 }
 
@@ -126,6 +146,10 @@ mod tests {
     use Encoding::{Intensity, Saturated, Threshold};
     use Reduction::{Area, Stride};
 
+    fn params(reduction: Reduction, encoding: Encoding) -> StimulusParams {
+        StimulusParams { reduction, encoding, ..StimulusParams::default() }
+    }
+
     fn ramp(height: usize, width: usize) -> Grid<u8> {
         Grid::from_fn(height, width, |r, c| (9 * r + c) as u8)
     }
@@ -133,49 +157,60 @@ mod tests {
     #[test]
     fn stride_keeps_rows_and_columns_0_2_4() {
         let image = ramp(28, 28);
-        let grid = stimulus(&image, 14, 14, Stride, Intensity).unwrap();
+        let grid = stimulus(&image, 14, 14, &params(Stride, Intensity)).unwrap();
         assert!(grid.iter().all(|((r, c), &v)| v == f64::from(image[(2 * r, 2 * c)]) / 255.0));
-        let uneven = stimulus(&image, 28, 7, Stride, Intensity).unwrap();
+        let uneven = stimulus(&image, 28, 7, &params(Stride, Intensity)).unwrap();
         assert_eq!(uneven[(27, 6)], f64::from(image[(27, 24)]) / 255.0);
     }
 
     #[test]
     fn stride_refuses_sides_that_do_not_divide_and_names_the_way_out() {
-        let error = stimulus(&ramp(28, 28), 14, 13, Stride, Intensity).unwrap_err();
+        let error = stimulus(&ramp(28, 28), 14, 13, &params(Stride, Intensity)).unwrap_err();
         assert_eq!(error, StimulusError::Stride { axis: "columns", body: 13, image: 28 });
         assert!(error.to_string().contains("area"), "{error}");
-        assert!(stimulus(&ramp(28, 28), 56, 14, Stride, Intensity).is_err());
-        assert!(stimulus(&ramp(28, 28), 0, 14, Area, Intensity).is_err());
+        assert!(stimulus(&ramp(28, 28), 56, 14, &params(Stride, Intensity)).is_err());
+        assert!(stimulus(&ramp(28, 28), 0, 14, &params(Area, Intensity)).is_err());
     }
 
     #[test]
     fn encodings_are_the_papers() {
         let image = Grid::from_rows(vec![vec![0, 1, 128, 255]]).unwrap();
-        let cells = |encoding| stimulus(&image, 1, 4, Stride, encoding).unwrap().cells().to_vec();
+        let cells = |encoding| stimulus(&image, 1, 4, &params(Stride, encoding)).unwrap().cells().to_vec();
+        let above = |level| StimulusParams { level, ..params(Stride, Threshold) };
         assert_eq!(cells(Intensity), [0.0, 1.0 / 255.0, 128.0 / 255.0, 1.0]);
         assert_eq!(cells(Saturated), [0.0, 1.0, 1.0, 1.0]);
-        assert_eq!(cells(Threshold { level: 0.5 }), [0.0, 0.0, 1.0, 1.0]);
-        assert_eq!(cells(Threshold { level: 128.0 / 255.0 }), [0.0, 0.0, 0.0, 1.0]);
+        assert_eq!(cells(Threshold), [0.0, 0.0, 1.0, 1.0]);
+        let exact = stimulus(&image, 1, 4, &above(128.0 / 255.0)).unwrap();
+        assert_eq!(exact.cells(), [0.0, 0.0, 0.0, 1.0]);
         for level in [1.0, -0.1, f64::NAN] {
-            assert!(stimulus(&image, 1, 4, Stride, Threshold { level }).is_err());
+            assert!(stimulus(&image, 1, 4, &above(level)).is_err());
         }
     }
 
     #[test]
     fn area_averaging_is_exact_and_keeps_the_mean() {
         let quarter = Grid::from_rows(vec![vec![0, 255], vec![0, 1]]).unwrap();
-        assert_eq!(stimulus(&quarter, 1, 1, Area, Intensity).unwrap().cells(), [256.0 / 4.0 / 255.0]);
+        assert_eq!(
+            stimulus(&quarter, 1, 1, &params(Area, Intensity)).unwrap().cells(),
+            [256.0 / 4.0 / 255.0]
+        );
         // The mean is encoded, not the pixels: 64/255 is above 0.25, though only one pixel of four is.
-        let above = |level| stimulus(&quarter, 1, 1, Area, Threshold { level }).unwrap()[(0, 0)];
+        let above = |level| {
+            let params = StimulusParams { level, ..params(Area, Threshold) };
+            stimulus(&quarter, 1, 1, &params).unwrap()[(0, 0)]
+        };
         assert_eq!((above(0.25), above(0.26)), (1.0, 0.0));
         // Three pixels on two voxels: the middle one is shared half and half.
         let thirds = Grid::from_rows(vec![vec![30, 60, 90]]).unwrap();
-        assert_eq!(stimulus(&thirds, 1, 2, Area, Intensity).unwrap().cells(), [40.0 / 255.0, 80.0 / 255.0]);
+        assert_eq!(
+            stimulus(&thirds, 1, 2, &params(Area, Intensity)).unwrap().cells(),
+            [40.0 / 255.0, 80.0 / 255.0]
+        );
         let image = ramp(28, 28);
         let mean = |grid: &Grid<f64>| grid.cells().iter().sum::<f64>() / grid.area() as f64;
-        let whole = mean(&stimulus(&image, 28, 28, Area, Intensity).unwrap());
+        let whole = mean(&stimulus(&image, 28, 28, &params(Area, Intensity)).unwrap());
         for (height, width) in [(1, 1), (5, 13), (14, 14), (27, 3), (40, 56)] {
-            let reduced = stimulus(&image, height, width, Area, Intensity).unwrap();
+            let reduced = stimulus(&image, height, width, &params(Area, Intensity)).unwrap();
             assert!((mean(&reduced) - whole).abs() < 1e-12, "{height} x {width}");
         }
     }
@@ -183,15 +218,16 @@ mod tests {
     #[test]
     fn area_averaging_by_a_whole_factor_of_one_is_the_image() {
         let image = ramp(7, 9);
-        let same = stimulus(&image, 7, 9, Area, Intensity).unwrap();
-        assert_eq!(same, stimulus(&image, 7, 9, Stride, Intensity).unwrap());
+        let same = stimulus(&image, 7, 9, &params(Area, Intensity)).unwrap();
+        assert_eq!(same, stimulus(&image, 7, 9, &params(Stride, Intensity)).unwrap());
     }
 
     #[test]
     fn configs_name_them_in_lower_case() {
-        let read = |text: &str| serde_json::from_str::<Encoding>(text).unwrap();
-        assert_eq!(read("\"saturated\""), Saturated);
-        assert_eq!(read("{\"threshold\":{\"level\":0.5}}"), Threshold { level: 0.5 });
+        let read = |text: &str| serde_json::from_str::<StimulusParams>(text).unwrap();
+        assert_eq!(read("{}"), StimulusParams::default());
+        let threshold = StimulusParams { level: 0.25, ..params(Stride, Threshold) };
+        assert_eq!(read("{\"encoding\": \"threshold\", \"level\": 0.25}"), threshold);
         assert_eq!(serde_json::to_string(&Area).unwrap(), "\"area\"");
     }
 }

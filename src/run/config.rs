@@ -1,0 +1,293 @@
+//! [`Config`]: everything a run depends on, in TOML or JSON with the same keys.
+
+use super::Error;
+use super::toml_text::{self, Format};
+use crate::body::MAX_SIDE;
+use crate::genome::{BodySpec, MutationParams};
+use crate::qd::EmitterParams;
+use crate::sim::Physics;
+use crate::task::builtin::BuiltinDigits;
+use crate::task::evaluation::Savings;
+use crate::task::grouping::Grouping;
+use crate::task::protocol::Protocol;
+use crate::task::stimulus::StimulusParams;
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+
+/// Configs that are part of the program: name and text.
+pub const BUILT_IN: [(&str, &str); 5] = [
+    ("quickstart.toml", include_str!("../../configs/quickstart.toml")),
+    ("zero_one.toml", include_str!("../../configs/zero_one.toml")),
+    ("zero_one_published.toml", include_str!("../../configs/zero_one_published.toml")),
+    ("four_digit.toml", include_str!("../../configs/four_digit.toml")),
+    ("four_digit_published.toml", include_str!("../../configs/four_digit_published.toml")),
+];
+
+/// Largest seed: TOML's numbers are signed.
+const MAX_SEED: u64 = i64::MAX as u64;
+
+/// Everything a run depends on. Every key but `task` and `data` has a default.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Config {
+    /// Seed of all chance. Default 1.
+    #[serde(default = "one")]
+    pub seed: u64,
+    /// Generations, the first (random) one included. Default 30,000, the paper's.
+    #[serde(default = "paper_generations")]
+    pub generations: u64,
+    /// Size of bodies and which are valid.
+    #[serde(default)]
+    pub body: BodyConfig,
+    /// Which classes are to be told apart.
+    pub task: TaskConfig,
+    /// Which images.
+    pub data: DataConfig,
+    /// From image to stimulus.
+    #[serde(default)]
+    pub stimulus: StimulusParams,
+    /// How images are shown.
+    #[serde(default)]
+    pub protocol: Protocol,
+    /// Sizes of generations.
+    #[serde(default)]
+    pub map_elites: EmitterParams,
+    /// How the archive is measured.
+    #[serde(default)]
+    pub archive: ArchiveConfig,
+    /// Sizes of mutations.
+    #[serde(default)]
+    pub genome: MutationParams,
+    /// Savings that change no archive.
+    #[serde(default)]
+    pub savings: Savings,
+    /// When the run is saved.
+    #[serde(default)]
+    pub checkpoint: CheckpointConfig,
+    /// Constants of the simulator.
+    #[serde(default)]
+    pub physics: Physics,
+}
+
+fn one() -> u64 {
+    1
+}
+
+fn paper_generations() -> u64 {
+    30_000
+}
+
+/// Size of bodies and which are valid: section `[body]`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct BodyConfig {
+    /// Rows. Default 14.
+    pub height: usize,
+    /// Columns. Default 14.
+    pub width: usize,
+    /// Least number of muscle voxels. Default 3.
+    pub min_muscles: usize,
+}
+
+impl Default for BodyConfig {
+    fn default() -> Self {
+        BodyConfig { height: 14, width: 14, min_muscles: 3 }
+    }
+}
+
+/// Which classes are to be told apart: section `[task]`, either `groups` or `splits`.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct TaskConfig {
+    /// One task: two groups of classes that are to walk opposite ways.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub groups: Option<[Vec<u8>; 2]>,
+    /// All ways to split these classes in two groups; the task a robot performs is a dimension of the archive.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub splits: Option<Vec<u8>>,
+    /// With `splits`: one more bin for robots that walk the same way for all classes, as in the published code.
+    pub same_way_bin: bool,
+}
+
+/// Which images: section `[data]`.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DataConfig {
+    /// "mnist", "fashion-mnist", "builtin", or a name of one's own.
+    pub dataset: String,
+    /// Folder of its files, if neither `--data` nor `MORPHCOG_DATA` says one. Default `data/<dataset>`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub dir: Option<PathBuf>,
+    /// Training images by index, in the order in which a sequential life sees them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub train_images: Option<Vec<usize>>,
+    /// Without `train_images`: this many of each class, drawn by the run's seed. Default 1.
+    #[serde(default = "one_image")]
+    pub images_per_class: usize,
+    /// The built-in digits, for `dataset = "builtin"`.
+    #[serde(default)]
+    pub builtin: BuiltinDigits,
+}
+
+fn one_image() -> usize {
+    1
+}
+
+/// How the archive is measured: section `[archive]`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct ArchiveConfig {
+    /// Fitness that counts as nothing in the QD score \[voxel lengths\]. Default 0: elites that fail count nothing.
+    pub qd_offset: f64,
+}
+
+/// When the run is saved: section `[checkpoint]`. Whichever comes first.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct CheckpointConfig {
+    /// Every so many generations. Default 1000.
+    pub generations: u64,
+    /// Every so many seconds. Default 60.
+    pub seconds: f64,
+}
+
+impl Default for CheckpointConfig {
+    fn default() -> Self {
+        CheckpointConfig { generations: 1000, seconds: 60.0 }
+    }
+}
+
+impl Config {
+    /// Reads a config: a file (JSON if its name ends in `.json`, else TOML) or, if there is none, the built-in config of
+    /// that name; then sets `overrides` (`key=value`, keys as `map_elites.parents`).
+    ///
+    /// # Errors
+    /// What is wrong, with file, line and key.
+    pub fn load(name: &str, overrides: &[String]) -> Result<Self, Error> {
+        let path = Path::new(name);
+        let built_in =
+            || BUILT_IN.iter().find(|(own, _)| *own == name || own.strip_suffix(".toml") == Some(name));
+        let text = match std::fs::read_to_string(path) {
+            Ok(text) => text,
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => match built_in() {
+                Some((_, text)) => (*text).to_string(),
+                None => {
+                    let names = BUILT_IN.map(|(name, _)| name).join(", ");
+                    return Err(Error::input(format!(
+                        "{name}: there is no such file, and no built-in config of that name"
+                    ))
+                    .hint(format!("the built-in configs are {names}")));
+                }
+            },
+            Err(error) => return Err(Error::reading(path, &error)),
+        };
+        Config::parse(&text, name, overrides)
+    }
+
+    /// Reads a config's text; `name` stands in messages and, by its ending, tells JSON from TOML.
+    ///
+    /// # Errors
+    /// As [`Config::load`].
+    pub fn parse(text: &str, name: &str, overrides: &[String]) -> Result<Self, Error> {
+        let format = if name.ends_with(".json") { Format::Json } else { Format::Toml };
+        let mut config: Config = toml_text::read(text, format, name)?;
+        for assignment in overrides {
+            config = toml_text::set(&config, assignment)?;
+        }
+        config.validate().map_err(|error| error.within(name))?;
+        Ok(config)
+    }
+
+    /// The config as TOML, every key with its value.
+    pub fn to_toml(&self) -> String {
+        // Every field is a number, text, list or table, which TOML has.
+        toml::to_string_pretty(self).unwrap_or_default()
+    }
+
+    /// What bodies evolution makes.
+    pub fn body_spec(&self) -> BodySpec {
+        let BodyConfig { height, width, min_muscles } = self.body;
+        BodySpec { height, width, min_muscles }
+    }
+
+    /// The tasks.
+    ///
+    /// # Errors
+    /// If the section `[task]` makes none.
+    pub fn grouping(&self) -> Result<Grouping, Error> {
+        let TaskConfig { groups, splits, same_way_bin } = &self.task;
+        let grouping = match (groups, splits) {
+            (Some([a, b]), None) if !same_way_bin => Grouping::two_groups(a, b),
+            (None, Some(classes)) => Grouping::all_splits(classes, *same_way_bin),
+            (Some(_), None) => {
+                return Err(Error::input("task.same_way_bin: expected only with task.splits".to_string()));
+            }
+            _ => {
+                let text = "task: expected either groups, as in groups = [[0], [1]], or splits, as in splits = [0, 1, 2, 3]";
+                return Err(Error::input(text.to_string()));
+            }
+        };
+        grouping.map_err(|error| Error::input(format!("task: {error}")))
+    }
+
+    /// All classes of the task, in its order.
+    pub fn classes(&self) -> Vec<u8> {
+        let TaskConfig { groups, splits, .. } = &self.task;
+        groups.iter().flatten().chain(splits).flatten().copied().collect()
+    }
+
+    fn validate(&self) -> Result<(), Error> {
+        let refuse = |key: &str, found: String, expected: &str| {
+            Err(Error::input(format!("{key} = {found}: expected {expected}")))
+        };
+        self.grouping()?;
+        self.physics.validate().map_err(|error| Error::input(format!("physics.{error}")))?;
+        self.stimulus.validate().map_err(|error| Error::input(format!("stimulus: {error}")))?;
+        self.data.builtin.check().map_err(|error| Error::input(format!("data.builtin: {error}")))?;
+        for (key, side) in [("body.height", self.body.height), ("body.width", self.body.width)] {
+            if side == 0 || side > MAX_SIDE {
+                return refuse(key, side.to_string(), &format!("1 to {MAX_SIDE}"));
+            }
+        }
+        if self.body.min_muscles > self.body.height * self.body.width {
+            return refuse(
+                "body.min_muscles",
+                self.body.min_muscles.to_string(),
+                "no more than there are voxels",
+            );
+        }
+        if self.seed > MAX_SEED {
+            return refuse("seed", self.seed.to_string(), &format!("0 to {MAX_SEED}"));
+        }
+        if self.generations == 0 || self.generations > MAX_SEED {
+            return refuse("generations", self.generations.to_string(), "1 or more");
+        }
+        if self.map_elites.parents == 0 && self.map_elites.newcomers == 0 {
+            return refuse(
+                "map_elites.parents",
+                "0".to_string(),
+                "1 or more, or map_elites.newcomers above 0",
+            );
+        }
+        if self.protocol.control_steps == 0 {
+            return refuse("protocol.control_steps", "0".to_string(), "1 or more");
+        }
+        if self.protocol.start_row < self.physics.ground_row {
+            let expected = format!("{} (on the ground) or more", self.physics.ground_row);
+            return refuse("protocol.start_row", self.protocol.start_row.to_string(), &expected);
+        }
+        if !self.archive.qd_offset.is_finite() {
+            return refuse("archive.qd_offset", self.archive.qd_offset.to_string(), "a finite number");
+        }
+        if self.checkpoint.generations == 0
+            || self.checkpoint.seconds.is_nan()
+            || self.checkpoint.seconds < 0.0
+        {
+            return refuse("checkpoint", "0".to_string(), "generations of 1 or more, seconds of 0 or more");
+        }
+        if self.data.images_per_class == 0 || self.data.train_images.as_ref().is_some_and(Vec::is_empty) {
+            return refuse("data", "no images".to_string(), "at least one training image of each class");
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,114 @@
+//! [`Error`]: what a command fails with, and the exit code it means.
+
+use std::fmt;
+use std::path::Path;
+
+/// Kinds of failure; each has an exit code of its own.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ErrorKind {
+    /// Anything without a code of its own, as a full disk.
+    Other,
+    /// The command line asks for what cannot be.
+    Usage,
+    /// A file the user gave is missing, broken or of the wrong kind.
+    Input,
+    /// A simulated life became unstable (`simulate` only).
+    Unstable,
+    /// Something is in the way: a run folder that exists, or is in use.
+    Occupied,
+    /// Stopped by a signal; the run was saved and can be resumed.
+    Stopped,
+}
+
+impl ErrorKind {
+    /// The process's exit code.
+    pub fn exit_code(self) -> u8 {
+        match self {
+            ErrorKind::Other => 1,
+            ErrorKind::Usage => 2,
+            ErrorKind::Input => 3,
+            ErrorKind::Unstable => 4,
+            ErrorKind::Occupied => 5,
+            ErrorKind::Stopped => 75,
+        }
+    }
+}
+
+/// What went wrong, where, what was expected; and in `hint`, what to do.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Error {
+    /// What kind of failure it is.
+    pub kind: ErrorKind,
+    /// One line for the user.
+    pub message: String,
+    /// What to do about it.
+    pub hint: Option<String>,
+}
+
+impl Error {
+    fn new(kind: ErrorKind, message: String) -> Self {
+        Error { kind, message, hint: None }
+    }
+
+    /// A file the user gave is wrong.
+    pub fn input(message: String) -> Self {
+        Error::new(ErrorKind::Input, message)
+    }
+
+    /// The command line is wrong.
+    pub fn usage(message: String) -> Self {
+        Error::new(ErrorKind::Usage, message)
+    }
+
+    /// Something is in the way.
+    pub fn occupied(message: String) -> Self {
+        Error::new(ErrorKind::Occupied, message)
+    }
+
+    /// A failure of another kind.
+    pub fn other(message: String) -> Self {
+        Error::new(ErrorKind::Other, message)
+    }
+
+    /// An unstable life.
+    pub fn unstable(message: String) -> Self {
+        Error::new(ErrorKind::Unstable, message)
+    }
+
+    /// Stopped by a signal.
+    pub fn stopped(message: String) -> Self {
+        Error::new(ErrorKind::Stopped, message)
+    }
+
+    /// A file the user gave cannot be read.
+    pub fn reading(path: &Path, error: &std::io::Error) -> Self {
+        Error::input(format!("{}: cannot be read: {error}", path.display()))
+    }
+
+    /// A file cannot be written.
+    pub fn writing(path: &Path, error: &std::io::Error) -> Self {
+        Error::other(format!("{}: cannot be written: {error}", path.display()))
+    }
+
+    /// The same with what to do.
+    #[must_use]
+    pub fn hint(mut self, hint: String) -> Self {
+        self.hint = Some(hint);
+        self
+    }
+
+    /// The same with where it is.
+    #[must_use]
+    pub fn within(mut self, place: &str) -> Self {
+        self.message = format!("{place}: {}", self.message);
+        self
+    }
+}
+
+impl fmt::Display for Error {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.message)
+    }
+}
+
+impl std::error::Error for Error {}
