@@ -1,10 +1,12 @@
 //! `morphcog data`: fetching and describing datasets.
 
+pub mod catalogue;
 pub mod fetch;
 
 use crate::task::dataset::{Dataset, DatasetError, Split};
 use crate::task::files::Place;
 use crate::task::info::DatasetInfo;
+use catalogue::Catalogue;
 use std::io::{self, Write};
 use std::path::Path;
 
@@ -38,7 +40,7 @@ pub fn info(name: &str, given: &[Place]) -> Result<Found, DatasetError> {
     let Some(info) = info else {
         return Err(problems.swap_remove(0).1);
     };
-    let known = fetch::Catalogue::named(name).map_or_else(|_| Vec::new(), |catalogue| catalogue.files);
+    let known = Catalogue::named(name).map_or_else(|_| Vec::new(), |catalogue| catalogue.files);
     let files = info.splits.values().flat_map(|split| &split.files);
     let published = files.filter(|file| known.iter().any(|k| k.sha256 == file.sha256));
     let published = published.map(|file| file.name.clone()).collect();

@@ -17,7 +17,7 @@ pub const FETCHABLE: [&str; 2] = ["mnist", "fashion-mnist"];
 /// A folder in which someone says the data are.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Place {
-    /// Who says so, as the user knows it: "--data", "MORPHCOG_DATA", "[data] dir".
+    /// Who says so, as the user knows it: "--data", "MORPHCOG_DATA", `[data] dir`.
     pub origin: String,
     /// The folder. If it has a subfolder with the dataset's name, that is used, so one folder can hold several datasets.
     pub path: PathBuf,

@@ -11,7 +11,7 @@ pub struct DatasetInfo {
     pub name: String,
     /// The folder it was read from, or "builtin".
     pub source: String,
-    /// Who named that folder ("--data", "MORPHCOG_DATA", "[data] dir", "default"), or "builtin".
+    /// Who named that folder ("--data", "MORPHCOG_DATA", `[data] dir`, "default"), or "builtin".
     pub origin: String,
     /// The splits that were loaded.
     pub splits: BTreeMap<Split, SplitInfo>,

@@ -1,0 +1,215 @@
+//! `morphcog data fetch` against a small HTTP server on this machine: what is not exactly the published file never gets
+//! to disk, and the next mirror is tried.
+
+use morphcog::base::hash::sha256_hex;
+use morphcog::run::data::catalogue::{Catalogue, RemoteFile};
+use morphcog::run::data::fetch::{
+    Attempt, AttemptError, FetchError, FetchObserver, FetchOptions, Fetched, Outcome, fetch,
+};
+use std::collections::BTreeMap;
+use std::io::{BufRead, BufReader, Write};
+use std::net::{TcpListener, TcpStream};
+use std::path::Path;
+use std::sync::{Arc, Mutex};
+
+/// A mirror with these files (path → body, as sent after `Content-Length: declared`).
+struct Mirror {
+    address: String,
+    asked: Arc<Mutex<Vec<String>>>,
+}
+
+impl Mirror {
+    fn serving(files: &[(&str, &[u8])]) -> Self {
+        let files = files.iter().map(|(name, body)| (*name, body.len(), *body));
+        Mirror::declaring(&files.collect::<Vec<_>>())
+    }
+
+    fn declaring(files: &[(&str, usize, &[u8])]) -> Self {
+        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+        let address = format!("http://{}/set", listener.local_addr().unwrap());
+        let files: BTreeMap<String, (usize, Vec<u8>)> = files
+            .iter()
+            .map(|(name, declared, body)| (format!("/set/{name}"), (*declared, body.to_vec())))
+            .collect();
+        let asked = Arc::new(Mutex::new(Vec::new()));
+        let log = Arc::clone(&asked);
+        std::thread::spawn(move || {
+            for stream in listener.incoming().flatten() {
+                answer(stream, &files, &log);
+            }
+        });
+        Mirror { address, asked }
+    }
+
+    fn asked(&self) -> Vec<String> {
+        self.asked.lock().unwrap().clone()
+    }
+}
+
+fn answer(mut stream: TcpStream, files: &BTreeMap<String, (usize, Vec<u8>)>, log: &Mutex<Vec<String>>) {
+    let mut lines = BufReader::new(stream.try_clone().unwrap()).lines().map_while(Result::ok);
+    let Some(request) = lines.next() else { return };
+    lines.take_while(|line| !line.is_empty()).for_each(drop);
+    let path = request.split(' ').nth(1).unwrap_or_default().to_string();
+    let head = |status: &str, length: usize| {
+        format!("HTTP/1.1 {status}\r\nContent-Length: {length}\r\nConnection: close\r\n\r\n")
+    };
+    let reply = match files.get(&path) {
+        Some((declared, body)) => [head("200 OK", *declared).as_bytes(), body].concat(),
+        None => head("404 Not Found", 0).into_bytes(),
+    };
+    log.lock().unwrap().push(path);
+    // A client that has read enough may have gone.
+    let _ = stream.write_all(&reply);
+}
+
+const IMAGES: &[u8] = b"these are the images";
+const LABELS: &[u8] = b"and the labels";
+
+fn catalogue(mirrors: &[&Mirror]) -> Catalogue {
+    let file = |name: &str, content: &[u8]| RemoteFile {
+        name: name.to_string(),
+        bytes: content.len() as u64,
+        sha256: sha256_hex(content),
+    };
+    Catalogue {
+        name: "mnist".to_string(),
+        mirrors: mirrors.iter().map(|m| m.address.clone()).collect(),
+        files: vec![file("images.gz", IMAGES), file("labels.gz", LABELS)],
+    }
+}
+
+fn to(folder: &Path) -> FetchOptions {
+    FetchOptions { to: Some(folder.to_path_buf()), ..FetchOptions::default() }
+}
+
+fn outcomes(fetched: Result<Vec<Fetched>, FetchError>) -> Vec<Outcome> {
+    fetched.unwrap().into_iter().map(|f| f.outcome).collect()
+}
+
+fn names(folder: &Path) -> Vec<String> {
+    let entries = std::fs::read_dir(folder).unwrap();
+    let mut names: Vec<String> = entries.map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
+    names.sort();
+    names
+}
+
+#[derive(Default)]
+struct Log(Vec<String>);
+
+impl FetchObserver for Log {
+    fn begins(&mut self, file: &RemoteFile, _: &str) {
+        self.0.push(format!("begins {}", file.name));
+    }
+    fn received(&mut self, file: &RemoteFile, bytes: u64) {
+        if bytes == file.bytes {
+            self.0.push(format!("received {} of {bytes}", file.name));
+        }
+    }
+    fn failed(&mut self, file: &RemoteFile, _: &Attempt) {
+        self.0.push(format!("failed {}", file.name));
+    }
+    fn done(&mut self, file: &RemoteFile, _: &Fetched) {
+        self.0.push(format!("done {}", file.name));
+    }
+}
+
+#[test]
+fn right_files_are_written_and_then_kept() {
+    let mirror = Mirror::serving(&[("images.gz", IMAGES), ("labels.gz", LABELS)]);
+    let root = tempfile::tempdir().unwrap();
+    let folder = root.path().join("data/mnist");
+    let mut log = Log::default();
+    let fetched = fetch(&catalogue(&[&mirror]), &to(&folder), &mut log);
+    let url = |name: &str| Outcome::Downloaded(format!("{}/{name}", mirror.address));
+    assert_eq!(outcomes(fetched), [url("images.gz"), url("labels.gz")]);
+    assert_eq!(std::fs::read(folder.join("images.gz")).unwrap(), IMAGES);
+    assert_eq!(names(&folder), ["images.gz", "labels.gz"]);
+    assert_eq!(log.0[..3], ["begins images.gz", "received images.gz of 20", "done images.gz"]);
+
+    let again = fetch(&catalogue(&[&mirror]), &to(&folder), &mut ());
+    assert_eq!(outcomes(again), [Outcome::Kept, Outcome::Kept]);
+    assert_eq!(mirror.asked().len(), 2);
+    let forced = FetchOptions { force: true, ..to(&folder) };
+    fetch(&catalogue(&[&mirror]), &forced, &mut ()).unwrap();
+    assert_eq!(mirror.asked().len(), 4);
+}
+
+#[test]
+fn a_file_that_a_mirror_lacks_comes_from_the_next() {
+    let first = Mirror::serving(&[("labels.gz", LABELS)]);
+    let second = Mirror::serving(&[("images.gz", IMAGES), ("labels.gz", LABELS)]);
+    let folder = tempfile::tempdir().unwrap();
+    let mut log = Log::default();
+    let fetched = fetch(&catalogue(&[&first, &second]), &to(folder.path()), &mut log);
+    let url = |mirror: &Mirror, name: &str| Outcome::Downloaded(format!("{}/{name}", mirror.address));
+    assert_eq!(outcomes(fetched), [url(&second, "images.gz"), url(&first, "labels.gz")]);
+    assert_eq!(log.0[..3], ["begins images.gz", "failed images.gz", "begins images.gz"]);
+}
+
+#[test]
+fn wrong_content_is_refused_and_never_reaches_the_disk() {
+    let wrong = Mirror::serving(&[("images.gz", b"those are the images")]);
+    let short = Mirror::serving(&[("images.gz", b"these are the")]);
+    let long = Mirror::serving(&[("images.gz", b"these are the images and more")]);
+    let cut = Mirror::declaring(&[("images.gz", IMAGES.len(), b"these are")]);
+    let absent = Mirror::serving(&[]);
+    let folder = tempfile::tempdir().unwrap();
+    let mirrors = [&wrong, &short, &long, &cut, &absent];
+    let error = fetch(&catalogue(&mirrors), &to(folder.path()), &mut ()).unwrap_err();
+    let message = error.to_string();
+    let FetchError::Mirrors { file, attempts, .. } = error else { panic!("{message}") };
+    let errors: Vec<AttemptError> = attempts.into_iter().map(|a| a.error).collect();
+    assert_eq!(file, "images.gz");
+    assert!(
+        matches!(
+            errors.as_slice(),
+            [
+                AttemptError::Checksum { .. },
+                AttemptError::Size { expected: 20, found: 13 },
+                AttemptError::Size { expected: 20, found: 21 },
+                AttemptError::Read(_),
+                AttemptError::Http(_),
+            ]
+        ),
+        "{errors:?}"
+    );
+    assert!(mirrors.iter().all(|m| message.contains(&m.address)), "{message}");
+    assert!(message.contains("404") && message.contains("--mirror"), "{message}");
+    assert!(names(folder.path()).is_empty());
+}
+
+#[test]
+fn another_file_of_that_name_is_not_replaced_without_force() {
+    let mirror = Mirror::serving(&[("images.gz", IMAGES), ("labels.gz", LABELS)]);
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("labels.gz"), "my own").unwrap();
+    let error = fetch(&catalogue(&[&mirror]), &to(folder.path()), &mut ()).unwrap_err();
+    assert!(matches!(error, FetchError::Differs { .. }) && error.to_string().contains("--force"), "{error}");
+    assert_eq!(names(folder.path()), ["labels.gz"]);
+    assert!(mirror.asked().is_empty());
+
+    let forced = FetchOptions { force: true, ..to(folder.path()) };
+    fetch(&catalogue(&[&mirror]), &forced, &mut ()).unwrap();
+    assert_eq!(std::fs::read(folder.path().join("labels.gz")).unwrap(), LABELS);
+}
+
+#[test]
+fn a_mirror_of_ones_own_is_used_instead_of_the_known_ones() {
+    let known = Mirror::serving(&[("images.gz", IMAGES), ("labels.gz", LABELS)]);
+    let own = Mirror::serving(&[("images.gz", IMAGES), ("labels.gz", LABELS)]);
+    let folder = tempfile::tempdir().unwrap();
+    let options = FetchOptions { mirror: Some(format!("{}/", own.address)), ..to(folder.path()) };
+    fetch(&catalogue(&[&known]), &options, &mut ()).unwrap();
+    assert_eq!(own.asked(), ["/set/images.gz", "/set/labels.gz"]);
+    assert!(known.asked().is_empty());
+}
+
+#[test]
+fn a_dead_mirror_is_an_error_that_names_it() {
+    let closed = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let options = FetchOptions { mirror: Some(format!("http://{closed}")), ..to(folder.path()) };
+    let error = fetch(&catalogue(&[]), &options, &mut ()).unwrap_err().to_string();
+    assert!(error.contains(&closed.to_string()) && error.contains("images.gz"), "{error}");
+}
