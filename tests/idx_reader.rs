@@ -55,8 +55,8 @@ fn real_mnist(test: &str) -> Option<Vec<Place>> {
     let given = places(None, std::env::var_os("MORPHCOG_DATA"), None);
     if given.is_empty() {
         // Not by eprintln!, which the test harness keeps to itself when a test passes.
-        writeln!(std::io::stderr(), "{test}: skipped: MORPHCOG_DATA does not name a folder with MNIST")
-            .unwrap();
+        let mut stderr = std::io::stderr();
+        writeln!(stderr, "{test}: skipped: MORPHCOG_DATA does not name a folder with MNIST").unwrap();
     }
     (!given.is_empty()).then_some(given)
 }
