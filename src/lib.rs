@@ -19,3 +19,4 @@ pub mod qd;
 pub mod run;
 pub mod sim;
 pub mod task;
+pub mod view;

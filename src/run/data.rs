@@ -7,8 +7,6 @@ use crate::task::dataset::{Dataset, DatasetError, Split};
 use crate::task::files::Place;
 use crate::task::info::DatasetInfo;
 use catalogue::Catalogue;
-use std::io::{self, Write};
-use std::path::Path;
 
 /// What there is of a dataset (`morphcog data info`).
 #[derive(Debug)]
@@ -47,27 +45,6 @@ pub fn info(name: &str, given: &[Place]) -> Result<Found, DatasetError> {
     Ok(Found { info, published, problems })
 }
 
-/// Writes a file so that, whatever happens, either the old or the whole new content is there: to a temporary
-/// file in the same folder, synced, renamed.
-///
-/// # Errors
-/// The system's, if the folder does not exist or cannot be written.
-pub fn write_atomically(file: &Path, bytes: &[u8]) -> io::Result<()> {
-    let folder = file.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let mut builder = tempfile::Builder::new();
-    #[cfg(unix)]
-    {
-        use std::os::unix::fs::PermissionsExt;
-        // What an ordinary file gets (the process's umask still applies), not a temporary file's owner-only.
-        builder.permissions(std::fs::Permissions::from_mode(0o666));
-    }
-    let mut temporary = builder.prefix(".morphcog-").tempfile_in(folder)?;
-    temporary.write_all(bytes)?;
-    temporary.as_file().sync_all()?;
-    temporary.persist(file)?;
-    Ok(())
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -86,16 +63,5 @@ mod tests {
         assert!(matches!(found.problems.as_slice(), [(Split::Train, _)]));
         assert!(found.published.is_empty());
         assert_eq!(info("builtin", &[]).unwrap().info.splits.len(), 2);
-    }
-
-    #[test]
-    fn writing_replaces_a_file_whole_and_leaves_nothing_else() {
-        let folder = tempfile::tempdir().unwrap();
-        let file = folder.path().join("a");
-        std::fs::write(&file, "old").unwrap();
-        write_atomically(&file, b"new").unwrap();
-        assert_eq!(std::fs::read(&file).unwrap(), b"new");
-        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
-        assert!(write_atomically(&folder.path().join("no/a"), b"new").is_err());
     }
 }

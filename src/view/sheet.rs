@@ -1,7 +1,7 @@
 //! The contact sheet (`morphcog data sheet`): images side by side, to be judged by eye.
 
 use crate::base::Grid;
-use crate::run::data::write_atomically;
+use crate::base::files::write_atomically;
 use crate::task::dataset::{Dataset, DatasetError, Split};
 use std::io;
 use std::path::{Path, PathBuf};

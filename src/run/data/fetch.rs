@@ -1,7 +1,7 @@
 //! `morphcog data fetch`: downloads the files of a dataset and lets none in that is not the published one.
 
 use super::catalogue::{Catalogue, RemoteFile};
-use super::write_atomically;
+use crate::base::files::write_atomically;
 use crate::base::hash::sha256_hex;
 use crate::task::files::default_folder;
 use std::fmt;
