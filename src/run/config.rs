@@ -236,7 +236,8 @@ impl Config {
         groups.iter().flatten().chain(splits).flatten().copied().collect()
     }
 
-    fn validate(&self) -> Result<(), Error> {
+    /// Checks what a type cannot.
+    pub(super) fn validate(&self) -> Result<(), Error> {
         let refuse = |key: &str, found: String, expected: &str| {
             Err(Error::input(format!("{key} = {found}: expected {expected}")))
         };

@@ -1,9 +1,15 @@
 //! Floor 4: what the commands do, one file per command. Reports through observers, never prints.
 
+pub mod archive;
+pub mod checkpoint;
 pub mod config;
 pub mod data;
 mod error;
+pub mod evolve;
+pub mod folder;
+pub mod metrics;
 mod toml_text;
+pub mod training;
 
 pub use config::Config;
 pub use error::{Error, ErrorKind};

@@ -22,20 +22,22 @@ pub(super) fn read<T: DeserializeOwned>(text: &str, format: Format, name: &str) 
                 refused(name, line_at(text, inner.span()), &error.path().to_string(), inner.message())
             })
         }
-        Format::Json => {
-            let mut reader = serde_json::Deserializer::from_str(text);
-            let value = serde_path_to_error::deserialize(&mut reader).map_err(|error| {
-                let line = Some(error.inner().line()).filter(|&line| line > 0);
-                let message = error.inner().to_string();
-                // serde_json ends its messages with the place, which is said already.
-                let message = message.split(" at line ").next().unwrap_or_default();
-                refused(name, line, &error.path().to_string(), message)
-            })?;
-            let tail =
-                reader.end().map_err(|error| refused(name, Some(error.line()), "", "text after the end"));
-            tail.map(|()| value)
-        }
+        Format::Json => read_json(text, name),
     }
+}
+
+/// Reads a value from JSON; `name` is the file's, for messages.
+pub(super) fn read_json<T: DeserializeOwned>(text: &str, name: &str) -> Result<T, Error> {
+    let mut reader = serde_json::Deserializer::from_str(text);
+    let value = serde_path_to_error::deserialize(&mut reader).map_err(|error| {
+        let line = Some(error.inner().line()).filter(|&line| line > 0);
+        let message = error.inner().to_string();
+        // serde_json ends its messages with the place, which is said already.
+        let message = message.split(" at line ").next().unwrap_or_default();
+        refused(name, line, &error.path().to_string(), message)
+    })?;
+    let tail = reader.end().map_err(|error| refused(name, Some(error.line()), "", "text after the end"));
+    tail.map(|()| value)
 }
 
 fn refused(name: &str, line: Option<usize>, key: &str, message: &str) -> Error {

@@ -1,0 +1,206 @@
+//! `run.json`: a run's archive with everything that made it; the file that `eval` and `replay` read.
+
+use super::training::{DatasetRef, ImageRef};
+use super::{Config, Error};
+use crate::body::{Body, VoxelCounts};
+use crate::genome::Genome;
+use crate::qd::{Archive, ArchiveStats, DescriptorSpace, Elite};
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+
+/// What `run.json` calls itself.
+pub const FORMAT: &str = "morphcog-run";
+/// Version of its schema; a reader refuses newer ones.
+pub const FORMAT_VERSION: u32 = 1;
+
+/// A robot: a genome, its body, and what it did on the training images.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Robot {
+    /// Content hash of the genome (ten hexadecimal digits).
+    pub id: String,
+    /// Its cell, one bin per dimension of the archive.
+    pub cell: Vec<usize>,
+    /// The task it performs, as "0|123": classes before the bar walk one way, the others the other.
+    pub task: String,
+    /// Its fitness, voxel lengths.
+    pub objective: f64,
+    /// Displacement under each training image, voxel lengths, right positive.
+    pub displacements: Vec<f64>,
+    /// Its voxels by kind.
+    pub voxels: VoxelCounts,
+    /// Generation it was born in.
+    pub generation: u64,
+    /// Id of its parent; none for a random individual.
+    pub parent: Option<String>,
+    /// Its body.
+    pub body: Body,
+    /// Its genome.
+    pub genome: Genome,
+}
+
+/// Dimensions of an archive.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Dimensions {
+    /// Names: muscle, sensor, total, and with several tasks, task.
+    pub names: Vec<String>,
+    /// Number of bins of each.
+    pub bins: Vec<usize>,
+    /// Cells that a body can have at all: what coverage is a fraction of.
+    pub possible_cells: usize,
+    /// Names of the tasks, in the order of their bins.
+    pub tasks: Vec<String>,
+}
+
+/// The content of `run.json`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RunFile {
+    /// [`FORMAT`].
+    pub format: String,
+    /// [`FORMAT_VERSION`].
+    pub format_version: u32,
+    /// Version of morphcog that wrote it.
+    pub program_version: String,
+    /// Name of the run: its config's.
+    pub name: String,
+    /// The config, every key resolved; the physics are in it.
+    pub config: Config,
+    /// The data.
+    pub dataset: DatasetRef,
+    /// The training images.
+    pub training_images: Vec<ImageRef>,
+    /// The archive's dimensions.
+    pub dimensions: Dimensions,
+    /// Generations done.
+    pub generations: u64,
+    /// Figures of the archive.
+    pub stats: ArchiveStats,
+    /// The elites, in the order of their cells.
+    pub elites: Vec<Robot>,
+}
+
+impl RunFile {
+    /// Reads `run.json`.
+    ///
+    /// # Errors
+    /// What is wrong with the file, with its line and key.
+    pub fn read(path: &Path) -> Result<Self, Error> {
+        let text = std::fs::read_to_string(path).map_err(|error| Error::reading(path, &error))?;
+        RunFile::parse(&text, &path.display().to_string())
+    }
+
+    /// Reads its text; `name` stands in messages.
+    ///
+    /// # Errors
+    /// As [`RunFile::read`].
+    pub fn parse(text: &str, name: &str) -> Result<Self, Error> {
+        /// What every version has, to tell a newer or foreign file before its details are refused.
+        #[derive(Deserialize)]
+        struct Head {
+            format: Option<String>,
+            format_version: Option<u32>,
+        }
+        let head: Head = super::toml_text::read_json(text, name)?;
+        if head.format.as_deref() != Some(FORMAT) {
+            return Err(Error::input(format!(
+                "{name}: not a run.json of morphcog: expected \"format\": \"{FORMAT}\""
+            )));
+        }
+        if head.format_version.is_none_or(|version| version > FORMAT_VERSION) {
+            let text = format!("{name}: format_version: expected at most {FORMAT_VERSION}");
+            return Err(
+                Error::input(text).hint("it was written by a newer morphcog; update this one".to_string())
+            );
+        }
+        let run: RunFile = super::toml_text::read_json(text, name)?;
+        run.check().map_err(|error| error.within(name))?;
+        Ok(run)
+    }
+
+    fn check(&self) -> Result<(), Error> {
+        self.config.validate()?;
+        let space = self.space();
+        for robot in &self.elites {
+            let refuse = |what: &str| Err(Error::input(format!("elite {}: {what}", robot.id)));
+            let (height, width) = (self.config.body.height, self.config.body.width);
+            if (robot.body.height(), robot.body.width()) != (height, width) {
+                return refuse(&format!("its body is not {height} × {width} voxels, as the config says"));
+            }
+            if space.index(&robot.cell).is_none() {
+                return refuse("there is no such cell in the archive");
+            }
+            if robot.displacements.len() != self.training_images.len() {
+                return refuse("it has not one displacement per training image");
+            }
+        }
+        Ok(())
+    }
+
+    fn space(&self) -> DescriptorSpace {
+        let Dimensions { names, bins, .. } = &self.dimensions;
+        DescriptorSpace::new(names.iter().cloned().zip(bins.iter().copied()).collect())
+    }
+
+    /// The elites as an archive to go on with.
+    ///
+    /// # Errors
+    /// If two elites are in one cell.
+    pub fn archive(&self) -> Result<Archive<Robot>, Error> {
+        let space = self.space();
+        let mut archive = Archive::new();
+        for robot in &self.elites {
+            let cell = space.index(&robot.cell).unwrap_or_default();
+            if archive.get(cell).is_some() {
+                return Err(Error::input(format!("elite {}: another one is in its cell", robot.id)));
+            }
+            let elite = Elite { cell, objective: robot.objective, solution: robot.clone() };
+            archive.insert(elite).map_err(|error| Error::input(error.to_string()))?;
+        }
+        Ok(archive)
+    }
+
+    /// Its text: the head on one line, then one line per elite.
+    pub fn to_json(&self) -> String {
+        let head = RunFile { elites: Vec::new(), ..self.clone() };
+        // Numbers are finite and keys are text: JSON has all of it.
+        let head = serde_json::to_string(&head).unwrap_or_default();
+        let lines: Vec<String> =
+            self.elites.iter().map(|robot| serde_json::to_string(robot).unwrap_or_default()).collect();
+        // `elites` is the last key.
+        let head = head.strip_suffix("]}").unwrap_or(&head);
+        format!("{head}\n{}\n]}}\n", lines.join(",\n"))
+    }
+
+    /// `elites.csv`: what pyribs' `ArchiveDataFrame` reads. `index`: cell; `objective`; `measures_i`: voxel counts (and task); `solution_i`:
+    /// voxels row-major; then id, task, generation and displacements.
+    ///
+    /// # Errors
+    /// If it cannot be written to memory.
+    pub fn to_csv(&self) -> Result<Vec<u8>, csv::Error> {
+        let space = self.space();
+        let voxels = self.config.body.height * self.config.body.width;
+        let numbered =
+            |name: &str, count: usize| (0..count).map(|i| format!("{name}_{i}")).collect::<Vec<_>>();
+        let mut header = vec!["index".to_string(), "objective".to_string()];
+        header.extend(numbered("measures", self.dimensions.bins.len()));
+        header.extend(numbered("solution", voxels));
+        header.extend(["id", "task", "generation"].map(str::to_string));
+        header.extend(numbered("displacement", self.training_images.len()));
+        let mut writer = csv::Writer::from_writer(Vec::new());
+        writer.write_record(&header)?;
+        for robot in &self.elites {
+            let index = space.index(&robot.cell).unwrap_or_default();
+            let VoxelCounts { muscle, sensor, total } = robot.voxels;
+            let mut row = vec![index.to_string(), robot.objective.to_string()];
+            row.extend([muscle, sensor, total].map(|count| count.to_string()));
+            row.extend(robot.cell.get(3).map(usize::to_string));
+            row.extend(robot.body.voxels().cells().iter().map(|material| material.code().to_string()));
+            row.extend([robot.id.clone(), robot.task.clone(), robot.generation.to_string()]);
+            row.extend(robot.displacements.iter().map(f64::to_string));
+            writer.write_record(&row)?;
+        }
+        writer.into_inner().map_err(|error| csv::Error::from(error.into_error()))
+    }
+}

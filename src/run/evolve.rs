@@ -1,0 +1,359 @@
+//! `morphcog evolve`: MAP-Elites over bodies, resumable, the same bits however it is run.
+
+use super::archive::{Dimensions, FORMAT, FORMAT_VERSION, Robot, RunFile};
+use super::checkpoint::{self, Checkpoint, KnownBodies};
+use super::folder::{self, IfExists, RunFolder};
+use super::metrics::{Metrics, Totals};
+use super::training::Training;
+use super::{Config, Error};
+use crate::base::files::write_atomically;
+use crate::base::random::{Purpose, stream};
+use crate::body::Body;
+use crate::genome::{BodySpec, Genome, GenomeError, MutationParams};
+use crate::qd::descriptor::{count_bin, possible_cells};
+use crate::qd::{Archive, ArchiveStats, DescriptorSpace, Evaluated, MapElites, Variation};
+use crate::task::evaluation::{Job, Outcome, Savings, evaluate};
+use crate::task::grouping::Grouping;
+use rayon::prelude::*;
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+/// What to evolve and where to.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// Everything the result depends on.
+    pub config: Config,
+    /// Name of the run.
+    pub name: String,
+    /// Its folder.
+    pub out: PathBuf,
+    /// What to do if there is a run in it.
+    pub if_exists: IfExists,
+    /// Where the data are, if the command line says.
+    pub data: Option<PathBuf>,
+    /// Number of threads; `None`: one per core.
+    pub threads: Option<usize>,
+}
+
+/// How far a run is.
+#[derive(Clone, Copy, Debug)]
+pub struct Progress {
+    /// Generations done.
+    pub done: u64,
+    /// Generations to be done in all.
+    pub generations: u64,
+    /// Figures of the archive.
+    pub stats: ArchiveStats,
+    /// Counts so far.
+    pub totals: Totals,
+}
+
+/// Who is told how a run goes.
+pub trait Observer {
+    /// Before the first generation of this session.
+    fn started(&mut self, folder: &RunFolder, training: &Training, progress: &Progress);
+    /// After every generation.
+    fn generation(&mut self, progress: &Progress);
+    /// Something the user should know.
+    fn warning(&mut self, text: &str);
+}
+
+/// How a session of a run ended.
+#[derive(Clone, Debug)]
+pub struct Finished {
+    /// The run as it stands in `run.json`.
+    pub run: RunFile,
+    /// Counts of the whole run.
+    pub totals: Totals,
+    /// Whether a signal stopped it before its last generation.
+    pub stopped: bool,
+}
+
+/// Runs a config, or goes on with a run. `stop` is looked at after every generation.
+///
+/// # Errors
+/// What is wrong with config, data or folder; nothing that was there is lost.
+pub fn evolve(
+    options: &Options,
+    stop: &AtomicBool,
+    observer: &mut (dyn Observer + Send),
+) -> Result<Finished, Error> {
+    let config = &options.config;
+    let training = Training::load(config, options.data.as_deref())?;
+    let folder = RunFolder::open(&options.out, options.if_exists)?;
+    let saved = match options.if_exists {
+        IfExists::Resume => checkpoint::read(folder.path(), |text| observer.warning(&text))?,
+        _ => None,
+    };
+    if let Some(saved) = &saved {
+        compatible(saved, config, &training)
+            .map_err(|error| error.within(&options.out.display().to_string()))?;
+    }
+    let write = |name: &str, content: &[u8]| {
+        let path = folder.path().join(name);
+        write_atomically(&path, content).map_err(|error| Error::writing(&path, &error))
+    };
+    write(folder::CONFIG, config.to_toml().as_bytes())?;
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(options.threads.unwrap_or(0)).build();
+    let pool = pool.map_err(|error| Error::other(format!("no threads: {error}")))?;
+    let mut run = Run::new(options, &training, saved)?;
+    let mut metrics = Metrics::open(folder.path(), run.generation)?;
+    pool.install(|| run.live(&folder, &mut metrics, stop, observer))?;
+    metrics.flush()?;
+    let file = run.save(&folder)?;
+    let stopped = run.generation < config.generations;
+    Ok(Finished { run: file, totals: run.totals(), stopped })
+}
+
+/// Whether a saved run can be gone on with under a config: all that its results depend on must be the same.
+fn compatible(saved: &Checkpoint, config: &Config, training: &Training) -> Result<(), Error> {
+    let essence = |config: &Config| Config {
+        generations: 1,
+        savings: Savings::default(),
+        checkpoint: Default::default(),
+        data: crate::run::config::DataConfig { dir: None, ..config.data.clone() },
+        ..config.clone()
+    };
+    let hint = "resume with the config it was started with, or start anew with --force".to_string();
+    let (theirs, ours) = (essence(&saved.run.config).to_toml(), essence(config).to_toml());
+    if let Some((theirs, ours)) = theirs.lines().zip(ours.lines()).find(|(theirs, ours)| theirs != ours) {
+        let text =
+            format!("the run in this folder has another config: it says {theirs}, now {ours} is asked for");
+        return Err(Error::input(text).hint(hint));
+    }
+    if saved.run.dataset != training.dataset || saved.run.training_images != training.images {
+        let text = "the run in this folder was made with other images: the dataset has changed".to_string();
+        return Err(Error::input(text).hint(hint));
+    }
+    Ok(())
+}
+
+/// A run under way.
+struct Run<'a> {
+    options: &'a Options,
+    training: &'a Training,
+    grouping: Grouping,
+    space: DescriptorSpace,
+    possible: usize,
+    search: MapElites<Robot>,
+    known: KnownBodies,
+    totals: Totals,
+    /// Generations done.
+    generation: u64,
+    began: Instant,
+}
+
+/// How genomes vary in this run.
+struct Mutations<'a> {
+    seed: u64,
+    spec: BodySpec,
+    params: &'a MutationParams,
+}
+
+/// A robot that has not lived yet.
+fn newborn((genome, body): (Genome, Body), generation: u64, parent: Option<&Robot>) -> Robot {
+    Robot {
+        id: genome.id(),
+        cell: Vec::new(),
+        task: String::new(),
+        objective: 0.0,
+        displacements: Vec::new(),
+        voxels: body.counts(),
+        generation,
+        parent: parent.map(|parent| parent.id.clone()),
+        body,
+        genome,
+    }
+}
+
+impl Variation<Robot> for Mutations<'_> {
+    type Error = GenomeError;
+
+    fn newcomer(&self, generation: u64, child: u64) -> Result<Robot, GenomeError> {
+        let rng = &mut stream(self.seed, Purpose::Newcomer, generation, child);
+        Ok(newborn(Genome::random(self.spec, self.params, rng)?, generation, None))
+    }
+
+    fn offspring(&self, parent: &Robot, generation: u64, child: u64) -> Result<Robot, GenomeError> {
+        let rng = &mut stream(self.seed, Purpose::Mutation, generation, child);
+        let made = parent.genome.offspring(self.spec, self.params, rng)?;
+        Ok(newborn(made, generation, Some(parent)))
+    }
+}
+
+impl<'a> Run<'a> {
+    fn new(options: &'a Options, training: &'a Training, saved: Option<Checkpoint>) -> Result<Self, Error> {
+        let config = &options.config;
+        let grouping = config.grouping()?;
+        let tasks = grouping.tasks().len();
+        let area = config.body.height * config.body.width;
+        let (archive, known, totals, generation) = match saved {
+            Some(saved) => (saved.run.archive()?, saved.known_bodies, saved.totals, saved.run.generations),
+            None => (Archive::new(), KnownBodies::default(), Totals::default(), 0),
+        };
+        Ok(Run {
+            options,
+            training,
+            grouping,
+            space: DescriptorSpace::voxel_counts(tasks),
+            possible: possible_cells(area, config.body.min_muscles, tasks).len(),
+            search: MapElites::new(config.seed, config.map_elites.clone(), archive),
+            known,
+            totals,
+            generation,
+            began: Instant::now(),
+        })
+    }
+
+    /// Counts so far, with the time of this session.
+    fn totals(&self) -> Totals {
+        Totals { seconds: self.totals.seconds + self.began.elapsed().as_secs_f64(), ..self.totals }
+    }
+
+    fn progress(&self) -> Progress {
+        let (done, generations) = (self.generation, self.options.config.generations);
+        Progress { done, generations, stats: self.stats(), totals: self.totals() }
+    }
+
+    fn stats(&self) -> ArchiveStats {
+        self.search.archive().stats(self.possible, self.options.config.archive.qd_offset)
+    }
+
+    fn live(
+        &mut self,
+        folder: &RunFolder,
+        metrics: &mut Metrics,
+        stop: &AtomicBool,
+        observer: &mut (dyn Observer + Send),
+    ) -> Result<(), Error> {
+        let config = &self.options.config;
+        observer.started(folder, self.training, &self.progress());
+        let every = Duration::try_from_secs_f64(config.checkpoint.seconds).unwrap_or(Duration::MAX);
+        let mut saved = Instant::now();
+        while self.generation < config.generations && !stop.load(Ordering::Relaxed) {
+            self.next_generation()?;
+            let progress = self.progress();
+            metrics.write(self.generation - 1, &progress.stats, &progress.totals)?;
+            observer.generation(&progress);
+            if self.generation.is_multiple_of(config.checkpoint.generations) || saved.elapsed() >= every {
+                metrics.flush()?;
+                self.save(folder)?;
+                saved = Instant::now();
+            }
+        }
+        Ok(())
+    }
+
+    /// Makes, evaluates and tells one generation.
+    fn next_generation(&mut self) -> Result<(), Error> {
+        let config = &self.options.config;
+        let mutations = Mutations { seed: config.seed, spec: config.body_spec(), params: &config.genome };
+        let proposals = self.search.ask(self.generation);
+        let robots: Result<Vec<Robot>, GenomeError> =
+            proposals.par_iter().map(|&proposal| self.search.make(proposal, &mutations)).collect();
+        let robots = robots.map_err(|error| Error::input(format!("body: {error}")))?;
+        self.totals.evaluations += robots.len() as u64;
+
+        let images = self.training.stimuli.len() as u64;
+        let mut fresh = Vec::new();
+        for (proposal, robot) in proposals.iter().zip(robots) {
+            let is_new = self.known.insert(robot.body.key());
+            if is_new || !config.savings.known_bodies {
+                fresh.push((proposal, robot));
+            } else {
+                self.totals.saved_known_bodies += images;
+            }
+        }
+        let jobs: Vec<Job> = fresh.iter().map(|(proposal, robot)| self.job(proposal.parent, robot)).collect();
+        let evaluations =
+            evaluate(&jobs, &self.training.stimuli, &config.physics, &config.protocol, config.savings);
+        drop(jobs);
+
+        let mut told = Vec::new();
+        for ((proposal, robot), evaluation) in fresh.into_iter().zip(evaluations) {
+            self.totals.count(&evaluation);
+            match evaluation.outcome {
+                Outcome::Walked(displacements) => {
+                    told.push(self.scored(proposal.child, robot, displacements))
+                }
+                Outcome::Unstable(_) => self.totals.unstable += 1,
+                Outcome::Stopped => {}
+            }
+        }
+        self.search.tell(told).map_err(|error| Error::other(error.to_string()))?;
+        self.generation += 1;
+        Ok(())
+    }
+
+    /// Bins of the three voxel counts.
+    fn bins(&self, robot: &Robot) -> Vec<usize> {
+        let area = robot.body.voxels().area();
+        let counts = robot.voxels;
+        [counts.muscle, counts.sensor, counts.total].map(|count| count_bin(count, area)).to_vec()
+    }
+
+    /// Coordinates of the cell of a robot that performs a task.
+    fn cell(&self, mut bins: Vec<usize>, task: usize) -> Vec<usize> {
+        bins.extend((self.grouping.tasks().len() > 1).then_some(task));
+        bins
+    }
+
+    fn job<'b>(&'b self, parent: Option<usize>, robot: &'b Robot) -> Job<'b> {
+        let archive = self.search.archive();
+        let parent = parent.and_then(|cell| archive.get(cell)).map(|elite| &elite.solution.displacements);
+        let least =
+            |d: &Vec<f64>| d.iter().enumerate().min_by(|a, b| a.1.abs().total_cmp(&b.1.abs())).map(|m| m.0);
+        let bins = self.bins(robot);
+        let may_win = move |known: &[Option<f64>]| {
+            let incumbent = |task| archive.objective(self.space.index(&self.cell(bins.clone(), task))?);
+            self.training.may_win(&self.grouping, known, incumbent)
+        };
+        let first_image = parent.and_then(least).unwrap_or(0);
+        Job { body: &robot.body, first_image, may_win: Box::new(may_win) }
+    }
+
+    fn scored(&self, child: u64, robot: Robot, displacements: Vec<f64>) -> Evaluated<Robot> {
+        let answers = self.training.answers(displacements.iter().copied().map(Some));
+        let score = self.grouping.score(&answers);
+        let coordinates = self.cell(self.bins(&robot), score.task);
+        // The coordinates are bins of this very space.
+        let cell = self.space.index(&coordinates).unwrap_or_default();
+        let task = self.grouping.tasks()[score.task].name();
+        let objective = score.fitness;
+        let solution = Robot { cell: coordinates, task, objective, displacements, ..robot };
+        Evaluated { child, cell, objective, solution }
+    }
+
+    /// Writes checkpoint, `run.json` and `elites.csv`.
+    fn save(&self, folder: &RunFolder) -> Result<RunFile, Error> {
+        let run = self.file();
+        let checkpoint = Checkpoint { run, totals: self.totals(), known_bodies: self.known.clone() };
+        checkpoint::write(folder.path(), &checkpoint)?;
+        let run = checkpoint.run;
+        let csv = run.to_csv().map_err(|error| Error::other(error.to_string()))?;
+        for (name, content) in [(folder::RUN_JSON, run.to_json().into_bytes()), (folder::ELITES, csv)] {
+            let path = folder.path().join(name);
+            write_atomically(&path, &content).map_err(|error| Error::writing(&path, &error))?;
+        }
+        Ok(run)
+    }
+
+    fn file(&self) -> RunFile {
+        let (names, bins) = self.space.dimensions().iter().cloned().unzip();
+        let tasks = self.grouping.tasks().iter().map(|split| split.name()).collect();
+        RunFile {
+            format: FORMAT.to_string(),
+            format_version: FORMAT_VERSION,
+            program_version: env!("CARGO_PKG_VERSION").to_string(),
+            name: self.options.name.clone(),
+            config: self.options.config.clone(),
+            dataset: self.training.dataset.clone(),
+            training_images: self.training.images.clone(),
+            dimensions: Dimensions { names, bins, possible_cells: self.possible, tasks },
+            generations: self.generation,
+            stats: self.stats(),
+            elites: self.search.archive().elites().map(|elite| elite.solution.clone()).collect(),
+        }
+    }
+}

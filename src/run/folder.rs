@@ -1,0 +1,98 @@
+//! A run's folder: made, locked, and never overwritten by accident.
+
+use super::{Error, checkpoint};
+use std::fs::{File, TryLockError};
+use std::path::{Path, PathBuf};
+
+/// Files a run writes into its folder.
+pub const RUN_JSON: &str = "run.json";
+/// The resolved config.
+pub const CONFIG: &str = "config.toml";
+/// The elites for pyribs.
+pub const ELITES: &str = "elites.csv";
+/// Figures per generation.
+pub const METRICS: &str = "metrics.csv";
+const LOCK: &str = ".lock";
+
+/// What to do with a folder that holds a run already.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum IfExists {
+    /// Refuse.
+    Refuse,
+    /// Go on with the run in it.
+    Resume,
+    /// Delete the run in it.
+    Overwrite,
+}
+
+/// A run's folder, in use by this process as long as the value lives.
+#[derive(Debug)]
+pub struct RunFolder {
+    path: PathBuf,
+    /// The operating system lets the lock go when the process ends, however it ends.
+    _lock: File,
+}
+
+impl RunFolder {
+    /// Makes the folder if there is none, and takes it into use.
+    ///
+    /// # Errors
+    /// If another process uses it, or it holds a run and `if_exists` says to refuse, or it cannot be written.
+    pub fn open(path: &Path, if_exists: IfExists) -> Result<Self, Error> {
+        std::fs::create_dir_all(path).map_err(|error| Error::writing(path, &error))?;
+        let holds_run = RunFolder::files().iter().any(|name| path.join(name).exists());
+        if holds_run && if_exists == IfExists::Refuse {
+            let text = format!("{}: there is a run in this folder already", path.display());
+            let hint = "go on with it by --resume, write elsewhere with --out, or replace it by --force";
+            return Err(Error::occupied(text).hint(hint.to_string()));
+        }
+        let lock = path.join(LOCK);
+        let file = File::options().create(true).truncate(false).write(true).open(&lock);
+        let file = file.map_err(|error| Error::writing(&lock, &error))?;
+        match file.try_lock() {
+            Ok(()) => {}
+            Err(TryLockError::WouldBlock) => {
+                let text = format!("{}: another morphcog is using this run folder", path.display());
+                return Err(Error::occupied(text)
+                    .hint("wait for it to end, or write elsewhere with --out".to_string()));
+            }
+            Err(TryLockError::Error(error)) => return Err(Error::writing(&lock, &error)),
+        }
+        if if_exists == IfExists::Overwrite {
+            for name in RunFolder::files() {
+                let file = path.join(name);
+                match std::fs::remove_file(&file) {
+                    Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+                        return Err(Error::writing(&file, &error));
+                    }
+                    _ => {}
+                }
+            }
+        }
+        Ok(RunFolder { path: path.to_path_buf(), _lock: file })
+    }
+
+    /// Where it is.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    fn files() -> [&'static str; 6] {
+        let [newest, previous] = checkpoint::NAMES;
+        [RUN_JSON, CONFIG, ELITES, METRICS, newest, previous]
+    }
+}
+
+/// The run.json under `runs/` that was written last: what commands look at when they are not told.
+///
+/// # Errors
+/// If there is none.
+pub fn newest_run() -> Result<PathBuf, Error> {
+    let runs = std::fs::read_dir("runs").into_iter().flatten().flatten();
+    let files = runs.map(|entry| entry.path().join(RUN_JSON));
+    let dated = files.filter_map(|file| Some((file.metadata().ok()?.modified().ok()?, file)));
+    dated.max().map(|(_, file)| file).ok_or_else(|| {
+        let hint = "name one with --archive, or make one: morphcog evolve --config quickstart.toml";
+        Error::input("there is no run under runs/".to_string()).hint(hint.to_string())
+    })
+}

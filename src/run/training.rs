@@ -1,0 +1,122 @@
+//! [`Training`]: the images a run evolves on, as its robots see them.
+
+use super::{Config, Error};
+use crate::base::Grid;
+use crate::task::dataset::{BUILTIN, Dataset, DatasetError, Split};
+use crate::task::files::places;
+use crate::task::grouping::Grouping;
+use crate::task::score::Answer;
+use crate::task::stimulus::stimulus;
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+
+/// An image by its place in a dataset.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ImageRef {
+    /// Index in its split.
+    pub index: usize,
+    /// Its class.
+    pub label: u8,
+}
+
+/// Which data a run was made with, wherever they lay: the same data have the same fingerprint.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct DatasetRef {
+    /// Name of the dataset.
+    pub name: String,
+    /// SHA-256 of the training split's content.
+    pub train_sha256: String,
+}
+
+/// The images a run evolves on.
+#[derive(Clone, Debug)]
+pub struct Training {
+    /// Where they come from.
+    pub dataset: DatasetRef,
+    /// The images, in the order in which a sequential life sees them.
+    pub images: Vec<ImageRef>,
+    /// What the sensors see of each: H × W in [0, 1].
+    pub stimuli: Vec<Grid<f64>>,
+}
+
+/// Loads the dataset of a config; `data` is the folder given on the command line.
+///
+/// # Errors
+/// What is missing or broken, where it was looked for and what to do.
+pub fn load_dataset(config: &Config, data: Option<&Path>, wanted: &[Split]) -> Result<Dataset, Error> {
+    let refuse = |error: DatasetError| Error::input(error.to_string());
+    if config.data.dataset == BUILTIN {
+        return Dataset::builtin(config.data.builtin.clone(), wanted).map_err(refuse);
+    }
+    let given = places(data, std::env::var_os("MORPHCOG_DATA"), config.data.dir.as_deref());
+    Dataset::load(&config.data.dataset, &given, wanted).map_err(refuse)
+}
+
+/// What a robot of a config sees of an image.
+///
+/// # Errors
+/// If the image does not go with the body's size.
+pub fn see(config: &Config, dataset: &Dataset, split: Split, index: usize) -> Result<Grid<f64>, Error> {
+    let image = dataset.image(split, index).map_err(|error| Error::input(error.to_string()))?;
+    let (height, width) = (config.body.height, config.body.width);
+    stimulus(&image, height, width, &config.stimulus)
+        .map_err(|error| Error::input(format!("stimulus.reduction: {error}")))
+}
+
+impl Training {
+    /// The training images of a config.
+    ///
+    /// # Errors
+    /// If the data are missing or broken, or an image is of a class that is not in the task, or a class has no image.
+    pub fn load(config: &Config, data: Option<&Path>) -> Result<Self, Error> {
+        let dataset = load_dataset(config, data, &[Split::Train])?;
+        let refuse = |error: DatasetError| Error::input(format!("data.train_images: {error}"));
+        let classes = config.classes();
+        let indices = match &config.data.train_images {
+            Some(indices) => indices.clone(),
+            None => dataset
+                .draw(Split::Train, &classes, config.data.images_per_class, config.seed, 0)
+                .map_err(refuse)?,
+        };
+        let mut images = Vec::new();
+        let mut stimuli = Vec::new();
+        for index in indices {
+            let label = dataset.label(Split::Train, index).map_err(refuse)?;
+            if !classes.contains(&label) {
+                let text =
+                    format!("data.train_images: image {index} shows a {label}, expected one of {classes:?}");
+                return Err(Error::input(text).hint("see [task] for the classes".to_string()));
+            }
+            stimuli.push(see(config, &dataset, Split::Train, index)?);
+            images.push(ImageRef { index, label });
+        }
+        if let Some(class) = classes.iter().find(|&&class| images.iter().all(|image| image.label != class)) {
+            return Err(Error::input(format!(
+                "data.train_images: expected an image of class {class}, found none"
+            )));
+        }
+        let train_sha256 = dataset.fingerprint(Split::Train).unwrap_or_default();
+        let dataset = DatasetRef { name: dataset.name().to_string(), train_sha256 };
+        Ok(Training { dataset, images, stimuli })
+    }
+
+    /// The answers that displacements under the images are; `None` where unknown.
+    pub fn answers(&self, displacements: impl IntoIterator<Item = Option<f64>>) -> Vec<Answer> {
+        let answer = |(image, displacement): (&ImageRef, Option<f64>)| {
+            Some(Answer { class: image.label, displacement: displacement? })
+        };
+        self.images.iter().zip(displacements).filter_map(answer).collect()
+    }
+
+    /// Whether a robot with some displacements known may still enter a cell whose elite has `incumbent(task)`.
+    pub fn may_win(
+        &self,
+        grouping: &Grouping,
+        known: &[Option<f64>],
+        incumbent: impl Fn(usize) -> Option<f64>,
+    ) -> bool {
+        let unknown = self.images.iter().zip(known).filter(|(_, displacement)| displacement.is_none());
+        let to_come: Vec<u8> = unknown.map(|(image, _)| image.label).collect();
+        grouping.can_still_win(&self.answers(known.iter().copied()), &to_come, incumbent)
+    }
+}
