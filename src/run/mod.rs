@@ -7,7 +7,10 @@ pub mod data;
 mod error;
 pub mod evolve;
 pub mod folder;
+pub mod gallery;
 pub mod metrics;
+pub mod robots;
+pub mod simulate;
 mod toml_text;
 pub mod training;
 

@@ -1,0 +1,207 @@
+//! `morphcog simulate`: any body under any stimuli.
+
+use super::{Error, toml_text};
+use crate::base::Grid;
+use crate::body::Body;
+use crate::sim::{Lattice, Physics, Start, World};
+use serde::Deserialize;
+use serde::de::IgnoredAny;
+use std::path::Path;
+
+/// A body, what it sees, and for how long. The keys of a reference trajectory are understood too; its results are passed over.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Scenario {
+    /// The body, rows of 0…6.
+    pub body: Body,
+    /// One stimulus for the whole life: H × W in [0, 1].
+    stimulus: Option<Grid<f64>>,
+    /// Or several, each shown for `switch_every` control steps, again from the first after the last.
+    stimuli: Option<Vec<Grid<f64>>>,
+    switch_every: Option<u64>,
+    /// Whether the robot goes back to its initial state at every switch.
+    #[serde(default)]
+    reset_between: bool,
+    /// Grid column of the body's left edge.
+    #[serde(default = "paper_column")]
+    start_column: i64,
+    /// Grid row of its bottom row; 2 is on the ground.
+    start_row: Option<u32>,
+    /// Control steps in all.
+    control_steps: Option<u64>,
+    /// The constants of the simulator, where they differ from the defaults.
+    #[serde(default)]
+    physics: Physics,
+    #[serde(default, rename = "name")]
+    _name: IgnoredAny,
+    #[serde(default, rename = "world_width")]
+    _world_width: IgnoredAny,
+    #[serde(default, rename = "unstable_at")]
+    _unstable_at: IgnoredAny,
+    #[serde(default, rename = "com")]
+    _com: IgnoredAny,
+    #[serde(default, rename = "points")]
+    _points: IgnoredAny,
+    #[serde(default, rename = "displacement_voxels")]
+    _displacement: IgnoredAny,
+    #[serde(default, rename = "displacement_voxels_shifted_world")]
+    _displacement_shifted: IgnoredAny,
+}
+
+fn paper_column() -> i64 {
+    493
+}
+
+/// Default length of a life: ten actuation cycles.
+const CONTROL_STEPS: u64 = 500;
+
+/// Farthest start column either way: world coordinates stay exact to far below a voxel.
+const MAX_COLUMN: i64 = 1_000_000;
+
+impl Scenario {
+    /// Reads a scenario.
+    ///
+    /// # Errors
+    /// What is wrong with the file, with its line and key.
+    pub fn read(path: &Path) -> Result<Self, Error> {
+        let text = std::fs::read_to_string(path).map_err(|error| Error::reading(path, &error))?;
+        let name = path.display().to_string();
+        let scenario: Scenario = toml_text::read_json(&text, &name)?;
+        scenario.check().map_err(|error| error.within(&name))?;
+        Ok(scenario)
+    }
+
+    fn check(&self) -> Result<(), Error> {
+        let refuse = |text: String| Err(Error::input(text));
+        self.physics.validate().map_err(|error| Error::input(format!("physics.{error}")))?;
+        if self.body.counts().total == 0 {
+            return refuse("body: expected at least one voxel that is not empty".to_string());
+        }
+        match (&self.stimulus, &self.stimuli, self.switch_every) {
+            (Some(_), Some(_), _) => {
+                return refuse("stimuli: expected either stimulus or stimuli, not both".to_string());
+            }
+            (_, Some(stimuli), _) if stimuli.is_empty() => {
+                return refuse("stimuli: expected at least one stimulus".to_string());
+            }
+            (_, Some(_), None | Some(0)) => {
+                return refuse("switch_every: expected 1 or more control steps with stimuli".to_string());
+            }
+            (_, None, Some(_)) => return refuse("switch_every: expected only with stimuli".to_string()),
+            _ => {}
+        }
+        for (index, stimulus) in self.stimuli().iter().enumerate() {
+            let key =
+                if self.stimuli.is_some() { format!("stimuli[{index}]") } else { "stimulus".to_string() };
+            let (height, width) = (self.body.height(), self.body.width());
+            if (stimulus.height(), stimulus.width()) != (height, width) {
+                let (rows, columns) = (stimulus.height(), stimulus.width());
+                return refuse(format!(
+                    "{key}: {rows} × {columns} pixels, expected {height} × {width} as the body"
+                ));
+            }
+            if let Some(((row, column), pixel)) =
+                stimulus.iter().find(|(_, pixel)| !(0.0..=1.0).contains(*pixel))
+            {
+                return refuse(format!("{key}: row {row}, column {column}: {pixel}, expected 0 to 1"));
+            }
+        }
+        let ground = self.physics.ground_row;
+        if self.start_row.is_some_and(|row| row < ground) {
+            return refuse(format!("start_row: expected {ground} (on the ground) or more"));
+        }
+        if self.start_column.abs() > MAX_COLUMN {
+            return refuse(format!("start_column: expected −{MAX_COLUMN} to {MAX_COLUMN}"));
+        }
+        Ok(())
+    }
+
+    fn stimuli(&self) -> &[Grid<f64>] {
+        self.stimuli.as_deref().unwrap_or(self.stimulus.as_slice())
+    }
+
+    /// Control steps of the life.
+    pub fn control_steps(&self) -> u64 {
+        let shown = self.switch_every.map(|every| every.saturating_mul(self.stimuli().len() as u64));
+        self.control_steps.or(shown).unwrap_or(CONTROL_STEPS)
+    }
+}
+
+/// Lives the scenario; `row` gets the control step (0: the start) and the centre of mass \[world units\] after it.
+///
+/// # Errors
+/// [`super::ErrorKind::Unstable`] if the life ends early, and what `row` says.
+pub fn simulate(
+    scenario: &Scenario,
+    mut row: impl FnMut(u64, [f64; 2]) -> Result<(), Error>,
+) -> Result<(), Error> {
+    let physics = &scenario.physics;
+    let lattice = Lattice::new(&scenario.body, physics);
+    let start_row = scenario.start_row.unwrap_or(physics.ground_row);
+    let mut world = World::new(&lattice, physics, Start { column: scenario.start_column, row: start_row });
+    let offset = scenario.start_column as f64 * physics.cell_size;
+    let place = |world: &World| {
+        let [x, y] = world.centre_of_mass();
+        [x + offset, y]
+    };
+    let stimuli = scenario.stimuli();
+    row(0, place(&world))?;
+    for step in 0..scenario.control_steps() {
+        let every = scenario.switch_every.unwrap_or(u64::MAX);
+        if step % every == 0 && !stimuli.is_empty() {
+            let index = (step / every) % stimuli.len() as u64;
+            world.set_stimulus(&stimuli[index as usize]);
+            if scenario.reset_between {
+                world.reset();
+            }
+        }
+        world.step().map_err(|unstable| {
+            // With resets the life's own clock starts again; what is reported counts the scenario's steps.
+            let unstable = crate::sim::Unstable { control_step: step, ..unstable };
+            Error::unstable(unstable.to_string())
+        })?;
+        row(step + 1, place(&world))?;
+    }
+    Ok(())
+}
+
+/// A number with 17 significant digits, which name every f64.
+pub fn digits17(value: f64) -> String {
+    let before = if value == 0.0 { 0.0 } else { value.abs().log10().floor() };
+    let decimals = (16.0 - before).clamp(0.0, 40.0) as usize;
+    format!("{value:.decimals$}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn seventeen_digits_name_every_number() {
+        for value in
+            [19.9605633802817, 1.0 / 3.0, 1e-9, -123456.789, 0.1 + 0.2, 0.0, 1e20, 9.99999999999999999]
+        {
+            assert_eq!(digits17(value).parse::<f64>().unwrap(), value, "{}", digits17(value));
+        }
+        assert_eq!(digits17(0.5), "0.50000000000000000");
+    }
+
+    fn refused(text: &str) -> String {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("scenario.json");
+        std::fs::write(&path, text).unwrap();
+        Scenario::read(&path).unwrap_err().message
+    }
+
+    #[test]
+    fn what_is_wrong_with_a_scenario_is_said_with_its_key() {
+        assert!(refused("{}").contains("missing field `body`"));
+        assert!(refused("{\"body\": [[3, 9]]}").contains("body"));
+        assert!(refused("{\"body\": [[0, 0]]}").contains("not empty"));
+        assert!(refused("{\"body\": [[3]],\n\"control_step\": 5}").contains(":2: "));
+        assert!(refused("{\"body\": [[3]], \"stimulus\": [[0.5, 1]]}").contains("1 × 2 pixels"));
+        assert!(refused("{\"body\": [[3]], \"stimulus\": [[1.5]]}").contains("expected 0 to 1"));
+        assert!(refused("{\"body\": [[3]], \"stimuli\": [[[1]]]}").contains("switch_every"));
+        assert!(refused("{\"body\": [[3]], \"start_row\": 1}").contains("start_row"));
+    }
+}
