@@ -1,5 +1,6 @@
 //! Floor 3: what a robot is asked to do: images, stimuli, protocols, rollouts and their scores.
 
+pub mod baselines;
 pub mod builtin;
 pub mod dataset;
 pub mod direction;

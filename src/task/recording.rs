@@ -6,7 +6,7 @@ use crate::body::Body;
 /// One stretch of a recording under one stimulus.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Phase {
-    /// Index of the phase's first frame in [`Recording::frames`].
+    /// Index in [`Recording::frames`] of the frame before the phase's first control step.
     pub first_frame: usize,
     /// What the sensors see: H × W in [0, 1].
     pub stimulus: Grid<f64>,

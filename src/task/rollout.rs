@@ -100,11 +100,11 @@ pub fn record(
         centre: place(world.centre_of_mass()),
     };
     for (index, (label, stimulus)) in images.iter().enumerate() {
-        let first_frame = recording.frames.len();
         if fresh || index == 0 {
             rollout.reset();
             recording.frames.push(frame(&rollout.world));
         }
+        let first_frame = recording.frames.len() - 1;
         let start = rollout.world.centre_of_mass()[0];
         let end = rollout.show(stimulus, |world| recording.frames.push(frame(world)));
         let so_far = voxel_lengths(rollout.world.centre_of_mass()[0] - start, physics);

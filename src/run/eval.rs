@@ -1,0 +1,217 @@
+//! `morphcog eval`: how well robots do on held-out images (paper, "Generalization test").
+
+use super::archive::{Robot, RunFile};
+use super::report::{Baselines, EvalFile, RobotReport, Trial};
+use super::robots::Selection;
+use super::training::{ImageRef, load_dataset, see};
+use super::{Config, Error};
+use crate::base::Grid;
+use crate::base::files::write_atomically;
+use crate::sim::Lattice;
+use crate::task::baselines::{Labelled, best_pixel, larger_group, nearest_training_image};
+use crate::task::dataset::{Dataset, Split};
+use crate::task::grouping::{self, Grouping};
+use crate::task::protocol::{Life, Protocol};
+use crate::task::rollout::{fresh_life, same_to_sensors};
+use rayon::prelude::*;
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+
+/// Training images per class on which the single-pixel baseline is chosen.
+const PIXEL_IMAGES_PER_CLASS: usize = 500;
+
+/// What to evaluate, and on what.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// The run.json.
+    pub archive: PathBuf,
+    /// Which of its robots.
+    pub robots: Selection,
+    /// Test images in all, evenly divided between the classes.
+    pub images: usize,
+    /// Seed of what is drawn: images, and robots with `random:N`.
+    pub seed: u64,
+    /// Displacements up to this count as wrong \[voxel lengths\].
+    pub threshold: f64,
+    /// Control steps per image.
+    pub control_steps: u32,
+    /// Where the data are, if the command line says.
+    pub data: Option<PathBuf>,
+    /// Where the results go (eval.json; eval.csv beside it).
+    pub out: PathBuf,
+    /// Number of threads; `None`: one per core.
+    pub threads: Option<usize>,
+}
+
+/// Who is told how an evaluation goes.
+pub trait Observer: Sync {
+    /// Before the first life: robots × images.
+    fn started(&self, robots: usize, images: usize);
+    /// Showings done so far, of robots × images.
+    fn progress(&self, done: u64);
+    /// Something the user should know.
+    fn warning(&self, text: &str);
+}
+
+/// The images of a test and how robots see them.
+struct Test {
+    images: Vec<ImageRef>,
+    stimuli: Vec<Grid<f64>>,
+}
+
+/// Evaluates robots; results are written after every robot, so that stopping keeps what is finished.
+///
+/// # Errors
+/// What is wrong with archive, data or selection.
+pub fn eval(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Result<EvalFile, Error> {
+    let run = RunFile::read(&options.archive)?;
+    let config = &run.config;
+    let grouping = config.grouping()?;
+    let dataset = load_dataset(config, options.data.as_deref(), &Split::ALL)?;
+    if dataset.fingerprint(Split::Train).unwrap_or_default() != run.dataset.train_sha256 {
+        observer.warning("the training images here are not those the run was made with (another SHA-256)");
+    }
+    let robots = options.robots.of(&run, options.seed)?;
+    let (robots, unskilled): (Vec<&Robot>, Vec<&Robot>) =
+        robots.into_iter().partition(|robot| task_of(&grouping, robot).is_some());
+    for robot in &unskilled {
+        observer.warning(&format!("{}: walks the same way for every class; left out", robot.id));
+    }
+    let test = test_images(config, &dataset, options)?;
+    let mut report =
+        EvalFile::new(&run, options, &test.images, dataset.fingerprint(Split::Test).unwrap_or_default());
+    report.baselines = baselines(&run, &grouping, &dataset, &test, &robots, options.seed)?;
+    observer.started(robots.len(), test.images.len());
+
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(options.threads.unwrap_or(0)).build();
+    let pool = pool.map_err(|error| Error::other(format!("no threads: {error}")))?;
+    let done = AtomicU64::new(0);
+    for robot in robots {
+        let Some(split) = task_of(&grouping, robot) else { continue };
+        let lives = pool.install(|| lives(config, options, robot, &test.stimuli, stop, &done, observer));
+        let Some((displacements, simulated)) = lives else {
+            report.stopped = true;
+            break;
+        };
+        let trial = Trial { run: &run, robot, split, images: &test.images, threshold: options.threshold };
+        report.robots.push(RobotReport::new(&trial, displacements, simulated));
+        report.conclude();
+        write(options, &report)?;
+    }
+    Ok(report)
+}
+
+/// The recognition task a robot performs; none if it always walks the same way.
+fn task_of<'a>(grouping: &'a Grouping, robot: &Robot) -> Option<&'a grouping::Split> {
+    grouping.tasks().iter().find(|split| split.name() == robot.task && !split.is_same_way())
+}
+
+fn write(options: &Options, report: &EvalFile) -> Result<(), Error> {
+    let csv_path = options.out.with_extension("csv");
+    let csv = report.to_csv().map_err(|error| Error::other(error.to_string()))?;
+    for (path, content) in [(&options.out, report.to_json().into_bytes()), (&csv_path, csv)] {
+        write_atomically(path, &content).map_err(|error| Error::writing(path, &error))?;
+    }
+    Ok(())
+}
+
+/// `count` test images, evenly divided between the classes; the first classes get what is left over.
+fn test_images(config: &Config, dataset: &Dataset, options: &Options) -> Result<Test, Error> {
+    let classes = config.classes();
+    let mut test = Test { images: Vec::new(), stimuli: Vec::new() };
+    for (place, &class) in classes.iter().enumerate() {
+        let count = options.images / classes.len() + usize::from(place < options.images % classes.len());
+        let drawn = dataset.draw(Split::Test, &[class], count, options.seed, 0);
+        let drawn = drawn.map_err(|error| {
+            let most = classes.iter().map(|&c| dataset.indices_of(Split::Test, c).len()).min().unwrap_or(0);
+            let hint = format!("ask for at most --images {}", most * classes.len());
+            Error::input(error.to_string()).hint(hint)
+        })?;
+        for index in drawn {
+            test.stimuli.push(see(config, dataset, Split::Test, index)?);
+            test.images.push(ImageRef { index, label: class });
+        }
+    }
+    Ok(test)
+}
+
+/// The displacement under each image (`None`: unstable), and the number of lives it took: images that show the sensors the
+/// same pixels are one life. `None` if stopped before the end.
+fn lives(
+    config: &Config,
+    options: &Options,
+    robot: &Robot,
+    stimuli: &[Grid<f64>],
+    stop: &AtomicBool,
+    done: &AtomicU64,
+    observer: &dyn Observer,
+) -> Option<(Vec<Option<f64>>, usize)> {
+    let protocol =
+        Protocol { life: Life::Fresh, control_steps: options.control_steps, ..config.protocol.clone() };
+    let lattice = Lattice::new(&robot.body, &config.physics);
+    let views: Vec<&Grid<f64>> = stimuli.iter().collect();
+    let same_as = same_to_sensors(&robot.body, &views);
+    let mut shared = BTreeMap::<usize, u64>::new();
+    same_as.iter().for_each(|&first| *shared.entry(first).or_default() += 1);
+    let life = |(&image, &count): (&usize, &u64)| {
+        if stop.load(Ordering::Relaxed) {
+            return None;
+        }
+        let displacement = fresh_life(&lattice, &config.physics, &protocol, &stimuli[image]).ok();
+        observer.progress(done.fetch_add(count, Ordering::Relaxed) + count);
+        Some((image, displacement))
+    };
+    let lives: Option<BTreeMap<usize, Option<f64>>> = shared.par_iter().map(life).collect();
+    let lives = lives?;
+    Some((same_as.iter().map(|first| lives.get(first).copied().flatten()).collect(), lives.len()))
+}
+
+fn view(list: &[(Grid<f64>, u8)]) -> Vec<Labelled<'_>> {
+    list.iter().map(|(stimulus, class)| Labelled { stimulus, class: *class }).collect()
+}
+
+/// The baselines of every task that the robots perform.
+fn baselines(
+    run: &RunFile,
+    grouping: &Grouping,
+    dataset: &Dataset,
+    test: &Test,
+    robots: &[&Robot],
+    seed: u64,
+) -> Result<BTreeMap<String, Baselines>, Error> {
+    let config = &run.config;
+    let classes = config.classes();
+    let labelled = |images: &[ImageRef]| -> Result<Vec<(Grid<f64>, u8)>, Error> {
+        images
+            .iter()
+            .map(|image| Ok((see(config, dataset, Split::Train, image.index)?, image.label)))
+            .collect()
+    };
+    let mut choice = Vec::new();
+    for &class in &classes {
+        let count = dataset.indices_of(Split::Train, class).len().min(PIXEL_IMAGES_PER_CLASS);
+        let drawn = dataset.draw(Split::Train, &[class], count, seed, 0);
+        let drawn = drawn.map_err(|error| Error::input(error.to_string()))?;
+        choice.extend(drawn.into_iter().map(|index| ImageRef { index, label: class }));
+    }
+    let (choice, templates) = (labelled(&choice)?, labelled(&run.training_images)?);
+    let tested = test.stimuli.iter().zip(&test.images);
+    let tested: Vec<Labelled> =
+        tested.map(|(stimulus, image)| Labelled { stimulus, class: image.label }).collect();
+    let mut all = BTreeMap::new();
+    for split in robots.iter().filter_map(|robot| task_of(grouping, robot)) {
+        if all.contains_key(&split.name()) {
+            continue;
+        }
+        let rule = best_pixel(split, &view(&choice));
+        let baselines = Baselines {
+            larger_group: larger_group(split, &tested),
+            best_single_pixel: rule.map_or(0.0, |rule| rule.accuracy(split, &tested)),
+            pixel: rule.map_or([0, 0], |rule| [rule.row, rule.column]),
+            nearest_training_image: nearest_training_image(split, &view(&templates), &tested),
+        };
+        all.insert(split.name(), baselines);
+    }
+    Ok(all)
+}

@@ -1,0 +1,179 @@
+//! `morphcog replay`: record a robot's life, for the pictures.
+
+use super::archive::RunFile;
+use super::robots::Selection;
+use super::training::{ImageRef, load_dataset, see};
+use super::{Config, Error, folder, gallery};
+use crate::body::Body;
+use crate::task::dataset::Split;
+use crate::task::protocol::Life;
+use crate::task::recording::Recording;
+use crate::task::rollout::record;
+use std::path::PathBuf;
+use std::str::FromStr;
+
+/// Most images in one recording: pictures hold every frame.
+pub const MAX_IMAGES: usize = 20;
+
+/// An image by split and index: `train:3`, `test:17`; without a word, a training image.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Shown {
+    /// Its split.
+    pub split: Split,
+    /// Its index there.
+    pub index: usize,
+}
+
+impl FromStr for Shown {
+    type Err = String;
+    fn from_str(text: &str) -> Result<Self, String> {
+        let (split, digits) = match text.split_once(':') {
+            Some(("test", digits)) => (Split::Test, digits),
+            Some(("train", digits)) => (Split::Train, digits),
+            None => (Split::Train, text),
+            Some((other, _)) => return Err(format!("{other}: expected train or test before the colon")),
+        };
+        let index =
+            digits.trim().parse().map_err(|_| format!("{text}: expected an index, as 3 or test:17"))?;
+        Ok(Shown { split, index })
+    }
+}
+
+/// What to record.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// The robot: an id, the beginning of one, "best", or a name in the gallery.
+    pub robot: String,
+    /// The run.json; `None`: the newest under `runs/`.
+    pub archive: Option<PathBuf>,
+    /// The images; none: the training images.
+    pub images: Vec<Shown>,
+    /// Where the data are, if the command line says.
+    pub data: Option<PathBuf>,
+    /// Another dataset than the run's.
+    pub dataset: Option<String>,
+}
+
+/// A robot's life, and where it is from.
+#[derive(Clone, Debug)]
+pub struct Replay {
+    /// The life.
+    pub recording: Recording,
+    /// What a page says about it: words and values.
+    pub about: Vec<(String, String)>,
+    /// What the recording is called in file names.
+    pub name: String,
+}
+
+/// Records a robot's life as its config's protocol has it.
+///
+/// # Errors
+/// What is wrong with robot, archive, images or data.
+pub fn replay(options: &Options) -> Result<Replay, Error> {
+    let found = find(options)?;
+    let mut config = found.config;
+    if let Some(dataset) = &options.dataset
+        && *dataset != config.data.dataset
+    {
+        // Images of one dataset mean nothing in another.
+        config.data = super::config::DataConfig {
+            dataset: dataset.clone(),
+            dir: None,
+            train_images: None,
+            ..config.data.clone()
+        };
+    }
+    let mut shown = options.images.clone();
+    if shown.is_empty() {
+        let own = if options.dataset.is_none() { found.training } else { Vec::new() };
+        shown = match own.as_slice() {
+            [] => super::training::Training::load(&config, options.data.as_deref())?.images,
+            own => own.to_vec(),
+        }
+        .into_iter()
+        .map(|image| Shown { split: Split::Train, index: image.index })
+        .collect();
+    }
+    if shown.len() > MAX_IMAGES {
+        let text =
+            format!("--images: {} images, expected at most {MAX_IMAGES} in one recording", shown.len());
+        return Err(Error::usage(text));
+    }
+    let wanted: Vec<Split> =
+        Split::ALL.into_iter().filter(|split| shown.iter().any(|image| image.split == *split)).collect();
+    let dataset =
+        load_dataset(&config, options.data.as_deref(), &wanted).map_err(|error| match found.published {
+            true => error.hint(
+                "morphcog data fetch mnist, or --dataset builtin for digits the program draws".to_string(),
+            ),
+            false => error,
+        })?;
+    let mut images = Vec::new();
+    for Shown { split, index } in shown {
+        let label =
+            dataset.label(split, index).map_err(|error| Error::usage(format!("--images: {error}")))?;
+        images.push((format!("{label} ({split} {index})"), see(&config, &dataset, split, index)?));
+    }
+    let fresh = config.protocol.life == Life::Fresh;
+    let recording = record(&found.name, &found.body, &config.physics, &config.protocol, fresh, &images);
+    let mut about = found.about;
+    about.push((
+        "Images".to_string(),
+        format!("{}, {:?} encoding", dataset.name(), config.stimulus.encoding).to_lowercase(),
+    ));
+    let life = if fresh { "a fresh life for every image" } else { "one continuous life" };
+    about.push((
+        "Protocol".to_string(),
+        format!("{life}, {} control steps each", config.protocol.control_steps),
+    ));
+    Ok(Replay { recording, about, name: found.name })
+}
+
+/// A robot and how it lived.
+struct Found {
+    name: String,
+    body: Body,
+    config: Config,
+    training: Vec<ImageRef>,
+    about: Vec<(String, String)>,
+    published: bool,
+}
+
+fn find(options: &Options) -> Result<Found, Error> {
+    if options.archive.is_none()
+        && let Some(robot) = gallery::find(&options.robot)?
+    {
+        let about = vec![
+            ("Robot".to_string(), robot.name.clone()),
+            ("From".to_string(), "the robots published with the paper".to_string()),
+            ("Task".to_string(), "0|1".to_string()),
+            ("Published fitness".to_string(), format!("{:.2} voxel lengths", robot.fitness)),
+        ];
+        let (name, body, config) = (robot.name, robot.body, gallery::config()?);
+        return Ok(Found { name, body, config, training: Vec::new(), about, published: true });
+    }
+    let archive = match &options.archive {
+        Some(path) => path.clone(),
+        None => folder::newest_run()?,
+    };
+    let run = RunFile::read(&archive)?;
+    let robots = Selection::Ids(vec![options.robot.clone()]).of(&run, 0);
+    let robots = robots.map_err(|error| error.within(&archive.display().to_string()))?;
+    let robot = robots[0];
+    let about = vec![
+        ("Robot".to_string(), robot.id.clone()),
+        ("From".to_string(), format!("{}, seed {}", run.name, run.config.seed)),
+        ("Task".to_string(), robot.task.clone()),
+        ("Fitness".to_string(), format!("{:.2} voxel lengths", robot.objective)),
+        ("Born".to_string(), format!("generation {}", robot.generation)),
+    ];
+    let (name, body) = (robot.id.clone(), robot.body.clone());
+    Ok(Found {
+        name,
+        body,
+        training: run.training_images.clone(),
+        about,
+        published: false,
+        config: run.config,
+    })
+}

@@ -1,0 +1,125 @@
+//! Honest neighbours of a robot's accuracy: what takes no body at all.
+
+use super::grouping::{Group, Split};
+use crate::base::Grid;
+
+/// An image as the sensors see it, with its class.
+#[derive(Clone, Copy, Debug)]
+pub struct Labelled<'a> {
+    /// H × W in [0, 1].
+    pub stimulus: &'a Grid<f64>,
+    /// Its class.
+    pub class: u8,
+}
+
+/// One pixel and a threshold: above it one group, else the other.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PixelRule {
+    /// Its row.
+    pub row: usize,
+    /// Its column.
+    pub column: usize,
+    /// The threshold, in [0, 1].
+    pub level: f64,
+    /// The answer for pixels above the threshold.
+    pub above: Group,
+}
+
+/// Share of the images that are of the larger group: the accuracy of always giving that answer.
+pub fn larger_group(split: &Split, images: &[Labelled]) -> f64 {
+    let a = images.iter().filter(|image| split.group(image.class) == Some(Group::A)).count();
+    a.max(images.len() - a) as f64 / images.len().max(1) as f64
+}
+
+/// The pixel and threshold that tell the groups of some images apart best (the first in reading order wins a tie);
+/// `None` without images.
+pub fn best_pixel(split: &Split, images: &[Labelled]) -> Option<PixelRule> {
+    let first = images.first()?.stimulus;
+    let total_a = images.iter().filter(|image| split.group(image.class) == Some(Group::A)).count();
+    let mut best: Option<(usize, PixelRule)> = None;
+    for row in 0..first.height() {
+        for column in 0..first.width() {
+            let value =
+                |image: &Labelled| image.stimulus.get(row as isize, column as isize).copied().unwrap_or(0.0);
+            let mut sorted: Vec<(f64, bool)> =
+                images.iter().map(|i| (value(i), split.group(i.class) == Some(Group::A))).collect();
+            sorted.sort_by(|x, y| x.0.total_cmp(&y.0));
+            // Below a threshold after i images: right if A is the answer below, B above; or the other way round.
+            let mut a_below = 0;
+            for (i, (level, is_a)) in sorted.iter().enumerate() {
+                a_below += usize::from(*is_a);
+                if sorted.get(i + 1).is_some_and(|next| next.0 == *level) {
+                    continue;
+                }
+                let b_below = i + 1 - a_below;
+                let right_if_a_below = a_below + (images.len() - total_a - b_below);
+                for (right, above) in
+                    [(right_if_a_below, Group::B), (images.len() - right_if_a_below, Group::A)]
+                {
+                    if best.as_ref().is_none_or(|(most, _)| right > *most) {
+                        best = Some((right, PixelRule { row, column, level: *level, above }));
+                    }
+                }
+            }
+        }
+    }
+    best.map(|(_, rule)| rule)
+}
+
+impl PixelRule {
+    /// Share of images it answers right.
+    pub fn accuracy(&self, split: &Split, images: &[Labelled]) -> f64 {
+        let answer = |image: &Labelled| {
+            let value = image.stimulus.get(self.row as isize, self.column as isize).copied().unwrap_or(0.0);
+            if (value > self.level) == (self.above == Group::A) { Group::A } else { Group::B }
+        };
+        share(images, |image| split.group(image.class) == Some(answer(image)))
+    }
+}
+
+/// Accuracy of answering with the group of the nearest training image (Euclidean distance; the first wins a tie).
+pub fn nearest_training_image(split: &Split, training: &[Labelled], images: &[Labelled]) -> f64 {
+    let distance = |a: &Grid<f64>, b: &Grid<f64>| {
+        a.cells().iter().zip(b.cells()).map(|(x, y)| (x - y) * (x - y)).sum::<f64>()
+    };
+    let nearest = |image: &Labelled| {
+        let of = |t: &Labelled| distance(t.stimulus, image.stimulus);
+        training.iter().min_by(|s, t| of(s).total_cmp(&of(t))).and_then(|t| split.group(t.class))
+    };
+    share(images, |image| nearest(image).is_some() && nearest(image) == split.group(image.class))
+}
+
+fn share(images: &[Labelled], is_right: impl Fn(&Labelled) -> bool) -> f64 {
+    images.iter().filter(|image| is_right(image)).count() as f64 / images.len().max(1) as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::task::grouping::Grouping;
+
+    fn grid(cells: [f64; 4]) -> Grid<f64> {
+        Grid::from_fn(2, 2, |r, c| cells[2 * r + c])
+    }
+
+    #[test]
+    fn the_best_pixel_is_found_with_its_threshold_and_sense() {
+        let grouping = Grouping::two_groups(&[0], &[1, 2]).unwrap();
+        let split = &grouping.tasks()[0];
+        let zeros = [grid([0.1, 0.9, 0.0, 0.3]), grid([0.8, 0.7, 0.0, 0.4])];
+        let others = [grid([0.1, 0.2, 0.0, 0.3]), grid([0.9, 0.4, 0.0, 0.9])];
+        let of = |list: &'static [u8], grids: &'static [Grid<f64>]| -> Vec<Labelled<'static>> {
+            list.iter().zip(grids).map(|(&class, stimulus)| Labelled { stimulus, class }).collect()
+        };
+        let zeros: &'static _ = Box::leak(Box::new(zeros));
+        let others: &'static _ = Box::leak(Box::new(others));
+        let images = [of(&[0, 0], zeros), of(&[1, 2], others)].concat();
+        let rule = best_pixel(split, &images).unwrap();
+        assert_eq!(rule, PixelRule { row: 0, column: 1, level: 0.4, above: Group::A });
+        assert_eq!(rule.accuracy(split, &images), 1.0);
+        assert_eq!(rule.accuracy(split, &images[2..]), 1.0);
+        assert_eq!(larger_group(split, &images[1..]), 2.0 / 3.0);
+        assert_eq!(nearest_training_image(split, &images[..3], &images), 0.75);
+        assert_eq!(best_pixel(split, &[]), None);
+    }
+}
