@@ -1,3 +1,92 @@
 //! Floor 5: pictures and the terminal.
 
 pub mod sheet;
+//! Floor 5: pictures and the terminal. Recordings of lives become images, animations, pages and text here.
+//!
+//! A [`Walk`] is a checked [`Recording`](crate::task::recording::Recording); a [`Stage`] decides what part of the
+//! world a picture shows; `scene` and `panel` make drawing primitives of one frame; `raster` paints them. On top of
+//! these stand the animated GIF, the self-contained HTML page and the view in a terminal.
+
+pub mod colour;
+pub mod font;
+pub mod gif;
+pub mod palette;
+pub mod panel;
+pub mod raster;
+pub mod scene;
+pub mod stage;
+pub mod walk;
+#[cfg(test)]
+mod wobble;
+
+pub use stage::Stage;
+pub use walk::Walk;
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+/// Why there is no picture.
+#[derive(Debug, thiserror::Error)]
+pub enum PictureError {
+    /// The recording does not hold what a picture needs.
+    #[error("the recording cannot be drawn: {0}")]
+    Recording(&'static str),
+    /// The picture would be too small, too large or have no frame.
+    #[error("a picture of {width} × {height} pixels is not possible; expected a width of {} … {} pixels",
+            stage::WIDTHS.start(), stage::WIDTHS.end())]
+    Size {
+        /// Pixels asked for.
+        width: u32,
+        /// Pixels asked for, or that follow from the width.
+        height: u32,
+    },
+    /// The encoder refused.
+    #[error("the picture could not be encoded: {0}")]
+    Encode(String),
+    /// The file could not be written.
+    #[error("could not write {}: {source}; check that the folder exists and is writable", path.display())]
+    Write {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+}
+
+/// Writes a file in one go: into a temporary file of the same folder, then renamed, so that a reader sees the whole
+/// file or the old one.
+///
+/// # Errors
+/// [`PictureError::Write`] with the path.
+pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), PictureError> {
+    let write = || {
+        let folder = path.parent().filter(|f| !f.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let mut builder = tempfile::Builder::new();
+        // Temporary files are private by default; a picture is readable like any other file.
+        #[cfg(unix)]
+        builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+        let mut file = builder.prefix(".morphcog-").tempfile_in(folder)?;
+        file.write_all(bytes)?;
+        file.as_file().sync_all()?;
+        file.persist(path).map_err(|e| e.error)?;
+        Ok(())
+    };
+    write().map_err(|source| PictureError::Write { path: path.to_path_buf(), source })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn files_are_replaced_whole_and_leave_no_rest() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("picture");
+        write_whole(&path, b"old").unwrap();
+        write_whole(&path, b"new").unwrap();
+        assert_eq!(std::fs::read(&path).unwrap(), b"new");
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+        let error = write_whole(&folder.path().join("none/picture"), b"").unwrap_err().to_string();
+        assert!(error.contains("none") && error.contains("folder"), "{error}");
+    }
+}

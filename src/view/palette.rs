@@ -1,0 +1,81 @@
+//! One palette for a whole animation: the frequent colours of some of its frames.
+
+use std::collections::BTreeMap;
+
+/// Most colours of a palette; one index of 256 is left for "unchanged".
+const COLOURS: usize = 255;
+/// Colours nearer to each other than this (Euclidean, of 255 per channel) share an index.
+const NEAR: i32 = 18;
+
+/// Up to 255 colours, and the nearest of them for any colour.
+#[derive(Clone, Debug)]
+pub struct Palette {
+    colours: Vec<[u8; 3]>,
+    /// Index of the nearest colour by the upper six bits of red, green, blue.
+    nearest: Vec<u8>,
+}
+
+impl Palette {
+    /// A palette: the `fixed` colours, then the most frequent of the samples (RGBA bytes) that are not near one already
+    /// taken.
+    pub fn new<'a>(fixed: &[[u8; 3]], samples: impl IntoIterator<Item = &'a [u8]>) -> Self {
+        let mut counts: BTreeMap<[u8; 3], u32> = BTreeMap::new();
+        for sample in samples {
+            for pixel in sample.chunks_exact(4) {
+                *counts.entry([pixel[0], pixel[1], pixel[2]]).or_default() += 1;
+            }
+        }
+        let mut frequent: Vec<_> = counts.into_iter().collect();
+        frequent.sort_by_key(|(colour, count)| (std::cmp::Reverse(*count), *colour));
+        let mut colours: Vec<[u8; 3]> = Vec::new();
+        for colour in fixed.iter().copied().chain(frequent.into_iter().map(|(colour, _)| colour)) {
+            let is_new = colours.iter().all(|c| distance(*c, colour) >= NEAR * NEAR);
+            if is_new && colours.len() < COLOURS {
+                colours.push(colour);
+            }
+        }
+        let nearest = (0..1 << 18).map(|bin: i32| {
+            let centre = [bin >> 12, bin >> 6, bin].map(|v| (((v & 63) << 2) + 2) as u8);
+            (0..colours.len()).min_by_key(|&i| distance(colours[i], centre)).unwrap_or(0) as u8
+        });
+        Palette { nearest: nearest.collect(), colours }
+    }
+
+    /// Index of the colour nearest to a pixel's red, green and blue.
+    pub fn index(&self, [r, g, b]: [u8; 3]) -> u8 {
+        let bin = usize::from(r >> 2) << 12 | usize::from(g >> 2) << 6 | usize::from(b >> 2);
+        self.nearest[bin]
+    }
+
+    /// The colours in the order of their indices.
+    pub fn colours(&self) -> &[[u8; 3]] {
+        &self.colours
+    }
+}
+
+fn distance(a: [u8; 3], b: [u8; 3]) -> i32 {
+    a.iter().zip(b).map(|(a, b)| (i32::from(*a) - i32::from(b)).pow(2)).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn fixed_colours_are_exact_and_frequent_ones_near() {
+        let samples: Vec<u8> = (0..4000u32).flat_map(|i| [(i % 250) as u8, (i / 50) as u8, 9, 255]).collect();
+        let fixed = [[255, 255, 255], [200, 10, 30]];
+        let palette = Palette::new(&fixed, [samples.as_slice()]);
+        assert!(palette.colours().len() <= 255);
+        for colour in fixed {
+            assert_eq!(palette.colours()[usize::from(palette.index(colour))], colour);
+        }
+        let few: Vec<u8> = (0..40u8).flat_map(|i| [6 * i, 255 - 6 * i, 90, 255]).collect();
+        let palette = Palette::new(&fixed, [few.as_slice()]);
+        for pixel in few.chunks(4) {
+            let colour = [pixel[0], pixel[1], pixel[2]];
+            let found = palette.colours()[usize::from(palette.index(colour))];
+            assert!(distance(found, colour) <= (NEAR + 4) * (NEAR + 4), "{colour:?} {found:?}");
+        }
+    }
+}

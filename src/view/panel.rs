@@ -1,0 +1,210 @@
+//! What stands around the world in a raster picture: stimulus, read-outs, legend, numbers on the ruler. In pixels, y
+//! down.
+
+use super::colour::{self, Colour};
+use super::font;
+use super::scene::{Primitive, ruler};
+use super::stage::Stage;
+use super::walk::Walk;
+use crate::body::{Body, Material};
+
+/// Side of the stimulus picture at zoom 1, pixels.
+const STIMULUS: f64 = 84.0;
+/// Distance from the picture's edges at zoom 1, pixels.
+const MARGIN: f64 = 10.0;
+
+/// Everything around the world at a frame.
+pub fn panel(walk: &Walk, frame: usize, stage: &Stage) -> Vec<Primitive> {
+    let z = stage.zoom;
+    let mut out =
+        vec![Primitive::rectangle([0.0, 0.0], [f64::from(stage.width), stage.panel], colour::PAPER)];
+    let side = stimulus(walk, frame, [MARGIN * z, MARGIN * z], z, &mut out);
+    readouts(walk, frame, [MARGIN * z + side[0] + 12.0 * z, MARGIN * z], z, &mut out);
+    legend(walk, [f64::from(stage.width) - (MARGIN + 116.0) * z, MARGIN * z], z, &mut out);
+    numbers(walk, frame, stage, &mut out);
+    out
+}
+
+/// Words on a moment of a walk: what every view says.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Readout {
+    /// What the robot sees.
+    pub label: String,
+    /// Control steps of the phase done and all of them, and cycles done.
+    pub time: String,
+    /// Signed distance in the phase, with the direction as an arrow.
+    pub displacement: String,
+}
+
+/// The words for a frame.
+pub fn readout(walk: &Walk, frame: usize) -> Readout {
+    let frames = walk.phase_frames(walk.phase_index(frame));
+    // A phase that goes on into the next ends with that one's first frame.
+    let goes_on = frames.end < walk.len() && !walk.is_fresh(walk.phase_index(frame) + 1);
+    let last = if goes_on { frames.end } else { frames.end.saturating_sub(1) };
+    let step = frame.saturating_sub(frames.start);
+    let cycles = step as f64 / walk.recording().cycle.max(1) as f64;
+    let d = walk.displacement(frame);
+    let arrow = if d.abs() < 0.005 {
+        ' '
+    } else if d < 0.0 {
+        '←'
+    } else {
+        '→'
+    };
+    Readout {
+        label: walk.phase(frame).label.clone(),
+        time: format!("step {step}/{} · cycle {cycles:.1}", last - frames.start),
+        displacement: format!("{arrow} {}", signed(d)),
+    }
+}
+
+/// A distance with its sign and two decimals; shorter when huge.
+pub fn signed(distance: f64) -> String {
+    let text = if distance.abs() < 1e5 { format!("{distance:+.2}") } else { format!("{distance:+.1e}") };
+    // "−0.00" is 0.
+    if text == "-0.00" || text == "+0.00" { "0.00".into() } else { text.replace('-', "−") }
+}
+
+/// The picture as the sensors see it, the sensor voxels framed in their colour. Returns its width and height.
+fn stimulus(walk: &Walk, frame: usize, [x, y]: [f64; 2], z: f64, out: &mut Vec<Primitive>) -> [f64; 2] {
+    let image = &walk.phase(frame).stimulus;
+    let longest = image.height().max(image.width()) as f64;
+    let cell = (STIMULUS * z / longest).floor().max(1.0);
+    let size = [cell * image.width() as f64, cell * image.height() as f64];
+    let frame_line = Primitive::rectangle([x - z, y - z], [x + size[0] + z, y + size[1] + z], colour::INK);
+    out.push(frame_line);
+    let body = &walk.recording().body;
+    for ((row, column), intensity) in image.iter() {
+        let [left, top] = [x + cell * column as f64, y + cell * row as f64];
+        let [right, bottom] = [left + cell, top + cell];
+        out.push(Primitive::rectangle([left, top], [right, bottom], Colour::gray(*intensity)));
+        let at = |dr: isize, dc: isize| body.at(row as isize + dr, column as isize + dc);
+        let material = at(0, 0);
+        if material.is_sensor() {
+            // The outline of the region of one kind of sensor, inside its cells.
+            let line = (z * 1.0).min(cell / 3.0).max(1.0);
+            let colour = sensor_line(material);
+            let mut side = |a, b| out.push(Primitive::rectangle(a, b, colour));
+            if at(-1, 0) != material {
+                side([left, top], [right, top + line]);
+            }
+            if at(1, 0) != material {
+                side([left, bottom - line], [right, bottom]);
+            }
+            if at(0, -1) != material {
+                side([left, top], [left + line, bottom]);
+            }
+            if at(0, 1) != material {
+                side([right - line, top], [right, bottom]);
+            }
+        }
+    }
+    size
+}
+
+/// Brighter than the voxel: seen on black and on white.
+fn sensor_line(material: Material) -> Colour {
+    if material == Material::SensorShrink { Colour::new(240, 62, 82) } else { Colour::new(38, 186, 120) }
+}
+
+fn readouts(walk: &Walk, frame: usize, [x, y]: [f64; 2], z: f64, out: &mut Vec<Primitive>) {
+    let words = readout(walk, frame);
+    let recording = walk.recording();
+    let mut line = |dy: f64, text: &str, dot: f64, colour, letters: usize| {
+        let text: String = if text.chars().count() > letters {
+            text.chars().take(letters - 1).chain(['…']).collect()
+        } else {
+            text.into()
+        };
+        out.extend(font::text(&text, [x, y + dy * z], dot * z, colour));
+    };
+    line(0.0, &words.label, 2.0, colour::INK, 19);
+    line(24.0, &words.time, 1.0, colour::FAINT, 38);
+    line(42.0, &words.displacement, 2.0, colour::TRACE, 19);
+    let letters = words.displacement.chars().count() as f64;
+    out.extend(font::text("voxel lengths", [x + (12.0 * letters + 4.0) * z, y + 49.0 * z], z, colour::FAINT));
+    let name = format!("robot {}", recording.robot);
+    let (note, colour) = if recording.unstable {
+        (format!("{name} · ended unstable"), colour::ALARM)
+    } else {
+        (name, colour::FAINT)
+    };
+    let note: String = note.chars().take(38).collect();
+    out.extend(font::text(&note, [x, y + 73.0 * z], z, colour));
+}
+
+/// The materials that the body has.
+pub fn present(body: &Body) -> impl Iterator<Item = Material> {
+    Material::ALL.into_iter().filter(|m| !m.is_empty() && body.voxels().cells().contains(m))
+}
+
+fn legend(walk: &Walk, [x, y]: [f64; 2], z: f64, out: &mut Vec<Primitive>) {
+    for (k, material) in present(&walk.recording().body).enumerate() {
+        let top = y + 14.0 * k as f64 * z;
+        // Small, at rest and large.
+        for (tone, rgb) in colour::tones(material).into_iter().enumerate() {
+            let left = x + 5.0 * tone as f64 * z;
+            let fill = Colour { rgb, opacity: 255 };
+            out.push(Primitive::rectangle([left, top], [left + 5.0 * z, top + 9.0 * z], fill));
+        }
+        out.extend(font::text(material.name(), [x + 20.0 * z, top + z], z, colour::INK));
+    }
+}
+
+fn numbers(walk: &Walk, frame: usize, stage: &Stage, out: &mut Vec<Primitive>) {
+    let z = stage.zoom;
+    let zero = walk.centre(walk.life(frame).start)[0];
+    let window = stage.window(frame);
+    let step = if window.scale * 10.0 > 45.0 * z { 10.0 } else { 50.0 };
+    for mark in ruler(&window, zero, step) {
+        let at = stage.to_pixels(frame, [zero + mark, 0.0]);
+        let text = if mark == 0.0 { "0".into() } else { format!("{mark:+}").replace('-', "−") };
+        // The sign hangs over: the digits stand under their tick.
+        let left = at[0] - (font::width(text.trim_start_matches(['+', '−'])) / 2.0) * z;
+        let sign = if mark == 0.0 { 0.0 } else { font::ADVANCE * z };
+        out.extend(font::text(&text, [(left - sign).round(), at[1] + 11.0 * z], z, colour::FAINT));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::wobble;
+    use super::*;
+
+    #[test]
+    fn readouts_count_steps_of_the_phase_and_agree_with_the_displacement() {
+        for fresh in [false, true] {
+            let recording = wobble::recording("33/44", 2, 100, fresh);
+            let walk = Walk::new(&recording).unwrap();
+            let first = readout(&walk, walk.phase_frames(1).start);
+            assert_eq!(first.time, "step 0/100 · cycle 0.0");
+            assert_eq!(first.displacement.trim(), "0.00");
+            let last = readout(&walk, walk.len() - 1);
+            assert_eq!(
+                (last.time.as_str(), last.displacement.as_str()),
+                ("step 100/100 · cycle 2.0", "→ +3.40")
+            );
+            assert_eq!(readout(&walk, 50).time, "step 50/100 · cycle 1.0");
+        }
+    }
+
+    #[test]
+    fn distances_have_a_sign_and_never_a_negative_zero() {
+        assert_eq!([-3.456, -0.001, 2.0].map(signed), ["−3.46", "0.00", "+2.00"]);
+        assert!(signed(-1.0e300).len() < 16 && signed(f64::NAN).len() < 16);
+    }
+
+    #[test]
+    fn sensors_are_framed_in_the_stimulus() {
+        let frames = |body| {
+            let recording = wobble::recording(body, 1, 1, false);
+            let walk = Walk::new(&recording).unwrap();
+            let mut out = vec![];
+            stimulus(&walk, 0, [0.0, 0.0], 1.0, &mut out);
+            let line = |p: &&Primitive| matches!(p, Primitive::Quad { fill, .. } if *fill == sensor_line(Material::SensorShrink));
+            out.iter().filter(line).count()
+        };
+        assert_eq!((frames("33/33"), frames("53/33"), frames("55/33")), (0, 4, 6));
+    }
+}

@@ -1,0 +1,206 @@
+//! One frame as drawing primitives in world coordinates (voxel lengths, y up): what all raster pictures are made of.
+
+use super::colour::{self, Colour};
+use super::walk::{Walk, area};
+
+/// Something to draw. Coordinates are the world's (voxel lengths, y up) or pixels (y down), as the maker says.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Primitive {
+    /// A filled quadrilateral.
+    Quad {
+        /// Its corners in order.
+        corners: [[f64; 2]; 4],
+        /// Its colour.
+        fill: Colour,
+        /// Whether its edges are smoothed; axis-parallel rectangles on whole pixels need not be.
+        smooth: bool,
+    },
+    /// A line through points.
+    Line {
+        /// The points in order.
+        points: Vec<[f64; 2]>,
+        /// Its width as a multiple of the picture's zoom (about a pixel in a small picture).
+        width: f64,
+        /// Its colour.
+        colour: Colour,
+        /// Whether its edges are smoothed.
+        smooth: bool,
+    },
+}
+
+impl Primitive {
+    /// A filled axis-parallel rectangle between two opposite corners.
+    pub fn rectangle(a: [f64; 2], b: [f64; 2], fill: Colour) -> Self {
+        Primitive::Quad { corners: [a, [b[0], a[1]], b, [a[0], b[1]]], fill, smooth: false }
+    }
+
+    /// A line between two points.
+    pub fn line(from: [f64; 2], to: [f64; 2], width: f64, colour: Colour) -> Self {
+        Primitive::Line { points: vec![from, to], width, colour, smooth: true }
+    }
+}
+
+/// A visible part of the world, voxel lengths.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Window {
+    /// Its left edge.
+    pub left: f64,
+    /// Its right edge.
+    pub right: f64,
+    /// Its lower edge, below the ground's surface at 0.
+    pub bottom: f64,
+    /// Its upper edge.
+    pub top: f64,
+    /// Pixels per voxel length: what is too small to see is left out.
+    pub scale: f64,
+    /// Whether voxels have hard edges: fewer colours, so that animations stay small.
+    pub crisp: bool,
+}
+
+impl Window {
+    fn shows(&self, points: &[[f64; 2]]) -> bool {
+        let beyond = |outside: &dyn Fn(&[f64; 2]) -> bool| points.iter().all(outside);
+        !(beyond(&|p| p[0] < self.left)
+            || beyond(&|p| p[0] > self.right)
+            || beyond(&|p| p[1] < self.bottom)
+            || beyond(&|p| p[1] > self.top))
+    }
+}
+
+/// The whole numbers of voxel lengths from the ruler's zero that lie in the window, at most about 10⁴ of them; every
+/// `step`-th.
+pub fn ruler(window: &Window, zero: f64, step: f64) -> impl Iterator<Item = f64> + use<> {
+    let first = ((window.left - zero) / step).ceil();
+    let count = ((window.right - zero) / step).floor() - first + 1.0;
+    (0..count.clamp(0.0, 1e4) as u32).map(move |k| (first + f64::from(k)) * step)
+}
+
+/// The world at a frame, from back to front: sky, ground with its ruler, start marks, body, path of the centre of
+/// mass. The ruler's zero is the centre of mass at the start of the life.
+pub fn world(walk: &Walk, frame: usize, window: &Window) -> Vec<Primitive> {
+    let mut out = ground(walk, frame, window);
+    out.extend(body(walk, frame, window));
+    out.extend(path(walk, frame, window));
+    out
+}
+
+fn ground(walk: &Walk, frame: usize, window: &Window) -> Vec<Primitive> {
+    let Window { left, right, bottom, top, scale, .. } = *window;
+    let mut out = vec![
+        Primitive::rectangle([left, top], [right, bottom], colour::PAPER),
+        Primitive::rectangle([left, 0.0], [right, bottom], colour::GROUND),
+    ];
+    let zero = walk.centre(walk.life(frame).start)[0];
+    for (step, depth, line) in [(1.0, 3.0, 1.0), (10.0, 7.0, 1.5)] {
+        // Ticks closer than four pixels would be a gray band.
+        if step * scale >= 4.0 {
+            let tick = |at| Primitive::line([at, 0.0], [at, -depth / scale], line, colour::GROUND_LINE);
+            out.extend(ruler(window, zero, step).map(|mark| tick(zero + mark)));
+        }
+    }
+    out.push(Primitive::line([left, 0.0], [right, 0.0], 1.5, colour::GROUND_LINE));
+    // Where the life and (if it goes on) this phase began: dashes of five pixels, five apart.
+    let phase = walk.centre(walk.phase(frame).first_frame)[0];
+    for x in if phase == zero { vec![zero] } else { vec![zero, phase] } {
+        let dash = 5.0 / scale;
+        let count = (top / (2.0 * dash)).clamp(0.0, 1e3) as u32;
+        let dashes = (0..count).map(|k| 2.0 * dash * f64::from(k));
+        out.extend(dashes.map(|y| Primitive::line([x, y], [x, y + dash], 1.0, Colour::gray(0.72))));
+    }
+    out
+}
+
+fn body(walk: &Walk, frame: usize, window: &Window) -> Vec<Primitive> {
+    let smooth = !window.crisp;
+    let voxels = walk.voxels(frame).filter(|(_, corners)| window.shows(corners));
+    let quad = |(material, corners)| {
+        let fill = colour::shade(material, area(&corners));
+        Primitive::Quad { corners, fill, smooth }
+    };
+    let mut out: Vec<Primitive> = voxels.map(quad).collect();
+    // At small scales the lines would hide the voxels.
+    if window.scale >= 5.0 {
+        let seams = walk.seams(frame).filter(|side| window.shows(side));
+        let line = |points: [[f64; 2]; 2]| Primitive::Line {
+            points: points.to_vec(),
+            width: 1.0,
+            colour: SEAM,
+            smooth,
+        };
+        out.extend(seams.map(line));
+    }
+    let rim = walk.outline(frame).filter(|side| window.shows(side));
+    out.extend(rim.map(|[a, b]| Primitive::line(a, b, 1.2, colour::INK)));
+    out
+}
+
+/// The thin line between two voxels.
+const SEAM: Colour = colour::PAPER.with_opacity(120);
+
+fn path(walk: &Walk, frame: usize, window: &Window) -> Vec<Primitive> {
+    let life = walk.life(frame).start..=frame;
+    let points: Vec<[f64; 2]> = life.map(|f| walk.centre(f)).collect();
+    let mut out = Vec::new();
+    // Split where the path leaves the window, so that a long walk costs no more than a short one.
+    for piece in points.chunk_by(|a, b| window.shows(&[*a, *b])).filter(|piece| piece.len() > 1) {
+        let line = |width, colour| Primitive::Line { points: piece.to_vec(), width, colour, smooth: true };
+        out.push(line(3.4, colour::PAPER.with_opacity(170)));
+        out.push(line(1.6, colour::TRACE));
+    }
+    if let Some([x, y]) = points.last() {
+        for (half, fill) in [(4.0, colour::PAPER), (3.0, colour::TRACE)] {
+            let h = half / window.scale;
+            let corners = [[*x, y + h], [x + h, *y], [*x, y - h], [x - h, *y]];
+            out.push(Primitive::Quad { corners, fill, smooth: true });
+        }
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::wobble;
+    use super::*;
+
+    const WINDOW: Window =
+        Window { left: -10.0, right: 20.0, bottom: -2.0, top: 10.0, scale: 16.0, crisp: false };
+
+    #[test]
+    fn every_visible_voxel_is_a_quad_with_its_shade() {
+        let recording = wobble::recording("34/56", 1, 40, false);
+        let walk = Walk::new(&recording).unwrap();
+        let scene = world(&walk, 20, &WINDOW);
+        for (material, corners) in walk.voxels(20) {
+            let fill = colour::shade(material, area(&corners));
+            assert!(scene.contains(&Primitive::Quad { corners, fill, smooth: true }), "{material:?}");
+        }
+        let elsewhere = Window { left: 100.0, right: 130.0, ..WINDOW };
+        assert!(body(&walk, 20, &elsewhere).is_empty());
+    }
+
+    #[test]
+    fn the_ruler_counts_from_the_start_and_survives_any_window() {
+        let marks: Vec<f64> = ruler(&WINDOW, 0.5, 10.0).collect();
+        assert_eq!(marks, [-10.0, 0.0, 10.0]);
+        let far = Window { left: 1e6, right: 1e6 + 30.0, ..WINDOW };
+        assert_eq!(ruler(&far, 0.0, 10.0).count(), 4);
+        let broken = Window { left: f64::NAN, right: f64::INFINITY, ..WINDOW };
+        assert!(ruler(&broken, 0.0, 1.0).count() <= 10_000);
+    }
+
+    #[test]
+    fn the_path_starts_at_the_last_reset() {
+        let fresh = wobble::recording("33/44", 2, 30, true);
+        let walk = Walk::new(&fresh).unwrap();
+        let lengths = |frame| {
+            let path = path(&walk, frame, &WINDOW);
+            path.iter()
+                .filter_map(|p| match p {
+                    Primitive::Line { points, .. } => Some(points.len()),
+                    Primitive::Quad { .. } => None,
+                })
+                .max()
+        };
+        assert_eq!((lengths(30), lengths(31), lengths(33)), (Some(31), None, Some(3)));
+    }
+}
