@@ -10,11 +10,13 @@ pub mod sheet;
 pub mod colour;
 pub mod font;
 pub mod gif;
+pub mod html;
 pub mod palette;
 pub mod panel;
 pub mod raster;
 pub mod scene;
 pub mod stage;
+pub mod terminal;
 pub mod walk;
 #[cfg(test)]
 mod wobble;

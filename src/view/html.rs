@@ -1,0 +1,251 @@
+//! One self-contained HTML page that plays a recording: no network, works from `file://`.
+//!
+//! Positions are embedded as 16-bit numbers, in steps of 1/200 voxel length from an origin per frame (near the centre of
+//! mass, in 64-bit floats): exact within 0.0025 voxel lengths however far the robot walks.
+
+use super::colour::{TONE_AREAS, tones};
+use super::walk::Walk;
+use super::{PictureError, gif, write_whole};
+use crate::body::Material;
+use crate::task::recording::Recording;
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD as BASE64;
+use serde_json::json;
+use std::path::Path;
+
+const TEMPLATE: &str = include_str!("replay.html");
+/// Steps of a position per voxel length.
+const STEPS: f64 = 200.0;
+/// The number for a position that is not finite or more than 163 voxel lengths from the frame's origin.
+const NOWHERE: i16 = i16::MIN;
+/// Most bytes of positions in a page (a third more in base64); longer recordings show every second frame, third …
+const MOST_BYTES: usize = 5_500_000;
+
+/// Writes the page. `title` and the `metadata` (shown as a table, in order) may be any text.
+///
+/// # Errors
+/// [`PictureError`] if the recording cannot be drawn or the file cannot be written.
+pub fn write(
+    path: &Path,
+    recording: &Recording,
+    title: &str,
+    metadata: &[(String, String)],
+) -> Result<(), PictureError> {
+    write_whole(path, page(recording, title, metadata)?.as_bytes())
+}
+
+/// The page as text.
+///
+/// # Errors
+/// [`PictureError::Recording`] if the recording cannot be drawn.
+pub fn page(
+    recording: &Recording,
+    title: &str,
+    metadata: &[(String, String)],
+) -> Result<String, PictureError> {
+    let walk = Walk::new(recording)?;
+    let rows = metadata.iter().map(|(key, value)| {
+        format!("<tr><th scope=\"row\">{}</th><td>{}</td></tr>\n", escape(key), escape(value))
+    });
+    let warning = if recording.unstable {
+        "<p class=\"alarm\" role=\"alert\">This life ended early: the simulation became unstable.</p>"
+    } else {
+        ""
+    };
+    let life = life(&walk).to_string();
+    Ok(fill(
+        TEMPLATE,
+        &[
+            ("title", &escape(title)),
+            ("metadata", &rows.collect::<String>()),
+            ("warning", warning),
+            // In a script element only "<" could end it or open another.
+            ("life", &life.replace('<', "\\u003c")),
+        ],
+    ))
+}
+
+/// The recording as the page's script reads it.
+fn life(walk: &Walk) -> serde_json::Value {
+    let recording = walk.recording();
+    let points = recording.frames.iter().map(|f| f.points.len()).min().unwrap_or(0);
+    let every = (walk.len() * points * 4).div_ceil(MOST_BYTES).max(1);
+    let shown = gif::shown(walk, every);
+    let origins: Vec<[f64; 2]> =
+        shown.iter().map(|f| walk.centre(*f).map(|v| (v * STEPS).round() / STEPS)).collect();
+    let positions = shown.iter().zip(&origins).flat_map(|(f, origin)| {
+        recording.frames[*f].points.iter().take(points).flat_map(|p| quantised(*p, *origin))
+    });
+    let phases = recording.phases.iter().enumerate().map(|(k, phase)| {
+        let range = walk.phase_frames(k);
+        let first = shown.partition_point(|f| *f < range.start);
+        let stimulus = phase.stimulus.rows().flatten().map(|v| (255.0 * v.clamp(0.0, 1.0)).round() as u8);
+        json!({
+            "first": first,
+            "label": phase.label,
+            "displacement": number(phase.displacement),
+            "fresh": walk.is_fresh(k),
+            "height": phase.stimulus.height(),
+            "width": phase.stimulus.width(),
+            "stimulus": BASE64.encode(stimulus.collect::<Vec<u8>>()),
+        })
+    });
+    let body = &recording.body;
+    json!({
+        "robot": recording.robot,
+        "body": body.to_string(),
+        "voxels": recording.voxels.iter().map(|v| {
+            let material = body.at(v.row as isize, v.column as isize);
+            json!([material.code(), v.corners])
+        }).collect::<Vec<_>>(),
+        "points": points,
+        "cycle": recording.cycle.max(1),
+        "unstable": recording.unstable,
+        "steps": shown,
+        "phases": phases.collect::<Vec<_>>(),
+        "unit": STEPS,
+        "origins": BASE64.encode(bytes(origins.iter().flatten().map(|v| v.to_le_bytes()))),
+        "positions": BASE64.encode(bytes(positions.map(i16::to_le_bytes))),
+        "materials": Material::ALL.map(|m| json!({ "name": m.name(), "tones": tones(m), "sensor": m.is_sensor() })),
+        "areas": TONE_AREAS,
+    })
+}
+
+fn bytes<const N: usize>(words: impl Iterator<Item = [u8; N]>) -> Vec<u8> {
+    words.flatten().collect()
+}
+
+fn quantised(point: [f64; 2], origin: [f64; 2]) -> [i16; 2] {
+    let steps = [0, 1].map(|k| ((point[k] - origin[k]) * STEPS).round());
+    if steps.iter().all(|s| s.abs() < 32767.0) { steps.map(|s| s as i16) } else { [NOWHERE; 2] }
+}
+
+/// JSON has no infinities: `null` for them.
+fn number(value: f64) -> Option<f64> {
+    value.is_finite().then_some(value)
+}
+
+/// Text as it stands in HTML, in elements and in quoted attributes.
+fn escape(text: &str) -> String {
+    let mut out = String::with_capacity(text.len());
+    for letter in text.chars() {
+        match letter {
+            '&' => out.push_str("&amp;"),
+            '<' => out.push_str("&lt;"),
+            '>' => out.push_str("&gt;"),
+            '"' => out.push_str("&quot;"),
+            '\'' => out.push_str("&#39;"),
+            _ => out.push(letter),
+        }
+    }
+    out
+}
+
+/// The template with its `{{name}}`s replaced, in one pass: what is put in is not looked at again.
+fn fill(template: &str, values: &[(&str, &str)]) -> String {
+    let mut out = String::new();
+    let mut rest = template;
+    while let Some((before, (name, after))) =
+        rest.split_once("{{").and_then(|(b, r)| Some((b, r.split_once("}}")?)))
+    {
+        out.push_str(before);
+        out.extend(values.iter().find(|(n, _)| *n == name).map(|(_, value)| *value));
+        rest = after;
+    }
+    out + rest
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::wobble;
+    use super::*;
+
+    fn embedded(page: &str) -> serde_json::Value {
+        let (_, rest) = page.split_once("<script type=\"application/json\" id=\"life\">").unwrap();
+        serde_json::from_str(rest.split_once("</script>").unwrap().0).unwrap()
+    }
+
+    /// Positions by shown frame, as the script decodes them.
+    fn positions(life: &serde_json::Value) -> Vec<Vec<Option<[f64; 2]>>> {
+        let data = |key: &str| BASE64.decode(life[key].as_str().unwrap()).unwrap();
+        let origins: Vec<f64> =
+            data("origins").chunks(8).map(|b| f64::from_le_bytes(b.try_into().unwrap())).collect();
+        let steps: Vec<i16> =
+            data("positions").chunks(2).map(|b| i16::from_le_bytes(b.try_into().unwrap())).collect();
+        let points = life["points"].as_u64().unwrap() as usize;
+        let frames = steps.chunks(2 * points).zip(origins.chunks(2));
+        let position = |p: &[i16], o: &[f64]| {
+            (p[0] != NOWHERE).then(|| [0, 1].map(|k| f64::from(p[k]) / life["unit"].as_f64().unwrap() + o[k]))
+        };
+        frames.map(|(frame, o)| frame.chunks(2).map(|p| position(p, o)).collect()).collect()
+    }
+
+    #[test]
+    fn embedded_positions_decode_within_a_200th_of_a_voxel_however_far() {
+        for far in [0.0, -321.7, 1e6] {
+            let mut recording = wobble::recording("3344/1256", 2, 40, true);
+            recording.frames.iter_mut().for_each(|f| {
+                f.points.iter_mut().for_each(|p| p[0] += far);
+                f.centre[0] += far;
+            });
+            let life = embedded(&page(&recording, "", &[]).unwrap());
+            let decoded = positions(&life);
+            assert_eq!(decoded.len(), recording.frames.len());
+            for (frame, points) in recording.frames.iter().zip(&decoded) {
+                for (p, q) in frame.points.iter().zip(points) {
+                    let q = q.unwrap();
+                    assert!((p[0] - q[0]).abs() < 0.005 && (p[1] - q[1]).abs() < 0.005, "{p:?} {q:?}");
+                }
+            }
+            assert_eq!(life["phases"][1]["first"], 41);
+            assert_eq!(life["phases"][1]["fresh"], true);
+        }
+    }
+
+    #[test]
+    fn the_page_needs_no_network_and_lets_no_text_become_markup() {
+        let mut recording = wobble::recording("34/56", 1, 5, false);
+        recording.robot = "</script><script>alert(1)</script>".into();
+        recording.phases[0].label = "<script>".into();
+        let metadata = [("<b>".to_string(), "\"{{life}}\" & <script>x</script>".to_string())];
+        let page = page(&recording, "<script>alert('t')</script>", &metadata).unwrap();
+        for forbidden in ["http://", "https://", "src=", "@import", "url(", "<link", "{{title", "{{life}}</"]
+        {
+            assert!(!page.contains(forbidden), "{forbidden}");
+        }
+        let scripts = TEMPLATE.matches("<script").count();
+        assert_eq!(page.matches("<script").count(), scripts);
+        assert_eq!(page.matches("</script").count(), scripts);
+        assert!(
+            page.contains("&lt;script&gt;alert(&#39;t&#39;)") && page.contains("{{life}}&quot; &amp; &lt;")
+        );
+        assert_eq!(embedded(&page)["robot"], recording.robot.as_str());
+    }
+
+    #[test]
+    fn unstable_lives_say_so_and_leave_out_what_is_nowhere() {
+        let mut recording = wobble::recording("34/56", 1, 5, false);
+        assert!(!page(&recording, "", &[]).unwrap().contains("became unstable"));
+        recording.unstable = true;
+        recording.frames[5].points[0] = [f64::NAN, 1.0];
+        recording.frames[5].points[1] = [1e200, 1.0];
+        recording.frames[5].centre = [f64::NAN; 2];
+        recording.phases[0].displacement = f64::NAN;
+        let page = page(&recording, "", &[]).unwrap();
+        assert!(page.contains("became unstable"));
+        let last = positions(&embedded(&page)).pop().unwrap();
+        assert!(last[0].is_none() && last[1].is_none() && last[2].is_some());
+    }
+
+    #[test]
+    fn pages_stay_below_eight_megabytes() {
+        let full = ["34215634215634"; 14].join("/");
+        let recording = wobble::recording(&full, 4, 500, true);
+        let text = page(&recording, "", &[]).unwrap();
+        assert!(text.len() < 8_000_000, "{}", text.len());
+        assert_eq!(positions(&embedded(&text)).len(), recording.frames.len());
+        let huge = [&*"3".repeat(64); 64].join("/");
+        let text = page(&wobble::recording(&huge, 2, 250, true), "", &[]).unwrap();
+        assert!(text.len() < 8_000_000, "{}", text.len());
+    }
+}

@@ -1,0 +1,190 @@
+//! A frame of a recording as text, for a live view in a terminal.
+
+use super::colour::{self, Colour};
+use super::panel::readout;
+use super::walk::{Walk, area};
+use crate::body::Material;
+
+/// Columns of the stimulus' corner are only taken from views at least this wide.
+const WIDE: usize = 40;
+
+/// What one pixel of the view shows.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Pixel {
+    Sky,
+    Ground,
+    /// Ground below a mark of the ruler (every ten voxel lengths from the start).
+    Mark,
+    Voxel(Material, f64),
+    Image(f64),
+}
+
+/// A frame as exactly `rows` lines of exactly `columns` characters, joined by newlines: a line of read-outs, then the
+/// world, followed by the camera. With `colour`, two pixels a character (half blocks, 24-bit colours); without, plain
+/// ASCII: `#` rigid, `:` soft, `/` and `\` muscles, `-` and `+` sensors.
+pub fn frame(walk: &Walk, frame: usize, columns: usize, rows: usize, colour: bool) -> String {
+    let (columns, rows) = (columns.min(1000), rows.min(1000));
+    let words = readout(walk, frame);
+    let status = format!("{}  {}  {}", words.label, words.time, words.displacement);
+    let status = if colour {
+        status
+    } else {
+        status.replace('·', "-").replace('−', "-").replace(['←', '→'], "")
+    };
+    let shown = status.chars().map(|c| if c.is_control() || (!colour && !c.is_ascii()) { '?' } else { c });
+    let status: String = shown.chain(std::iter::repeat(' ')).take(columns).collect();
+    // A character is about twice as high as wide.
+    let (height, tall) =
+        if colour { (2 * rows.saturating_sub(1), 1.0) } else { (rows.saturating_sub(1), 2.0) };
+    let pixels = pixels(walk, frame, columns, height, tall);
+    let mut lines = vec![status];
+    let at = |r: usize, c: usize| pixels.get(r * columns + c).copied().unwrap_or(Pixel::Sky);
+    for row in 1..rows {
+        let line = |cell: &dyn Fn(usize) -> String| -> String { (0..columns).map(cell).collect() };
+        lines.push(if colour {
+            let pair = |c: usize| [at(2 * row - 2, c), at(2 * row - 1, c)].map(|p| paint(p).rgb);
+            let half = |c: usize| match pair(c) {
+                // The colours stay set until they change.
+                same if c > 0 && same == pair(c - 1) => "▀".to_string(),
+                [[r, g, b], [x, y, z]] => format!("\x1b[38;2;{r};{g};{b};48;2;{x};{y};{z}m▀"),
+            };
+            line(&half) + "\x1b[0m"
+        } else {
+            line(&|c| letter(at(row - 1, c)).to_string())
+        });
+    }
+    lines.truncate(rows);
+    lines.join("\n")
+}
+
+/// The view as rows of pixels, top row first; a pixel is `tall` times as high as wide.
+fn pixels(walk: &Walk, frame: usize, columns: usize, rows: usize, tall: f64) -> Vec<Pixel> {
+    if columns == 0 || rows == 0 {
+        return vec![];
+    }
+    let first = walk.extent(0..1);
+    let (width, top) = ((first.right - first.left).clamp(1.0, 128.0), first.top.clamp(1.0, 128.0));
+    let ground = 1 + rows / 16;
+    // Pixels per voxel length: the robot with as much free ground beside it, and some sky above.
+    let scale = (columns as f64 / (2.0 * width + 4.0))
+        .min((rows - ground.min(rows - 1)) as f64 * tall / (1.2 * top + 1.0));
+    let left = ((walk.centre(frame)[0] * scale).round() - (columns / 2) as f64) / scale;
+    let surface = rows.saturating_sub(ground);
+    let zero = walk.centre(walk.life(frame).start)[0];
+    let mut out = vec![Pixel::Sky; columns * rows];
+    for (i, pixel) in out.iter_mut().enumerate().skip(surface * columns) {
+        let x = left + ((i % columns) as f64 + 0.5) / scale - zero;
+        let is_mark = (x / 10.0 - (x / 10.0).round()).abs() * 10.0 * scale <= 0.5;
+        *pixel = if is_mark { Pixel::Mark } else { Pixel::Ground };
+    }
+    for (material, quad) in walk.voxels(frame) {
+        let shown = Pixel::Voxel(material, area(&quad));
+        let place = quad.map(|[x, y]| [(x - left) * scale, surface as f64 - y * scale / tall]);
+        let bounds = |k: usize, most: usize| {
+            let low = place.iter().map(|p| p[k]).fold(f64::INFINITY, f64::min);
+            let high = place.iter().map(|p| p[k]).fold(f64::NEG_INFINITY, f64::max);
+            low.floor().clamp(0.0, most as f64) as usize..high.ceil().clamp(0.0, most as f64) as usize
+        };
+        for row in bounds(1, surface) {
+            for column in bounds(0, columns) {
+                if contains(&place, [column as f64 + 0.5, row as f64 + 0.5]) {
+                    out[row * columns + column] = shown;
+                }
+            }
+        }
+    }
+    let image = &walk.phase(frame).stimulus;
+    if columns >= WIDE && 2 * image.width() < columns && image.height() < surface && tall == 1.0 {
+        for ((row, column), intensity) in image.iter() {
+            out[row * columns + column] = Pixel::Image(*intensity);
+        }
+    }
+    out
+}
+
+/// Whether a point lies in a quadrilateral: an odd number of its sides are to the right.
+fn contains(quad: &[[f64; 2]; 4], [x, y]: [f64; 2]) -> bool {
+    let crossed = |k: &usize| {
+        let ([ax, ay], [bx, by]) = (quad[*k], quad[(k + 1) % 4]);
+        (ay > y) != (by > y) && x < ax + (y - ay) / (by - ay) * (bx - ax)
+    };
+    (0..4).filter(crossed).count() % 2 == 1
+}
+
+fn paint(pixel: Pixel) -> Colour {
+    match pixel {
+        Pixel::Sky => Colour::gray(0.95),
+        Pixel::Ground => Colour::new(206, 198, 182),
+        Pixel::Mark => colour::GROUND_LINE,
+        Pixel::Voxel(material, area) => colour::shade(material, area),
+        Pixel::Image(intensity) => Colour::gray(intensity),
+    }
+}
+
+fn letter(pixel: Pixel) -> char {
+    match pixel {
+        Pixel::Sky => ' ',
+        Pixel::Ground => '=',
+        Pixel::Mark => '|',
+        Pixel::Voxel(Material::Rigid, _) => '#',
+        Pixel::Voxel(Material::MuscleInPhase, _) => '/',
+        Pixel::Voxel(Material::MuscleAntiphase, _) => '\\',
+        Pixel::Voxel(Material::SensorShrink, _) => '-',
+        Pixel::Voxel(Material::SensorExpand, _) => '+',
+        Pixel::Voxel(Material::Soft | Material::Empty, _) => ':',
+        Pixel::Image(intensity) => {
+            if intensity > 0.5 {
+                '@'
+            } else {
+                '.'
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::wobble;
+    use super::*;
+
+    /// The visible characters of every line.
+    fn visible(text: &str) -> Vec<usize> {
+        let strip = |line: &str| {
+            let mut pieces = line.split('\x1b');
+            let first = pieces.next().map_or(0, |p| p.chars().count());
+            first + pieces.map(|p| p.split_once('m').map_or(0, |(_, t)| t.chars().count())).sum::<usize>()
+        };
+        text.split('\n').map(strip).collect()
+    }
+
+    #[test]
+    fn views_have_the_asked_size() {
+        let mut recording = wobble::recording("3344/1256", 2, 20, true);
+        recording.frames[7].points[3] = [f64::NAN, 1e300];
+        recording.frames[8].points[3] = [1e8, -1e8];
+        let walk = Walk::new(&recording).unwrap();
+        for (columns, rows) in [(80, 24), (20, 8), (1, 1), (2, 2), (200, 60), (41, 3)] {
+            for f in [0, 7, 8, 30, 41] {
+                for colour in [true, false] {
+                    let text = frame(&walk, f, columns, rows, colour);
+                    assert_eq!(visible(&text), vec![columns; rows], "{columns} × {rows}");
+                    assert!(colour || text.is_ascii());
+                }
+            }
+        }
+        assert!(frame(&walk, 0, 10, 0, true).is_empty());
+    }
+
+    #[test]
+    fn every_material_is_seen_in_its_colour_or_letter() {
+        let recording = wobble::recording("123/456", 1, 10, false);
+        let walk = Walk::new(&recording).unwrap();
+        let plain = frame(&walk, 0, 80, 24, false);
+        assert!("#:/\\-+=|".chars().all(|c| plain.contains(c)), "{plain}");
+        let colours = frame(&walk, 4, 80, 24, true);
+        for (material, quad) in walk.voxels(4) {
+            let [r, g, b] = colour::shade(material, area(&quad)).rgb;
+            assert!(colours.contains(&format!("{r};{g};{b}")), "{material:?}");
+        }
+    }
+}
