@@ -61,7 +61,7 @@ pub fn shown(walk: &Walk, every: usize) -> Vec<usize> {
 /// The bytes of the GIF.
 ///
 /// # Errors
-/// As [`write`], but for the file.
+/// As [`write()`], but for the file.
 pub fn encode(recording: &Recording, options: &GifOptions) -> Result<Vec<u8>, PictureError> {
     let walk = Walk::new(recording)?;
     let stage = Stage::new(&walk, options.width)?.crisp();
@@ -222,5 +222,16 @@ mod tests {
         assert_eq!(decode(&encode(&recording, &options).unwrap()).3.len(), 2);
         recording.frames.truncate(1);
         assert_eq!(decode(&encode(&recording, &options).unwrap()).3.len(), 1);
+    }
+
+    #[test]
+    fn the_largest_body_thrown_a_million_voxels_away_is_drawn() {
+        let mut recording = wobble::recording(&[&*"3".repeat(64); 64].join("/"), 1, 3, false);
+        for (frame, shift) in recording.frames.iter_mut().zip([0.0, 40.0, 1e6, -1e6]) {
+            frame.points.iter_mut().for_each(|p| p[0] += shift);
+            frame.centre[0] += shift;
+        }
+        let options = GifOptions { every: 1, ..GifOptions::default() };
+        assert_eq!(decode(&encode(&recording, &options).unwrap()).3.len(), 4);
     }
 }

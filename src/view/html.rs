@@ -57,6 +57,8 @@ pub fn page(
         TEMPLATE,
         &[
             ("title", &escape(title)),
+            ("style", include_str!("replay.css")),
+            ("script", include_str!("replay.js")),
             ("metadata", &rows.collect::<String>()),
             ("warning", warning),
             // In a script element only "<" could end it or open another.

@@ -7,15 +7,19 @@ pub mod sheet;
 //! world a picture shows; `scene` and `panel` make drawing primitives of one frame; `raster` paints them. On top of
 //! these stand the animated GIF, the self-contained HTML page and the view in a terminal.
 
+pub mod bar;
 pub mod colour;
+pub mod console;
 pub mod font;
 pub mod gif;
 pub mod html;
 pub mod palette;
 pub mod panel;
+pub mod progress;
 pub mod raster;
 pub mod scene;
 pub mod stage;
+pub mod table;
 pub mod terminal;
 pub mod walk;
 #[cfg(test)]

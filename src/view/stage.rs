@@ -62,7 +62,11 @@ impl Stage {
         let panel = PANEL * zoom;
         let surface = (panel + top * scale).round();
         let height = (surface + GROUND * zoom) as u32;
-        let middle = if follow { followed(walk) } else { vec![(left + right) / 2.0; walk.len()] };
+        let middle = if follow {
+            followed(walk, 0.3 * f64::from(width) / scale)
+        } else {
+            vec![(left + right) / 2.0; walk.len()]
+        };
         // Whole pixels: the ground scrolls without flicker.
         let snap = |x: f64| ((x * scale - f64::from(width) / 2.0).round()) / scale;
         let crisp = false;
@@ -115,8 +119,9 @@ fn reach(walk: &Walk) -> (f64, f64) {
     (all.left.max(low - size - 2.0).min(low), all.right.min(high + size + 2.0).max(high))
 }
 
-/// The centres' x, averaged twice over [`SMOOTHING`] frames on both sides, each life by itself.
-fn followed(walk: &Walk) -> Vec<f64> {
+/// The centres' x, averaged twice over [`SMOOTHING`] frames on both sides, each life by itself, and never further than
+/// `most` voxel lengths from the centre: a body that is hurled away stays in view.
+fn followed(walk: &Walk, most: f64) -> Vec<f64> {
     let mut path: Vec<f64> = (0..walk.len()).map(|f| walk.centre(f)[0]).collect();
     let mut start = 0;
     while start < path.len() {
@@ -125,6 +130,10 @@ fn followed(walk: &Walk) -> Vec<f64> {
             smooth(&mut path[life.clone()]);
         }
         start = life.end.max(start + 1);
+    }
+    for (f, x) in path.iter_mut().enumerate() {
+        let centre = walk.centre(f)[0];
+        *x = x.clamp(centre - most, centre + most);
     }
     path
 }
@@ -191,6 +200,8 @@ mod tests {
                 assert!((120..=800).contains(&stage.height), "{body} {x}: {}", stage.height);
                 let window = stage.window(2);
                 assert!(window.left.is_finite() && window.right > window.left && window.scale >= 1.0);
+                let seen = stage.to_pixels(2, walk.centre(2))[0];
+                assert!((0.0..=480.0).contains(&seen), "{x}: {seen}");
             }
         }
         let recording = wobble::recording("3", 1, 1, false);

@@ -26,11 +26,7 @@ pub fn frame(walk: &Walk, frame: usize, columns: usize, rows: usize, colour: boo
     let (columns, rows) = (columns.min(1000), rows.min(1000));
     let words = readout(walk, frame);
     let status = format!("{}  {}  {}", words.label, words.time, words.displacement);
-    let status = if colour {
-        status
-    } else {
-        status.replace('·', "-").replace('−', "-").replace(['←', '→'], "")
-    };
+    let status = if colour { status } else { status.replace(['·', '−'], "-").replace(['←', '→'], "") };
     let shown = status.chars().map(|c| if c.is_control() || (!colour && !c.is_ascii()) { '?' } else { c });
     let status: String = shown.chain(std::iter::repeat(' ')).take(columns).collect();
     // A character is about twice as high as wide.

@@ -106,7 +106,7 @@ impl<'a> Walk<'a> {
     pub fn life(&self, frame: usize) -> Range<usize> {
         let phase = self.phase_index(frame);
         let resets = || self.fresh.iter().enumerate().filter(|(_, f)| **f).map(|(p, _)| p);
-        let first = resets().filter(|&p| p <= phase).last().unwrap_or(0);
+        let first = resets().rfind(|&p| p <= phase).unwrap_or(0);
         let next = resets().find(|&p| p > phase).unwrap_or(self.fresh.len());
         self.phase_frames(first).start..self.phase_frames(next).start
     }

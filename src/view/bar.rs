@@ -1,0 +1,171 @@
+//! What moves on the terminal while something runs: progress and live pictures. All of it is written by
+//! [`Console`].
+
+use super::console::{Console, Mode, lock};
+use super::progress::{Pacer, Progress, count_line};
+use indicatif::ProgressBar;
+use serde::Serialize;
+use std::sync::Mutex;
+use std::time::Instant;
+
+/// A line that is rewritten on a terminal, and repeated from time to time elsewhere.
+struct Line<'c> {
+    console: &'c Console,
+    total: u64,
+    begin: Instant,
+    moving: Option<ProgressBar>,
+    pacer: Mutex<Pacer>,
+}
+
+impl<'c> Line<'c> {
+    fn new(console: &'c Console, total: u64) -> Self {
+        let moving = console.moving_line(total);
+        Line { console, total, begin: Instant::now(), moving, pacer: Mutex::default() }
+    }
+
+    /// Shows the text, made from the seconds since the beginning.
+    fn show(&self, done: u64, text: impl FnOnce(f64) -> String) {
+        let seconds = self.begin.elapsed().as_secs_f64();
+        if let Some(line) = &self.moving {
+            line.set_position(done);
+            line.set_message(text(seconds));
+        } else if self.console.mode() == Mode::Human && self.is_due(done, seconds) {
+            self.console.err(&format!("{}\n", text(seconds)));
+        }
+    }
+
+    fn is_due(&self, done: u64, seconds: f64) -> bool {
+        lock(&self.pacer).is_due(seconds, done as f64 / self.total.max(1) as f64)
+    }
+}
+
+impl Drop for Line<'_> {
+    fn drop(&mut self) {
+        if self.moving.is_some() {
+            self.console.clear_line();
+        }
+    }
+}
+
+/// Progress of an evolution; the line goes when this is dropped.
+pub struct Bar<'c> {
+    begin: Mutex<Option<Progress>>,
+    line: Line<'c>,
+}
+
+impl<'c> Bar<'c> {
+    pub(super) fn new(console: &'c Console, total: u64) -> Self {
+        Bar { begin: Mutex::new(None), line: Line::new(console, total) }
+    }
+
+    /// Shows how far it is (JSON: an event `generation`). The first call counts as the beginning: a resumed run calls
+    /// it once before it goes on.
+    pub fn update(&self, progress: &Progress) {
+        let begin = *lock(&self.begin).get_or_insert(*progress);
+        self.line.show(progress.done, |seconds| progress.line(&begin, seconds));
+        self.line.console.event("generation", progress);
+    }
+}
+
+/// Progress of something counted; the line goes when this is dropped.
+pub struct Counter<'c> {
+    label: String,
+    unit: String,
+    line: Line<'c>,
+}
+
+impl<'c> Counter<'c> {
+    pub(super) fn new(console: &'c Console, label: &str, total: u64, unit: &str) -> Self {
+        Counter { label: label.into(), unit: unit.into(), line: Line::new(console, total) }
+    }
+
+    /// Shows that `done` of the things are done (JSON: an event `progress`, as often as a plain line).
+    pub fn update(&self, done: u64) {
+        #[derive(Serialize)]
+        struct Count<'a> {
+            label: &'a str,
+            done: u64,
+            total: u64,
+            unit: &'a str,
+        }
+        let (label, unit, total) = (self.label.as_str(), self.unit.as_str(), self.line.total);
+        self.line.show(done, |seconds| count_line(label, done, total, unit, seconds));
+        let is_json = self.line.console.mode() == Mode::Json;
+        if is_json && self.line.is_due(done, self.line.begin.elapsed().as_secs_f64()) {
+            self.line.console.event("progress", &Count { label, done, total, unit });
+        }
+    }
+}
+
+/// A picture of text on stdout, drawn over by the next.
+pub struct Live<'c> {
+    console: &'c Console,
+    height: usize,
+}
+
+impl<'c> Live<'c> {
+    pub(super) fn new(console: &'c Console) -> Self {
+        Live { console, height: 0 }
+    }
+
+    /// Shows a picture in the place of the one before.
+    pub fn show(&mut self, picture: &str) {
+        let up = if self.height > 0 { format!("\x1b[{}F", self.height) } else { String::new() };
+        self.height = picture.lines().count();
+        self.console.out(&format!("{up}{picture}\n"));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::console::tests::console;
+    use super::*;
+
+    const PROGRESS: Progress =
+        Progress { done: 0, total: 100, best: Some(1.0), coverage: 0.5, evaluations: 0 };
+
+    #[test]
+    fn without_a_terminal_progress_is_a_line_every_tenth() {
+        let (console, out, err) = console(Mode::Human);
+        let bar = console.progress(100);
+        (0..=100).for_each(|done| bar.update(&Progress { done, evaluations: 20 * done, ..PROGRESS }));
+        let text = err.read();
+        assert_eq!((text.lines().count(), out.read().as_str()), (11, ""), "{text}");
+        assert!(text.starts_with("generation 0/100 · best 1.00 · coverage 50.0 %"), "{text}");
+        assert!(text.lines().last().unwrap().starts_with("generation 100/100"));
+    }
+
+    #[test]
+    fn quiet_shows_no_progress_and_json_every_generation() {
+        for (mode, lines) in [(Mode::Quiet, 0), (Mode::Json, 5)] {
+            let (console, out, err) = console(mode);
+            let bar = console.progress(100);
+            (1..=5).for_each(|done| bar.update(&Progress { done, ..PROGRESS }));
+            assert_eq!((out.read().lines().count(), err.read().as_str()), (lines, ""));
+        }
+    }
+
+    #[test]
+    fn counters_count_in_every_mode() {
+        let (human, _, err) = console(Mode::Human);
+        human.counter("eval", 4, "images").update(4);
+        assert!(err.read().starts_with("eval 4/4 images"), "{}", err.read());
+        let (json, out, _) = console(Mode::Json);
+        let counter = json.counter("fetch", 2000, "bytes");
+        (1..=2000).for_each(|done| counter.update(done));
+        let lines: Vec<serde_json::Value> =
+            out.read().lines().map(|l| serde_json::from_str(l).unwrap()).collect();
+        assert!((11..=12).contains(&lines.len()), "{lines:?}");
+        assert_eq!(lines[lines.len() - 1]["done"], 2000);
+    }
+
+    #[test]
+    fn a_live_picture_is_drawn_over_the_one_before() {
+        let (console, out, _) = console(Mode::Human);
+        assert!(console.live().is_none(), "not a terminal");
+        let mut live = Live::new(&console);
+        live.show("a\nb");
+        live.show("c\nd");
+        assert_eq!(out.read(), "a\nb\n\x1b[2Fc\nd\n");
+    }
+}

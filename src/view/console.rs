@@ -1,0 +1,336 @@
+//! [`Console`]: the only writer to the terminal. Results go to stdout; progress, notes and errors to stderr.
+
+pub use super::bar::{Bar, Counter, Live};
+pub use super::progress::Progress;
+use super::table;
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use serde::Serialize;
+use std::error::Error;
+use std::io::{self, IsTerminal, Write};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+/// For whom the console writes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Mode {
+    /// People: a moving progress line on a terminal, plain lines elsewhere.
+    #[default]
+    Human,
+    /// Results, warnings and errors only.
+    Quiet,
+    /// Programs: one JSON object per line on stdout, its kind under `event`; warnings and errors on stderr too.
+    Json,
+}
+
+/// The terminal, or what stands for it. May be shared between threads.
+pub struct Console {
+    mode: Mode,
+    /// What is known of stdout and stderr: whether they are terminals that can move the cursor.
+    terminals: [bool; 2],
+    colour: bool,
+    streams: Mutex<Streams>,
+    /// The progress line on the terminal, which must step aside for other lines.
+    line: Mutex<Option<ProgressBar>>,
+}
+
+struct Streams {
+    out: Box<dyn Write + Send>,
+    err: Box<dyn Write + Send>,
+    /// The reader of stdout has gone (`| head`).
+    closed: bool,
+}
+
+pub(super) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    // A thread that panicked while it held a stream leaves it usable.
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+impl Console {
+    /// The process's stdout and stderr. No colours if `NO_COLOR` is set; no moving lines if `TERM` is `dumb`.
+    pub fn new(mode: Mode) -> Self {
+        let set = |name| std::env::var_os(name).filter(|v| !v.is_empty());
+        let smart = set("TERM").is_none_or(|term| term != "dumb");
+        let terminals = [io::stdout().is_terminal() && smart, io::stderr().is_terminal() && smart];
+        Console {
+            terminals,
+            colour: set("NO_COLOR").is_none(),
+            ..Console::with_writers(mode, Box::new(io::stdout()), Box::new(io::stderr()))
+        }
+    }
+
+    /// A console onto any two writers, taken for files: no colours, no moving lines.
+    pub fn with_writers(mode: Mode, out: Box<dyn Write + Send>, err: Box<dyn Write + Send>) -> Self {
+        let streams = Mutex::new(Streams { out, err, closed: false });
+        Console { mode, terminals: [false; 2], colour: false, streams, line: Mutex::new(None) }
+    }
+
+    /// For whom it writes.
+    pub fn mode(&self) -> Mode {
+        self.mode
+    }
+
+    /// Whether pictures in colour may be written to stdout.
+    pub fn has_colour(&self) -> bool {
+        self.terminals[0] && self.colour
+    }
+
+    /// Whether the reader of stdout has gone: nobody waits for further results.
+    pub fn is_closed(&self) -> bool {
+        lock(&self.streams).closed
+    }
+
+    /// A line of results, to stdout.
+    pub fn line(&self, text: &str) {
+        match self.mode {
+            Mode::Json => self.event("result", &Text { text }),
+            _ => self.out(&format!("{text}\n")),
+        }
+    }
+
+    /// A table of results, to stdout; columns of numbers are aligned to the right.
+    pub fn table(&self, headers: &[&str], rows: &[Vec<String>]) {
+        #[derive(Serialize)]
+        struct Table<'a> {
+            headers: &'a [&'a str],
+            rows: &'a [Vec<String>],
+        }
+        match self.mode {
+            Mode::Json => self.event("table", &Table { headers, rows }),
+            _ => self.out(&(table::align(headers, rows).join("\n") + "\n")),
+        }
+    }
+
+    /// One JSON line on stdout: the payload's fields after `"event": name` (a payload that is no object: as `value`).
+    /// Nothing in the other modes.
+    pub fn event(&self, name: &str, payload: &impl Serialize) {
+        if self.mode != Mode::Json {
+            return;
+        }
+        let (Ok(name), Ok(payload)) = (serde_json::to_string(name), serde_json::to_string(payload)) else {
+            return self.warning(&format!("the event {name:?} cannot be written as JSON"));
+        };
+        let fields = match payload.strip_prefix('{') {
+            Some("}") => "}".to_string(),
+            Some(fields) => format!(",{fields}"),
+            None => format!(",\"value\":{payload}}}"),
+        };
+        self.out(&format!("{{\"event\":{name}{fields}\n"));
+    }
+
+    /// A note to people, to stderr (JSON: an event).
+    pub fn info(&self, text: &str) {
+        match self.mode {
+            Mode::Human => self.err(&format!("{text}\n")),
+            Mode::Quiet => {}
+            Mode::Json => self.event("info", &Text { text }),
+        }
+    }
+
+    /// A warning, to stderr, in every mode.
+    pub fn warning(&self, text: &str) {
+        self.err(&format!("{} {text}\n", self.paint("warning:", "1;33")));
+    }
+
+    /// An error with its causes and perhaps what to do, to stderr, in every mode. A cause that the line above it
+    /// already tells is left out.
+    pub fn error(&self, error: &(dyn Error + 'static), hint: Option<&str>) {
+        let mut told = error.to_string();
+        let mut text = format!("{} {told}\n", self.paint("error:", "1;31"));
+        let mut causes = Vec::new();
+        let mut source = error.source();
+        while let Some(cause) = source {
+            let words = cause.to_string();
+            if !told.contains(&words) {
+                text += &format!("  caused by: {words}\n");
+                told = words.clone();
+                causes.push(words);
+            }
+            source = cause.source();
+        }
+        if let Some(hint) = hint {
+            text += &format!("{} {hint}\n", self.paint("hint:", "1"));
+        }
+        self.err(&text);
+        self.event(
+            "error",
+            &serde_json::json!({ "message": error.to_string(), "causes": causes, "hint": hint }),
+        );
+    }
+
+    /// Progress of an evolution: call [`Bar::update`] after every generation.
+    pub fn progress(&self, total: u64) -> Bar<'_> {
+        Bar::new(self, total)
+    }
+
+    /// Progress of anything counted: `label`, how many `unit`s in all ("images", "robots", "bytes").
+    pub fn counter(&self, label: &str, total: u64, unit: &str) -> Counter<'_> {
+        Counter::new(self, label, total, unit)
+    }
+
+    /// A picture of text that is drawn over by the next, on stdout; none if that is not a terminal for people.
+    pub fn live(&self) -> Option<Live<'_>> {
+        (self.mode == Mode::Human && self.terminals[0]).then(|| Live::new(self))
+    }
+
+    fn paint(&self, text: &str, code: &str) -> String {
+        if self.terminals[1] && self.colour { format!("\x1b[{code}m{text}\x1b[0m") } else { text.to_string() }
+    }
+
+    pub(super) fn out(&self, text: &str) {
+        let failure = self.aside(|streams| {
+            if streams.closed {
+                return None;
+            }
+            let result = streams.out.write_all(text.as_bytes()).and_then(|()| streams.out.flush());
+            streams.closed = result.is_err();
+            result.err().filter(|e| e.kind() != io::ErrorKind::BrokenPipe)
+        });
+        if let Some(e) = failure {
+            self.warning(&format!("results can no longer be written to the standard output: {e}"));
+        }
+    }
+
+    pub(super) fn err(&self, text: &str) {
+        // Where stderr is gone there is nobody left to tell.
+        let _ =
+            self.aside(|streams| streams.err.write_all(text.as_bytes()).and_then(|()| streams.err.flush()));
+    }
+
+    /// Writes while the progress line is out of the way.
+    fn aside<R>(&self, write: impl FnOnce(&mut Streams) -> R) -> R {
+        let line = lock(&self.line).clone();
+        let write = || write(&mut lock(&self.streams));
+        match line {
+            Some(line) => line.suspend(write),
+            None => write(),
+        }
+    }
+
+    /// A moving line on the terminal, if there is one for people; it is taken away by [`Console::clear_line`].
+    pub(super) fn moving_line(&self, total: u64) -> Option<ProgressBar> {
+        if self.mode != Mode::Human || !self.terminals[1] {
+            return None;
+        }
+        let line = ProgressBar::with_draw_target(Some(total), ProgressDrawTarget::stderr_with_hz(10));
+        let bar = if self.colour { "{bar:10.cyan/dim}" } else { "{bar:10}" };
+        // The template is fixed: if it were wrong, the default would show.
+        if let Ok(style) = ProgressStyle::with_template(&format!("{bar} {{wide_msg}}")) {
+            line.set_style(style.progress_chars("━━─"));
+        }
+        *lock(&self.line) = Some(line.clone());
+        Some(line)
+    }
+
+    /// Takes the moving line away.
+    pub(super) fn clear_line(&self) {
+        if let Some(line) = lock(&self.line).take() {
+            line.finish_and_clear();
+        }
+    }
+}
+
+#[derive(Serialize)]
+struct Text<'a> {
+    text: &'a str,
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+    use std::sync::Arc;
+
+    /// A writer that can be read, or that refuses like a closed pipe.
+    #[derive(Clone, Default)]
+    pub struct Page {
+        text: Arc<Mutex<Vec<u8>>>,
+        closed: bool,
+    }
+
+    impl Page {
+        pub fn read(&self) -> String {
+            String::from_utf8(lock(&self.text).clone()).unwrap()
+        }
+    }
+
+    impl Write for Page {
+        fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+            if self.closed {
+                return Err(io::ErrorKind::BrokenPipe.into());
+            }
+            lock(&self.text).extend_from_slice(bytes);
+            Ok(bytes.len())
+        }
+        fn flush(&mut self) -> io::Result<()> {
+            Ok(())
+        }
+    }
+
+    pub fn console(mode: Mode) -> (Console, Page, Page) {
+        let (out, err) = (Page::default(), Page::default());
+        (Console::with_writers(mode, Box::new(out.clone()), Box::new(err.clone())), out, err)
+    }
+
+    #[derive(Debug, thiserror::Error)]
+    #[error("run.json cannot be read: {0}")]
+    struct Outer(#[source] Middle);
+    #[derive(Debug, thiserror::Error)]
+    #[error("no such file")]
+    struct Middle(#[source] Inner);
+    #[derive(Debug, thiserror::Error)]
+    #[error("disk 7 is gone")]
+    struct Inner;
+
+    #[test]
+    fn results_go_to_stdout_and_everything_else_to_stderr() {
+        let (console, out, err) = console(Mode::Human);
+        console.line("best 3.2");
+        console.table(&["a"], &[vec!["1".into()]]);
+        console.info("note");
+        console.warning("careful");
+        console.error(&Outer(Middle(Inner)), Some("try again"));
+        console.event("generation", &1);
+        assert_eq!(out.read(), "best 3.2\na\n-\n1\n");
+        let expected = "note\nwarning: careful\nerror: run.json cannot be read: no such file\n  \
+                        caused by: disk 7 is gone\nhint: try again\n";
+        assert_eq!(err.read(), expected);
+    }
+
+    #[test]
+    fn quiet_leaves_results_warnings_and_errors() {
+        let (console, out, err) = console(Mode::Quiet);
+        console.line("result");
+        console.info("note");
+        console.warning("careful");
+        assert_eq!((out.read().as_str(), err.read().as_str()), ("result\n", "warning: careful\n"));
+    }
+
+    #[test]
+    fn json_mode_writes_one_object_per_line_and_nothing_else_to_stdout() {
+        let (console, out, _) = console(Mode::Json);
+        console
+            .event("generation", &Progress { done: 3, total: 9, best: None, coverage: 0.5, evaluations: 60 });
+        console.event("list", &[1, 2]);
+        console.event("done", &serde_json::json!({}));
+        console.line("a\nb");
+        console.table(&["a"], &[vec!["1".into()]]);
+        console.info("note");
+        console.error(&Inner, None);
+        let text = out.read();
+        assert!(text.starts_with("{\"event\":\"generation\",\"generation\":3,"), "{text}");
+        let lines: Vec<serde_json::Value> = text.lines().map(|l| serde_json::from_str(l).unwrap()).collect();
+        let events: Vec<&str> = lines.iter().map(|l| l["event"].as_str().unwrap()).collect();
+        assert_eq!(events, ["generation", "list", "done", "result", "table", "info", "error"]);
+        assert_eq!((&lines[1]["value"][1], &lines[3]["text"]), (&2.into(), &"a\nb".into()));
+    }
+
+    #[test]
+    fn a_closed_pipe_ends_output_quietly() {
+        let err = Page::default();
+        let out = Page { closed: true, ..Page::default() };
+        let console = Console::with_writers(Mode::Human, Box::new(out), Box::new(err.clone()));
+        assert!(!console.is_closed());
+        console.line("nobody reads this");
+        console.line("nor this");
+        assert!(console.is_closed());
+        assert_eq!(err.read(), "");
+    }
+}

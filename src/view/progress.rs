@@ -1,0 +1,133 @@
+//! Progress in words: how far, how fast, how long still.
+
+use serde::Serialize;
+
+/// How far an evolution is.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Progress {
+    /// Generations done.
+    #[serde(rename = "generation")]
+    pub done: u64,
+    /// Generations in all.
+    #[serde(rename = "generations")]
+    pub total: u64,
+    /// Best fitness so far, voxel lengths; none if no robot has one.
+    pub best: Option<f64>,
+    /// Share of the possible cells that are filled, in [0, 1].
+    pub coverage: f64,
+    /// Evaluations so far.
+    pub evaluations: u64,
+}
+
+impl Progress {
+    /// In one line, given the progress at the beginning (of this session: a resumed run has done some already) and the
+    /// seconds since.
+    pub fn line(&self, begin: &Progress, seconds: f64) -> String {
+        let best = self.best.map_or("none".into(), |b| format!("{b:.2}"));
+        let rate = rate(self.evaluations.saturating_sub(begin.evaluations), seconds);
+        // The speed last: it is what a narrow terminal cuts off.
+        format!(
+            "generation {}/{} · best {best} · coverage {:.1} %{} · {rate} evaluations/s",
+            self.done,
+            self.total,
+            100.0 * self.coverage,
+            left(begin.done, self.done, self.total, seconds)
+        )
+    }
+}
+
+/// How far some counted thing is, in one line: images, robots or, with the unit "bytes", megabytes.
+pub fn count_line(label: &str, done: u64, total: u64, unit: &str, seconds: f64) -> String {
+    let end = left(0, done, total, seconds);
+    if unit == "bytes" {
+        let mega = |bytes: u64| bytes as f64 / 1e6;
+        let speed = if seconds > 0.0 { mega(done) / seconds } else { 0.0 };
+        return format!("{label} {:.1}/{:.1} MB · {speed:.1} MB/s{end}", mega(done), mega(total));
+    }
+    format!("{label} {done}/{total} {unit} · {} {unit}/s{end}", rate(done, seconds))
+}
+
+fn rate(count: u64, seconds: f64) -> String {
+    let rate = if seconds > 0.0 { count as f64 / seconds } else { 0.0 };
+    if rate < 10.0 { format!("{rate:.1}") } else { format!("{rate:.0}") }
+}
+
+fn left(begin: u64, done: u64, total: u64, seconds: f64) -> String {
+    let (did, todo) = (done.saturating_sub(begin), total.saturating_sub(done));
+    if did == 0 || todo == 0 {
+        return String::new();
+    }
+    format!(" · {} left", duration(seconds * todo as f64 / did as f64))
+}
+
+/// A time span in its two largest units: "45 s", "12 min 3 s", "3 h 20 min", "2 d 4 h".
+pub fn duration(seconds: f64) -> String {
+    let whole = if seconds.is_finite() { seconds.max(0.0).round() as u64 } else { 0 };
+    let (minutes, hours, days) = (whole / 60, whole / 3600, whole / 86400);
+    match (days, hours, minutes) {
+        (0, 0, 0) => format!("{whole} s"),
+        (0, 0, m) => format!("{m} min {} s", whole % 60),
+        (0, h, m) => format!("{h} h {} min", m % 60),
+        (d, h, _) => format!("{d} d {} h", h % 24),
+    }
+}
+
+/// Decides when a plain line is due where lines cannot be rewritten: the first at once, then every ten seconds or
+/// every tenth of the work, and the last.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Pacer(Option<(f64, f64)>);
+
+impl Pacer {
+    /// Whether a line is due at so many seconds and such a share of the work done.
+    pub fn is_due(&mut self, seconds: f64, share: f64) -> bool {
+        let due = match self.0 {
+            None => true,
+            Some((then, before)) => {
+                seconds - then >= 10.0 || share - before >= 0.1 || (share >= 1.0 && before < 1.0)
+            }
+        };
+        if due {
+            self.0 = Some((seconds, share));
+        }
+        due
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_resumed_run_counts_its_speed_from_where_it_resumed() {
+        let begin = Progress { done: 100, total: 200, best: None, coverage: 0.0, evaluations: 2000 };
+        let now = Progress { done: 150, best: Some(3.1449), coverage: 0.25, evaluations: 3000, ..begin };
+        let line = now.line(&begin, 10.0);
+        assert_eq!(line, "generation 150/200 · best 3.14 · coverage 25.0 % · 10 s left · 100 evaluations/s");
+        assert!(begin.line(&begin, 0.0).ends_with("best none · coverage 0.0 % · 0.0 evaluations/s"));
+    }
+
+    #[test]
+    fn counted_things_have_their_unit() {
+        assert_eq!(count_line("eval", 50, 100, "images", 5.0), "eval 50/100 images · 10 images/s · 5 s left");
+        let line = count_line("train images", 5_000_000, 10_000_000, "bytes", 2.0);
+        assert_eq!(line, "train images 5.0/10.0 MB · 2.5 MB/s · 2 s left");
+        assert!(count_line("x", 3, 0, "images", 0.0).contains("3/0"));
+    }
+
+    #[test]
+    fn durations_have_two_units_at_most() {
+        let spans = [0.4, 45.0, 723.0, 12_000.0, 187_200.0, f64::NAN].map(duration);
+        assert_eq!(spans, ["0 s", "45 s", "12 min 3 s", "3 h 20 min", "2 d 4 h", "0 s"]);
+    }
+
+    #[test]
+    fn plain_lines_come_every_ten_seconds_or_tenth_and_at_the_end() {
+        let mut pacer = Pacer::default();
+        let due: Vec<bool> =
+            [(0.0, 0.0), (1.0, 0.05), (2.0, 0.1), (3.0, 0.15), (12.0, 0.16), (12.5, 0.17), (13.0, 1.0)]
+                .map(|(seconds, share)| pacer.is_due(seconds, share))
+                .to_vec();
+        assert_eq!(due, [true, false, true, false, true, false, true]);
+        assert!(!pacer.is_due(14.0, 1.0));
+    }
+}

@@ -1,0 +1,305 @@
+"use strict";
+(() => {
+  const $ = (id) => document.getElementById(id);
+  const life = JSON.parse($("life").textContent);
+  const view = (text) => {
+    const raw = atob(text), bytes = new Uint8Array(raw.length);
+    for (let i = 0; i < raw.length; i++) bytes[i] = raw.charCodeAt(i);
+    return new DataView(bytes.buffer);
+  };
+  const N = life.steps.length, P = life.points, UNIT = life.unit, NOWHERE = -32768;
+  const positions = view(life.positions), origins = view(life.origins);
+  const origin = (f, k) => origins.getFloat64(16 * f + 8 * k, true);
+  // A point in voxel lengths, or null where the simulation had lost it.
+  const point = (f, i) => {
+    const at = 4 * (f * P + i), x = positions.getInt16(at, true);
+    return x === NOWHERE ? null : [x / UNIT + origin(f, 0), positions.getInt16(at + 2, true) / UNIT + origin(f, 1)];
+  };
+  const rows = life.body.split("\n"), H = rows.length, W = rows[0].length;
+
+  // Phases and lives (a life goes from one reset to the next).
+  const phases = life.phases;
+  const end = (p) => (p + 1 < phases.length ? phases[p + 1].first : N);
+  const phaseOf = (f) => { let p = phases.length - 1; while (p > 0 && phases[p].first > f) p--; return p; };
+  const lifeOf = (f) => {
+    let a = phaseOf(f), b = a + 1;
+    while (a > 0 && !phases[a].fresh) a--;
+    while (b < phases.length && !phases[b].fresh) b++;
+    return [phases[a].first, end(b - 1)];
+  };
+  const stepsIn = (p) => {
+    const goesOn = p + 1 < phases.length && !phases[p + 1].fresh;
+    return life.steps[goesOn ? end(p) : end(p) - 1] - life.steps[phases[p].first];
+  };
+  const moved = (f) => origin(f, 0) - origin(phases[phaseOf(f)].first, 0);
+  const signed = (d) => {
+    if (!Number.isFinite(d)) return "?";
+    const t = Math.abs(d) < 1e5 ? Math.abs(d).toFixed(2) : Math.abs(d).toExponential(1);
+    return Number(t) === 0 ? "0.00" : (d < 0 ? "−" : "+") + t;
+  };
+
+  // What the whole walk needs, and a smooth path for the camera where that does not fit.
+  let low = Infinity, high = -Infinity, top = 0, standing = 1;
+  for (let f = 0; f < N; f++) {
+    low = Math.min(low, origin(f, 0)); high = Math.max(high, origin(f, 0));
+    for (let i = 0; i < P; i++) { const q = point(f, i); if (q) { top = Math.max(top, q[1]); if (f === 0) standing = Math.max(standing, q[1]); } }
+  }
+  top = Math.min(Math.max(top + 1, standing + 1.5), 1.35 * standing + 2);
+  let size = 1, centre0 = origin(0, 0);
+  for (let i = 0; i < P; i++) { const q = point(0, i); if (q) size = Math.max(size, 2 * Math.abs(q[0] - centre0)); }
+  const left = low - size * 0.75 - 1.5, right = high + size * 0.75 + 1.5;
+  const path = new Float64Array(N);
+  for (let f = 0; f < N;) {
+    const [a, b] = lifeOf(f);
+    let line = Array.from({ length: b - a }, (_, i) => origin(a + i, 0));
+    for (let pass = 0; pass < 2; pass++) {
+      const sums = [0];
+      for (const x of line) sums.push(sums[sums.length - 1] + x);
+      line = line.map((_, i) => { const r = Math.min(50, i, line.length - 1 - i); return (sums[i + r + 1] - sums[i - r]) / (2 * r + 1); });
+    }
+    path.set(line, a);
+    f = Math.max(b, f + 1);
+  }
+
+  // Colours.
+  const style = getComputedStyle(document.documentElement);
+  const css = (name) => style.getPropertyValue("--" + name).trim();
+  const shade = (material, area) => {
+    const [a, b, c] = life.areas, [dark, rest, light] = life.materials[material].tones;
+    const [from, to, t] = area < b ? [dark, rest, (area - a) / (b - a)] : [rest, light, (area - b) / (c - b)];
+    const u = Math.min(Math.max(t, 0), 1);
+    return "rgb(" + from.map((v, k) => Math.round(v + u * (to[k] - v))).join(",") + ")";
+  };
+
+  // A canvas of sharp pixels; returns its context in CSS pixels.
+  const fit = (canvas, width, height) => {
+    const ratio = Math.min(window.devicePixelRatio || 1, 3);
+    const w = Math.max(1, Math.round(width * ratio)), h = Math.max(1, Math.round(height * ratio));
+    if (canvas.width !== w || canvas.height !== h) { canvas.width = w; canvas.height = h; }
+    canvas.style.height = height + "px";
+    const ctx = canvas.getContext("2d");
+    ctx.setTransform(ratio, 0, 0, ratio, 0, 0);
+    return ctx;
+  };
+
+  let frame = 0;
+  const sides = new Map();
+  for (const [, c] of life.voxels) for (let k = 0; k < 4; k++) {
+    const a = Math.min(c[k], c[(k + 1) % 4]), b = Math.max(c[k], c[(k + 1) % 4]), key = a * P + b;
+    sides.set(key, (sides.get(key) || 0) + 1);
+  }
+
+  const drawWorld = () => {
+    const canvas = $("world"), width = canvas.parentElement.clientWidth - 24, groundHeight = 30;
+    const fitting = width / (right - left), tallest = Math.min(1.1 * width, 620) / top;
+    const follow = fitting < Math.min(7, tallest);
+    const scale = Math.min(follow ? width / (1.7 * size + 8) : fitting, tallest, 34);
+    const surface = Math.round(top * scale), height = surface + groundHeight;
+    const ctx = fit(canvas, width, height);
+    // The camera never loses a body that is hurled away.
+    const far = 0.3 * width / scale, at = origin(frame, 0);
+    const middle = follow ? Math.min(Math.max(path[frame], at - far), at + far) : (left + right) / 2;
+    const x0 = middle - width / 2 / scale;
+    const X = (x) => Math.min(Math.max((x - x0) * scale, -9999), 9999);
+    const Y = (y) => Math.min(Math.max(surface - y * scale, -9999), 9999);
+    ctx.fillStyle = css("sky"); ctx.fillRect(0, 0, width, height);
+    ctx.fillStyle = css("ground"); ctx.fillRect(0, surface, width, groundHeight);
+    const [first] = lifeOf(frame), zero = origin(first, 0), begin = origin(phases[phaseOf(frame)].first, 0);
+    ctx.strokeStyle = css("mark"); ctx.lineWidth = 1; ctx.setLineDash([5, 5]);
+    for (const x of begin === zero ? [zero] : [zero, begin]) { ctx.beginPath(); ctx.moveTo(X(x), 0); ctx.lineTo(X(x), surface); ctx.stroke(); }
+    ctx.setLineDash([]);
+    ctx.strokeStyle = css("ground-line"); ctx.fillStyle = css("faint");
+    ctx.font = "11px system-ui, sans-serif"; ctx.textAlign = "center"; ctx.textBaseline = "top";
+    const by = scale * 10 > 45 ? 10 : 50;
+    for (let m = Math.ceil(x0 - zero); m <= x0 - zero + width / scale; m++) {
+      const ten = m % 10 === 0;
+      if (!ten && scale < 4) continue;
+      ctx.lineWidth = ten ? 1.5 : 1;
+      ctx.beginPath(); ctx.moveTo(X(zero + m), surface); ctx.lineTo(X(zero + m), surface + (ten ? 9 : 4)); ctx.stroke();
+      if (m % by === 0) ctx.fillText(m === 0 ? "0" : (m < 0 ? "−" : "+") + Math.abs(m), X(zero + m), surface + 13);
+    }
+    ctx.lineWidth = 1.5; ctx.beginPath(); ctx.moveTo(0, surface); ctx.lineTo(width, surface); ctx.stroke();
+
+    const points = Array.from({ length: P }, (_, i) => point(frame, i));
+    ctx.lineJoin = ctx.lineCap = "round";
+    for (const [material, corners] of life.voxels) {
+      const [a, b, c, d] = corners.map((i) => points[i]);
+      if (!(a && b && c && d)) continue;
+      const area = ((c[0] - a[0]) * (b[1] - d[1]) - (b[0] - d[0]) * (c[1] - a[1])) / 2;
+      ctx.fillStyle = ctx.strokeStyle = shade(material, area);
+      ctx.lineWidth = 0.6;
+      ctx.beginPath();
+      for (const q of [a, b, c, d]) ctx.lineTo(X(q[0]), Y(q[1]));
+      ctx.closePath(); ctx.fill(); ctx.stroke();
+    }
+    for (const outer of [false, true]) {
+      if (!outer && scale < 5) continue;
+      ctx.strokeStyle = css(outer ? "rim" : "seam"); ctx.lineWidth = outer ? 1.4 : 1;
+      ctx.beginPath();
+      for (const [key, count] of sides) if ((count === 1) === outer) {
+        const a = points[Math.floor(key / P)], b = points[key % P];
+        if (a && b) { ctx.moveTo(X(a[0]), Y(a[1])); ctx.lineTo(X(b[0]), Y(b[1])); }
+      }
+      ctx.stroke();
+    }
+    for (const [colour, line] of [["halo", 4], ["accent", 1.8]]) {
+      ctx.strokeStyle = css(colour); ctx.lineWidth = line; ctx.beginPath();
+      for (let f = first; f <= frame; f++) ctx.lineTo(X(origin(f, 0)), Y(origin(f, 1)));
+      ctx.stroke();
+    }
+    ctx.fillStyle = css("accent"); ctx.strokeStyle = css("sky"); ctx.lineWidth = 1.5;
+    ctx.beginPath(); ctx.arc(X(origin(frame, 0)), Y(origin(frame, 1)), 4.5, 0, 7); ctx.fill(); ctx.stroke();
+  };
+
+  const images = phases.map((p) => view(p.stimulus));
+  const drawStimulus = () => {
+    const canvas = $("stimulus"), p = phaseOf(frame), { height, width } = phases[p], data = images[p];
+    const room = canvas.parentElement.clientWidth, cell = room / Math.max(height, width);
+    const ctx = fit(canvas, room, cell * height);
+    ctx.clearRect(0, 0, room, cell * height);
+    const material = (r, c) => (r < 0 || c < 0 || r >= H || c >= W ? 0 : Number(rows[r][c]));
+    for (let r = 0; r < height; r++) for (let c = 0; c < width; c++) {
+      const v = data.getUint8(r * width + c);
+      ctx.fillStyle = `rgb(${v},${v},${v})`;
+      const x = Math.round(c * cell), y = Math.round(r * cell);
+      ctx.fillRect(x, y, Math.round((c + 1) * cell) - x, Math.round((r + 1) * cell) - y);
+    }
+    ctx.lineWidth = Math.max(1, Math.min(2.5, cell / 4));
+    const h = ctx.lineWidth / 2;
+    for (let r = 0; r < height; r++) for (let c = 0; c < width; c++) {
+      const m = material(r, c);
+      if (!life.materials[m].sensor) continue;
+      ctx.strokeStyle = m === 5 ? "#f03e52" : "#26ba78";
+      const [l, t] = [Math.round(c * cell) + h, Math.round(r * cell) + h];
+      const [R, b] = [Math.round((c + 1) * cell) - h, Math.round((r + 1) * cell) - h];
+      ctx.beginPath();
+      if (material(r - 1, c) !== m) { ctx.moveTo(l - h, t); ctx.lineTo(R + h, t); }
+      if (material(r + 1, c) !== m) { ctx.moveTo(l - h, b); ctx.lineTo(R + h, b); }
+      if (material(r, c - 1) !== m) { ctx.moveTo(l, t - h); ctx.lineTo(l, b + h); }
+      if (material(r, c + 1) !== m) { ctx.moveTo(R, t - h); ctx.lineTo(R, b + h); }
+      ctx.stroke();
+    }
+  };
+
+  const gutter = 52;
+  const drawChart = () => {
+    const canvas = $("chart"), width = canvas.parentElement.clientWidth - 24, height = 92, bottom = height - 4;
+    const ctx = fit(canvas, width, height);
+    ctx.clearRect(0, 0, width, height);
+    let lo = Infinity, hi = -Infinity;
+    for (let f = 0; f < N; f++) { const d = origin(f, 0) - origin(lifeOf.cache[f], 0); lo = Math.min(lo, d); hi = Math.max(hi, d); }
+    const pad = Math.max(0.5, (hi - lo) * 0.08); lo -= pad; hi += pad;
+    const X = (f) => gutter + (width - gutter - 6) * (N > 1 ? f / (N - 1) : 0);
+    const Y = (d) => 18 + (bottom - 18) * (hi - d) / (hi - lo);
+    ctx.font = "11px system-ui, sans-serif"; ctx.textBaseline = "middle"; ctx.textAlign = "right";
+    const marks = [0, lo + pad, hi - pad].filter((d, k, all) => k === 0 || Math.abs(Y(d) - Y(0)) > 12);
+    for (const d of marks) {
+      ctx.strokeStyle = css("line"); ctx.lineWidth = 1;
+      ctx.beginPath(); ctx.moveTo(gutter, Y(d)); ctx.lineTo(width - 6, Y(d)); ctx.stroke();
+      ctx.fillStyle = css("faint"); ctx.fillText(Math.abs(d) < 1e4 ? signed(d).replace(/\.?0+$/, "") || "0" : signed(d), gutter - 6, Y(d));
+    }
+    ctx.textAlign = "left"; ctx.textBaseline = "top";
+    phases.forEach((p, k) => {
+      ctx.strokeStyle = css("mark"); ctx.setLineDash([4, 4]);
+      if (k > 0) { ctx.beginPath(); ctx.moveTo(X(p.first), 0); ctx.lineTo(X(p.first), bottom); ctx.stroke(); }
+      ctx.setLineDash([]);
+      const room = X(end(k)) - X(p.first) - 8;
+      let text = p.label;
+      while (text.length > 1 && ctx.measureText(text).width > room) text = text.slice(0, -1);
+      ctx.fillStyle = css("faint"); ctx.fillText(text, X(p.first) + 5, 1);
+    });
+    ctx.strokeStyle = css("accent"); ctx.lineWidth = 1.8; ctx.lineJoin = "round"; ctx.beginPath();
+    for (let f = 0; f < N; f++) {
+      const first = lifeOf.cache[f], y = Y(origin(f, 0) - origin(first, 0));
+      if (f === first) ctx.moveTo(X(f), y); else ctx.lineTo(X(f), y);
+    }
+    ctx.stroke();
+    ctx.strokeStyle = css("ink"); ctx.lineWidth = 1;
+    ctx.beginPath(); ctx.moveTo(X(frame), 16); ctx.lineTo(X(frame), bottom); ctx.stroke();
+    ctx.fillStyle = css("accent"); ctx.beginPath();
+    ctx.arc(X(frame), Y(origin(frame, 0) - origin(lifeOf.cache[frame], 0)), 4, 0, 7); ctx.fill();
+  };
+  lifeOf.cache = Array.from({ length: N }, (_, f) => lifeOf(f)[0]);
+
+  const draw = () => {
+    const p = phaseOf(frame), step = life.steps[frame] - life.steps[phases[p].first], d = moved(frame);
+    $("label").textContent = phases[p].label;
+    $("step").textContent = `${step} of ${stepsIn(p)}`;
+    $("cycle").textContent = (step / life.cycle).toFixed(1);
+    $("moved").textContent = (Math.abs(d) < 0.005 ? "" : d < 0 ? "← " : "→ ") + signed(d);
+    $("time").value = frame;
+    $("time").setAttribute("aria-valuetext", `${phases[p].label}, step ${step} of ${stepsIn(p)}`);
+    $("world").setAttribute("aria-label", `The robot sees ${phases[p].label}; step ${step}; moved ${signed(d)} voxel lengths`);
+    $("stimulus").setAttribute("aria-label", `The image as the sensors see it: ${phases[p].label}`);
+    [...$("phases").children].forEach((b, k) => b.setAttribute("aria-pressed", String(k === p)));
+    drawWorld(); drawStimulus(); drawChart();
+  };
+  const show = (f) => { frame = Math.min(Math.max(Math.round(f), 0), N - 1); draw(); };
+
+  // Playing: 50 control steps a second at speed 1.
+  let playing = false, clock = 0, at = 0, speed = 1;
+  const tick = (now) => {
+    if (!playing) return;
+    at += Math.min(now - clock, 100) / 1000 * 50 * speed; clock = now;
+    let f = frame;
+    while (f + 1 < N && life.steps[f + 1] <= at) f++;
+    if (f !== frame) show(f);
+    if (f >= N - 1) { play(false); return; }
+    requestAnimationFrame(tick);
+  };
+  const play = (on) => {
+    playing = on && N > 1;
+    $("play").textContent = playing ? "Pause" : "Play";
+    if (!playing) return;
+    if (frame >= N - 1) show(0);
+    at = life.steps[frame]; clock = performance.now();
+    requestAnimationFrame(tick);
+  };
+  const seek = (f) => { show(f); at = life.steps[frame]; };
+  const halt = (f) => { play(false); seek(f); };
+
+  $("time").max = N - 1;
+  $("play").onclick = () => play(!playing);
+  $("back").onclick = () => halt(frame - 1);
+  $("next").onclick = () => halt(frame + 1);
+  $("time").oninput = (e) => seek(Number(e.target.value));
+  for (const s of [0.1, 0.25, 0.5, 1, 2, 4, 8]) $("speed").add(new Option(s + " ×", s, s === 1, s === 1));
+  $("speed").onchange = (e) => { speed = Number(e.target.value); };
+  phases.forEach((p, k) => {
+    const button = document.createElement("button"), far = document.createElement("span");
+    button.type = "button"; button.textContent = p.label; far.textContent = signed(p.displacement ?? NaN);
+    button.append(far); button.onclick = () => seek(p.first); $("phases").append(button);
+  });
+  const used = new Set(life.voxels.map(([m]) => m));
+  life.materials.forEach((m, k) => {
+    if (!used.has(k)) return;
+    const item = document.createElement("li"), swatch = document.createElement("div");
+    for (const tone of m.tones) { const i = document.createElement("i"); i.style.background = `rgb(${tone.join(",")})`; swatch.append(i); }
+    item.append(swatch, m.name); $("legend").append(item);
+  });
+  const drag = (e) => {
+    if (e.type === "pointermove" && !e.buttons) return;
+    const box = $("chart").getBoundingClientRect();
+    seek((e.clientX - box.left - gutter) / (box.width - gutter - 6) * (N - 1));
+  };
+  $("chart").addEventListener("pointerdown", drag);
+  $("chart").addEventListener("pointermove", drag);
+  document.addEventListener("keydown", (e) => {
+    if (e.ctrlKey || e.metaKey || e.altKey || e.target.matches("select")) return;
+    const slider = e.target === $("time");
+    if (e.key === " " && !e.target.matches("button")) play(!playing);
+    else if (e.key === "ArrowLeft" && !slider) halt(frame - 1);
+    else if (e.key === "ArrowRight" && !slider) halt(frame + 1);
+    else if (e.key === "Home" && !slider) seek(0);
+    else if (e.key === "End" && !slider) seek(N - 1);
+    else if (e.key >= "1" && e.key <= "9" && phases[Number(e.key) - 1]) seek(phases[Number(e.key) - 1].first);
+    else return;
+    e.preventDefault();
+  });
+  window.addEventListener("resize", draw);
+  window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", draw);
+  // "#260" opens the page at frame 260, paused.
+  const asked = /^#(\d+)$/.exec(location.hash);
+  show(asked ? Number(asked[1]) : 0);
+  if (!asked && !window.matchMedia("(prefers-reduced-motion: reduce)").matches) play(true);
+})();
