@@ -41,6 +41,8 @@ pub const GROUND: Colour = Colour::new(236, 233, 226);
 pub const GROUND_LINE: Colour = Colour::new(120, 112, 98);
 /// Path of the centre of mass.
 pub const TRACE: Colour = Colour::new(178, 24, 158);
+/// Lines between voxels, where they are not see-through.
+pub const SEAM: Colour = Colour::new(226, 228, 232);
 /// Warnings.
 pub const ALARM: Colour = Colour::new(190, 20, 40);
 

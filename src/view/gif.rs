@@ -99,7 +99,7 @@ pub fn encode(recording: &Recording, options: &GifOptions) -> Result<Vec<u8>, Pi
 
 fn palette(walk: &Walk, stage: &Stage, frames: &[usize]) -> Result<Palette, PictureError> {
     let mut fixed: Vec<Colour> =
-        vec![colour::PAPER, colour::INK, colour::GROUND, colour::TRACE, colour::FAINT];
+        vec![colour::PAPER, colour::INK, colour::GROUND, colour::TRACE, colour::FAINT, colour::SEAM];
     let [small, _, large] = colour::TONE_AREAS;
     for material in present(&walk.recording().body) {
         fixed.extend((0..SHADES).map(|k| {

@@ -118,24 +118,28 @@ fn body(walk: &Walk, frame: usize, window: &Window) -> Vec<Primitive> {
         Primitive::Quad { corners, fill, smooth }
     };
     let mut out: Vec<Primitive> = voxels.map(quad).collect();
+    let seam = if window.crisp { colour::SEAM } else { colour::PAPER.with_opacity(120) };
     // At small scales the lines would hide the voxels.
     if window.scale >= 5.0 {
         let seams = walk.seams(frame).filter(|side| window.shows(side));
         let line = |points: [[f64; 2]; 2]| Primitive::Line {
             points: points.to_vec(),
             width: 1.0,
-            colour: SEAM,
+            colour: seam,
             smooth,
         };
         out.extend(seams.map(line));
     }
     let rim = walk.outline(frame).filter(|side| window.shows(side));
-    out.extend(rim.map(|[a, b]| Primitive::line(a, b, 1.2, colour::INK)));
+    let line = |side: [[f64; 2]; 2]| Primitive::Line {
+        points: side.to_vec(),
+        width: 1.2,
+        colour: colour::INK,
+        smooth,
+    };
+    out.extend(rim.map(line));
     out
 }
-
-/// The thin line between two voxels.
-const SEAM: Colour = colour::PAPER.with_opacity(120);
 
 fn path(walk: &Walk, frame: usize, window: &Window) -> Vec<Primitive> {
     let life = walk.life(frame).start..=frame;
