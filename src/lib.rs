@@ -14,6 +14,7 @@
 
 pub mod base;
 pub mod body;
+pub mod cli;
 pub mod genome;
 pub mod qd;
 pub mod run;

@@ -157,6 +157,11 @@ impl Default for CheckpointConfig {
     }
 }
 
+/// What a run of a config is called: the config's name without folder and ending.
+pub fn name_of(config: &str) -> String {
+    Path::new(config).file_stem().map_or("run".to_string(), |stem| stem.to_string_lossy().into_owned())
+}
+
 impl Config {
     /// Reads a config: a file (JSON if its name ends in `.json`, else TOML) or, if there is none, the built-in config of
     /// that name; then sets `overrides` (`key=value`, keys as `map_elites.parents`).

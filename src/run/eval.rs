@@ -34,8 +34,8 @@ pub struct Options {
     pub seed: u64,
     /// Displacements up to this count as wrong \[voxel lengths\].
     pub threshold: f64,
-    /// Control steps per image.
-    pub control_steps: u32,
+    /// Actuation cycles per image.
+    pub cycles: u32,
     /// Where the data are, if the command line says.
     pub data: Option<PathBuf>,
     /// Where the results go (eval.json; eval.csv beside it).
@@ -65,6 +65,12 @@ struct Test {
 /// # Errors
 /// What is wrong with archive, data or selection.
 pub fn eval(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Result<EvalFile, Error> {
+    if !(options.threshold >= 0.0 && options.threshold.is_finite()) {
+        return Err(Error::usage(format!(
+            "--threshold {}: expected 0 or more voxel lengths",
+            options.threshold
+        )));
+    }
     let run = RunFile::read(&options.archive)?;
     let config = &run.config;
     let grouping = config.grouping()?;
@@ -79,8 +85,8 @@ pub fn eval(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Re
         observer.warning(&format!("{}: walks the same way for every class; left out", robot.id));
     }
     let test = test_images(config, &dataset, options)?;
-    let mut report =
-        EvalFile::new(&run, options, &test.images, dataset.fingerprint(Split::Test).unwrap_or_default());
+    let test_sha256 = dataset.fingerprint(Split::Test).unwrap_or_default();
+    let mut report = EvalFile::new(&run, options, control_steps(config, options), &test.images, test_sha256);
     report.baselines = baselines(&run, &grouping, &dataset, &test, &robots, options.seed)?;
     observer.started(robots.len(), test.images.len());
 
@@ -100,6 +106,10 @@ pub fn eval(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Re
         write(options, &report)?;
     }
     Ok(report)
+}
+
+fn control_steps(config: &Config, options: &Options) -> u32 {
+    options.cycles.saturating_mul(config.physics.cycle_steps)
 }
 
 /// The recognition task a robot performs; none if it always walks the same way.
@@ -147,8 +157,11 @@ fn lives(
     done: &AtomicU64,
     observer: &dyn Observer,
 ) -> Option<(Vec<Option<f64>>, usize)> {
-    let protocol =
-        Protocol { life: Life::Fresh, control_steps: options.control_steps, ..config.protocol.clone() };
+    let protocol = Protocol {
+        life: Life::Fresh,
+        control_steps: control_steps(config, options),
+        ..config.protocol.clone()
+    };
     let lattice = Lattice::new(&robot.body, &config.physics);
     let views: Vec<&Grid<f64>> = stimuli.iter().collect();
     let same_as = same_to_sensors(&robot.body, &views);

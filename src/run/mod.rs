@@ -13,6 +13,7 @@ pub mod metrics;
 pub mod replay;
 pub mod report;
 pub mod robots;
+pub mod signals;
 pub mod simulate;
 mod toml_text;
 pub mod training;

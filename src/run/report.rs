@@ -179,7 +179,13 @@ impl RobotReport {
 }
 
 impl EvalFile {
-    pub(super) fn new(run: &RunFile, options: &Options, images: &[ImageRef], test_sha256: String) -> Self {
+    pub(super) fn new(
+        run: &RunFile,
+        options: &Options,
+        control_steps: u32,
+        images: &[ImageRef],
+        test_sha256: String,
+    ) -> Self {
         EvalFile {
             format: FORMAT.to_string(),
             format_version: FORMAT_VERSION,
@@ -190,7 +196,7 @@ impl EvalFile {
             dataset: run.dataset.name.clone(),
             test_sha256,
             seed: options.seed,
-            control_steps: options.control_steps,
+            control_steps,
             threshold: options.threshold,
             stopped: false,
             images: images.to_vec(),

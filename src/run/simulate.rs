@@ -2,6 +2,7 @@
 
 use super::{Error, toml_text};
 use crate::base::Grid;
+use crate::base::files::write_atomically;
 use crate::body::Body;
 use crate::sim::{Lattice, Physics, Start, World};
 use serde::Deserialize;
@@ -127,14 +128,14 @@ impl Scenario {
     }
 }
 
-/// Lives the scenario; `row` gets the control step (0: the start) and the centre of mass \[world units\] after it.
+/// Lives the scenario; `line` gets the CSV's lines: `step,com_x,com_y`, then the centre of mass \[world units\] before the first
+/// and after every control step.
 ///
 /// # Errors
-/// [`super::ErrorKind::Unstable`] if the life ends early, and what `row` says.
-pub fn simulate(
-    scenario: &Scenario,
-    mut row: impl FnMut(u64, [f64; 2]) -> Result<(), Error>,
-) -> Result<(), Error> {
+/// [`super::ErrorKind::Unstable`] if the life ends early, and what `line` says.
+pub fn simulate(scenario: &Scenario, mut line: impl FnMut(String) -> Result<(), Error>) -> Result<(), Error> {
+    line("step,com_x,com_y\n".to_string())?;
+    let mut row = |step: u64, [x, y]: [f64; 2]| line(format!("{step},{},{}\n", digits17(x), digits17(y)));
     let physics = &scenario.physics;
     let lattice = Lattice::new(&scenario.body, physics);
     let start_row = scenario.start_row.unwrap_or(physics.ground_row);
@@ -163,6 +164,20 @@ pub fn simulate(
         row(step + 1, place(&world))?;
     }
     Ok(())
+}
+
+/// Writes the CSV to a file, also of a life that ends unstable, up to its end.
+///
+/// # Errors
+/// As [`simulate`], and if the file cannot be written.
+pub fn to_file(scenario: &Scenario, path: &Path) -> Result<(), Error> {
+    let mut text = String::new();
+    let outcome = simulate(scenario, |line| {
+        text.push_str(&line);
+        Ok(())
+    });
+    write_atomically(path, text.as_bytes()).map_err(|error| Error::writing(path, &error))?;
+    outcome
 }
 
 /// A number with 17 significant digits, which name every f64.

@@ -35,8 +35,10 @@ pub struct Console {
 struct Streams {
     out: Box<dyn Write + Send>,
     err: Box<dyn Write + Send>,
-    /// The reader of stdout has gone (`| head`).
+    /// The reader of stdout has gone (`| head`), or it takes no more.
     closed: bool,
+    /// Results were lost for another reason than that nobody read on: a full disk.
+    lost: bool,
 }
 
 pub(super) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
@@ -59,7 +61,7 @@ impl Console {
 
     /// A console onto any two writers, taken for files: no colours, no moving lines.
     pub fn with_writers(mode: Mode, out: Box<dyn Write + Send>, err: Box<dyn Write + Send>) -> Self {
-        let streams = Mutex::new(Streams { out, err, closed: false });
+        let streams = Mutex::new(Streams { out, err, closed: false, lost: false });
         Console { mode, terminals: [false; 2], colour: false, streams, line: Mutex::new(None) }
     }
 
@@ -78,12 +80,22 @@ impl Console {
         lock(&self.streams).closed
     }
 
+    /// Whether results could not be written though somebody wanted them, as on a full disk.
+    pub fn has_lost_results(&self) -> bool {
+        lock(&self.streams).lost
+    }
+
     /// A line of results, to stdout.
     pub fn line(&self, text: &str) {
         match self.mode {
             Mode::Json => self.event("result", &Text { text }),
             _ => self.out(&format!("{text}\n")),
         }
+    }
+
+    /// A document as it is, to stdout, in every mode: a config, a man page, a trajectory.
+    pub fn text(&self, text: &str) {
+        self.out(text);
     }
 
     /// A table of results, to stdout; columns of numbers are aligned to the right.
@@ -182,7 +194,9 @@ impl Console {
             }
             let result = streams.out.write_all(text.as_bytes()).and_then(|()| streams.out.flush());
             streams.closed = result.is_err();
-            result.err().filter(|e| e.kind() != io::ErrorKind::BrokenPipe)
+            let lost = result.err().filter(|e| e.kind() != io::ErrorKind::BrokenPipe);
+            streams.lost |= lost.is_some();
+            lost
         });
         if let Some(e) = failure {
             self.warning(&format!("results can no longer be written to the standard output: {e}"));

@@ -1,6 +1,3 @@
-//! Floor 5: pictures and the terminal.
-
-pub mod sheet;
 //! Floor 5: pictures and the terminal. Recordings of lives become images, animations, pages and text here.
 //!
 //! A [`Walk`] is a checked [`Recording`](crate::task::recording::Recording); a [`Stage`] decides what part of the
@@ -15,10 +12,14 @@ pub mod gif;
 pub mod html;
 pub mod palette;
 pub mod panel;
+pub mod pictures;
 pub mod progress;
 pub mod raster;
+pub mod reporters;
 pub mod scene;
+pub mod sheet;
 pub mod stage;
+pub mod summary;
 pub mod table;
 pub mod terminal;
 pub mod walk;
@@ -28,7 +29,6 @@ mod wobble;
 pub use stage::Stage;
 pub use walk::Walk;
 
-use std::io::Write;
 use std::path::{Path, PathBuf};
 
 /// Why there is no picture.
@@ -65,19 +65,8 @@ pub enum PictureError {
 /// # Errors
 /// [`PictureError::Write`] with the path.
 pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), PictureError> {
-    let write = || {
-        let folder = path.parent().filter(|f| !f.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        let mut builder = tempfile::Builder::new();
-        // Temporary files are private by default; a picture is readable like any other file.
-        #[cfg(unix)]
-        builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-        let mut file = builder.prefix(".morphcog-").tempfile_in(folder)?;
-        file.write_all(bytes)?;
-        file.as_file().sync_all()?;
-        file.persist(path).map_err(|e| e.error)?;
-        Ok(())
-    };
-    write().map_err(|source| PictureError::Write { path: path.to_path_buf(), source })
+    crate::base::files::write_atomically(path, bytes)
+        .map_err(|source| PictureError::Write { path: path.to_path_buf(), source })
 }
 
 #[cfg(test)]

@@ -1,0 +1,117 @@
+//! What the console shows while a command runs: the observers of `run`.
+
+use super::console::{Bar, Console, Counter, Progress};
+use crate::run::data::catalogue::RemoteFile;
+use crate::run::data::fetch::{Attempt, FetchObserver};
+use crate::run::folder::RunFolder;
+use crate::run::training::Training;
+use crate::run::{eval, evolve};
+use std::sync::OnceLock;
+
+/// Shows an evolution.
+pub struct Evolution<'c> {
+    console: &'c Console,
+    bar: Option<Bar<'c>>,
+}
+
+impl<'c> Evolution<'c> {
+    /// Shows it on a console.
+    pub fn new(console: &'c Console) -> Self {
+        Evolution { console, bar: None }
+    }
+}
+
+fn shown(progress: &evolve::Progress) -> Progress {
+    Progress {
+        done: progress.done,
+        total: progress.generations,
+        best: progress.stats.obj_max,
+        coverage: progress.stats.coverage,
+        evaluations: progress.totals.evaluations,
+    }
+}
+
+impl evolve::Observer for Evolution<'_> {
+    fn started(&mut self, folder: &RunFolder, training: &Training, progress: &evolve::Progress) {
+        let list: Vec<String> =
+            training.images.iter().map(|image| format!("{} (train {})", image.label, image.index)).collect();
+        let verb = if progress.done > 0 { "going on with" } else { "evolving in" };
+        let (folder, dataset) = (folder.path().display(), &training.dataset.name);
+        self.console.info(&format!("{verb} {folder}; images from {dataset}: {}", list.join(", ")));
+        let bar = self.console.progress(progress.generations);
+        bar.update(&shown(progress));
+        self.bar = Some(bar);
+    }
+
+    fn generation(&mut self, progress: &evolve::Progress) {
+        if let Some(bar) = &self.bar {
+            bar.update(&shown(progress));
+        }
+    }
+
+    fn warning(&mut self, text: &str) {
+        self.console.warning(text);
+    }
+}
+
+/// Shows an evaluation.
+pub struct Evaluation<'c> {
+    console: &'c Console,
+    counter: OnceLock<Counter<'c>>,
+}
+
+impl<'c> Evaluation<'c> {
+    /// Shows it on a console.
+    pub fn new(console: &'c Console) -> Self {
+        Evaluation { console, counter: OnceLock::new() }
+    }
+}
+
+impl eval::Observer for Evaluation<'_> {
+    fn started(&self, robots: usize, images: usize) {
+        let total = (robots * images) as u64;
+        let label = format!("evaluating {robots} robots on {images} images:");
+        self.counter.get_or_init(|| self.console.counter(&label, total, "lives"));
+    }
+
+    fn progress(&self, done: u64) {
+        if let Some(counter) = self.counter.get() {
+            counter.update(done);
+        }
+    }
+
+    fn warning(&self, text: &str) {
+        self.console.warning(text);
+    }
+}
+
+/// Shows a download.
+pub struct Download<'c> {
+    console: &'c Console,
+    counter: Option<Counter<'c>>,
+}
+
+impl<'c> Download<'c> {
+    /// Shows it on a console.
+    pub fn new(console: &'c Console) -> Self {
+        Download { console, counter: None }
+    }
+}
+
+impl FetchObserver for Download<'_> {
+    fn begins(&mut self, file: &RemoteFile, _url: &str) {
+        self.counter = None;
+        self.counter = Some(self.console.counter(&file.name, file.bytes, "bytes"));
+    }
+
+    fn received(&mut self, _file: &RemoteFile, bytes: u64) {
+        if let Some(counter) = &self.counter {
+            counter.update(bytes);
+        }
+    }
+
+    fn failed(&mut self, file: &RemoteFile, attempt: &Attempt) {
+        self.counter = None;
+        self.console.warning(&format!("{}: {}: {}", file.name, attempt.url, attempt.error));
+    }
+}

@@ -1,0 +1,211 @@
+//! What a command says at its end.
+
+use super::console::{Console, Mode};
+use super::progress::duration;
+use crate::run::data::Found;
+use crate::run::data::fetch::{Fetched, Outcome};
+use crate::run::evolve::Finished;
+use crate::run::folder::RUN_JSON;
+use crate::run::gallery::Published;
+use crate::run::report::EvalFile;
+use std::path::Path;
+
+/// Robots shown after an evolution.
+const SHOWN: usize = 5;
+
+fn percent(share: f64) -> String {
+    format!("{:.1}", 100.0 * share)
+}
+
+/// After an evolution: the fittest robots, what was saved, and what to do next.
+pub fn evolution(console: &Console, finished: &Finished, out: &Path) {
+    let Finished { run, totals, .. } = finished;
+    if console.mode() == Mode::Json {
+        let elites = run.elites.len();
+        let best =
+            run.elites.iter().max_by(|a, b| a.objective.total_cmp(&b.objective)).map(|robot| &robot.id);
+        let done = serde_json::json!({
+            "folder": out, "generations": run.generations, "stopped": finished.stopped, "best": best,
+            "elites": elites, "stats": run.stats, "totals": totals,
+        });
+        return console.event("finished", &done);
+    }
+    let mut robots: Vec<_> = run.elites.iter().collect();
+    robots.sort_by(|a, b| b.objective.total_cmp(&a.objective));
+    let rows = robots.iter().take(SHOWN).map(|robot| {
+        let walks: Vec<String> = run
+            .training_images
+            .iter()
+            .zip(&robot.displacements)
+            .map(|(image, d)| format!("{}: {d:+.1}", image.label))
+            .collect();
+        let kinds = robot.voxels;
+        vec![
+            robot.id.clone(),
+            robot.task.clone(),
+            format!("{:.2}", robot.objective),
+            walks.join("  "),
+            kinds.muscle.to_string(),
+            kinds.sensor.to_string(),
+            kinds.total.to_string(),
+        ]
+    });
+    let headers = ["robot", "task", "fitness", "displacements", "muscle", "sensor", "voxels"];
+    console.table(&headers, &rows.collect::<Vec<_>>());
+    let stats = run.stats;
+    let cells = run.dimensions.possible_cells;
+    console.line(&format!(
+        "{} of {cells} cells filled (coverage {} %), QD score {:.1}, {} generations in {}",
+        stats.num_elites,
+        percent(stats.coverage),
+        stats.qd_score,
+        run.generations,
+        duration(totals.seconds)
+    ));
+    let showings = (totals.simulated + totals.saved()).max(1) as f64;
+    let share = |count: u64| percent(count as f64 / showings);
+    console.line(&format!(
+        "{} evaluations; of the images shown, simulated {} %, saved {} % (known bodies {} %, early stop {} %, shared lives {} %)",
+        totals.evaluations,
+        share(totals.simulated),
+        share(totals.saved()),
+        share(totals.saved_known_bodies),
+        share(totals.saved_early_stop),
+        share(totals.saved_shared_lives)
+    ));
+    let archive = out.join(RUN_JSON);
+    console.info(&format!(
+        "next: morphcog replay --robot best --archive {0}\n      morphcog eval --archive {0}",
+        archive.display()
+    ));
+}
+
+/// After an evaluation: a table per robot, the means, and the baselines.
+pub fn evaluation(console: &Console, report: &EvalFile, out: &Path) {
+    if report.robots.is_empty() {
+        return console.warning("no robot was evaluated");
+    }
+    let classes: Vec<u8> = report.robots[0].per_class.keys().copied().collect();
+    let names: Vec<String> = classes.iter().map(|class| format!("% of {class}")).collect();
+    let mut headers = vec!["robot", "task", "fitness", "accuracy %", "95 % interval", "balanced %"];
+    headers.extend(names.iter().map(String::as_str));
+    headers.extend(["mean |d|", "not moved %", "unstable", "lives"]);
+    let rows = report.robots.iter().map(|robot| {
+        let [low, high] = robot.interval.map(percent);
+        let mut row = vec![
+            robot.id.clone(),
+            robot.task.clone(),
+            format!("{:.2}", robot.objective),
+            percent(robot.accuracy),
+            format!("{low}–{high}"),
+            percent(robot.balanced_accuracy),
+        ];
+        row.extend(robot.per_class.values().map(|share| percent(*share)));
+        row.extend([format!("{:.1}", robot.mean_distance), percent(robot.not_moved)]);
+        row.extend([robot.unstable.to_string(), robot.simulated.to_string()]);
+        row
+    });
+    console.table(&headers, &rows.collect::<Vec<_>>());
+    console.line("");
+    let rows = report.means.iter().map(|(task, mean)| {
+        let baselines = report.baselines.get(task);
+        let baseline = |of: fn(&crate::run::report::Baselines) -> f64| {
+            baselines.map_or(String::new(), |b| percent(of(b)))
+        };
+        vec![
+            task.clone(),
+            mean.robots.to_string(),
+            percent(mean.accuracy),
+            percent(mean.balanced_accuracy),
+            baseline(|b| b.larger_group),
+            baseline(|b| b.best_single_pixel),
+            baseline(|b| b.nearest_training_image),
+        ]
+    });
+    let headers = [
+        "task",
+        "robots",
+        "mean accuracy %",
+        "mean balanced %",
+        "larger group %",
+        "best pixel %",
+        "nearest image %",
+    ];
+    console.table(&headers, &rows.collect::<Vec<_>>());
+    console.line("");
+    console.line(&format!(
+        "{} {} test images; {}; |d| up to {} voxel lengths is wrong",
+        report.images.len(),
+        report.dataset,
+        report.selected,
+        report.threshold
+    ));
+    console.line(&format!("wrote {} and {}", out.display(), out.with_extension("csv").display()));
+}
+
+/// The published robots.
+pub fn gallery(console: &Console, robots: &[Published]) {
+    let rows = robots.iter().map(|robot| {
+        let counts = robot.body.counts();
+        let counts = [counts.muscle, counts.sensor, counts.total].map(|count| count.to_string());
+        [vec![robot.name.clone(), "0|1".to_string(), format!("{:.2}", robot.fitness)], counts.to_vec()]
+            .concat()
+    });
+    let headers = ["robot", "task", "published fitness", "muscle", "sensor", "voxels"];
+    console.table(&headers, &rows.collect::<Vec<_>>());
+    console.info("watch one: morphcog replay --robot XFJPI (needs MNIST; or add --dataset builtin)");
+}
+
+/// The built-in configs: name and first comment.
+pub fn configs(console: &Console, configs: &[(&str, &str)]) {
+    let rows = configs.iter().map(|(name, text)| {
+        let about: Vec<&str> = text.lines().map_while(|line| line.strip_prefix("# ")).collect();
+        let about = about.join(" ");
+        vec![name.to_string(), about.split_once(". ").map_or(about.as_str(), |(first, _)| first).to_string()]
+    });
+    console.table(&["config", "what it is"], &rows.collect::<Vec<_>>());
+}
+
+/// After a download.
+pub fn fetched(console: &Console, files: &[Fetched]) {
+    for file in files {
+        let how = match &file.outcome {
+            Outcome::Kept => "was there and is right".to_string(),
+            Outcome::Downloaded(url) => format!("downloaded from {url}, checksum right"),
+        };
+        console.line(&format!("{}: {how}", file.file.display()));
+    }
+}
+
+/// What was found of a dataset.
+pub fn dataset(console: &Console, found: &Found) {
+    let info = &found.info;
+    if console.mode() == Mode::Json {
+        return console.event("dataset", info);
+    }
+    console.line(&format!("{}: {} ({})", info.name, info.source, info.origin));
+    let mut rows = Vec::new();
+    for (split, images) in &info.splits {
+        console.line(&format!(
+            "{split}: {} images of {} × {}, SHA-256 {}",
+            images.images, images.height, images.width, images.fingerprint
+        ));
+        for file in &images.files {
+            let is_published = if found.published.contains(&file.name) { ", as published" } else { "" };
+            console.line(&format!(
+                "  {}: {} bytes, SHA-256 {}{is_published}",
+                file.name, file.bytes, file.sha256
+            ));
+        }
+        rows.extend(
+            images
+                .per_class
+                .iter()
+                .map(|(class, count)| vec![split.to_string(), class.to_string(), count.to_string()]),
+        );
+    }
+    console.table(&["split", "class", "images"], &rows);
+    for (split, problem) in &found.problems {
+        console.warning(&format!("{split}: {problem}"));
+    }
+}
