@@ -5,13 +5,12 @@ use super::checkpoint::{self, Checkpoint, KnownBodies};
 use super::folder::{self, IfExists, RunFolder};
 use super::metrics::{Metrics, Totals};
 use super::training::Training;
+use super::variation::Mutations;
 use super::{Config, Error};
 use crate::base::files::write_atomically;
-use crate::base::random::{Purpose, stream};
-use crate::body::Body;
-use crate::genome::{BodySpec, Genome, GenomeError, MutationParams};
+use crate::genome::GenomeError;
 use crate::qd::descriptor::{count_bin, possible_cells};
-use crate::qd::{Archive, ArchiveStats, DescriptorSpace, Evaluated, MapElites, Variation};
+use crate::qd::{Archive, ArchiveStats, DescriptorSpace, Evaluated, MapElites};
 use crate::task::evaluation::{Job, Outcome, Savings, evaluate};
 use crate::task::grouping::Grouping;
 use rayon::prelude::*;
@@ -142,44 +141,6 @@ struct Run<'a> {
     /// Generations done.
     generation: u64,
     began: Instant,
-}
-
-/// How genomes vary in this run.
-struct Mutations<'a> {
-    seed: u64,
-    spec: BodySpec,
-    params: &'a MutationParams,
-}
-
-/// A robot that has not lived yet.
-fn newborn((genome, body): (Genome, Body), generation: u64, parent: Option<&Robot>) -> Robot {
-    Robot {
-        id: genome.id(),
-        cell: Vec::new(),
-        task: String::new(),
-        objective: 0.0,
-        displacements: Vec::new(),
-        voxels: body.counts(),
-        generation,
-        parent: parent.map(|parent| parent.id.clone()),
-        body,
-        genome,
-    }
-}
-
-impl Variation<Robot> for Mutations<'_> {
-    type Error = GenomeError;
-
-    fn newcomer(&self, generation: u64, child: u64) -> Result<Robot, GenomeError> {
-        let rng = &mut stream(self.seed, Purpose::Newcomer, generation, child);
-        Ok(newborn(Genome::random(self.spec, self.params, rng)?, generation, None))
-    }
-
-    fn offspring(&self, parent: &Robot, generation: u64, child: u64) -> Result<Robot, GenomeError> {
-        let rng = &mut stream(self.seed, Purpose::Mutation, generation, child);
-        let made = parent.genome.offspring(self.spec, self.params, rng)?;
-        Ok(newborn(made, generation, Some(parent)))
-    }
 }
 
 impl<'a> Run<'a> {

@@ -17,6 +17,7 @@ pub mod signals;
 pub mod simulate;
 mod toml_text;
 pub mod training;
+mod variation;
 
 pub use config::Config;
 pub use error::{Error, ErrorKind};
