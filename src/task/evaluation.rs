@@ -7,7 +7,9 @@ use crate::body::Body;
 use crate::sim::{Lattice, Physics, Unstable};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
-use std::sync::Mutex;
+use std::cmp::Reverse;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// Savings that change no archive; keys of a config's section `[savings]`. All on by default.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -53,9 +55,6 @@ pub struct Evaluation {
     pub stopped: u64,
 }
 
-/// Displacement per image, as far as known.
-pub type Known = Vec<Option<f64>>;
-
 /// Whether a robot with these displacements so far may still get into the archive.
 pub type MayWin<'a> = dyn Fn(&[Option<f64>]) -> bool + Sync + Send + 'a;
 
@@ -70,6 +69,10 @@ pub struct Job<'a> {
 }
 
 /// Evaluates jobs, each on all images; results in the jobs' order, the same on any number of threads.
+///
+/// All lives of all jobs are one list of work: first every robot's first image, then every second one, and so on, large
+/// bodies first so that no core waits long at the end. A life whose robot has dropped out by then is passed over. One
+/// that was begun before that was known is simply not counted.
 pub fn evaluate(
     jobs: &[Job],
     images: &[Grid<f64>],
@@ -77,137 +80,165 @@ pub fn evaluate(
     protocol: &Protocol,
     savings: Savings,
 ) -> Vec<Evaluation> {
-    let stage = Stage { images, physics, protocol, savings };
-    let done: Vec<Mutex<Option<Evaluation>>> = jobs.iter().map(|_| Mutex::new(None)).collect();
-    rayon::scope(|scope| {
-        for (job, done) in jobs.iter().zip(&done) {
-            let stage = &stage;
-            scope.spawn(move |scope| match protocol.life {
-                Life::Sequential => put(done, stage.sequential(job)),
-                Life::Fresh => stage.fresh(job, done, scope),
-            });
+    let candidates: Vec<Candidate> =
+        jobs.iter().map(|job| Candidate::new(job, images, physics, protocol, savings)).collect();
+    let mut work: Vec<(usize, &Candidate)> = candidates
+        .iter()
+        .flat_map(|candidate| (0..candidate.lives()).map(move |place| (place, candidate)))
+        .collect();
+    // Stable: equally large bodies stay in the jobs' order.
+    work.sort_by_key(|(place, candidate)| (*place, Reverse(candidate.lattice.point_count())));
+    let next = AtomicUsize::new(0);
+    let worker = |_| {
+        while let Some((place, candidate)) = work.get(next.fetch_add(1, Ordering::Relaxed)) {
+            candidate.live(*place);
         }
-    });
-    let whole = |slot: Mutex<Option<Evaluation>>| slot.into_inner().unwrap_or_else(|e| e.into_inner());
-    // Every task has put its evaluation in, or the scope has passed its panic on.
-    done.into_iter().filter_map(whole).collect()
+    };
+    (0..rayon::current_num_threads().min(work.len())).into_par_iter().with_max_len(1).for_each(worker);
+    candidates.iter().map(Candidate::evaluation).collect()
 }
 
-fn put(slot: &Mutex<Option<Evaluation>>, evaluation: Evaluation) {
-    *slot.lock().unwrap_or_else(|e| e.into_inner()) = Some(evaluation);
+/// A life that was lived: one image's if fresh; if sequential all images', up to where the robot dropped out.
+struct Lived {
+    /// Displacement under each image shown, voxel lengths; none for the one under which it became unstable.
+    displacements: Vec<Option<f64>>,
+    /// How it became unstable, if it did.
+    unstable: Option<Unstable>,
 }
 
-/// What all jobs of an evaluation have in common.
-struct Stage<'a> {
+impl Lived {
+    fn add(&mut self, shown: Result<f64, Unstable>) {
+        self.displacements.push(shown.ok());
+        self.unstable = shown.err();
+    }
+}
+
+/// A job being done.
+struct Candidate<'a> {
+    job: &'a Job<'a>,
     images: &'a [Grid<f64>],
     physics: &'a Physics,
     protocol: &'a Protocol,
-    savings: Savings,
-}
-
-/// A fresh evaluation under way.
-struct Progress {
+    early_stop: bool,
     lattice: Lattice,
-    /// Images still to be shown, next last.
-    open: Vec<usize>,
     /// For each image the one whose life it shares.
     same_as: Vec<usize>,
-    known: Known,
-    simulated: u64,
+    /// The images that need showing, in order.
+    order: Vec<usize>,
+    /// In the order in which they count.
+    lives: Mutex<Vec<Option<Lived>>>,
 }
 
-impl<'a> Stage<'a> {
-    fn sequential(&self, job: &Job) -> Evaluation {
-        let lattice = Lattice::new(job.body, self.physics);
-        let mut rollout = Rollout::new(&lattice, self.physics, self.protocol);
-        let mut known: Known = vec![None; self.images.len()];
-        let mut simulated = 0;
-        let ended = |outcome, simulated| {
-            let stopped = self.images.len() as u64 - simulated;
-            Evaluation { outcome, simulated, shared: 0, stopped }
+impl<'a> Candidate<'a> {
+    fn new(
+        job: &'a Job<'a>,
+        images: &'a [Grid<f64>],
+        physics: &'a Physics,
+        protocol: &'a Protocol,
+        savings: Savings,
+    ) -> Self {
+        let all: Vec<usize> = (0..images.len()).collect();
+        let is_fresh = protocol.life == Life::Fresh;
+        let same_as = match is_fresh && savings.shared_lives {
+            true => same_to_sensors(job.body, &images.iter().collect::<Vec<_>>()),
+            false => all.clone(),
         };
-        for (index, image) in self.images.iter().enumerate() {
-            simulated += 1;
-            match rollout.show(image, |_| ()) {
-                Ok(displacement) => known[index] = Some(displacement),
-                Err(unstable) => return ended(Outcome::Unstable(unstable), simulated),
-            }
-            if self.savings.early_stop && index + 1 < self.images.len() && !(job.may_win)(&known) {
-                return ended(Outcome::Stopped, simulated);
-            }
+        let mut order: Vec<usize> = all.into_iter().filter(|&image| same_as[image] == image).collect();
+        if is_fresh && let Some(first) = same_as.get(job.first_image) {
+            order.sort_by_key(|image| (image != first, *image));
         }
-        ended(Outcome::Walked(known.into_iter().flatten().collect()), simulated)
+        let lives = if is_fresh { order.len() } else { 1 };
+        Candidate {
+            job,
+            images,
+            physics,
+            protocol,
+            early_stop: savings.early_stop,
+            lattice: Lattice::new(job.body, physics),
+            same_as,
+            order,
+            lives: Mutex::new((0..lives).map(|_| None).collect()),
+        }
     }
 
-    /// Fresh lives are independent work items. Without early stopping all at once; with it one after the other for
-    /// a robot, so that what is simulated does not depend on timing.
-    fn fresh<'s>(&'s self, job: &'s Job<'s>, done: &'s Mutex<Option<Evaluation>>, scope: &rayon::Scope<'s>) {
-        let views: Vec<&Grid<f64>> = self.images.iter().collect();
-        let same_as = match self.savings.shared_lives {
-            true => same_to_sensors(job.body, &views),
-            false => (0..views.len()).collect(),
-        };
-        let first = same_as.get(job.first_image).copied().unwrap_or(0);
-        let mut open: Vec<usize> = (0..views.len()).filter(|&i| same_as[i] == i && i != first).collect();
-        open.reverse();
-        open.push(first);
-        let lattice = Lattice::new(job.body, self.physics);
-        let mut progress = Progress { lattice, open, same_as, known: vec![None; views.len()], simulated: 0 };
-        if self.savings.early_stop {
-            self.advance(job, done, progress, scope);
+    fn lives(&self) -> usize {
+        self.locked().len()
+    }
+
+    fn locked(&self) -> MutexGuard<'_, Vec<Option<Lived>>> {
+        // A thread that panicked leaves whole entries.
+        self.lives.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Lives one life, unless the robot has dropped out.
+    fn live(&self, place: usize) {
+        if self.early_stop && self.verdict(&self.locked()).is_some() {
             return;
         }
-        let open = std::mem::take(&mut progress.open);
-        let life = |&image: &usize| (image, self.life(&progress.lattice, image));
-        let lives: Vec<_> = open.par_iter().rev().map(life).collect();
-        progress.simulated = lives.len() as u64;
-        let unstable = lives.iter().find_map(|(_, life)| life.err());
-        lives.into_iter().for_each(|(image, life)| progress.note(image, life.ok()));
-        put(done, progress.ended(unstable.map(Outcome::Unstable)));
-    }
-
-    fn life(&self, lattice: &Lattice, image: usize) -> Result<f64, Unstable> {
-        fresh_life(lattice, self.physics, self.protocol, &self.images[image])
-    }
-
-    /// Shows the next image, then spawns the rest as a task of its own if the robot may still win.
-    fn advance<'s>(
-        &'s self,
-        job: &'s Job<'s>,
-        done: &'s Mutex<Option<Evaluation>>,
-        mut progress: Progress,
-        scope: &rayon::Scope<'s>,
-    ) {
-        let Some(image) = progress.open.pop() else {
-            return put(done, progress.ended(None));
-        };
-        progress.simulated += 1;
-        match self.life(&progress.lattice, image) {
-            Err(unstable) => return put(done, progress.ended(Some(Outcome::Unstable(unstable)))),
-            Ok(displacement) => progress.note(image, Some(displacement)),
+        let mut lived = Lived { displacements: Vec::new(), unstable: None };
+        match self.protocol.life {
+            Life::Fresh => {
+                let image = &self.images[self.order[place]];
+                lived.add(fresh_life(&self.lattice, self.physics, self.protocol, image));
+            }
+            Life::Sequential => {
+                let mut rollout = Rollout::new(&self.lattice, self.physics, self.protocol);
+                for image in self.images {
+                    lived.add(rollout.show(image, |_| ()));
+                    if lived.unstable.is_some() || self.drops_out(&lived.displacements) {
+                        break;
+                    }
+                }
+            }
         }
-        if progress.open.is_empty() {
-            put(done, progress.ended(None));
-        } else if !(job.may_win)(&progress.known) {
-            put(done, progress.ended(Some(Outcome::Stopped)));
-        } else {
-            scope.spawn(move |scope| self.advance(job, done, progress, scope));
-        }
-    }
-}
-
-impl Progress {
-    fn note(&mut self, image: usize, displacement: Option<f64>) {
-        for (known, _) in self.known.iter_mut().zip(&self.same_as).filter(|(_, same)| **same == image) {
-            *known = displacement;
-        }
+        self.locked()[place] = Some(lived);
     }
 
-    fn ended(self, early: Option<Outcome>) -> Evaluation {
-        let all = self.known.len() as u64;
-        let stopped = self.same_as.iter().filter(|same| self.open.contains(same)).count() as u64;
-        let shared = all - self.simulated - stopped;
-        let outcome = early.unwrap_or_else(|| Outcome::Walked(self.known.into_iter().flatten().collect()));
-        Evaluation { outcome, simulated: self.simulated, shared, stopped }
+    /// Whether a robot with these displacements, in the order of showing, need not be shown the rest.
+    fn drops_out(&self, displacements: &[Option<f64>]) -> bool {
+        self.early_stop
+            && displacements.len() < self.order.len()
+            && !(self.job.may_win)(&self.known(displacements))
+    }
+
+    /// Displacement per image, as far as known from the first showings.
+    fn known(&self, displacements: &[Option<f64>]) -> Vec<Option<f64>> {
+        let shown = |image: &usize| self.order.iter().position(|shown| shown == image);
+        self.same_as.iter().map(|image| *displacements.get(shown(image)?)?).collect()
+    }
+
+    /// How the evaluation ends, as soon as that is known. Lives count in their order, whichever was done first.
+    fn verdict(&self, lives: &[Option<Lived>]) -> Option<Evaluation> {
+        let mut displacements = Vec::new();
+        let mut unstable = None;
+        for life in lives {
+            let life = life.as_ref()?;
+            for displacement in &life.displacements {
+                displacements.push(*displacement);
+                if displacement.is_some() && self.drops_out(&displacements) {
+                    return Some(self.ended(Outcome::Stopped, displacements.len()));
+                }
+            }
+            unstable = unstable.or(life.unstable);
+            if self.early_stop && unstable.is_some() {
+                break;
+            }
+        }
+        let walked = || Outcome::Walked(self.known(&displacements).into_iter().flatten().collect());
+        let outcome = unstable.map_or_else(walked, Outcome::Unstable);
+        Some(self.ended(outcome, displacements.len()))
+    }
+
+    fn ended(&self, outcome: Outcome, simulated: usize) -> Evaluation {
+        let open = &self.order[simulated..];
+        let stopped = self.same_as.iter().filter(|same| open.contains(same)).count() as u64;
+        let (all, simulated) = (self.images.len() as u64, simulated as u64);
+        Evaluation { outcome, simulated, shared: all - simulated - stopped, stopped }
+    }
+
+    fn evaluation(&self) -> Evaluation {
+        // All lives are done that the verdict needs; without images there is nothing to walk for.
+        let verdict = self.verdict(&self.locked());
+        verdict.unwrap_or_else(|| self.ended(Outcome::Walked(Vec::new()), 0))
     }
 }
