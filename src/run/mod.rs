@@ -1,6 +1,7 @@
 //! Floor 4: what the commands do, one file per command. Reports through observers, never prints.
 
 pub mod archive;
+pub mod bench;
 pub mod checkpoint;
 pub mod config;
 pub mod data;

@@ -1,0 +1,126 @@
+//! `morphcog bench`: how fast this machine simulates.
+
+use crate::base::Grid;
+use crate::base::lanes::InstructionSet;
+use crate::body::{Body, Material};
+use crate::sim::{Lattice, Physics, Start, World};
+use serde::Serialize;
+use std::time::Instant;
+
+/// A body to measure with.
+#[derive(Clone, Debug)]
+pub struct Specimen {
+    /// What it stands for.
+    pub name: &'static str,
+    /// The body.
+    pub body: Body,
+}
+
+/// How fast one body is simulated, on one core.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Speed {
+    /// What the body stands for.
+    pub body: &'static str,
+    /// Its voxels.
+    pub voxels: usize,
+    /// Instruction set.
+    pub instruction_set: &'static str,
+    /// Microseconds per substep, median of the repetitions.
+    pub microseconds: f64,
+    /// Control steps per second.
+    pub control_steps: f64,
+}
+
+/// Bodies of every kind that differ in cost. Their voxels are a fixed pattern, so that figures of different machines and
+/// versions can be compared.
+pub fn specimens() -> Vec<Specimen> {
+    use Material::{Empty, MuscleAntiphase, MuscleInPhase, Rigid, SensorExpand, SensorShrink, Soft};
+    let active = |r: usize, c: usize| match (r / 2 + c / 3) % 4 {
+        0 => MuscleInPhase,
+        1 => SensorExpand,
+        2 => MuscleAntiphase,
+        _ => SensorShrink,
+    };
+    let soft = |r: usize, c: usize| if (r / 3 + c / 3) % 2 == 0 { Soft } else { active(r, c) };
+    let kinds: [(&'static str, Box<dyn Fn(usize, usize) -> Material>); 5] = [
+        ("full, soft and active", Box::new(soft)),
+        (
+            "half, soft and active",
+            Box::new(move |r, c| if c < 7 || (r < 1 && c < 14) { soft(r, c) } else { Empty }),
+        ),
+        ("small, soft and active", Box::new(move |r, c| if r >= 9 && c < 8 { soft(r, c) } else { Empty })),
+        ("full, mostly rigid", Box::new(move |r, c| if (r + 2 * c) % 3 < 2 { Rigid } else { soft(r, c) })),
+        // Gaps in diagonal pairs: at each the other two voxels touch at a corner only.
+        (
+            "corner contacts",
+            Box::new(move |r, c| if matches!((r % 4, c % 4), (1, 2) | (2, 1)) { Empty } else { soft(r, c) }),
+        ),
+    ];
+    let specimen = |(name, material): (&'static str, Box<dyn Fn(usize, usize) -> Material>)| {
+        Body::new(Grid::from_fn(14, 14, material)).ok().map(|body| Specimen { name, body })
+    };
+    kinds.into_iter().filter_map(specimen).collect()
+}
+
+/// Control steps of one repetition: one actuation cycle.
+const STEPS: u32 = 50;
+/// Control steps lived before measuring: the robot has landed and walks.
+const WARM_UP: u32 = 50;
+
+/// Measures one body on one instruction set: the median of `repetitions` repetitions of [`STEPS`] control steps of one
+/// life.
+pub fn measure(specimen: &Specimen, set: InstructionSet, repetitions: usize) -> Speed {
+    let physics = Physics::default();
+    let lattice = Lattice::new(&specimen.body, &physics);
+    let start = Start { column: 493, row: physics.ground_row };
+    let mut world = World::new(&lattice, &physics, start).with_instructions(set);
+    let stimulus = |r: usize, c: usize| if (r + c) % 3 == 0 { 1.0 } else { 0.0 };
+    world.set_stimulus(&Grid::from_fn(specimen.body.height(), specimen.body.width(), stimulus));
+    let mut live = |steps: u32| {
+        let begin = Instant::now();
+        for _ in 0..steps {
+            // An unstable life starts again; that costs no more than a step.
+            if world.step().is_err() {
+                world.reset();
+            }
+        }
+        begin.elapsed().as_secs_f64() / f64::from(steps)
+    };
+    live(WARM_UP);
+    let mut seconds: Vec<f64> = (0..repetitions.max(1)).map(|_| live(STEPS)).collect();
+    seconds.sort_by(f64::total_cmp);
+    let median = seconds[seconds.len() / 2];
+    Speed {
+        body: specimen.name,
+        voxels: specimen.body.counts().total,
+        instruction_set: set.name(),
+        microseconds: 1e6 * median / f64::from(physics.substeps),
+        control_steps: 1.0 / median,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn specimens_are_the_bodies_that_figures_are_quoted_for() {
+        let list = specimens();
+        let voxels: Vec<usize> = list.iter().map(|specimen| specimen.body.counts().total).collect();
+        assert_eq!(voxels, [196, 105, 40, 196, 172]);
+        assert!(list.iter().all(|specimen| specimen.body.is_valid(3)));
+        let rigid = list[3].body.voxels().cells().iter().filter(|m| **m == Material::Rigid).count();
+        assert_eq!(rigid, 131);
+        let lattice = |i: usize| Lattice::new(&list[i].body, &Physics::default()).point_count();
+        // 24 gaps, none of which takes a whole vertex away; at each of 12 corner contacts one point more.
+        assert!(lattice(4) > lattice(0), "{} {}", lattice(4), lattice(0));
+    }
+
+    #[test]
+    fn every_specimen_lives_and_is_measured() {
+        for specimen in specimens() {
+            let speed = measure(&specimen, InstructionSet::in_use(), 1);
+            assert!(speed.microseconds > 0.0 && speed.control_steps > 0.0);
+        }
+    }
+}
