@@ -1,17 +1,29 @@
 //! Writing files so that nothing is ever half-written.
 
+use std::ffi::{OsStr, OsString};
+use std::fs::File;
 use std::io::{self, Write};
 use std::path::Path;
 
-/// Writes a file as a whole or not at all: to a temporary name in the same folder, synced, then renamed.
+/// Beginning and end of the names of temporary files, around the name of the file to be written.
+const TEMPORARY: [&str; 2] = [".", ".tmp"];
+
+/// Writes a file as a whole or not at all: to a temporary name in the same folder, synced, then renamed. Of a
+/// symbolic link, the file it leads to; what is no ordinary file (`/dev/stdout`, a pipe) is written to as it is.
 ///
 /// # Errors
 /// What the system says, as when the folder does not exist; the file is then as it was.
 pub fn write_atomically(path: &Path, content: &[u8]) -> io::Result<()> {
-    let folder = match path.parent() {
-        Some(folder) if !folder.as_os_str().is_empty() => folder,
-        _ => Path::new("."),
-    };
+    // A rename would put an ordinary file in the place of a device or a link.
+    if std::fs::metadata(path).is_ok_and(|found| !found.is_file() && !found.is_dir()) {
+        return File::options().write(true).open(path)?.write_all(content);
+    }
+    let path = &path.canonicalize().unwrap_or_else(|_| path.to_path_buf());
+    let folder = folder_of(path);
+    let mut prefix = OsString::from(TEMPORARY[0]);
+    // Names have at most 255 bytes.
+    let name = path.file_name().filter(|name| name.len() <= 200).unwrap_or_default();
+    prefix.extend([name, OsStr::new(".")]);
     let mut builder = tempfile::Builder::new();
     #[cfg(unix)]
     {
@@ -19,11 +31,47 @@ pub fn write_atomically(path: &Path, content: &[u8]) -> io::Result<()> {
         // What an ordinary file gets (the process's umask still applies), not a temporary file's owner-only.
         builder.permissions(std::fs::Permissions::from_mode(0o666));
     }
-    let mut file = builder.prefix(".morphcog-").suffix(".tmp").tempfile_in(folder)?;
+    let mut file = builder.prefix(&prefix).suffix(TEMPORARY[1]).tempfile_in(folder)?;
     file.write_all(content)?;
     file.as_file().sync_all()?;
     file.persist(path).map_err(|error| error.error)?;
     sync_folder(folder)
+}
+
+/// Whether [`write_atomically`] would find its place; nothing is left behind.
+///
+/// # Errors
+/// What the system says, as when the folder does not exist.
+pub fn check_writable(path: &Path) -> io::Result<()> {
+    match std::fs::metadata(path) {
+        Ok(found) if found.is_dir() => Err(io::ErrorKind::IsADirectory.into()),
+        Ok(found) if !found.is_file() => Ok(()),
+        _ => tempfile::tempfile_in(folder_of(path)).map(|_| ()),
+    }
+}
+
+fn folder_of(path: &Path) -> &Path {
+    path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
+/// Removes what writing the files of these names left half-written in a folder when the process was killed. Only for who
+/// alone writes those files.
+///
+/// # Errors
+/// What the system says.
+pub fn remove_half_written(folder: &Path, names: &[&str]) -> io::Result<()> {
+    let [begin, end] = TEMPORARY;
+    for entry in std::fs::read_dir(folder)? {
+        let entry = entry?;
+        let found = entry.file_name();
+        let found = found.to_string_lossy();
+        let inner = found.strip_prefix(begin).and_then(|rest| rest.strip_suffix(end));
+        let inner = inner.and_then(|inner| inner.rsplit_once('.'));
+        if inner.is_some_and(|(name, _)| names.contains(&name)) {
+            std::fs::remove_file(entry.path())?;
+        }
+    }
+    Ok(())
 }
 
 /// Makes a rename in a folder durable. (Elsewhere than on Unix a folder cannot be synced.)
@@ -31,7 +79,7 @@ pub fn write_atomically(path: &Path, content: &[u8]) -> io::Result<()> {
 /// # Errors
 /// What the system says.
 pub fn sync_folder(folder: &Path) -> io::Result<()> {
-    if cfg!(unix) { std::fs::File::open(folder)?.sync_all() } else { Ok(()) }
+    if cfg!(unix) { File::open(folder)?.sync_all() } else { Ok(()) }
 }
 
 #[cfg(test)]
@@ -58,5 +106,60 @@ mod tests {
         assert!(write_atomically(&path, b"new").is_err());
         assert_eq!(std::fs::read(path.join("content")).unwrap(), b"kept");
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn what_cannot_be_written_is_known_before_and_nothing_is_left_behind() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("eval.json");
+        check_writable(&path).unwrap();
+        assert!(check_writable(folder.path()).is_err());
+        assert!(check_writable(&folder.path().join("no/eval.json")).is_err());
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
+        write_atomically(&path, b"{}").unwrap();
+        check_writable(&path).unwrap();
+        assert_eq!(std::fs::read(&path).unwrap(), b"{}");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn through_a_link_the_file_it_leads_to_is_written() {
+        let folder = tempfile::tempdir().unwrap();
+        let [real, link] = ["real.json", "link.json"].map(|name| folder.path().join(name));
+        std::fs::write(&real, b"old").unwrap();
+        std::os::unix::fs::symlink("real.json", &link).unwrap();
+        write_atomically(&link, b"new").unwrap();
+        assert_eq!(std::fs::read(&real).unwrap(), b"new");
+        assert!(link.symlink_metadata().unwrap().is_symlink());
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_pipe_is_written_to_and_stays_a_pipe() {
+        use std::os::unix::fs::FileTypeExt;
+        let folder = tempfile::tempdir().unwrap();
+        let pipe = folder.path().join("pipe");
+        assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+        let reader = std::thread::spawn({
+            let pipe = pipe.clone();
+            move || std::fs::read(pipe).unwrap()
+        });
+        write_atomically(&pipe, b"content").unwrap();
+        assert_eq!(reader.join().unwrap(), b"content");
+        assert!(pipe.metadata().unwrap().file_type().is_fifo());
+    }
+
+    #[test]
+    fn only_half_written_files_of_these_names_are_removed() {
+        let folder = tempfile::tempdir().unwrap();
+        let kept =
+            ["run.json", ".lock", ".eval.json.Ab1.tmp", ".hidden", "run.json.tmp", ".run.json", ".tmp"];
+        for name in kept.iter().chain(&[".run.json.Xy2zz.tmp", ".elites.csv.q.tmp"]) {
+            std::fs::write(folder.path().join(name), b"").unwrap();
+        }
+        remove_half_written(folder.path(), &["run.json", "elites.csv"]).unwrap();
+        let left = std::fs::read_dir(folder.path()).unwrap().count();
+        assert_eq!(left, kept.len());
+        assert!(kept.iter().all(|name| folder.path().join(name).exists()));
     }
 }

@@ -1,6 +1,7 @@
 //! A run's folder: made, locked, and never overwritten by accident.
 
 use super::{Error, checkpoint};
+use crate::base::files::remove_half_written;
 use std::fs::{File, TryLockError};
 use std::path::{Path, PathBuf};
 
@@ -58,6 +59,7 @@ impl RunFolder {
             }
             Err(TryLockError::Error(error)) => return Err(Error::writing(&lock, &error)),
         }
+        remove_half_written(path, &RunFolder::files()).map_err(|error| Error::writing(path, &error))?;
         if if_exists == IfExists::Overwrite {
             for name in RunFolder::files() {
                 let file = path.join(name);
@@ -77,7 +79,8 @@ impl RunFolder {
         &self.path
     }
 
-    fn files() -> [&'static str; 6] {
+    /// Names of the files of a run.
+    pub(super) fn files() -> [&'static str; 6] {
         let [newest, previous] = checkpoint::NAMES;
         [RUN_JSON, CONFIG, ELITES, METRICS, newest, previous]
     }
