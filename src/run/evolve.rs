@@ -6,12 +6,12 @@ use super::folder::{self, IfExists, RunFolder};
 use super::metrics::{Metrics, Totals};
 use super::training::Training;
 use super::variation::Mutations;
-use super::{Config, Error};
+use super::{Config, Error, resume};
 use crate::base::files::write_atomically;
 use crate::genome::GenomeError;
-use crate::qd::descriptor::{count_bin, possible_cells};
+use crate::qd::descriptor::count_bin;
 use crate::qd::{Archive, ArchiveStats, DescriptorSpace, Evaluated, MapElites};
-use crate::task::evaluation::{Job, Outcome, Savings, evaluate};
+use crate::task::evaluation::{Job, Outcome, evaluate};
 use crate::task::grouping::Grouping;
 use rayon::prelude::*;
 use std::path::PathBuf;
@@ -82,13 +82,9 @@ pub fn evolve(
     let training = Training::load(config, options.data.as_deref())?;
     let folder = RunFolder::open(&options.out, options.if_exists)?;
     let saved = match options.if_exists {
-        IfExists::Resume => checkpoint::read(folder.path(), |text| observer.warning(&text))?,
+        IfExists::Resume => resume::saved(&folder, config, &training, |text| observer.warning(&text))?,
         _ => None,
     };
-    if let Some(saved) = &saved {
-        compatible(saved, config, &training)
-            .map_err(|error| error.within(&options.out.display().to_string()))?;
-    }
     let write = |name: &str, content: &[u8]| {
         let path = folder.path().join(name);
         write_atomically(&path, content).map_err(|error| Error::writing(&path, &error))
@@ -105,36 +101,13 @@ pub fn evolve(
     Ok(Finished { run: file, totals: run.totals(), stopped })
 }
 
-/// Whether a saved run can be gone on with under a config: all that its results depend on must be the same.
-fn compatible(saved: &Checkpoint, config: &Config, training: &Training) -> Result<(), Error> {
-    let essence = |config: &Config| Config {
-        generations: 1,
-        savings: Savings::default(),
-        checkpoint: Default::default(),
-        data: crate::run::config::DataConfig { dir: None, ..config.data.clone() },
-        ..config.clone()
-    };
-    let hint = "resume with the config it was started with, or start anew with --force".to_string();
-    let (theirs, ours) = (essence(&saved.run.config).to_toml(), essence(config).to_toml());
-    if let Some((theirs, ours)) = theirs.lines().zip(ours.lines()).find(|(theirs, ours)| theirs != ours) {
-        let text =
-            format!("the run in this folder has another config: it says {theirs}, now {ours} is asked for");
-        return Err(Error::input(text).hint(hint));
-    }
-    if saved.run.dataset != training.dataset || saved.run.training_images != training.images {
-        let text = "the run in this folder was made with other images: the dataset has changed".to_string();
-        return Err(Error::input(text).hint(hint));
-    }
-    Ok(())
-}
-
 /// A run under way.
 struct Run<'a> {
     options: &'a Options,
     training: &'a Training,
     grouping: Grouping,
     space: DescriptorSpace,
-    possible: usize,
+    dimensions: Dimensions,
     search: MapElites<Robot>,
     known: KnownBodies,
     totals: Totals,
@@ -147,8 +120,6 @@ impl<'a> Run<'a> {
     fn new(options: &'a Options, training: &'a Training, saved: Option<Checkpoint>) -> Result<Self, Error> {
         let config = &options.config;
         let grouping = config.grouping()?;
-        let tasks = grouping.tasks().len();
-        let area = config.body.height * config.body.width;
         let (archive, known, totals, generation) = match saved {
             Some(saved) => (saved.run.archive()?, saved.known_bodies, saved.totals, saved.run.generations),
             None => (Archive::new(), KnownBodies::default(), Totals::default(), 0),
@@ -156,9 +127,9 @@ impl<'a> Run<'a> {
         Ok(Run {
             options,
             training,
+            space: DescriptorSpace::voxel_counts(grouping.tasks().len()),
+            dimensions: Dimensions::of(config)?,
             grouping,
-            space: DescriptorSpace::voxel_counts(tasks),
-            possible: possible_cells(area, config.body.min_muscles, tasks).len(),
             search: MapElites::new(config.seed, config.map_elites.clone(), archive),
             known,
             totals,
@@ -178,7 +149,7 @@ impl<'a> Run<'a> {
     }
 
     fn stats(&self) -> ArchiveStats {
-        self.search.archive().stats(self.possible, self.options.config.archive.qd_offset)
+        self.search.archive().stats(self.dimensions.possible_cells, self.options.config.archive.qd_offset)
     }
 
     fn live(
@@ -301,8 +272,6 @@ impl<'a> Run<'a> {
     }
 
     fn file(&self) -> RunFile {
-        let (names, bins) = self.space.dimensions().iter().cloned().unzip();
-        let tasks = self.grouping.tasks().iter().map(|split| split.name()).collect();
         RunFile {
             format: FORMAT.to_string(),
             format_version: FORMAT_VERSION,
@@ -311,7 +280,7 @@ impl<'a> Run<'a> {
             config: self.options.config.clone(),
             dataset: self.training.dataset.clone(),
             training_images: self.training.images.clone(),
-            dimensions: Dimensions { names, bins, possible_cells: self.possible, tasks },
+            dimensions: self.dimensions.clone(),
             generations: self.generation,
             stats: self.stats(),
             elites: self.search.archive().elites().map(|elite| elite.solution.clone()).collect(),

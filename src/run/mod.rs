@@ -13,6 +13,7 @@ pub mod gallery;
 pub mod metrics;
 pub mod replay;
 pub mod report;
+mod resume;
 pub mod robots;
 pub mod signals;
 pub mod simulate;
