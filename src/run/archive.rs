@@ -4,6 +4,7 @@ use super::training::{DatasetRef, ImageRef};
 use super::{Config, Error};
 use crate::body::{Body, VoxelCounts};
 use crate::genome::Genome;
+use crate::qd::descriptor::possible_cells;
 use crate::qd::{Archive, ArchiveStats, DescriptorSpace, Elite};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -51,6 +52,22 @@ pub struct Dimensions {
     pub possible_cells: usize,
     /// Names of the tasks, in the order of their bins.
     pub tasks: Vec<String>,
+}
+
+impl Dimensions {
+    /// Those of the archive of a config.
+    ///
+    /// # Errors
+    /// If the config has no tasks.
+    pub fn of(config: &Config) -> Result<Self, Error> {
+        let grouping = config.grouping()?;
+        let tasks: Vec<String> = grouping.tasks().iter().map(|split| split.name()).collect();
+        let space = DescriptorSpace::voxel_counts(tasks.len());
+        let (names, bins) = space.dimensions().iter().cloned().unzip();
+        let area = config.body.height * config.body.width;
+        let possible_cells = possible_cells(area, config.body.min_muscles, tasks.len()).len();
+        Ok(Dimensions { names, bins, possible_cells, tasks })
+    }
 }
 
 /// The content of `run.json`.
@@ -121,6 +138,9 @@ impl RunFile {
 
     fn check(&self) -> Result<(), Error> {
         self.config.validate()?;
+        if self.dimensions != Dimensions::of(&self.config)? {
+            return Err(Error::input("dimensions: they are not those of the config".to_string()));
+        }
         let space = self.space();
         for robot in &self.elites {
             let refuse = |what: &str| Err(Error::input(format!("elite {}: {what}", robot.id)));
@@ -135,7 +155,7 @@ impl RunFile {
                 return refuse("it has not one displacement per training image");
             }
         }
-        Ok(())
+        self.archive().map(|_| ())
     }
 
     fn space(&self) -> DescriptorSpace {
