@@ -9,7 +9,7 @@ use crate::sim::Physics;
 use crate::task::builtin::BuiltinDigits;
 use crate::task::evaluation::Savings;
 use crate::task::grouping::Grouping;
-use crate::task::protocol::Protocol;
+use crate::task::protocol::{MAX_COLUMN, Protocol};
 use crate::task::stimulus::StimulusParams;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -25,6 +25,9 @@ pub const BUILT_IN: [(&str, &str); 5] = [
 
 /// Largest seed: TOML's numbers are signed.
 const MAX_SEED: u64 = i64::MAX as u64;
+
+/// Largest offset of the QD score either way \[voxel lengths\].
+const MAX_OFFSET: f64 = 1e9;
 
 /// Everything a run depends on. Every key but `task` and `data` has a default.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -282,14 +285,24 @@ impl Config {
             let expected = format!("{} (on the ground) or more", self.physics.ground_row);
             return refuse("protocol.start_row", self.protocol.start_row.to_string(), &expected);
         }
-        if !self.archive.qd_offset.is_finite() {
-            return refuse("archive.qd_offset", self.archive.qd_offset.to_string(), "a finite number");
+        if !(-MAX_COLUMN..=MAX_COLUMN).contains(&self.protocol.start_column) {
+            let expected = format!("−{MAX_COLUMN} to {MAX_COLUMN}");
+            return refuse("protocol.start_column", self.protocol.start_column.to_string(), &expected);
         }
-        if self.checkpoint.generations == 0
-            || self.checkpoint.seconds.is_nan()
-            || self.checkpoint.seconds < 0.0
-        {
-            return refuse("checkpoint", "0".to_string(), "generations of 1 or more, seconds of 0 or more");
+        // Sums over an archive must stay finite: files cannot hold what is not.
+        if self.archive.qd_offset.is_nan() || self.archive.qd_offset.abs() > MAX_OFFSET {
+            let expected = format!("a number from −{MAX_OFFSET} to {MAX_OFFSET}");
+            return refuse("archive.qd_offset", self.archive.qd_offset.to_string(), &expected);
+        }
+        if self.checkpoint.generations == 0 {
+            return refuse("checkpoint.generations", "0".to_string(), "1 or more");
+        }
+        if !(self.checkpoint.seconds >= 0.0 && self.checkpoint.seconds.is_finite()) {
+            return refuse(
+                "checkpoint.seconds",
+                self.checkpoint.seconds.to_string(),
+                "a finite number, 0 or above",
+            );
         }
         if self.data.images_per_class == 0 || self.data.train_images.as_ref().is_some_and(Vec::is_empty) {
             return refuse("data", "no images".to_string(), "at least one training image of each class");

@@ -5,6 +5,7 @@ use crate::base::Grid;
 use crate::base::files::write_atomically;
 use crate::body::Body;
 use crate::sim::{Lattice, Physics, Start, World};
+use crate::task::protocol::MAX_COLUMN;
 use serde::Deserialize;
 use serde::de::IgnoredAny;
 use std::path::Path;
@@ -55,9 +56,6 @@ fn paper_column() -> i64 {
 
 /// Default length of a life: ten actuation cycles.
 const CONTROL_STEPS: u64 = 500;
-
-/// Farthest start column either way: world coordinates stay exact to far below a voxel.
-const MAX_COLUMN: i64 = 1_000_000;
 
 impl Scenario {
     /// Reads a scenario.
@@ -111,7 +109,7 @@ impl Scenario {
         if self.start_row.is_some_and(|row| row < ground) {
             return refuse(format!("start_row: expected {ground} (on the ground) or more"));
         }
-        if self.start_column.abs() > MAX_COLUMN {
+        if !(-MAX_COLUMN..=MAX_COLUMN).contains(&self.start_column) {
             return refuse(format!("start_column: expected −{MAX_COLUMN} to {MAX_COLUMN}"));
         }
         Ok(())

@@ -30,6 +30,9 @@ impl Default for BuiltinDigits {
     }
 }
 
+/// Most images of a class in a split.
+const MAX_PER_CLASS: usize = 1_000_000;
+
 /// Why there are no such built-in digits.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum BuiltinError {
@@ -39,6 +42,9 @@ pub enum BuiltinError {
     /// A class that is not a digit.
     #[error("built-in digits: there is no class {0}; expected 0 to 9")]
     NotADigit(u8),
+    /// More images than can be told apart by index.
+    #[error("built-in digits: {0} images of each class; expected at most {MAX_PER_CLASS}")]
+    TooMany(usize),
     /// A class given twice.
     #[error("built-in digits: class {0} is given more than once")]
     Repeated(u8),
@@ -48,13 +54,17 @@ impl BuiltinDigits {
     /// Number of rows and of columns of every image.
     pub const SIDE: usize = pen::SIDE;
 
-    /// Whether the classes are different digits, and there is at least one.
+    /// Whether the classes are different digits, there is at least one, and not too many images of each.
     ///
     /// # Errors
     /// [`BuiltinError`] if not.
     pub fn check(&self) -> Result<(), BuiltinError> {
         if self.classes.is_empty() {
             return Err(BuiltinError::NoClasses);
+        }
+        let most = self.train_per_class.max(self.test_per_class);
+        if most > MAX_PER_CLASS {
+            return Err(BuiltinError::TooMany(most));
         }
         for (i, &class) in self.classes.iter().enumerate() {
             if class > 9 {
@@ -168,6 +178,8 @@ mod tests {
         let with = |classes: &[u8]| BuiltinDigits { classes: classes.to_vec(), ..BuiltinDigits::default() };
         assert_eq!(with(&[]).check(), Err(BuiltinError::NoClasses));
         assert_eq!(with(&[3, 10]).check(), Err(BuiltinError::NotADigit(10)));
+        let many = BuiltinDigits { test_per_class: usize::MAX, ..BuiltinDigits::default() };
+        assert_eq!(many.check(), Err(BuiltinError::TooMany(usize::MAX)));
         assert_eq!(with(&[3, 1, 3]).check(), Err(BuiltinError::Repeated(3)));
         assert_eq!(with(&[9, 0]).check(), Ok(()));
     }

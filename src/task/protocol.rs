@@ -2,6 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 
+/// Farthest start column either way \[voxels\]: world coordinates stay exact to far below a voxel.
+pub const MAX_COLUMN: i64 = 1_000_000;
+
 /// Whether images share a life.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
