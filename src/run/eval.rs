@@ -4,9 +4,9 @@ use super::archive::{Robot, RunFile};
 use super::report::{Baselines, EvalFile, RobotReport, Trial};
 use super::robots::Selection;
 use super::training::{ImageRef, load_dataset, see};
-use super::{Config, Error};
+use super::{Config, Error, folder::RunFolder};
 use crate::base::Grid;
-use crate::base::files::write_atomically;
+use crate::base::files::{check_writable, write_atomically};
 use crate::sim::Lattice;
 use crate::task::baselines::{Labelled, best_pixel, larger_group, nearest_training_image};
 use crate::task::dataset::{Dataset, Split};
@@ -15,7 +15,7 @@ use crate::task::protocol::{Life, Protocol};
 use crate::task::rollout::{fresh_life, same_to_sensors};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 /// Training images per class on which the single-pixel baseline is chosen.
@@ -72,6 +72,7 @@ pub fn eval(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Re
         )));
     }
     let run = RunFile::read(&options.archive)?;
+    check_out(options)?;
     let config = &run.config;
     let grouping = config.grouping()?;
     let dataset = load_dataset(config, options.data.as_deref(), &Split::ALL)?;
@@ -93,13 +94,14 @@ pub fn eval(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Re
     let pool = rayon::ThreadPoolBuilder::new().num_threads(options.threads.unwrap_or(0)).build();
     let pool = pool.map_err(|error| Error::other(format!("no threads: {error}")))?;
     let done = AtomicU64::new(0);
+    let mut left = robots.len();
+    report.stopped = left > 0;
     for robot in robots {
         let Some(split) = task_of(&grouping, robot) else { continue };
         let lives = pool.install(|| lives(config, options, robot, &test.stimuli, stop, &done, observer));
-        let Some((displacements, simulated)) = lives else {
-            report.stopped = true;
-            break;
-        };
+        let Some((displacements, simulated)) = lives else { break };
+        left -= 1;
+        report.stopped = left > 0;
         let trial = Trial { run: &run, robot, split, images: &test.images, threshold: options.threshold };
         report.robots.push(RobotReport::new(&trial, displacements, simulated));
         report.conclude();
@@ -117,6 +119,28 @@ fn task_of<'a>(grouping: &'a Grouping, robot: &Robot) -> Option<&'a grouping::Sp
     grouping.tasks().iter().find(|split| split.name() == robot.task && !split.is_same_way())
 }
 
+/// Whether the results can be written, and overwrite neither each other nor a file of the run.
+fn check_out(options: &Options) -> Result<(), Error> {
+    let Options { out, archive, .. } = options;
+    let refuse = |text: &str| Err(Error::usage(format!("--out {}: {text}", out.display())));
+    let csv = out.with_extension("csv");
+    if csv == *out {
+        return refuse("expected another ending: the CSV beside the results has that name");
+    }
+    let folder_of =
+        |path: &Path| path.parent().and_then(|folder| Path::new(".").join(folder).canonicalize().ok());
+    let same_folder = folder_of(out) == folder_of(archive);
+    for path in [out, &csv] {
+        let name = path.file_name();
+        let is_of_run = RunFolder::files().iter().any(|own| name == Some(own.as_ref()));
+        if same_folder && (is_of_run || name == archive.file_name()) {
+            return refuse("expected another name: this would overwrite a file of the run");
+        }
+        check_writable(path).map_err(|error| Error::writing(path, &error))?;
+    }
+    Ok(())
+}
+
 fn write(options: &Options, report: &EvalFile) -> Result<(), Error> {
     let csv_path = options.out.with_extension("csv");
     let csv = report.to_csv().map_err(|error| Error::other(error.to_string()))?;
@@ -129,6 +153,10 @@ fn write(options: &Options, report: &EvalFile) -> Result<(), Error> {
 /// `count` test images, evenly divided between the classes; the first classes get what is left over.
 fn test_images(config: &Config, dataset: &Dataset, options: &Options) -> Result<Test, Error> {
     let classes = config.classes();
+    if options.images < classes.len() {
+        let (asked, least) = (options.images, classes.len());
+        return Err(Error::usage(format!("--images {asked}: expected {least} or more, one of each class")));
+    }
     let mut test = Test { images: Vec::new(), stimuli: Vec::new() };
     for (place, &class) in classes.iter().enumerate() {
         let count = options.images / classes.len() + usize::from(place < options.images % classes.len());

@@ -38,7 +38,7 @@ pub struct EvalFile {
     pub control_steps: u32,
     /// Displacements up to this counted as wrong \[voxel lengths\].
     pub threshold: f64,
-    /// Whether a signal ended it before the last robot.
+    /// Whether it ended before the last robot, by a signal or otherwise.
     pub stopped: bool,
     /// The test images.
     pub images: Vec<ImageRef>,
