@@ -2,11 +2,15 @@
 
 use clap::Parser;
 use morphcog::cli::{self, Cli};
-use morphcog::view::console::Console;
+use morphcog::view::console::{Console, Mode};
+use std::io::ErrorKind;
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    let cli = Cli::parse();
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(help) => return say(&help),
+    };
     let console = Console::new(cli.mode());
     match cli::run(cli, &console) {
         Ok(()) if console.has_lost_results() => ExitCode::FAILURE,
@@ -15,5 +19,16 @@ fn main() -> ExitCode {
             console.error(&error, error.hint.as_deref());
             ExitCode::from(error.kind.exit_code())
         }
+    }
+}
+
+/// Help, the version, or what is wrong with the command line.
+fn say(help: &clap::Error) -> ExitCode {
+    match help.print() {
+        Err(error) if error.kind() != ErrorKind::BrokenPipe => {
+            Console::new(Mode::Human).error(&error, None);
+            ExitCode::FAILURE
+        }
+        _ => ExitCode::from(u8::try_from(help.exit_code()).unwrap_or(2)),
     }
 }

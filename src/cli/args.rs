@@ -1,0 +1,282 @@
+//! The words of the command line: clap's types, help and examples.
+
+use crate::run::replay::Shown;
+use crate::run::robots::Selection;
+use crate::task::dataset::BUILTIN;
+use crate::view::console::Mode;
+use crate::view::pictures::Format;
+use clap::{Args, Parser, Subcommand};
+use std::path::PathBuf;
+
+/// Evolve soft robots whose bodies alone recognise images.
+///
+/// Voxels that oscillate, voxels that swell or shrink with one pixel and passive voxels are put together by evolution so
+/// that the robot walks one way when it sees a zero and the other way when it sees a one: no neurons, no controller.
+#[derive(Debug, Parser)]
+#[command(name = "morphcog", version, after_help = EXAMPLES, max_term_width = 100)]
+pub struct Cli {
+    #[command(subcommand)]
+    pub(super) command: Command,
+    /// Results, warnings and errors only.
+    #[arg(short, long, global = true, conflicts_with = "json")]
+    pub(super) quiet: bool,
+    /// For programs: one JSON object per line on stdout.
+    #[arg(long, global = true)]
+    pub(super) json: bool,
+}
+
+const EXAMPLES: &str = "\
+Examples:
+  morphcog evolve --config quickstart.toml     about a minute, no download
+  morphcog replay --robot best                 watch the fittest robot of the newest run
+  morphcog data fetch mnist                    then the paper's experiments:
+  morphcog evolve --config zero_one.toml
+  morphcog eval --archive runs/zero_one-seed1/run.json --images 1000 --robots top:10
+
+Exit codes:
+  0 done   1 failed   2 wrong command line   3 wrong or missing input file   4 life unstable (simulate)
+  5 run folder taken   75 stopped by a signal, saved, can be resumed   130 stopped at once";
+
+#[derive(Debug, Subcommand)]
+pub(super) enum Command {
+    /// Evolve bodies with MAP-Elites.
+    #[command(after_help = "\
+Examples:
+  morphcog evolve --config quickstart.toml
+  morphcog evolve --config zero_one.toml --seed 2 --generations 1000
+  morphcog evolve --config zero_one.toml --seed 2 --generations 30000 --resume   goes on with that run
+  morphcog evolve --config zero_one.toml --set map_elites.parents=40 --out runs/forty
+
+Ctrl-C (or SIGTERM, SIGUSR1) finishes the generation, saves and exits with 75; a second Ctrl-C ends at once.")]
+    Evolve(EvolveArgs),
+    /// Test robots on held-out images.
+    #[command(after_help = "\
+Examples:
+  morphcog eval --archive runs/zero_one-seed1/run.json --images 1000
+  morphcog eval --archive runs/zero_one-seed1/run.json --robots top:10
+  morphcog eval --archive runs/zero_one-seed1/run.json --robots 3fa,b02 -o two.json")]
+    Eval(EvalArgs),
+    /// Watch a robot: an animated GIF and a page for the browser.
+    #[command(after_help = "\
+Examples:
+  morphcog replay --robot best
+  morphcog replay --robot 3fa --archive runs/zero_one-seed1/run.json --images train:1,test:17
+  morphcog replay --robot XFJPI            a robot published with the paper (see morphcog gallery)
+  morphcog replay --robot best --format terminal
+  morphcog replay --robot best -o walk.gif")]
+    Replay(ReplayArgs),
+    /// Simulate any body under any stimuli.
+    #[command(after_help = "\
+Example:
+  morphcog simulate scenario.json --out traj.csv
+
+scenario.json:
+  {\"body\": [[3, 3, 6], [4, 0, 5]],         rows from the top; 0 empty, 1 rigid, 2 soft, 3 and 4 muscle (in phase,
+                                           antiphase), 5 and 6 sensor (shrinks, expands)
+   \"stimulus\": [[0, 0.5, 1], [0, 0, 1]],   one pixel per voxel, 0 to 1; or \"stimuli\": [...] with \"switch_every\": 500
+   \"control_steps\": 500, \"start_row\": 2, \"start_column\": 493, \"reset_between\": false}
+
+Output: step,com_x,com_y in world units (a voxel is 0.1). Exit code 4 if the life becomes unstable.")]
+    Simulate(SimulateArgs),
+    /// Find, download and look at images.
+    #[command(after_help = "\
+Examples:
+  morphcog data fetch mnist
+  morphcog data info mnist
+  morphcog data sheet builtin -o sheet.png")]
+    Data {
+        #[command(subcommand)]
+        command: DataCommand,
+    },
+    /// The robots published with the paper.
+    #[command(after_help = "Examples:\n  morphcog gallery\n  morphcog replay --robot XFJPI")]
+    Gallery,
+    /// The built-in configs: list them, or print one to start your own from.
+    #[command(after_help = "Examples:\n  morphcog config\n  morphcog config zero_one.toml > mine.toml")]
+    Config {
+        /// Name of a built-in config, or a file: printed with every key resolved.
+        name: Option<String>,
+        /// Change a key before printing.
+        #[arg(long, value_name = "KEY=VALUE", requires = "name")]
+        set: Vec<String>,
+    },
+    /// Completions for a shell.
+    #[command(
+        after_help = "Example:\n  morphcog completions bash > ~/.local/share/bash-completion/completions/morphcog"
+    )]
+    Completions {
+        /// The shell.
+        shell: clap_complete::Shell,
+    },
+    /// The man page.
+    #[command(after_help = "Example:\n  morphcog man > morphcog.1 && man ./morphcog.1")]
+    Man,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct EvolveArgs {
+    /// Config file (TOML or JSON), or the name of a built-in one (see morphcog config).
+    #[arg(short, long, value_name = "FILE")]
+    pub(super) config: String,
+    /// Change a key, as in map_elites.parents=10; may be given several times.
+    #[arg(long, value_name = "KEY=VALUE")]
+    pub(super) set: Vec<String>,
+    /// Seed of all chance.
+    #[arg(long)]
+    pub(super) seed: Option<u64>,
+    /// Number of generations.
+    #[arg(short, long)]
+    pub(super) generations: Option<u64>,
+    /// Threads (default: one per core); the result does not depend on it.
+    #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub(super) threads: Option<u16>,
+    /// Run folder (default: runs/<config>-seed<seed>).
+    #[arg(short, long, value_name = "DIR")]
+    pub(super) out: Option<PathBuf>,
+    /// Folder with the images.
+    #[arg(long, value_name = "DIR")]
+    pub(super) data: Option<PathBuf>,
+    /// Go on with the run in the folder; start it if there is none.
+    #[arg(long, conflicts_with = "force")]
+    pub(super) resume: bool,
+    /// Replace the run in the folder.
+    #[arg(long)]
+    pub(super) force: bool,
+    /// At the end, replay the fittest robot into the run folder.
+    #[arg(long)]
+    pub(super) replay: bool,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct EvalArgs {
+    /// The run.json (default: the newest under runs/).
+    #[arg(short, long, value_name = "FILE")]
+    pub(super) archive: Option<PathBuf>,
+    /// Test images in all, evenly divided between the classes.
+    #[arg(short = 'n', long, default_value_t = 1000, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    pub(super) images: u32,
+    /// all, top:N, random:N, or ids (or beginnings of ids) separated by commas.
+    #[arg(short, long, default_value = "top:10")]
+    pub(super) robots: Selection,
+    /// Seed of what is drawn: images, and robots with random:N.
+    #[arg(long, default_value_t = 1)]
+    pub(super) seed: u64,
+    /// Displacements up to this many voxel lengths are wrong.
+    #[arg(long, default_value_t = 3.0)]
+    pub(super) threshold: f64,
+    /// Actuation cycles per image.
+    #[arg(long, default_value_t = 10, value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    pub(super) cycles: u32,
+    /// Folder with the images.
+    #[arg(long, value_name = "DIR")]
+    pub(super) data: Option<PathBuf>,
+    /// Result file; a CSV goes beside it (default: eval.json beside run.json).
+    #[arg(short, long, value_name = "FILE")]
+    pub(super) out: Option<PathBuf>,
+    /// Threads (default: one per core).
+    #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub(super) threads: Option<u16>,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct ReplayArgs {
+    /// Id (or the beginning of one), "best", or the name of a published robot.
+    #[arg(short, long, default_value = "best")]
+    pub(super) robot: String,
+    /// The run.json (default: the newest under runs/).
+    #[arg(short, long, value_name = "FILE")]
+    pub(super) archive: Option<PathBuf>,
+    /// Images by index, as train:1,test:17 (default: the training images).
+    #[arg(short, long, value_delimiter = ',')]
+    pub(super) images: Vec<Shown>,
+    /// Another dataset than the run's, as builtin.
+    #[arg(long)]
+    pub(super) dataset: Option<String>,
+    /// Folder with the images.
+    #[arg(long, value_name = "DIR")]
+    pub(super) data: Option<PathBuf>,
+    /// What to make.
+    #[arg(short, long, value_delimiter = ',', default_values_t = [Format::Gif, Format::Html])]
+    pub(super) format: Vec<Format>,
+    /// File; its ending (.gif, .html, .png) says the format (default: replay-<robot> beside run.json).
+    #[arg(short, long, value_name = "FILE")]
+    pub(super) out: Option<PathBuf>,
+    /// Width of GIF and PNG in pixels.
+    #[arg(long, default_value_t = 480)]
+    pub(super) width: u32,
+    /// Open the result.
+    #[arg(long)]
+    pub(super) open: bool,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct SimulateArgs {
+    /// The scenario (JSON).
+    pub(super) scenario: PathBuf,
+    /// CSV file (default: standard output).
+    #[arg(short, long, value_name = "FILE")]
+    pub(super) out: Option<PathBuf>,
+}
+
+#[derive(Debug, Subcommand)]
+pub(super) enum DataCommand {
+    /// Download a dataset and check it.
+    #[command(
+        after_help = "Examples:\n  morphcog data fetch\n  morphcog data fetch fashion-mnist --to ~/data/fashion"
+    )]
+    Fetch {
+        /// mnist or fashion-mnist.
+        #[arg(default_value = "mnist")]
+        dataset: String,
+        /// Folder (default: data/<dataset>).
+        #[arg(long, value_name = "DIR")]
+        to: Option<PathBuf>,
+        /// Address of a folder with the files, instead of the well-known mirrors.
+        #[arg(long, value_name = "URL")]
+        mirror: Option<String>,
+        /// Replace files that are there but differ.
+        #[arg(long)]
+        force: bool,
+    },
+    /// What is found of a dataset, and where.
+    #[command(
+        after_help = "Examples:\n  morphcog data info\n  morphcog data info emnist-digits --data ~/data/emnist"
+    )]
+    Info(DatasetArgs),
+    /// A contact sheet: images side by side.
+    #[command(after_help = "Example:\n  morphcog data sheet builtin -o sheet.png")]
+    Sheet {
+        #[command(flatten)]
+        dataset: DatasetArgs,
+        /// Images per class.
+        #[arg(short, long, default_value_t = 16)]
+        samples: usize,
+        /// The test images instead of the training images.
+        #[arg(long)]
+        test: bool,
+        /// PNG file.
+        #[arg(short, long, value_name = "FILE", default_value = "sheet.png")]
+        out: PathBuf,
+    },
+}
+
+#[derive(Debug, Args)]
+pub(super) struct DatasetArgs {
+    /// builtin, mnist, fashion-mnist, or a name of your own.
+    #[arg(default_value = BUILTIN)]
+    pub(super) dataset: String,
+    /// Folder with the files.
+    #[arg(long, value_name = "DIR")]
+    pub(super) data: Option<PathBuf>,
+}
+
+impl Cli {
+    /// How the console is to speak.
+    pub fn mode(&self) -> Mode {
+        match (self.quiet, self.json) {
+            (true, _) => Mode::Quiet,
+            (_, true) => Mode::Json,
+            _ => Mode::Human,
+        }
+    }
+}
