@@ -25,7 +25,7 @@ pub fn evolution(console: &Console, finished: &Finished, out: &Path) {
         let best =
             run.elites.iter().max_by(|a, b| a.objective.total_cmp(&b.objective)).map(|robot| &robot.id);
         let done = serde_json::json!({
-            "folder": out, "generations": run.generations, "stopped": finished.stopped, "best": best,
+            "folder": out.display().to_string(), "generations": run.generations, "stopped": finished.stopped, "best": best,
             "elites": elites, "stats": run.stats, "totals": totals,
         });
         return console.event("finished", &done);
