@@ -83,11 +83,17 @@ pub fn replay(options: &Options) -> Result<Replay, Error> {
             ..config.data.clone()
         };
     }
+    // Published robots come without images of their own.
+    let offer = |error: Error| match found.published {
+        true => error
+            .hint("morphcog data fetch mnist, or --dataset builtin for digits the program draws".to_string()),
+        false => error,
+    };
     let mut shown = options.images.clone();
     if shown.is_empty() {
         let own = if options.dataset.is_none() { found.training } else { Vec::new() };
         shown = match own.as_slice() {
-            [] => super::training::Training::load(&config, options.data.as_deref())?.images,
+            [] => super::training::Training::load(&config, options.data.as_deref()).map_err(offer)?.images,
             own => own.to_vec(),
         }
         .into_iter()
@@ -101,13 +107,7 @@ pub fn replay(options: &Options) -> Result<Replay, Error> {
     }
     let wanted: Vec<Split> =
         Split::ALL.into_iter().filter(|split| shown.iter().any(|image| image.split == *split)).collect();
-    let dataset =
-        load_dataset(&config, options.data.as_deref(), &wanted).map_err(|error| match found.published {
-            true => error.hint(
-                "morphcog data fetch mnist, or --dataset builtin for digits the program draws".to_string(),
-            ),
-            false => error,
-        })?;
+    let dataset = load_dataset(&config, options.data.as_deref(), &wanted).map_err(offer)?;
     let mut images = Vec::new();
     for Shown { split, index } in shown {
         let label =
