@@ -1,6 +1,8 @@
 //! What several test programs share.
 #![allow(dead_code, reason = "every test program uses its own part")]
 
+pub mod program;
+
 use flate2::read::GzDecoder;
 use morphcog::base::Grid;
 use morphcog::body::Body;

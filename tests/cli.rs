@@ -1,0 +1,834 @@
+//! The command line, as its users meet it: what it prints, where it writes, how it ends.
+
+mod common;
+
+use common::program::{Sandbox, TINY, files, said};
+use common::{Reference, golden};
+use morphcog::run::config::{BUILT_IN, Config};
+use morphcog::run::report::EvalFile;
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::sync::OnceLock;
+
+/// A finished tiny run and what belongs to it, made once; copy it with [`with_run`].
+fn run_once() -> &'static BTreeMap<String, Vec<u8>> {
+    static RUN: OnceLock<BTreeMap<String, Vec<u8>>> = OnceLock::new();
+    RUN.get_or_init(|| {
+        let sandbox = Sandbox::tiny();
+        sandbox.run("evolve -q -c tiny.toml -o run").ended(0, &[]);
+        files(&sandbox.path("run"))
+    })
+}
+
+/// A sandbox with a finished run in `run`.
+fn with_run() -> Sandbox {
+    let sandbox = Sandbox::tiny();
+    run_once().iter().for_each(|(name, content)| {
+        sandbox.write(&format!("run/{name}"), content);
+    });
+    sandbox
+}
+
+// ---- help ----
+
+const COMMANDS: [&str; 14] = [
+    "",
+    "evolve",
+    "eval",
+    "replay",
+    "simulate",
+    "data",
+    "data fetch",
+    "data info",
+    "data sheet",
+    "gallery",
+    "config",
+    "completions",
+    "man",
+    "help",
+];
+
+#[test]
+fn the_help_of_every_command_has_an_example_that_names_it() {
+    let sandbox = Sandbox::new();
+    for command in COMMANDS.iter().filter(|command| **command != "help") {
+        let said = sandbox.run(&format!("{command} --help")).ended(0, &[]);
+        let example = format!("morphcog {command}");
+        let (_, examples) = said.out.split_once("Example").unwrap_or_else(|| panic!("{command}: no example"));
+        assert!(examples.contains(example.trim()), "{command}: {examples}");
+    }
+}
+
+#[test]
+fn the_help_documents_every_exit_code() {
+    let help = Sandbox::new().run("--help").ended(0, &[]).out;
+    let (_, codes) = help.split_once("Exit codes").unwrap();
+    for code in ["0 ", "1 ", "2 ", "3 ", "4 ", "5 ", "75 ", "130 "] {
+        assert!(codes.contains(code), "{code} is not in {codes}");
+    }
+}
+
+#[test]
+fn a_wrong_command_line_ends_with_2() {
+    let sandbox = Sandbox::tiny();
+    for wrong in [
+        "",
+        "evolv",
+        "evolve",
+        "evolve -c tiny.toml --seed x",
+        "evolve -c tiny.toml --threads 0",
+        "evolve -c tiny.toml --threads 99999",
+        "evolve -c tiny.toml --resume --force",
+        "evolve -c tiny.toml --seed -1",
+        "evolve -c tiny.toml --seed 18446744073709551616",
+        "evolve -c tiny.toml -g 1.5",
+        "evolve -c tiny.toml -q --json",
+        "eval --images 0",
+        "eval --images -5",
+        "eval --robots top:0",
+        "eval --robots top:x",
+        "eval --robots worst:3",
+        "eval --cycles 0",
+        "replay --images x",
+        "replay --images dev:3",
+        "replay --images train:-1",
+        "replay --format mpeg",
+        "replay --width x",
+        "simulate",
+        "data",
+        "data sheet --samples x",
+        "completions csh",
+        "config zero_one.toml --unknown",
+    ] {
+        sandbox.run(wrong).ended(2, &[]);
+    }
+}
+
+#[test]
+fn completions_for_all_shells_name_every_command() {
+    let sandbox = Sandbox::new();
+    for shell in ["bash", "elvish", "fish", "powershell", "zsh"] {
+        let said = sandbox.run(&format!("completions {shell}")).ended(0, &[]);
+        for command in ["evolve", "eval", "replay", "simulate", "gallery", "--resume"] {
+            let word = command.trim_start_matches('-');
+            assert!(said.out.contains(word), "{shell}: {command}");
+        }
+    }
+}
+
+#[test]
+fn the_man_page_renders() {
+    let page = Sandbox::new().run("man").ended(0, &[]).out;
+    assert!(page.contains(".TH morphcog 1") && page.contains(".SH NAME"), "{page}");
+    assert!(page.contains("evolve") && page.contains("Exit codes"));
+    // Where there is a man, it must understand it.
+    let sandbox = Sandbox::new();
+    let file = sandbox.write("morphcog.1", &page);
+    if let Ok(shown) = std::process::Command::new("man").arg("-l").arg(file).env("MANPAGER", "cat").output() {
+        let text = String::from_utf8_lossy(&shown.stdout).into_owned();
+        assert!(!shown.status.success() || text.is_empty() || text.contains("morphcog"), "{text}");
+    }
+}
+
+// ---- configs ----
+
+#[test]
+fn every_shipped_config_is_valid_and_its_built_in_copy_is_the_same() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs");
+    let shipped = files(&folder);
+    let built_in: BTreeMap<String, Vec<u8>> =
+        BUILT_IN.iter().map(|(name, text)| (name.to_string(), text.as_bytes().to_vec())).collect();
+    assert_eq!(shipped, built_in);
+    let sandbox = Sandbox::new();
+    let list = sandbox.run("config").ended(0, &[]).out;
+    for (name, text) in BUILT_IN {
+        Config::parse(text, name, &[]).unwrap();
+        assert!(list.contains(name), "{list}");
+    }
+}
+
+#[test]
+fn a_printed_config_is_itself_a_config_equal_to_the_original() {
+    let sandbox = Sandbox::new();
+    for (name, text) in BUILT_IN {
+        let printed = sandbox.run(&format!("config {name}")).ended(0, &[]).out;
+        let original = Config::parse(text, name, &[]).unwrap();
+        assert_eq!(Config::parse(&printed, "printed.toml", &[]).unwrap(), original, "{name}");
+        sandbox.write("printed.toml", &printed);
+        assert_eq!(sandbox.run("config printed.toml").ended(0, &[]).out, printed);
+        assert!(printed.contains("[physics]") && printed.contains("gravity"), "every key is printed");
+    }
+    let changed =
+        sandbox.run("config zero_one.toml --set map_elites.parents=7 --set seed=5").ended(0, &[]).out;
+    let changed = Config::parse(&changed, "changed.toml", &[]).unwrap();
+    assert_eq!((changed.map_elites.parents, changed.seed), (7, 5));
+}
+
+#[test]
+fn a_file_in_this_folder_comes_before_the_built_in_config_of_its_name() {
+    let sandbox = Sandbox::new();
+    let built_in = sandbox.run("config quickstart.toml").ended(0, &[]).out;
+    assert_eq!(sandbox.run("config quickstart").ended(0, &[]).out, built_in);
+    sandbox.write("quickstart.toml", TINY);
+    assert_ne!(sandbox.run("config quickstart.toml").ended(0, &[]).out, built_in);
+}
+
+#[test]
+fn toml_and_json_with_the_same_keys_make_the_same_run() {
+    let sandbox = Sandbox::tiny();
+    let table: toml::Table = toml::from_str(TINY).unwrap();
+    sandbox.write("json/tiny.json", serde_json::to_string_pretty(&table).unwrap());
+    sandbox.run("evolve -q -c tiny.toml -o a").ended(0, &[]);
+    sandbox.run("evolve -q -c json/tiny.json -o b").ended(0, &[]);
+    assert_eq!(sandbox.read("a/run.json"), sandbox.read("b/run.json"));
+    assert_eq!(sandbox.read("a/config.toml"), sandbox.read("b/config.toml"));
+    // The config that a run writes makes the same run again.
+    std::fs::copy(sandbox.path("a/config.toml"), sandbox.path("json/tiny.toml")).unwrap();
+    sandbox.run("evolve -q -c json/tiny.toml -o c").ended(0, &[]);
+    assert_eq!(sandbox.read("a/run.json"), sandbox.read("c/run.json"));
+}
+
+#[test]
+fn a_wrong_config_is_refused_with_file_line_and_key() {
+    let sandbox = Sandbox::new();
+    let wrong = |name: &str, text: &str, words: &[&str]| {
+        sandbox.write(name, text);
+        sandbox.run(&format!("evolve -c {name} -o run")).ended(3, words);
+        assert!(!sandbox.path("run").exists(), "{name}: {text}");
+    };
+    let with = |line: &str| format!("{TINY}\n[physics]\n{line}\n");
+    let line = |text: &str| text.lines().count();
+    let place = format!("own.toml:{}", line(&with("x")));
+    wrong("own.toml", &with("gravitee = 3"), &[&place, "physics", "gravitee", "unknown field"]);
+    wrong("own.toml", &with("gravity = \"much\""), &[&place, "physics.gravity", "expected f64"]);
+    wrong("own.toml", &with("substeps = -1"), &[&place, "physics.substeps"]);
+    wrong("own.toml", &with("substeps = 1e3"), &[&place, "physics.substeps"]);
+    wrong("own.toml", &with("substeps = = 3"), &[&place]);
+    wrong("own.toml", &TINY.replace("[[0], [1]]", "[[0], [300]]"), &["own.toml:10", "task.groups"]);
+    wrong("own.toml", &TINY.replace("\"fresh\"", "\"stale\""), &["own.toml:20", "protocol.life", "stale"]);
+    wrong("own.toml", &TINY.replace("seed = 3", "seed = 3\nseed = 4"), &["own.toml:3", "duplicate key"]);
+    wrong("own.toml", &TINY.replace("seed = 3", "sed = 3"), &["own.toml:2", "sed"]);
+    // What is wrong with values that are well typed.
+    wrong("own.toml", &TINY.replace("[[0], [1]]", "[[0], []]"), &["own.toml", "task"]);
+    wrong("own.toml", &TINY.replace("[[0], [1]]", "[[0], [0]]"), &["own.toml", "task", "more than once"]);
+    wrong("own.toml", &TINY.replace("[0, 1]", "[0, 1, 2]"), &["data.train_images", "image 2 shows a 2"]);
+    wrong("own.toml", &TINY.replace("[0, 1]", "[0]"), &["data.train_images", "class 1"]);
+    wrong("own.toml", &TINY.replace("[0, 1]", "[0, 10000000]"), &["data.train_images", "10000000"]);
+    wrong("own.toml", &TINY.replace("height = 5", "height = 0"), &["own.toml", "body.height = 0", "1 to 64"]);
+    wrong("own.toml", &TINY.replace("control_steps = 20", "control_steps = 0"), &["protocol.control_steps"]);
+    wrong("own.toml", &with("time_step = nan"), &["own.toml", "physics.time_step"]);
+    wrong("own.toml", &with("time_step = -inf"), &["own.toml", "physics.time_step"]);
+    wrong("own.toml", "", &["own.toml", "task"]);
+
+    let table: toml::Table = toml::from_str(TINY).unwrap();
+    let json = serde_json::to_string_pretty(&table).unwrap();
+    let at = |word: &str| format!("own.json:{}", 1 + json.lines().position(|l| l.contains(word)).unwrap());
+    let changed = |from: &str, to: &str| {
+        assert!(json.contains(from), "{json}");
+        json.replace(from, to)
+    };
+    let at_steps = at("control_steps");
+    wrong("own.json", &changed("control_steps", "control_step"), &[&at_steps, "protocol", "control_step"]);
+    wrong(
+        "own.json",
+        &changed("\"control_steps\": 20", "\"control_steps\": \"20\""),
+        &[&at_steps, "protocol.control_steps"],
+    );
+    wrong(
+        "own.json",
+        &changed("\"control_steps\": 20", "\"control_steps\": 1e99"),
+        &[&at_steps, "protocol.control_steps"],
+    );
+    wrong("own.json", &changed("\"control_steps\": 20", "\"control_steps\": NaN"), &[&at_steps]);
+    wrong("own.json", &json[..json.len() / 2], &["own.json:"]);
+    wrong("own.json", &format!("{json} {json}"), &["own.json:", "after the end"]);
+    wrong("own.json", "", &["own.json"]);
+    wrong("own.json", "[]", &["own.json"]);
+}
+
+#[test]
+fn a_wrong_set_is_refused_with_2_and_quotes_it() {
+    let sandbox = Sandbox::tiny();
+    for (set, words) in [
+        ("seed", "key=value"),
+        ("=3", "--set =3"),
+        ("sed=3", "sed"),
+        ("seed=x", "seed=x"),
+        ("seed.x=3", "seed"),
+        ("physics.gravitee=3", "gravitee"),
+        ("physics=3", "physics=3"),
+        ("map_elites.initial=0", "map_elites.initial=0"),
+        ("a..b=1", "a..b=1"),
+        ("", "key=value"),
+    ] {
+        let command = sandbox.command(["evolve", "-c", "tiny.toml", "-o", "run", "--set", set]);
+        said(command).ended(2, &["--set", words]);
+        assert!(!sandbox.path("run").exists());
+    }
+    // Well typed, but not what can be: the config's fault.
+    sandbox.run("evolve -c tiny.toml -o run --set generations=0").ended(3, &["generations = 0"]);
+}
+
+#[test]
+fn a_config_that_is_not_there_is_refused_naming_the_built_in_ones() {
+    let said =
+        Sandbox::new().run("evolve -c nowhere.toml").ended(3, &["nowhere.toml", "hint:", "quickstart.toml"]);
+    assert!(said.out.is_empty());
+}
+
+// ---- data ----
+
+#[test]
+fn missing_data_are_refused_naming_file_place_and_remedy() {
+    let sandbox = Sandbox::tiny();
+    std::fs::create_dir(sandbox.path("empty")).unwrap();
+    let words = ["train-images-idx3-ubyte", "morphcog data fetch mnist"];
+    let run = "evolve -c tiny.toml -o run --set data.dataset=mnist";
+    sandbox.run(run).ended(3, &["data/mnist", "morphcog data fetch mnist"]);
+    sandbox.run(&format!("{run} --data empty")).ended(3, &[&words[..], &["empty", "--data"]].concat());
+    let mut command = sandbox.command(run.split(' '));
+    command.env("MORPHCOG_DATA", sandbox.path("empty"));
+    said(command).ended(3, &[&words[..], &["MORPHCOG_DATA"]].concat());
+    sandbox.run(&format!("{run} --set data.dir=empty")).ended(3, &[&words[..], &["[data] dir"]].concat());
+    sandbox.run("data info mnist").ended(3, &["data/mnist", "morphcog data fetch mnist"]);
+    sandbox.run("data info ../x").ended(3, &["../x"]);
+    assert!(!sandbox.path("run").exists());
+}
+
+#[test]
+fn broken_data_are_refused_naming_the_file() {
+    let sandbox = Sandbox::tiny();
+    sandbox.write("data/mnist/train-images-idx3-ubyte", [0u8, 0, 8, 3, 0, 0, 0, 9, 0, 0]);
+    sandbox.write("data/mnist/train-labels-idx1-ubyte", [0u8, 0, 8, 1, 0, 0, 0, 9]);
+    let run = "evolve -c tiny.toml -o run --set data.dataset=mnist";
+    sandbox.run(run).ended(3, &["train-images-idx3-ubyte"]);
+    sandbox.write("data/mnist/train-images-idx3-ubyte", "this is no image");
+    sandbox.run(run).ended(3, &["train-images-idx3-ubyte"]);
+}
+
+#[test]
+fn data_info_and_sheet_work_on_the_built_in_digits() {
+    let sandbox = Sandbox::new();
+    let info = sandbox.run("data info").ended(0, &[]).out;
+    assert!(info.contains("10000 images of 28 × 28") && info.contains("5000 images"), "{info}");
+    sandbox.run("data sheet -o made.png --samples 2 --test").ended(0, &[]);
+    assert!(std::fs::read(sandbox.path("made.png")).unwrap().starts_with(b"\x89PNG"));
+    sandbox.run("data sheet -o none.png --samples 0").ended(2, &["--samples"]);
+    assert!(!sandbox.path("none.png").exists());
+}
+
+// ---- simulate ----
+
+/// A reference life as a scenario file, as it is, results and all.
+fn scenario(sandbox: &Sandbox, name: &str) -> Reference {
+    let text: serde_json::Value = golden(name);
+    sandbox.write("scenario.json", serde_json::to_string(&text).unwrap());
+    golden(name)
+}
+
+/// Reads a trajectory; numbers must name the f64 they were.
+fn rows(csv: &str) -> Vec<[f64; 2]> {
+    let mut lines = csv.lines();
+    assert_eq!(lines.next(), Some("step,com_x,com_y"));
+    let row = |(number, line): (usize, &str)| {
+        let fields: Vec<&str> = line.split(',').collect();
+        assert_eq!((fields.len(), fields[0]), (3, number.to_string().as_str()), "{line}");
+        let digits = |text: &str| text.chars().filter(char::is_ascii_digit).count();
+        assert!(fields[1..].iter().all(|text| digits(text) >= 17), "{line}");
+        [fields[1], fields[2]].map(|text| text.parse().unwrap())
+    };
+    lines.enumerate().map(row).collect()
+}
+
+fn agree(ours: &[[f64; 2]], theirs: &[[f64; 2]]) {
+    assert_eq!(ours.len(), theirs.len());
+    for (a, b) in ours.iter().zip(theirs) {
+        assert!((a[0] - b[0]).abs() < 1e-7 && (a[1] - b[1]).abs() < 1e-7, "{a:?} and {b:?}");
+    }
+}
+
+#[test]
+fn simulate_agrees_with_a_reference_trajectory() {
+    let sandbox = Sandbox::new();
+    let life = scenario(&sandbox, "disc_5x5_00");
+    let printed = sandbox.run("simulate scenario.json").ended(0, &[]);
+    assert!(printed.err.is_empty(), "{}", printed.err);
+    agree(&rows(&printed.out), &life.com);
+    let written = sandbox.run("simulate scenario.json --out traj.csv").ended(0, &[]);
+    assert!(written.out.is_empty());
+    assert_eq!(sandbox.read("traj.csv"), printed.out);
+}
+
+#[test]
+fn an_unstable_life_ends_with_4_after_its_rows_and_says_when() {
+    let sandbox = Sandbox::new();
+    let life = scenario(&sandbox, "unstable_comb");
+    let said = sandbox.run("simulate scenario.json").ended(4, &[]);
+    agree(&rows(&said.out), &life.com);
+    let last = said.err.lines().last().unwrap();
+    assert!(last.contains("unstable in control step 70"), "{last}");
+    sandbox.run("simulate scenario.json -o traj.csv").ended(4, &["control step 70"]);
+    assert_eq!(sandbox.read("traj.csv"), said.out);
+}
+
+#[test]
+fn simulate_switches_stimuli_and_resets_when_asked() {
+    let sandbox = Sandbox::new();
+    let run = |text: &str| {
+        sandbox.write("s.json", text);
+        rows(&sandbox.run("simulate s.json").ended(0, &[]).out)
+    };
+    let body = r#""body": [[6, 4, 5], [3, 0, 3]]"#;
+    let [a, b] = ["[[1, 0, 0.5], [0, 0, 0]]", "[[0, 1, 1], [0, 0, 0]]"];
+    let alone = |stimulus: &str| run(&format!("{{{body}, \"stimulus\": {stimulus}, \"control_steps\": 9}}"));
+    let fresh =
+        run(&format!("{{{body}, \"stimuli\": [{a}, {b}], \"switch_every\": 9, \"reset_between\": true}}"));
+    let (first, second) = (alone(a), alone(b));
+    assert_eq!((fresh.len(), &fresh[..10], &fresh[10..]), (19, &first[..], &second[1..]));
+    let continuous = run(&format!("{{{body}, \"stimuli\": [{a}, {b}], \"switch_every\": 9}}"));
+    assert_eq!(continuous[..10], first[..]);
+    assert_ne!(continuous[10..], fresh[10..]);
+    let moved = run(&format!("{{{body}, \"stimulus\": {a}, \"control_steps\": 9, \"start_column\": 499}}"));
+    assert!(
+        (moved[9][0] - first[9][0] - 0.6).abs() < 1e-9,
+        "start_column is a voxel's tenth of a world unit"
+    );
+}
+
+#[test]
+fn a_wrong_scenario_is_refused_with_file_line_and_key() {
+    let sandbox = Sandbox::new();
+    for (text, word) in [
+        ("", "s.json"),
+        ("{\n\"body\": [[3]],\n\"bodi\": 1}", "s.json:3"),
+        ("{\"body\": [[3], [3, 3]]}", "row 1"),
+        ("{\"body\": []}", "body"),
+        ("{\"body\": [[7]]}", "body"),
+        ("{\"body\": [[-1]]}", "body"),
+        ("{\"body\": [[3.5]]}", "body"),
+        ("{\"body\": [[0]]}", "body"),
+        ("{\"body\": [[3]], \"stimulus\": [[1e999]]}", "stimulus"),
+        ("{\"body\": [[3]], \"stimulus\": [[-0.1]]}", "stimulus"),
+        ("{\"body\": [[3]], \"stimulus\": [[null]]}", "stimulus"),
+        ("{\"body\": [[3]], \"stimulus\": [[1, 1]]}", "stimulus"),
+        ("{\"body\": [[3]], \"stimuli\": []}", "stimuli"),
+        ("{\"body\": [[3]], \"stimuli\": [[[1]]], \"switch_every\": 0}", "switch_every"),
+        ("{\"body\": [[3]], \"stimuli\": [[[1]]], \"stimulus\": [[1]], \"switch_every\": 1}", "stimuli"),
+        ("{\"body\": [[3]], \"switch_every\": 3}", "switch_every"),
+        ("{\"body\": [[3]], \"control_steps\": -3}", "control_steps"),
+        ("{\"body\": [[3]], \"control_steps\": 1e3}", "control_steps"),
+        ("{\"body\": [[3]], \"start_column\": 9223372036854775807}", "start_column"),
+        ("{\"body\": [[3]], \"start_column\": -9223372036854775808}", "start_column"),
+        ("{\"body\": [[3]], \"start_row\": 1}", "start_row"),
+        ("{\"body\": [[3]], \"start_row\": -1}", "start_row"),
+        ("{\"body\": [[3]], \"physics\": {\"gravity\": \"x\"}}", "physics.gravity"),
+        ("{\"body\": [[3]], \"physics\": {\"mass\": 0}}", "physics.mass"),
+        ("{\"body\": [[3]], \"physics\": {\"peg_spacing\": 0}}", "physics.peg_spacing"),
+    ] {
+        sandbox.write("s.json", text);
+        let said = sandbox.run("simulate s.json").ended(3, &["s.json", word]);
+        assert!(said.out.is_empty(), "{text}");
+    }
+    sandbox.run("simulate nowhere.json").ended(3, &["nowhere.json"]);
+    let huge = vec![vec![1; 65]; 65];
+    sandbox.write("s.json", format!("{{\"body\": {huge:?}}}"));
+    sandbox.run("simulate s.json").ended(3, &["65", "64"]);
+}
+
+// ---- robots ----
+
+#[test]
+fn robots_are_found_by_unique_beginnings_of_their_ids_only() {
+    let sandbox = with_run();
+    let run = sandbox.run_file("run");
+    let ids: Vec<&str> = run.elites.iter().map(|robot| robot.id.as_str()).collect();
+    let id = ids[0];
+    let unique = (1..=id.len())
+        .map(|len| &id[..len])
+        .find(|begin| ids.iter().filter(|other| other.starts_with(*begin)).count() == 1)
+        .unwrap();
+    let replay = |robot: &str| sandbox.run(&format!("replay -a run/run.json --robot {robot} -o out.png"));
+    for known in [id, unique, &id.to_uppercase(), "best"] {
+        replay(known).ended(0, &[]);
+    }
+    replay("zzz").ended(3, &["zzz", "hint:"]);
+    let eval = |robots: &str| sandbox.run(&format!("eval -a run/run.json -n 2 --cycles 1 --robots {robots}"));
+    assert!(eval(unique).ended(0, &[]).out.contains(id));
+    eval(&format!("{unique},zzz")).ended(3, &["zzz"]);
+    // With more than sixteen robots two ids must begin alike.
+    let twice = ids.iter().find_map(|id| {
+        let begin = &id[..1];
+        (ids.iter().filter(|other| other.starts_with(begin)).count() > 1).then_some(begin)
+    });
+    if let Some(begin) = twice {
+        eval(begin).ended(3, &["begin with", "hint:", "more digits"]);
+    }
+}
+
+#[test]
+fn robots_drawn_at_random_depend_on_the_seed_and_are_different_ones() {
+    let sandbox = with_run();
+    let drawn = |seed: u32, count: usize| -> Vec<String> {
+        let eval = format!("eval -q -a run/run.json -n 2 --cycles 1 --robots random:{count} --seed {seed}");
+        sandbox.run(&eval).ended(0, &[]);
+        let report: EvalFile = serde_json::from_str(&sandbox.read("run/eval.json")).unwrap();
+        report.robots.into_iter().map(|robot| robot.id).collect()
+    };
+    let all = sandbox.run_file("run").elites.len();
+    assert_eq!(drawn(1, 3), drawn(1, 3));
+    assert!((2..8).any(|seed| drawn(seed, 3) != drawn(1, 3)));
+    let mut everyone = drawn(1, all + 5);
+    everyone.sort();
+    everyone.dedup();
+    assert_eq!(everyone.len(), all);
+}
+
+#[test]
+fn a_broken_run_json_is_refused_saying_how() {
+    let sandbox = with_run();
+    let whole = sandbox.read("run/run.json");
+    let replaced = |from: &str, to: &str| {
+        assert!(whole.contains(from), "{from}");
+        whole.replacen(from, to, 1)
+    };
+    let edge = whole.find("\"edges\":[[").unwrap() + "\"edges\":[".len();
+    let cyclic = format!("{}[4,4,1.0],{}", &whole[..edge], &whole[edge..]);
+    let elite = whole.lines().nth(1).unwrap();
+    for (content, word) in [
+        (String::new(), "run.json"),
+        (whole[..whole.len() / 2].to_string(), "run.json:"),
+        ("{\"a\": 1}".to_string(), "not a run.json of morphcog"),
+        ("[1, 2]".to_string(), "run.json"),
+        (replaced("\"format_version\":1", "\"format_version\":2"), "format_version"),
+        (replaced("\"format\":\"morphcog-run\"", "\"format\":\"other\""), "not a run.json of morphcog"),
+        (cyclic, "elites[0].genome"),
+        (replaced("\"elites\":[", &format!("\"elites\":[\n{},", elite.trim_end_matches(','))), "elite"),
+        (replaced("\"displacements\":[", "\"displacements\":[1.0,"), "displacement"),
+        (replaced("\"cell\":[", "\"cell\":[999,"), "cell"),
+        (replaced("\"gravity\":110.0", "\"gravity\":null"), "config.physics.gravity"),
+        (replaced("\"body\":[[", "\"body\":[[9],["), "body"),
+    ] {
+        sandbox.write("bad/run.json", &content);
+        for command in ["eval -n 2 --cycles 1 -a bad/run.json", "replay -a bad/run.json"] {
+            let said = sandbox.run(command).ended(3, &["bad/run.json"]);
+            assert!(said.err.contains(word), "expected {word:?} in {}", said.err);
+        }
+    }
+    assert_eq!(files(&sandbox.path("bad")).len(), 1, "nothing was written");
+}
+
+// ---- eval ----
+
+#[test]
+fn an_evaluation_adds_up() {
+    let sandbox = with_run();
+    let said = sandbox
+        .run("eval -a run/run.json --images 31 --cycles 1 --threshold 0.05 --robots all")
+        .ended(0, &[]);
+    let report: EvalFile = serde_json::from_str(&sandbox.read("run/eval.json")).unwrap();
+    let run = sandbox.run_file("run");
+    assert_eq!((report.images.len(), report.robots.len(), report.stopped), (31, run.elites.len(), false));
+    assert_eq!(report.control_steps, 50);
+    let of = |class: u8| report.images.iter().filter(|image| image.label == class).count();
+    assert_eq!((of(0), of(1)), (16, 15));
+    for robot in &report.robots {
+        assert_eq!((robot.images, robot.displacements.len()), (31, 31));
+        assert_eq!(robot.accuracy, robot.right as f64 / 31.0);
+        let [low, high] = robot.interval;
+        assert!(low <= robot.accuracy && robot.accuracy <= high && low >= 0.0 && high <= 1.0);
+        assert_eq!(robot.balanced_accuracy, (robot.per_class[&0] + robot.per_class[&1]) / 2.0);
+        let zero_walks = if robot.first_group_walks == "right" { 1.0 } else { -1.0 };
+        let right = |(image, d): (&morphcog::run::training::ImageRef, &Option<f64>)| {
+            let towards = if image.label == 0 { zero_walks } else { -zero_walks };
+            d.is_some_and(|d| d * towards > 0.05)
+        };
+        assert_eq!(
+            report.images.iter().zip(&robot.displacements).filter(|pair| right(*pair)).count(),
+            robot.right
+        );
+        let still = robot.displacements.iter().flatten().filter(|d| d.abs() <= 0.05).count();
+        assert_eq!(robot.not_moved, still as f64 / 31.0);
+        assert_eq!(robot.unstable, robot.displacements.iter().filter(|d| d.is_none()).count());
+        assert!((1..=31).contains(&robot.simulated));
+        assert!(said.out.contains(&robot.id));
+    }
+    let [mean, baselines] = [report.means.len(), report.baselines.len()];
+    assert_eq!((mean, baselines), (1, 1));
+    let mean = report.robots.iter().map(|robot| robot.accuracy).sum::<f64>() / report.robots.len() as f64;
+    assert!((report.means["0|1"].accuracy - mean).abs() < 1e-12);
+    let baselines = &report.baselines["0|1"];
+    assert_eq!(baselines.larger_group, 16.0 / 31.0);
+    assert!(baselines.best_single_pixel > 0.5 && baselines.nearest_training_image > 0.5, "{baselines:?}");
+
+    let text = sandbox.read("run/eval.csv");
+    let mut csv = csv::Reader::from_reader(text.as_bytes());
+    let lines: Vec<BTreeMap<String, String>> = csv.deserialize().map(Result::unwrap).collect();
+    assert_eq!(lines.len(), report.robots.len());
+    for (line, robot) in lines.iter().zip(&report.robots) {
+        assert_eq!(line["id"], robot.id);
+        assert_eq!(line["accuracy"].parse::<f64>().unwrap(), robot.accuracy);
+        assert_eq!(line["accuracy_1"].parse::<f64>().unwrap(), robot.per_class[&1]);
+        assert_eq!(line["simulated"], robot.simulated.to_string());
+    }
+}
+
+#[test]
+fn held_out_images_are_the_same_for_the_same_seed_and_others_for_another() {
+    let sandbox = with_run();
+    let images = |seed: u32| {
+        sandbox
+            .run(&format!("eval -q -a run/run.json -n 10 --cycles 1 --robots best --seed {seed}"))
+            .ended(0, &[]);
+        let report: EvalFile = serde_json::from_str(&sandbox.read("run/eval.json")).unwrap();
+        report.images
+    };
+    assert_eq!(images(1), images(1));
+    assert_ne!(images(1), images(2));
+}
+
+#[test]
+fn too_many_images_are_refused_saying_how_many_there_are() {
+    let sandbox = with_run();
+    sandbox.run("eval -a run/run.json --images 1002").ended(3, &["500", "hint:", "--images 1000"]);
+    assert!(!sandbox.path("run/eval.json").exists());
+}
+
+#[test]
+fn the_results_of_an_evaluation_never_overwrite_each_other_or_the_run() {
+    let sandbox = with_run();
+    let before = files(&sandbox.path("run"));
+    for out in ["results.csv", "run/run.json", "run/../run/run.json", "run/elites.json", "run/metrics.json"] {
+        sandbox.run(&format!("eval -a run/run.json -n 2 --cycles 1 --robots best -o {out}")).ended(2, &[out]);
+        assert_eq!(files(&sandbox.path("run")), before, "{out}");
+        assert!(!sandbox.path("results.csv").exists());
+    }
+}
+
+#[test]
+fn an_evaluation_that_cannot_be_written_fails_before_its_first_life() {
+    let sandbox = with_run();
+    sandbox.write("file", "in the way");
+    let said =
+        sandbox.run("eval -a run/run.json -n 2 --cycles 1 -o file/eval.json").ended(1, &["file/eval.json"]);
+    assert!(!said.err.contains("evaluating"), "{}", said.err);
+}
+
+#[test]
+fn what_an_evaluation_is_asked_for_must_make_sense() {
+    let sandbox = with_run();
+    for wrong in ["--threshold nan", "--threshold=-1", "--threshold inf", "--images 1"] {
+        sandbox.run(&format!("eval -a run/run.json --cycles 1 {wrong}")).ended(2, &[&wrong[..8]]);
+    }
+    sandbox.run("eval -a nowhere/run.json").ended(3, &["nowhere/run.json"]);
+    sandbox.run("eval -a run").ended(3, &["run"]);
+    Sandbox::new().run("eval").ended(3, &["runs/", "hint:", "--archive"]);
+}
+
+// ---- replay, gallery ----
+
+#[test]
+fn replay_writes_a_gif_and_a_page_beside_the_run() {
+    let sandbox = with_run();
+    let said = sandbox.run("replay --robot best -a run/run.json").ended(0, &[]);
+    let id = &sandbox
+        .run_file("run")
+        .elites
+        .iter()
+        .max_by(|a, b| a.objective.total_cmp(&b.objective))
+        .unwrap()
+        .id
+        .clone();
+    let gif = std::fs::read(sandbox.path(&format!("run/replay-{id}.gif"))).unwrap();
+    assert!(gif.starts_with(b"GIF89a") && gif.ends_with(b";"));
+    let page = sandbox.read(&format!("run/replay-{id}.html"));
+    assert!(page.contains("<canvas") && page.contains(id));
+    assert!(!page.contains("http://") && !page.contains("https://"), "it must work without a network");
+    assert!(
+        said.out.contains(&format!("replay-{id}.gif")) && said.out.contains("0 (train 0)"),
+        "{}",
+        said.out
+    );
+}
+
+#[test]
+fn replay_shows_the_images_and_formats_it_is_asked_for() {
+    let sandbox = with_run();
+    let said = sandbox.run("replay -a run/run.json -i test:17,3 -o here.png --width 400").ended(0, &[]);
+    assert!(said.out.contains("7 (test 17)") && said.out.contains("3 (train 3)"), "{}", said.out);
+    assert!(std::fs::read(sandbox.path("here.png")).unwrap().starts_with(b"\x89PNG"));
+    let view = sandbox.run("replay -a run/run.json --format terminal").ended(0, &[]);
+    assert!(view.out.lines().count() > 10 && !view.out.contains('\x1b'), "{}", view.out);
+    sandbox.run("replay -a run/run.json -i test:99999999").ended(2, &["--images", "99999999"]);
+    sandbox.run("replay -a run/run.json -o walk.avi").ended(2, &["walk.avi", ".gif"]);
+    for width in ["0", "1", "4294967295"] {
+        sandbox.run(&format!("replay -a run/run.json -o walk.gif --width {width}")).ended(2, &["--width"]);
+    }
+    let many = vec!["1"; 21].join(",");
+    sandbox.run(&format!("replay -a run/run.json -i {many}")).ended(2, &["--images", "20"]);
+}
+
+#[test]
+fn a_published_robot_replays_on_the_built_in_digits_without_any_run() {
+    let sandbox = Sandbox::new();
+    let table = sandbox.run("gallery").ended(0, &[]).out;
+    assert!(["APUKI", "IHSUJ", "QMAXD", "XFJPI", "YJTLA"].iter().all(|name| table.contains(name)), "{table}");
+    sandbox.run("replay --robot xfjpi --dataset builtin").ended(0, &[]);
+    assert!(sandbox.path("replay-XFJPI.gif").exists() && sandbox.path("replay-XFJPI.html").exists());
+    sandbox.run("replay --robot XFJPI").ended(3, &["mnist", "hint:", "--dataset builtin"]);
+    sandbox.run("replay --robot nobody").ended(3, &["runs/"]);
+}
+
+#[test]
+fn the_newest_run_is_what_commands_look_at_when_they_are_not_told() {
+    let sandbox = Sandbox::tiny();
+    sandbox.run("evolve -q -c tiny.toml -g 2").ended(0, &[]);
+    assert!(sandbox.path("runs/tiny-seed3/run.json").exists());
+    sandbox.run("evolve -q -c tiny.toml -g 2 --seed 8").ended(0, &[]);
+    assert!(sandbox.path("runs/tiny-seed8/run.json").exists());
+    sandbox.run("eval -q -n 2 --cycles 1 --robots best").ended(0, &[]);
+    assert!(sandbox.path("runs/tiny-seed8/eval.json").exists());
+    sandbox.run("replay -q").ended(0, &[]);
+    assert!(files(&sandbox.path("runs/tiny-seed8")).keys().any(|name| name.ends_with(".gif")));
+}
+
+#[test]
+fn evolve_with_replay_leaves_the_pictures_in_the_run_folder() {
+    let sandbox = Sandbox::tiny();
+    sandbox.run("evolve -q -c tiny.toml -g 2 -o run --replay").ended(0, &[]);
+    let names: Vec<String> = files(&sandbox.path("run")).into_keys().collect();
+    assert!(
+        names.iter().any(|name| name.ends_with(".gif")) && names.iter().any(|name| name.ends_with(".html"))
+    );
+}
+
+// ---- where the words go ----
+
+#[test]
+fn quiet_leaves_results_only() {
+    let sandbox = Sandbox::tiny();
+    let said = sandbox.run("evolve --quiet -c tiny.toml -o run").ended(0, &[]);
+    assert!(said.err.is_empty() && said.out.contains("cells filled"), "{said:?}");
+    let said = sandbox.run("evolve -c tiny.toml -o loud").ended(0, &["evolving in", "generation"]);
+    assert!(said.out.contains("cells filled"));
+    let said = sandbox.run("eval -q -a run/run.json -n 2 --cycles 1").ended(0, &[]);
+    assert!(said.err.is_empty() && said.out.contains("accuracy"));
+}
+
+#[test]
+fn with_json_every_line_on_stdout_is_json() {
+    let sandbox = with_run();
+    let events = |args: &str, code: i32| -> Vec<String> {
+        let lines = sandbox.run(&format!("--json {args}")).ended(code, &[]).json_lines();
+        assert!(!lines.is_empty(), "{args}");
+        lines.iter().map(|line| line["event"].as_str().unwrap().to_string()).collect()
+    };
+    let evolve = events("evolve -c tiny.toml -o new", 0);
+    assert_eq!(evolve.iter().filter(|name| *name == "generation").count(), 13);
+    assert_eq!(evolve.last().unwrap(), "finished");
+    events("eval -a run/run.json -n 4 --cycles 1", 0);
+    events("replay -a run/run.json", 0);
+    events("replay -a run/run.json --format terminal", 0);
+    events("gallery", 0);
+    events("config", 0);
+    events("data info", 0);
+    events("data sheet -o sheet.png --samples 1", 0);
+    assert_eq!(events("evolve -c tiny.toml -o run", 5), ["error"]);
+    assert_eq!(events("eval -a nowhere.json", 3), ["error"]);
+    assert_eq!(events("evolve -c tiny.toml -o x --set a=1", 2), ["error"]);
+}
+
+#[test]
+fn away_from_a_terminal_there_are_no_escape_sequences_with_or_without_no_color() {
+    let sandbox = with_run();
+    for value in [None, Some("1"), Some("")] {
+        for args in [
+            "evolve -c tiny.toml -o run",
+            "eval -a run/run.json -n 2 --cycles 1",
+            "replay -a run/run.json --format terminal",
+        ] {
+            let mut command = sandbox.command(args.split(' '));
+            value.map(|value| command.env("NO_COLOR", value));
+            let said = said(command);
+            assert!(!said.out.contains('\x1b') && !said.err.contains('\x1b'), "{said:?}");
+        }
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn a_reader_that_goes_away_is_no_error() {
+    let sandbox = with_run();
+    let life = scenario(&sandbox, "disc_5x5_00");
+    assert_eq!(life.control_steps, 500);
+    for args in [
+        "simulate scenario.json",
+        "config zero_one.toml",
+        "completions bash",
+        "man",
+        "gallery",
+        "evolve -c tiny.toml -o piped",
+    ] {
+        let mut child = sandbox.start(args);
+        drop(child.stdout.take());
+        let ended = child.wait_with_output().unwrap();
+        let err = String::from_utf8_lossy(&ended.stderr);
+        assert!(
+            ended.status.success() && !err.contains("panicked") && !err.contains("error"),
+            "{args}: {ended:?}"
+        );
+    }
+    // Nobody waits for the rest of a life that would take years.
+    let forever = r#"{"body": [[3]], "control_steps": 1000000000000}"#;
+    sandbox.write("forever.json", forever);
+    let mut child = sandbox.start("simulate forever.json");
+    drop(child.stdout.take());
+    assert!(child.wait().unwrap().success());
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_disk_is_an_error_and_is_said() {
+    let sandbox = with_run();
+    scenario(&sandbox, "disc_5x5_00");
+    for args in [
+        "simulate scenario.json",
+        "config zero_one.toml",
+        "man",
+        "completions zsh",
+        "gallery",
+        "--json gallery",
+        "--help",
+    ] {
+        let full = std::fs::File::options().write(true).open("/dev/full").unwrap();
+        let mut command = std::process::Command::new(common::program::PROGRAM);
+        let ended =
+            command.current_dir(sandbox.path("")).args(args.split(' ')).stdout(full).output().unwrap();
+        let err = String::from_utf8_lossy(&ended.stderr);
+        assert!(
+            !ended.status.success() && ended.status.code().is_some_and(|c| c != 101),
+            "{args}: {ended:?}"
+        );
+        assert!(err.contains("No space left") && !err.contains("panicked"), "{args}: {err}");
+    }
+}
+
+#[test]
+fn where_nothing_can_be_written_it_says_where() {
+    let sandbox = with_run();
+    scenario(&sandbox, "disc_5x5_00");
+    sandbox.write("file", "in the way");
+    for args in [
+        "evolve -c tiny.toml -o file",
+        "evolve -c tiny.toml -o file/run",
+        "replay -a run/run.json -o file/walk.gif",
+        "replay -a run/run.json -o file/walk.html",
+        "simulate scenario.json -o file/traj.csv",
+        "simulate scenario.json -o run",
+        "data sheet -o file/sheet.png",
+        "replay -a run/run.json -o nowhere/walk.png",
+    ] {
+        let place = args.rsplit(' ').next().unwrap();
+        sandbox.run(args).ended(1, &[place]);
+    }
+    assert_eq!(sandbox.read("file"), "in the way");
+}

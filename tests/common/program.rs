@@ -1,0 +1,160 @@
+//! Running the program itself, as a user does: in a folder of its own, with no settings from outside.
+
+use assert_cmd::Command;
+use morphcog::run::archive::RunFile;
+use std::collections::BTreeMap;
+use std::ffi::OsStr;
+use std::path::{Path, PathBuf};
+use std::process::Stdio;
+use std::time::Duration;
+use tempfile::TempDir;
+
+/// Where the program is.
+pub const PROGRAM: &str = env!("CARGO_BIN_EXE_morphcog");
+/// No command of a test may take longer.
+const LIMIT: Duration = Duration::from_secs(120);
+/// What the environment of the tests must not decide.
+const SETTINGS: [&str; 5] = ["MORPHCOG_DATA", "MORPHCOG_ISA", "NO_COLOR", "TERM", "RAYON_NUM_THREADS"];
+
+/// A tiny run that still does everything: two digits, bodies of 5 × 5, a fifth of a second.
+pub const TINY: &str = r#"
+seed = 3
+generations = 12
+
+[body]
+height = 5
+width = 5
+
+[task]
+groups = [[0], [1]]
+
+[data]
+dataset = "builtin"
+train_images = [0, 1]
+
+[stimulus]
+reduction = "area"
+
+[protocol]
+life = "fresh"
+control_steps = 20
+
+[map_elites]
+initial = 8
+parents = 8
+"#;
+
+/// What a command said and how it ended.
+#[derive(Debug)]
+pub struct Said {
+    /// Exit code; `None` if a signal ended it.
+    pub code: Option<i32>,
+    pub out: String,
+    pub err: String,
+}
+
+impl Said {
+    /// Checks that it ended with this code; what is in `words` must be in what it said on stderr.
+    #[track_caller]
+    pub fn ended(self, code: i32, words: &[&str]) -> Self {
+        assert_eq!(self.code, Some(code), "{self:#?}");
+        for word in words {
+            assert!(self.err.contains(word), "expected {word:?} in:\n{}", self.err);
+        }
+        self
+    }
+
+    /// Every line of stdout as JSON.
+    #[track_caller]
+    pub fn json_lines(&self) -> Vec<serde_json::Value> {
+        let read = |line: &str| serde_json::from_str(line).unwrap_or_else(|e| panic!("{e} in: {line}"));
+        self.out.lines().map(read).collect()
+    }
+}
+
+/// A folder in which commands run; gone at the end.
+pub struct Sandbox(TempDir);
+
+impl Sandbox {
+    pub fn new() -> Self {
+        Sandbox(tempfile::tempdir().unwrap())
+    }
+
+    /// A sandbox with [`TINY`] as `tiny.toml`.
+    pub fn tiny() -> Self {
+        let sandbox = Sandbox::new();
+        sandbox.write("tiny.toml", TINY);
+        sandbox
+    }
+
+    pub fn path(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    pub fn write(&self, name: &str, content: impl AsRef<[u8]>) -> PathBuf {
+        let path = self.path(name);
+        std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+        std::fs::write(&path, content).unwrap();
+        path
+    }
+
+    pub fn read(&self, name: &str) -> String {
+        std::fs::read_to_string(self.path(name)).unwrap_or_else(|e| panic!("{name}: {e}"))
+    }
+
+    /// The program, not yet started.
+    pub fn command<A: AsRef<OsStr>>(&self, args: impl IntoIterator<Item = A>) -> Command {
+        let mut command = Command::new(PROGRAM);
+        command.current_dir(self.0.path()).args(args).timeout(LIMIT);
+        SETTINGS.iter().for_each(|name| {
+            command.env_remove(name);
+        });
+        command
+    }
+
+    /// Runs the program; arguments are separated by blanks.
+    #[track_caller]
+    pub fn run(&self, args: &str) -> Said {
+        said(self.command(args.split_whitespace()))
+    }
+
+    /// Starts the program in the background, stdout to be read; arguments are separated by blanks.
+    pub fn start(&self, args: &str) -> std::process::Child {
+        let mut command = std::process::Command::new(PROGRAM);
+        command.current_dir(self.0.path()).args(args.split_whitespace());
+        SETTINGS.iter().for_each(|name| {
+            command.env_remove(name);
+        });
+        command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap()
+    }
+
+    pub fn run_file(&self, folder: &str) -> RunFile {
+        RunFile::read(&self.path(folder).join("run.json")).unwrap()
+    }
+}
+
+/// Runs a command. Whatever it is asked, it must not panic.
+#[track_caller]
+pub fn said(mut command: Command) -> Said {
+    let output = command.output().unwrap();
+    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+    let said = Said { code: output.status.code(), out: text(&output.stdout), err: text(&output.stderr) };
+    assert!(!said.err.contains("panicked") && said.code != Some(101), "{said:#?}");
+    assert!(said.code.is_some(), "ended by a signal: {said:#?}");
+    said
+}
+
+/// All files of a folder with their content, to compare.
+pub fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
+    let entries = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
+    let named = |path: PathBuf| {
+        (path.file_name().unwrap().to_string_lossy().into_owned(), std::fs::read(&path).unwrap_or_default())
+    };
+    entries.map(named).collect()
+}
+
+/// `metrics.csv` without its last column, the only one that depends on the clock.
+pub fn without_seconds(metrics: &str) -> Vec<String> {
+    assert!(metrics.lines().next().is_some_and(|header| header.ends_with(",seconds")));
+    metrics.lines().map(|line| line.rsplit_once(',').unwrap().0.to_string()).collect()
+}
