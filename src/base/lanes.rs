@@ -1,17 +1,29 @@
-//! Wide lanes: which vector instructions the numerical loops are compiled for, chosen when the program runs.
+//! Wide lanes: numerical loops written once, compiled for every instruction set, chosen when the program runs.
 //!
-//! The loops are plain Rust over slices that the compiler turns into vector code; here the same loop is compiled
-//! once per instruction set. Rust never contracts a·b + c into a fused multiply-add and never reorders a sum,
-//! so every version gives the same bits (`tests/lanes_agree.rs`).
+//! A loop is a [`Kernel`] that is generic over [`Lanes`], a few `f64` side by side. [`dispatch`] runs it with the
+//! widest lanes that the machine has. Every operation of [`Lanes`] is IEEE 754's, exactly rounded, also the fused
+//! multiply-add (which the narrowest machines get from the C library, slowly), and lanes never mix but in
+//! [`Lanes::after`]. So every instruction set gives the same bits (`tests/lanes_agree.rs`).
 
+use std::ops::{Add, BitAnd, BitOr, Div, Mul, Sub};
 use std::sync::OnceLock;
+
+mod buffer;
+mod portable;
+#[cfg(target_arch = "x86_64")]
+mod x86;
+
+pub use buffer::Buffer;
+
+/// The number of lanes that the width of all lane types divides: loops over a multiple of it need no remainder.
+pub const BLOCK: usize = 8;
 
 /// An instruction set that the numerical loops exist for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum InstructionSet {
     /// What every machine of the target has (SSE2 on x86-64, NEON on AArch64).
     Baseline,
-    /// x86-64 with 256-bit vectors.
+    /// x86-64 with 256-bit vectors and fused multiply-add.
     Avx2,
     /// x86-64 with 512-bit vectors.
     Avx512,
@@ -36,13 +48,9 @@ impl InstructionSet {
         match self {
             InstructionSet::Baseline => true,
             #[cfg(target_arch = "x86_64")]
-            InstructionSet::Avx2 => is_x86_feature_detected!("avx2"),
+            InstructionSet::Avx2 => is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma"),
             #[cfg(target_arch = "x86_64")]
-            InstructionSet::Avx512 => {
-                is_x86_feature_detected!("avx512f")
-                    && is_x86_feature_detected!("avx512vl")
-                    && is_x86_feature_detected!("avx512dq")
-            }
+            InstructionSet::Avx512 => is_x86_feature_detected!("avx512f"),
             #[cfg(not(target_arch = "x86_64"))]
             _ => false,
         }
@@ -63,13 +71,62 @@ impl InstructionSet {
     }
 }
 
+/// A few `f64` side by side.
+pub trait Lanes:
+    Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self>
+{
+    /// One truth value per lane.
+    type Mask: Copy + BitAnd<Output = Self::Mask> + BitOr<Output = Self::Mask>;
+    /// How many.
+    const WIDTH: usize;
+
+    /// The same value in every lane.
+    fn splat(value: f64) -> Self;
+    /// `from[at..at + WIDTH]`; panics beyond the end.
+    fn load(from: &[f64], at: usize) -> Self;
+    /// To `to[at..at + WIDTH]`; panics beyond the end.
+    fn store(self, to: &mut [f64], at: usize);
+    /// self · factor + more, rounded once.
+    fn mul_add(self, factor: Self, more: Self) -> Self;
+    /// more − self · factor, rounded once.
+    fn mul_sub_from(self, factor: Self, more: Self) -> Self;
+    /// Square root.
+    fn sqrt(self) -> Self;
+    /// Absolute value.
+    fn abs(self) -> Self;
+    /// self > other ? self : other (so `other` where one is no number).
+    fn max(self, other: Self) -> Self;
+    /// Lanes in which self > other (false where one is no number).
+    fn above(self, other: Self) -> Self::Mask;
+    /// Where the mask holds `self`, elsewhere `other`.
+    fn or_else(self, mask: Self::Mask, other: Self) -> Self;
+    /// Whether a mask holds in any lane.
+    fn any(mask: Self::Mask) -> bool;
+    /// Whether a mask holds in all lanes.
+    fn all(mask: Self::Mask) -> bool;
+    /// The lanes moved up by one; the lowest is the last of `previous`: what `load` gives one place earlier.
+    fn after(self, previous: Self) -> Self;
+}
+
+/// An array of an expression for some indices, `each!(i in [0, 1] => a[i] + b[i])`. Unlike `array::map` it leaves nothing
+/// for the compiler to inline: a closure that it does not inline would be compiled without wide instructions.
+macro_rules! each {
+    ($index:ident in [$($value:expr),*] => $expression:expr) => {
+        [$({
+            let $index = $value;
+            $expression
+        }),*]
+    };
+}
+pub(crate) use each;
+
 /// A numerical loop to be compiled for every instruction set. `run` must be `#[inline(always)]`, and so must
 /// all that is to be vectorised below it.
 pub trait Kernel {
     /// What it computes.
     type Output;
     /// Computes it.
-    fn run(self) -> Self::Output;
+    fn run<L: Lanes>(self) -> Self::Output;
 }
 
 /// Runs a kernel compiled for an instruction set (the baseline's version if this machine lacks it).
@@ -78,22 +135,10 @@ pub fn dispatch<K: Kernel>(set: InstructionSet, kernel: K) -> K::Output {
     #[cfg(target_arch = "x86_64")]
     match set {
         // SAFETY: `is_available` has asked the processor for exactly these features.
-        InstructionSet::Avx512 if set.is_available() => return unsafe { avx512(kernel) },
+        InstructionSet::Avx512 if set.is_available() => return unsafe { x86::avx512(kernel) },
         // SAFETY: as above.
-        InstructionSet::Avx2 if set.is_available() => return unsafe { avx2(kernel) },
+        InstructionSet::Avx2 if set.is_available() => return unsafe { x86::avx2(kernel) },
         _ => {}
     }
-    kernel.run()
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx512f,avx512vl,avx512dq")]
-fn avx512<K: Kernel>(kernel: K) -> K::Output {
-    kernel.run()
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2")]
-fn avx2<K: Kernel>(kernel: K) -> K::Output {
-    kernel.run()
+    kernel.run::<portable::Few>()
 }

@@ -4,12 +4,15 @@
 
 use super::geometry::{Bounds, Vector, cross, inside};
 use super::lattice::{Lattice, SIDES, SurfaceVoxel};
-use super::neighbours::{Candidate, Neighbours, quad};
+use super::neighbours::{Candidate, Neighbours, place, quad};
 use super::params::Physics;
-use super::state::{Pair, State};
+use super::state::{Pair, State, X, Y};
 
 /// For each corner (clockwise from the top left) the corners at the far ends of the two sides that meet there.
 const FAR_ENDS: [[usize; 2]; 4] = [[1, 3], [0, 2], [3, 1], [2, 0]];
+
+/// A point this far out of a voxel's box \[wu\] is not inside, whatever rounding may do to the exact test.
+const CLEAR: f64 = 1e-9;
 
 /// The edge of a voxel that pushes a point out, with the depth of the point below it.
 struct Edge {
@@ -74,16 +77,16 @@ fn reaction(edge: &Edge, push: &Push, velocity: Vector, physics: &Physics) -> Ve
     n * along + push.friction / 2.0
 }
 
-/// Adds all contact forces to `external`.
+/// Adds all contact forces to `contact`.
 pub(super) fn add_contacts(
     lattice: &Lattice,
     physics: &Physics,
     start_column: i64,
     state: &State,
     neighbours: &Neighbours,
-    external: &mut Pair,
+    contact: &mut Pair,
 ) {
-    let mut contacts = Contacts { lattice, physics, state, external };
+    let mut contacts = Contacts { lattice, physics, state, contact };
     for &voxel in &neighbours.low {
         contacts.with_ground(&lattice.surface[voxel], start_column);
     }
@@ -96,33 +99,32 @@ struct Contacts<'a> {
     lattice: &'a Lattice,
     physics: &'a Physics,
     state: &'a State,
-    external: &'a mut Pair,
+    contact: &'a mut Pair,
 }
 
 impl Contacts<'_> {
     /// True velocity of a point \[wu/s\]: it sees what the limits moved.
     fn velocity(&self, point: usize) -> Vector {
-        let state = self.state;
-        let moved =
-            Vector::new(state.x[point] - state.previous_x[point], state.y[point] - state.previous_y[point]);
-        moved / self.physics.time_step
+        let moved = |axis: usize| self.state.position[axis][point] - self.state.previous[axis][point];
+        Vector::new(moved(X), moved(Y)) / self.physics.time_step
     }
 
     fn add(&mut self, point: usize, force: Vector) {
-        self.external.x[point] += force.x;
-        self.external.y[point] += force.y;
+        self.contact[X][point] += force.x;
+        self.contact[Y][point] += force.y;
     }
 
     fn with_self(&mut self, candidate: Candidate) {
         let (mover, host) = (&self.lattice.surface[candidate.mover], &self.lattice.surface[candidate.host]);
         let host_quad = quad(host, self.state);
         let point = mover.corners[candidate.corner];
-        let p = Vector::new(self.state.x[point], self.state.y[point]);
-        if !inside(p, &host_quad) {
+        let p = place(point, self.state);
+        let host_bounds = Bounds::of(&host_quad);
+        if !host_bounds.holds(p, CLEAR) || !inside(p, &host_quad) {
             return;
         }
         let mover_quad = quad(mover, self.state);
-        if !Bounds::of(&mover_quad).near(&Bounds::of(&host_quad), 0.0) {
+        if !Bounds::of(&mover_quad).near(&host_bounds, 0.0) {
             return;
         }
         let far_ends = FAR_ENDS[candidate.corner].map(|far| mover_quad[far]);
@@ -162,11 +164,12 @@ impl Contacts<'_> {
             }
             let ground = [(left, top), (right, top), (right, bottom), (left, bottom)];
             let ground = ground.map(|(x, y)| Vector::new(x, y));
+            let ground_bounds = Bounds { low: ground[3], high: ground[1] };
             let has_peg = (start_column + column).rem_euclid(i64::from(physics.peg_spacing)) == 0;
             for corner in 0..4 {
                 let far = |quad: &[Vector; 4]| FAR_ENDS[corner].map(|end| quad[end]);
                 let (p, g) = (robot[corner], ground[corner]);
-                if inside(p, &ground) {
+                if ground_bounds.holds(p, CLEAR) && inside(p, &ground) {
                     let exposed = [true, false, !has_peg, false];
                     if let Some(edge) = nearest_edge(p, far(&robot), &ground, &exposed, physics) {
                         let point = voxel.corners[corner];
@@ -174,7 +177,8 @@ impl Contacts<'_> {
                         self.add(point, push.on_point);
                     }
                 }
-                if inside(g, &robot)
+                if bounds.holds(g, CLEAR)
+                    && inside(g, &robot)
                     && let Some(edge) = nearest_edge(g, far(&ground), &robot, &voxel.exposed, physics)
                 {
                     let push = push(&edge, Vector::zeros(), physics);

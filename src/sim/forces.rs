@@ -1,169 +1,210 @@
-//! Spring lengths and forces: plain sweeps over the lattice's families, written for wide lanes.
+//! Spring forces on wide lanes.
+//!
+//! A sweep goes over the lattice's slots block by block. Each slot has four springs (horizontal, vertical, falling,
+//! rising), which look only ahead: to the slot's own point, the one to the right, and those two below. So what a
+//! spring does to points ahead is handed on ([`Passing`]), each point's forces are added up in the same order on
+//! any lanes, and a block's results may overwrite its inputs.
+//!
+//! A spring of stiffness k and rest length ρ, of length d₀ at the start of the substep, pulls with k(1 − ρ/d)w when
+//! its vector w has length d. With t = d²/d₀² − 1 that is
+//!
+//!   k(1 − ρ/d₀) + k(ρ/d₀)·(1 − 1/√(1 + t)) = `initial` + `change`·(1 − 1/√(1 + t)).
+//!
+//! Within a substep t is small, and [`shrink`] is a short series: neither root nor division.
 
-use super::lattice::{Family, Lattice};
-use super::params::Physics;
-use super::state::{Axis, Pair, Scratch};
+use super::lattice::{FAMILIES, Lattice};
+use super::state::{X, Y};
+use crate::base::lanes::{BLOCK, Buffer, Lanes, each};
 
-/// The coordinates of the two ends of every spring of a family.
-struct Ends<'a> {
-    ax: &'a [f64],
-    ay: &'a [f64],
-    bx: &'a [f64],
-    by: &'a [f64],
+/// Greatest |t| for the series: the terms left out are then below 3.5e-12, and 5e-14 at half of it. Springs beyond it
+/// (well below one in 1000) are computed with root and division.
+pub(super) const SERIES_RANGE: f64 = 1.0 / 64.0;
+
+/// (1 − 1/√(1 + t))/t up to t⁴: the binomial series.
+pub(super) const SERIES: [f64; 5] = [1.0 / 2.0, -3.0 / 8.0, 5.0 / 16.0, -35.0 / 128.0, 63.0 / 256.0];
+
+/// (1 − 1/√(1 + t))/t for |t| in the series' range.
+#[inline(always)]
+fn series<L: Lanes>(t: L) -> L {
+    let [c0, c1, c2, c3, c4] = each!(i in [0, 1, 2, 3, 4] => L::splat(SERIES[i]));
+    c4.mul_add(t, c3).mul_add(t, c2).mul_add(t, c1).mul_add(t, c0)
 }
 
+/// The greatest of four |t|.
 #[inline(always)]
-fn ends<'a>(family: &Family, slots: usize, x: &'a [f64], y: &'a [f64]) -> Ends<'a> {
-    let (a, b) = (family.from..family.from + slots, family.to..family.to + slots);
-    Ends { ax: &x[a.clone()], ay: &y[a], bx: &x[b.clone()], by: &y[b] }
+fn greatest<L: Lanes>(t: &[L; 4]) -> L {
+    (t[0].abs().max(t[1].abs())).max(t[2].abs().max(t[3].abs()))
 }
 
-/// This substep's rest lengths: from the present length a small part of the way to the goal (physics.md, 2).
+/// offset + factor·(1 − 1/√(1 + t)) by the series or, beyond its range, exactly: spring by spring.
 #[inline(always)]
-pub(super) fn set_rest_lengths(
-    lattice: &Lattice,
-    physics: &Physics,
-    x: &[f64],
-    y: &[f64],
-    scratch: &mut Scratch,
-) {
-    let (slots, gain) = (lattice.slots, physics.servo_gain);
-    for (index, (family, rest)) in lattice.families.iter().zip(&mut scratch.rest).enumerate() {
-        let Ends { ax, ay, bx, by } = ends(family, slots, x, y);
-        let rest = &mut rest[..slots];
-        // Only horizontal sides are actuated.
-        if index == 0 {
-            let goals = &scratch.goals[..slots];
-            for i in 0..slots {
-                let (dx, dy) = (bx[i] - ax[i], by[i] - ay[i]);
-                let length = (dx * dx + dy * dy).sqrt();
-                rest[i] = length + gain * (goals[i] - length);
-            }
-        } else {
-            for i in 0..slots {
-                let (dx, dy) = (bx[i] - ax[i], by[i] - ay[i]);
-                let length = (dx * dx + dy * dy).sqrt();
-                rest[i] = length + gain * (family.length - length);
-            }
+pub(super) fn shrink<L: Lanes>(t: [L; 4], factor: [L; 4], offset: [L; 4]) -> [L; 4] {
+    let mut out = each!(i in [0, 1, 2, 3] => (factor[i] * t[i]).mul_add(series(t[i]), offset[i]));
+    let range = L::splat(SERIES_RANGE);
+    if L::any(greatest(&t).above(range)) {
+        let one = L::splat(1.0);
+        for i in 0..4 {
+            let exact = factor[i].mul_add(one - one / (one + t[i]).sqrt(), offset[i]);
+            out[i] = exact.or_else(t[i].abs().above(range), out[i]);
         }
     }
-    for (index, (spring, rest)) in lattice.extra_springs.iter().zip(&mut scratch.extra_rest).enumerate() {
-        let [a, b] = spring.ends;
-        let (dx, dy) = (x[b] - x[a], y[b] - y[a]);
-        let length = (dx * dx + dy * dy).sqrt();
-        *rest = length + gain * (scratch.goals[slots + index] - length);
+    out
+}
+
+/// A number for each slot of a block.
+pub(super) type Wide = [f64; BLOCK];
+
+/// What a substep needs to know of four springs each of a block of slots.
+#[derive(Clone, Copy, Debug)]
+#[repr(C, align(64))]
+pub(super) struct Springs {
+    /// 1/d₀² and what follows from it, see the module \[1/s²\].
+    inverse_square: [Wide; FAMILIES],
+    change: [Wide; FAMILIES],
+    initial: [Wide; FAMILIES],
+    /// 1/d₀. Within a control step the next substep's is found from it by the same series; the first substep of
+    /// each control step starts from 0, which is out of the series' range, and so from root and division: a
+    /// life continued from its state is the same bits.
+    inverse_length: [Wide; FAMILIES],
+    /// Stiffness per mass of a point \[1/s²\]; 0 where there is no spring.
+    stiffness: [Wide; FAMILIES],
+}
+
+impl Springs {
+    /// Of springs of some stiffness, by blocks, in a block by families.
+    pub fn blocks(stiffness: &[f64], mass: f64) -> Vec<Self> {
+        let zeros = [[0.0; BLOCK]; FAMILIES];
+        let block = |of: &[f64]| Springs {
+            inverse_square: zeros,
+            change: zeros,
+            initial: zeros,
+            inverse_length: zeros,
+            stiffness: std::array::from_fn(|f| std::array::from_fn(|i| of[f * BLOCK + i] / mass)),
+        };
+        stiffness.chunks_exact(FAMILIES * BLOCK).map(block).collect()
     }
-}
 
-/// The force of every spring on its first point into `pull` (a dense sweep per family).
-#[inline(always)]
-pub(super) fn set_spring_pulls(
-    lattice: &Lattice,
-    rest: &[Vec<f64>; 4],
-    x: &[f64],
-    y: &[f64],
-    margin: usize,
-    pull: &mut [Pair; 4],
-) {
-    let slots = lattice.slots;
-    for ((family, rest), pull) in lattice.families.iter().zip(rest).zip(pull) {
-        let Ends { ax, ay, bx, by } = ends(family, slots, x, y);
-        let (rest, stiffness) = (&rest[..slots], &family.stiffness[..slots]);
-        let (px, py) = (&mut pull.x[margin..margin + slots], &mut pull.y[margin..margin + slots]);
-        for i in 0..slots {
-            let (dx, dy) = (bx[i] - ax[i], by[i] - ay[i]);
-            let length = (dx * dx + dy * dy).sqrt();
-            let force = stiffness[i] * (length - rest[i]) / length;
-            px[i] = force * dx;
-            py[i] = force * dy;
-        }
+    /// Forgets the lengths of the last substep.
+    pub fn forget(&mut self) {
+        self.inverse_length = [[0.0; BLOCK]; FAMILIES];
+        self.inverse_square = self.inverse_length;
     }
-}
 
-/// Sum of the pulls on every slot's point: plus at a spring's first end, minus at its second.
-#[inline(always)]
-pub(super) fn gather(
-    lattice: &Lattice,
-    margin: usize,
-    pull: &[Pair; 4],
-    axis: Axis,
-    mut put: impl FnMut(usize, f64),
-) {
-    let slots = lattice.slots;
-    let from =
-        |offset: usize, family: usize| &pull[family].along(axis)[margin - offset..margin - offset + slots];
-    let [h, v, f, r] = &lattice.families;
-    let (h0, h1) = (from(h.from, 0), from(h.to, 0));
-    let (v0, v1) = (from(v.from, 1), from(v.to, 1));
-    let (f0, f1) = (from(f.from, 2), from(f.to, 2));
-    let (r0, r1) = (from(r.from, 3), from(r.to, 3));
-    for i in 0..slots {
-        put(i, ((h0[i] - h1[i]) + (v0[i] - v1[i])) + ((f0[i] - f1[i]) + (r0[i] - r1[i])));
-    }
-}
-
-/// What acts on the points besides springs and drag, and what the springs need; fixed during a substep.
-pub(super) struct Load<'a> {
-    /// Rest lengths by family, and of the extra springs [wu].
-    pub rest: &'a [Vec<f64>; 4],
-    pub extra_rest: &'a [f64],
-    /// Contact force and weight [mass·wu/s²].
-    pub external: &'a Pair,
-    /// Zeros in front of every pull.
-    pub margin: usize,
-}
-
-/// Accelerations of all points at some positions and velocities (physics.md, 3).
-#[inline(always)]
-pub(super) fn accelerations(
-    lattice: &Lattice,
-    physics: &Physics,
-    load: &Load,
-    (x, y): (&[f64], &[f64]),
-    velocity: (&[f64], &[f64]),
-    pull: &mut [Pair; 4],
-    acceleration: &mut Pair,
-) {
-    let slots = lattice.slots;
-    let (drag, inverse_mass) = (physics.drag, 1.0 / physics.mass);
-    set_spring_pulls(lattice, load.rest, x, y, load.margin, pull);
-    for axis in [Axis::X, Axis::Y] {
-        let velocity = if axis == Axis::X { velocity.0 } else { velocity.1 };
-        let external = load.external.along(axis);
-        let out = acceleration.along_mut(axis);
-        let len = out.len();
-        let (velocity, external) = (&velocity[..len], &external[..len]);
-        for i in slots..len {
-            out[i] = (external[i] - drag * velocity[i]) * inverse_mass;
-        }
-        let out = &mut out[..slots];
-        gather(lattice, load.margin, pull, axis, |i, sum| {
-            out[i] = (sum + external[i] - drag * velocity[i]) * inverse_mass;
+    /// Sets this substep's rest lengths, a small part (`gain`) of the way from the present lengths to the goals
+    /// (physics.md, 2); gives the pull of each spring per vector.
+    #[inline(always)]
+    pub fn servo<L: Lanes>(&mut self, lane: usize, square: [L; 4], goal: [L; 4], gain: f64) -> [L; 4] {
+        let (one, gain) = (L::splat(1.0), L::splat(gain));
+        let t = each!(i in [0, 1, 2, 3] => {
+            square[i].mul_add(L::load(&self.inverse_square[i], lane), L::splat(-1.0))
         });
+        let mut inverse = each!(i in [0, 1, 2, 3] => {
+            let before = L::load(&self.inverse_length[i], lane);
+            (before * t[i]).mul_sub_from(series(t[i]), before)
+        });
+        let range = L::splat(SERIES_RANGE);
+        if L::any(greatest(&t).above(range)) {
+            for i in 0..4 {
+                // The floor is for what is no spring, between points at the same place.
+                let exact = one / square[i].max(L::splat(1e-60)).sqrt();
+                inverse[i] = exact.or_else(t[i].abs().above(range), inverse[i]);
+            }
+        }
+        each!(i in [0, 1, 2, 3] => {
+            // rest/d₀ = 1 − gain·(1 − goal/d₀)
+            let stiffness = L::load(&self.stiffness[i], lane);
+            let initial = (stiffness * gain) * goal[i].mul_sub_from(inverse[i], one);
+            inverse[i].store(&mut self.inverse_length[i], lane);
+            (inverse[i] * inverse[i]).store(&mut self.inverse_square[i], lane);
+            initial.store(&mut self.initial[i], lane);
+            (stiffness - initial).store(&mut self.change[i], lane);
+            initial
+        })
     }
-    for (spring, rest) in lattice.extra_springs.iter().zip(load.extra_rest) {
-        let [a, b] = spring.ends;
-        let (dx, dy) = (x[b] - x[a], y[b] - y[a]);
-        let length = (dx * dx + dy * dy).sqrt();
-        let pull = spring.stiffness * (length - rest) / length * inverse_mass;
-        acceleration.x[a] += pull * dx;
-        acceleration.y[a] += pull * dy;
-        acceleration.x[b] -= pull * dx;
-        acceleration.y[b] -= pull * dy;
-    }
-    let lowest = y.iter().fold(f64::INFINITY, |least, &v| if v < least { v } else { least });
-    if lowest < 0.0 {
-        add_floor(physics, y, velocity.0, acceleration);
+
+    /// The pull of each spring per vector at some later squared lengths in the same substep.
+    #[inline(always)]
+    pub fn pull<L: Lanes>(&self, lane: usize, square: [L; 4]) -> [L; 4] {
+        let t = each!(i in [0, 1, 2, 3] => {
+            square[i].mul_add(L::load(&self.inverse_square[i], lane), L::splat(-1.0))
+        });
+        let change = each!(i in [0, 1, 2, 3] => L::load(&self.change[i], lane));
+        shrink(t, change, each!(i in [0, 1, 2, 3] => L::load(&self.initial[i], lane)))
     }
 }
 
-/// The floor plane at y = 0, below the ground; only reached by tunnelling (physics.md, "World").
-#[cold]
-fn add_floor(physics: &Physics, y: &[f64], vx: &[f64], acceleration: &mut Pair) {
-    for i in (0..y.len()).filter(|&i| y[i] < 0.0) {
-        let normal = -physics.floor_stiffness * y[i];
-        let friction = physics.floor_friction * normal * libm::tanh(physics.floor_slip * normal * vx[i]);
-        acceleration.y[i] += normal / physics.mass;
-        acceleration.x[i] -= friction / physics.mass;
+/// The vectors of a slot's four springs, by axis.
+pub(super) type Vectors<L> = [[L; FAMILIES]; 2];
+
+/// The vectors of a slot's springs at some positions.
+#[inline(always)]
+pub(super) fn vectors<L: Lanes>(position: [&[f64]; 2], slot: usize, pitch: usize) -> Vectors<L> {
+    each!(axis in [X, Y] => {
+        let of = position[axis];
+        let (own, right) = (L::load(of, slot), L::load(of, slot + 1));
+        let (below, opposite) = (L::load(of, slot + pitch), L::load(of, slot + pitch + 1));
+        [right - own, below - own, opposite - own, below - right]
+    })
+}
+
+/// Their squared lengths.
+#[inline(always)]
+pub(super) fn squares<L: Lanes>([x, y]: &Vectors<L>) -> [L; FAMILIES] {
+    each!(i in [0, 1, 2, 3] => x[i].mul_add(x[i], y[i] * y[i]))
+}
+
+/// What the springs of slots gone by do to points below: by slot, with a margin of zeros in front.
+#[derive(Clone, Debug)]
+pub(super) struct Passing {
+    below: [Buffer; 2],
+    margin: usize,
+    pitch: usize,
+}
+
+/// A sweep's hold on what passes, and what the springs of the block before do to points at their right: in their
+/// own row, and in the row below.
+pub(super) struct Gather<'a, L> {
+    passing: [&'a mut [f64]; 2],
+    margin: usize,
+    pitch: usize,
+    beside: [L; 2],
+    below: [L; 2],
+}
+
+impl Passing {
+    pub fn new(lattice: &Lattice) -> Self {
+        let margin = lattice.pitch.next_multiple_of(BLOCK);
+        let zeros = || Buffer::zeros(margin + lattice.slots);
+        Passing { below: [zeros(), zeros()], margin, pitch: lattice.pitch }
+    }
+
+    /// For a run of blocks.
+    #[inline(always)]
+    pub fn gather<L: Lanes>(&mut self) -> Gather<'_, L> {
+        let [x, y] = &mut self.below;
+        let nothing = [L::splat(0.0); 2];
+        Gather { passing: [x, y], margin: self.margin, pitch: self.pitch, beside: nothing, below: nothing }
+    }
+}
+
+impl<L: Lanes> Gather<'_, L> {
+    /// The sum of all springs' pulls on the points at the next slot, given how the slot's own pull.
+    #[inline(always)]
+    pub fn next(&mut self, pull: [L; FAMILIES], vectors: &Vectors<L>, slot: usize) -> [L; 2] {
+        each!(axis in [X, Y] => {
+            let vector = &vectors[axis];
+            let (horizontal, vertical) = (pull[0] * vector[0], pull[1] * vector[1]);
+            let (falling, rising) = (pull[2] * vector[2], pull[3] * vector[3]);
+            let own = (horizontal + vertical) + falling;
+            let beside = rising - horizontal;
+            let below = (vertical + rising) + falling.after(self.below[axis]);
+            // In this order: of a narrow body the row above is in the same block.
+            below.store(self.passing[axis], self.margin + slot);
+            let above = L::load(self.passing[axis], self.margin + slot - self.pitch);
+            let sum = (own - above) + beside.after(self.beside[axis]);
+            self.beside[axis] = beside;
+            self.below[axis] = falling;
+            sum
+        })
     }
 }

@@ -1,13 +1,15 @@
 //! [`Lattice`]: a body as points, springs and surface; fixed for a life.
 //!
-//! Points lie on a dense lattice, one per grid vertex of the body's bounding box, row-major from the top left with
-//! a row pitch of width + 1; where two voxels touch only at a corner, the later voxel's point is an *extra* behind
+//! Points lie on a dense lattice, one slot per grid vertex of the body's bounding box, row-major from the top left
+//! with a fixed row pitch; where two voxels touch only at a corner, the later voxel's point is an *extra* behind
 //! the lattice. So each of the four spring families (sides and diagonals) joins points a fixed offset apart and
 //! is a plain sweep over arrays; the few springs that end in an extra are kept in a list.
 
 use super::params::Physics;
 use crate::base::Grid;
+use crate::base::lanes::{BLOCK, Buffer};
 use crate::body::{Body, Material};
+use std::ops::Range;
 
 /// Sides of a voxel in the order in which they are visited: top, right, bottom, left. Each runs clockwise, so
 /// that its outward normal is its direction turned left.
@@ -16,19 +18,14 @@ pub(super) const SIDES: [(usize, usize); 4] = [(0, 1), (1, 2), (2, 3), (3, 0)];
 /// Neighbouring cell across each side, in the order of [`SIDES`].
 const ACROSS: [(isize, isize); 4] = [(-1, 0), (0, 1), (1, 0), (0, -1)];
 
-/// Springs between points `from` and `to` places behind each slot; one slot per lattice point.
-#[derive(Clone, Debug)]
-pub(super) struct Family {
-    /// Offset of the spring's first point from its slot.
-    pub from: usize,
-    /// Offset of its second point.
-    pub to: usize,
-    /// Length at rest [wu].
-    pub length: f64,
-    /// Stiffness per slot, 0 where there is no spring.
-    pub stiffness: Vec<f64>,
-    /// Least and greatest length before the limits act [wu]; 0 and ∞ where there is no spring.
-    pub limits: (Vec<f64>, Vec<f64>),
+/// The four families of springs: horizontal, vertical, falling and rising diagonals.
+pub(super) const FAMILIES: usize = 4;
+
+/// Where the spring of a family that belongs to a slot is in the arrays over all springs: by blocks of slots, in a
+/// block by families, so that a sweep over the slots reads them from front to back.
+#[inline(always)]
+pub(super) fn spring_index(slot: usize, family: usize) -> usize {
+    (slot / BLOCK * FAMILIES + family) * BLOCK + slot % BLOCK
 }
 
 /// A spring with an end at an extra point.
@@ -70,16 +67,28 @@ pub(super) struct SurfaceVoxel {
 /// A body's points, springs and surface.
 #[derive(Clone, Debug)]
 pub struct Lattice {
-    /// Slots of the dense lattice.
+    /// Slots from one row to the next.
+    pub(super) pitch: usize,
+    /// Slots of the lattice proper.
+    lattice_slots: usize,
+    /// Slots, those of the extras included; a whole number of blocks.
     pub(super) slots: usize,
-    /// Length of all per-point arrays: slots, room for the sweeps to run over, extras.
+    /// Length of all per-point arrays: slots, and room for the sweeps to look ahead.
     pub(super) len: usize,
-    /// Horizontal, vertical, falling and rising diagonals.
-    pub(super) families: [Family; 4],
+    /// Where a slot has a point 1, elsewhere 0.
+    pub(super) present: Buffer,
+    /// The slots with a point or a spring, in whole blocks: the others need no work.
+    pub(super) runs: Vec<Range<usize>>,
+    /// Length at rest of each family's springs [wu].
+    pub(super) lengths: [f64; FAMILIES],
+    /// Stiffness of every spring ([`spring_index`]), 0 where there is none.
+    pub(super) stiffness: Buffer,
+    /// Where there is a spring 1, elsewhere 0.
+    pub(super) exists: Buffer,
     pub(super) extra_springs: Vec<ExtraSpring>,
     pub(super) actuated: Vec<ActuatedSide>,
     pub(super) active: Vec<ActiveVoxel>,
-    /// Sides of rigid voxels in the order of the rigid pass.
+    /// Sides of rigid voxels in an order of equal results to the rigid pass's.
     pub(super) rigid_links: Vec<[usize; 2]>,
     pub(super) surface: Vec<SurfaceVoxel>,
     /// Grid vertex (row, column) in the body of every point that exists, in EvoGym's order of creation.
@@ -94,30 +103,24 @@ impl Lattice {
     /// The lattice of a body.
     pub fn new(body: &Body, physics: &Physics) -> Self {
         let voxels = numbered_voxels(body);
-        let pitch = voxels.pitch;
-        let slots = voxels.slots;
+        let NumberedVoxels { pitch, slots, .. } = voxels;
         let length = physics.cell_size;
         let diagonal = length * std::f64::consts::SQRT_2;
-        let family = |from, to, length| Family {
-            from,
-            to,
-            length,
-            stiffness: vec![0.0; slots],
-            limits: (vec![0.0; slots], vec![f64::INFINITY; slots]),
-        };
         let mut lattice = Lattice {
+            pitch,
             slots,
-            len: voxels.len,
-            families: [
-                family(0, 1, length),
-                family(0, pitch, length),
-                family(0, pitch + 1, diagonal),
-                family(1, pitch, diagonal),
-            ],
+            // Springs reach from a slot to the one below and to the right; the last lanes look as far.
+            len: slots + pitch + BLOCK,
+            present: Buffer::zeros(slots),
+            runs: Vec::new(),
+            lengths: [length, length, diagonal, diagonal],
+            stiffness: Buffer::zeros(slots * FAMILIES),
+            exists: Buffer::zeros(slots * FAMILIES),
             extra_springs: Vec::new(),
             actuated: Vec::new(),
             active: Vec::new(),
             rigid_links: Vec::new(),
+            lattice_slots: voxels.lattice_slots,
             surface: surface_voxels(body, &voxels.list),
             points: Vec::new(),
             voxels: voxels.list,
@@ -126,6 +129,8 @@ impl Lattice {
         lattice.add_points();
         lattice.add_springs(body, physics);
         lattice.add_actuation(body);
+        lattice.order_rigid_links();
+        lattice.find_runs();
         lattice
     }
 
@@ -167,32 +172,69 @@ impl Lattice {
             let keep = material == Material::Rigid;
             let sides = [[tl, tr], [tr, br], [bl, br], [tl, bl]];
             for (ends, family) in sides.into_iter().zip([0, 1, 0, 1]) {
-                self.set_spring(physics, family, ends, side, keep);
+                self.set_spring(family, ends, side, keep);
             }
-            self.set_spring(physics, 2, [tl, br], side * ratio, false);
-            self.set_spring(physics, 3, [tr, bl], side * ratio, false);
+            self.set_spring(2, [tl, br], side * ratio, false);
+            self.set_spring(3, [tr, bl], side * ratio, false);
             if material == Material::Rigid {
                 self.rigid_links.extend(SIDES.map(|(a, b)| [corners[a], corners[b]]));
             }
         }
     }
 
-    fn set_spring(&mut self, physics: &Physics, family: usize, ends: [usize; 2], stiffness: f64, keep: bool) {
-        let family = &mut self.families[family];
-        let slot = ends[0].wrapping_sub(family.from);
-        let is_regular = slot < self.slots && ends[0] < self.slots && ends[1] == slot + family.to;
-        if is_regular {
-            if !keep || family.stiffness[slot] == 0.0 {
-                family.stiffness[slot] = stiffness;
+    fn set_spring(&mut self, family: usize, ends: [usize; 2], stiffness: f64, keep: bool) {
+        // From the slot to the spring's first and second point.
+        let (from, to) = [(0, 1), (0, self.pitch), (0, self.pitch + 1), (1, self.pitch)][family];
+        let slot = ends[0].wrapping_sub(from);
+        if slot < self.lattice_slots && ends[0] < self.lattice_slots && ends[1] == slot + to {
+            let index = spring_index(slot, family);
+            if !keep || self.exists[index] == 0.0 {
+                self.stiffness[index] = stiffness;
             }
-            family.limits.0[slot] = physics.limit_low * family.length;
-            family.limits.1[slot] = physics.limit_high * family.length;
+            self.exists[index] = 1.0;
             return;
         }
         match self.extra_springs.iter_mut().find(|spring| spring.ends == ends) {
             Some(spring) if !keep => spring.stiffness = stiffness,
             Some(_) => {}
-            None => self.extra_springs.push(ExtraSpring { ends, length: family.length, stiffness }),
+            None => self.extra_springs.push(ExtraSpring { ends, length: self.lengths[family], stiffness }),
+        }
+    }
+
+    /// Brings links that have nothing to do with each other together, so that the processor can work on several at
+    /// once. Links that share a point stay in their order, so results are the same bits.
+    fn order_rigid_links(&mut self) {
+        let mut taken = vec![0; self.len];
+        let mut rounds: Vec<(usize, [usize; 2])> = Vec::with_capacity(self.rigid_links.len());
+        for &ends in &self.rigid_links {
+            // After every earlier link at either end.
+            let round = 1 + taken[ends[0]].max(taken[ends[1]]);
+            ends.iter().for_each(|&end| taken[end] = round);
+            rounds.push((round, ends));
+        }
+        rounds.sort_by_key(|(round, _)| *round);
+        self.rigid_links = rounds.into_iter().map(|(_, ends)| ends).collect();
+    }
+
+    fn find_runs(&mut self) {
+        let mut used = vec![false; self.slots / BLOCK];
+        for (point, _) in &self.points {
+            self.present[*point] = 1.0;
+            used[point / BLOCK] = true;
+        }
+        // Springs reach from their slot to the next one's column: the next block passes that on.
+        for slot in 0..self.slots {
+            if (0..FAMILIES).any(|family| self.exists[spring_index(slot, family)] != 0.0) {
+                used[slot / BLOCK] = true;
+                used[(slot + 1) / BLOCK] = true;
+            }
+        }
+        for (block, _) in used.into_iter().enumerate().filter(|(_, used)| *used) {
+            let slots = block * BLOCK..(block + 1) * BLOCK;
+            match self.runs.last_mut() {
+                Some(run) if run.end == slots.start => run.end = slots.end,
+                _ => self.runs.push(slots),
+            }
         }
     }
 
@@ -218,8 +260,8 @@ impl Lattice {
 struct NumberedVoxels {
     list: Vec<((usize, usize), [usize; 4])>,
     pitch: usize,
+    lattice_slots: usize,
     slots: usize,
-    len: usize,
 }
 
 /// The voxels with the numbers of their points.
@@ -228,10 +270,12 @@ fn numbered_voxels(body: &Body) -> NumberedVoxels {
     let least = |f: fn(&(usize, usize)) -> usize| filled.iter().map(f).min().unwrap_or(0);
     let most = |f: fn(&(usize, usize)) -> usize| filled.iter().map(f).max().unwrap_or(0);
     let (top, left) = (least(|p| p.0), least(|p| p.1));
-    let pitch = most(|p| p.1) - left + 2;
-    let slots = (most(|p| p.0) - top + 2) * pitch;
-    // Sweeps read up to `pitch + 1` behind the last slot.
-    let mut len = slots + pitch + 1;
+    let (width, height) = (most(|p| p.1) - left + 2, most(|p| p.0) - top + 2);
+    // Whole blocks a row are faster to work on, if they are not many more.
+    let padded = width.next_multiple_of(BLOCK);
+    let pitch = if 4 * padded <= 5 * width { padded } else { width };
+    let lattice_slots = height * pitch;
+    let mut len = lattice_slots;
     let mut extra = Grid::filled(body.height() + 1, body.width() + 1, None);
     let mut list = Vec::with_capacity(filled.len());
     for (row, column) in filled {
@@ -254,7 +298,7 @@ fn numbered_voxels(body: &Body) -> NumberedVoxels {
         let corners = [number(0, 0), number(0, 1), number(1, 1), number(1, 0)];
         list.push(((row, column), corners));
     }
-    NumberedVoxels { list, pitch, slots, len }
+    NumberedVoxels { list, pitch, lattice_slots, slots: len.next_multiple_of(BLOCK) }
 }
 
 fn surface_voxels(body: &Body, voxels: &[((usize, usize), [usize; 4])]) -> Vec<SurfaceVoxel> {

@@ -1,106 +1,124 @@
 //! Length limits: positions are corrected so that no spring is far from its rest length (physics.md, 4).
+//!
+//! A spring beyond a limit l is corrected by (1 − l/d) of its vector; with t = d²/l² − 1, which is small, that is
+//! `shrink(t)` again: mostly neither root nor division.
 
-use super::forces::gather;
-use super::lattice::Lattice;
+use super::extra::Extra;
+use super::forces::{Passing, SERIES, SERIES_RANGE, shrink, squares, vectors};
+use super::lattice::{FAMILIES, Lattice};
 use super::params::Physics;
-use super::state::{Axis, Pair, Scratch, State};
+use super::state::{Pair, X, Y};
+use crate::base::lanes::{BLOCK, Lanes, each};
 
-/// How far a length is beyond its limits \[wu\]: positive when too long, negative when too short.
-#[inline(always)]
-fn excess(length: f64, low: f64, high: f64) -> f64 {
-    if length > high {
-        length - high
-    } else if length < low {
-        length - low
-    } else {
-        0.0
+/// Limits of springs of one length at rest.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Limits {
+    /// Squares of the least and of the greatest length.
+    squares: [f64; 2],
+    /// Middle and half width of the range between them.
+    middle: f64,
+    half: f64,
+}
+
+impl Limits {
+    pub fn new(length: f64, low: f64, high: f64) -> Self {
+        let [low, high] = [low * length, high * length].map(|limit| limit * limit);
+        Limits { squares: [low, high], middle: (low + high) / 2.0, half: (high - low) / 2.0 }
+    }
+
+    /// t for a squared length beyond the limits (positive when too long, negative when too short), 0 within them.
+    #[inline(always)]
+    pub fn excess<L: Lanes>(&self, square: L) -> L {
+        let [low, high] = each!(i in [0, 1] => L::splat(self.squares[i]));
+        let [short, long] =
+            each!(i in [0, 1] => square.mul_add(L::splat(1.0 / self.squares[i]), L::splat(-1.0)));
+        let zero = L::splat(0.0);
+        long.or_else(square.above(high), short.or_else(low.above(square), zero))
     }
 }
 
 /// All springs at once: corrections from the same positions, then added up.
 #[inline(always)]
-pub(super) fn limit_all(lattice: &Lattice, physics: &Physics, state: &mut State, scratch: &mut Scratch) {
-    let (slots, margin) = (lattice.slots, scratch.margin);
-    let share = physics.limit_share / 2.0;
-    let mut any = false;
-    for (family, pull) in lattice.families.iter().zip(&mut scratch.pull) {
-        let (a, b) = (family.from..family.from + slots, family.to..family.to + slots);
-        let (ax, ay, bx, by) = (&state.x[a.clone()], &state.y[a], &state.x[b.clone()], &state.y[b]);
-        let (low, high) = (&family.limits.0[..slots], &family.limits.1[..slots]);
-        let (px, py) = (&mut pull.x[margin..margin + slots], &mut pull.y[margin..margin + slots]);
-        let mut beyond = 0.0f64;
-        for i in 0..slots {
-            let (dx, dy) = (bx[i] - ax[i], by[i] - ay[i]);
-            let length = (dx * dx + dy * dy).sqrt();
-            let excess = excess(length, low[i], high[i]);
-            let factor = share * excess / length;
-            px[i] = factor * dx;
-            py[i] = factor * dy;
-            beyond = if excess.abs() > beyond { excess.abs() } else { beyond };
+pub(super) fn limit_all<L: Lanes>(
+    lattice: &Lattice,
+    physics: &Physics,
+    position: &mut Pair,
+    passing: &mut Passing,
+    extra: Option<&mut Extra>,
+) {
+    let limits = lattice.lengths.map(|length| Limits::new(length, physics.limit_low, physics.limit_high));
+    let share = L::splat(physics.limit_share / 2.0);
+    let extra = match extra {
+        Some(extra) => Some(extra.limit::<L>(lattice, physics, position)),
+        None => None,
+    };
+    let (exists, _) = lattice.exists.as_chunks::<{ FAMILIES * BLOCK }>();
+    let [x, y] = &mut *position;
+    let [x, y] = [&mut x[..], &mut y[..]];
+    for run in &lattice.runs {
+        let mut gather = passing.gather::<L>();
+        for slot in run.clone().step_by(L::WIDTH) {
+            let vectors = vectors([x, y], slot, lattice.pitch);
+            let exists = &exists[slot / BLOCK];
+            let pull = corrections(&limits, squares(&vectors), exists, slot % BLOCK, share);
+            let sums = gather.next(pull, &vectors, slot);
+            (L::load(x, slot) + sums[X]).store(x, slot);
+            (L::load(y, slot) + sums[Y]).store(y, slot);
         }
-        any |= beyond > 0.0;
     }
-    // The extra springs' corrections too come from the positions before any correction.
-    if !lattice.extra_springs.is_empty() {
-        any |= limit_extra(lattice, physics, state, &mut scratch.acceleration);
-    }
-    if !any {
-        return;
-    }
-    let x = &mut state.x[..slots];
-    gather(lattice, margin, &scratch.pull, Axis::X, |i, sum| x[i] += sum);
-    let y = &mut state.y[..slots];
-    gather(lattice, margin, &scratch.pull, Axis::Y, |i, sum| y[i] += sum);
-    if !lattice.extra_springs.is_empty() {
-        for spring in &lattice.extra_springs {
-            for point in spring.ends {
-                // Each point's sum is added once, however many of its springs are extra.
-                state.x[point] += std::mem::take(&mut scratch.acceleration.x[point]);
-                state.y[point] += std::mem::take(&mut scratch.acceleration.y[point]);
-            }
-        }
+    if let Some(extra) = extra {
+        extra.feed(lattice, position);
     }
 }
 
-/// Corrections of the extra springs, summed per point into `sums`; whether there were any.
-fn limit_extra(lattice: &Lattice, physics: &Physics, state: &State, sums: &mut Pair) -> bool {
-    for point in lattice.extra_springs.iter().flat_map(|spring| spring.ends) {
-        sums.x[point] = 0.0;
-        sums.y[point] = 0.0;
+/// By how much of its vector each spring of a slot is corrected; mostly none is.
+#[inline(always)]
+fn corrections<L: Lanes>(
+    limits: &[Limits; FAMILIES],
+    squares: [L; FAMILIES],
+    exists: &[f64; FAMILIES * BLOCK],
+    lane: usize,
+    share: L,
+) -> [L; FAMILIES] {
+    let zero = L::splat(0.0);
+    let out = each!(i in [0, 1, 2, 3] => {
+        let off = (squares[i] - L::splat(limits[i].middle)).abs();
+        (off * L::load(exists, i * BLOCK + lane)).above(L::splat(limits[i].half))
+    });
+    if !L::any((out[0] | out[1]) | (out[2] | out[3])) {
+        return [zero; FAMILIES];
     }
-    let mut any = false;
-    for spring in &lattice.extra_springs {
-        let [a, b] = spring.ends;
-        let (dx, dy) = (state.x[b] - state.x[a], state.y[b] - state.y[a]);
-        let length = (dx * dx + dy * dy).sqrt();
-        let excess = excess(length, physics.limit_low * spring.length, physics.limit_high * spring.length);
-        if excess != 0.0 {
-            any = true;
-            let factor = physics.limit_share / 2.0 * excess / length;
-            sums.x[a] += factor * dx;
-            sums.y[a] += factor * dy;
-            sums.x[b] -= factor * dx;
-            sums.y[b] -= factor * dy;
-        }
-    }
-    any
+    let t = each!(i in [0, 1, 2, 3] => limits[i].excess(squares[i]).or_else(out[i], zero));
+    shrink(t, [share; FAMILIES], [zero; FAMILIES])
 }
 
 /// The sides of rigid voxels, one after the other on current positions; a side shared by two comes up twice.
-pub(super) fn limit_rigid(lattice: &Lattice, physics: &Physics, state: &mut State) {
-    let low = physics.rigid_limit_low * physics.cell_size;
-    let high = physics.rigid_limit_high * physics.cell_size;
-    let (low_square, high_square) = (low * low, high * high);
+pub(super) fn limit_rigid(lattice: &Lattice, physics: &Physics, [x, y]: &mut Pair) {
+    let limits = Limits::new(physics.cell_size, physics.rigid_limit_low, physics.rigid_limit_high);
+    let [low, high] = limits.squares;
+    let share = physics.rigid_limit_share / 2.0;
+    let (x, y) = (&mut x[..], &mut y[..]);
     for &[a, b] in &lattice.rigid_links {
-        let (dx, dy) = (state.x[b] - state.x[a], state.y[b] - state.y[a]);
+        let (dx, dy) = (x[b] - x[a], y[b] - y[a]);
         let square = dx * dx + dy * dy;
-        if square > high_square || square < low_square {
-            let length = square.sqrt();
-            let factor = physics.rigid_limit_share / 2.0 * excess(length, low, high) / length;
-            state.x[a] += factor * dx;
-            state.y[a] += factor * dy;
-            state.x[b] -= factor * dx;
-            state.y[b] -= factor * dy;
+        if square > high || square < low {
+            let limit = if square > high { high } else { low };
+            let factor = share * shrink_one((square - limit) * (1.0 / limit));
+            x[a] += factor * dx;
+            y[a] += factor * dy;
+            x[b] -= factor * dx;
+            y[b] -= factor * dy;
         }
     }
+}
+
+/// 1 − 1/√(1 + t), in the order with the shortest chain.
+#[inline(always)]
+fn shrink_one(t: f64) -> f64 {
+    if t.abs() > SERIES_RANGE {
+        return 1.0 - 1.0 / (1.0 + t).sqrt();
+    }
+    let [c0, c1, c2, c3, c4] = SERIES;
+    let square = t * t;
+    ((c0 + c1 * t) + square * ((c2 + c3 * t) + square * c4)) * t
 }

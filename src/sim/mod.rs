@@ -8,6 +8,7 @@
 
 mod actuation;
 mod contact;
+mod extra;
 mod forces;
 mod geometry;
 mod integrator;

@@ -2,12 +2,14 @@
 //!
 //! All pairs of surface voxels would be tested in every substep otherwise. A list holds every pair whose boxes
 //! come within twice the budget; until a point has moved by more than the budget, along x or y, since the
-//! lists were made, no other pair can have met. So the lists change nothing but the time it takes.
+//! lists were made, no other pair can have met. So the lists change nothing but the time it takes. Motion along x
+//! counts relative to one of the points: the ground is the same everywhere, and a walk wears no list out.
 
 use super::geometry::{Bounds, Vector};
 use super::lattice::{Lattice, SurfaceVoxel};
 use super::params::Physics;
-use super::state::State;
+use super::state::{Pair, State, X, Y};
+use crate::base::lanes::{Lanes, each};
 
 /// How far a point may move before the lists are made anew \[voxel lengths\].
 const BUDGET: f64 = 0.2;
@@ -25,8 +27,7 @@ pub(super) struct Candidate {
 /// The lists, and the positions at which they were made.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Neighbours {
-    made_x: Vec<f64>,
-    made_y: Vec<f64>,
+    made: Pair,
     /// Surface voxels that may touch the ground, in order.
     pub low: Vec<usize>,
     /// Corners that may enter a voxel, by mover, then host.
@@ -40,30 +41,40 @@ pub(super) struct Neighbours {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct BlownUp;
 
+/// Where a point is.
+#[inline]
+pub(super) fn place(point: usize, state: &State) -> Vector {
+    Vector::new(state.position[X][point], state.position[Y][point])
+}
+
 /// The corners of a surface voxel, clockwise from the top left.
 #[inline]
 pub(super) fn quad(voxel: &SurfaceVoxel, state: &State) -> [Vector; 4] {
-    voxel.corners.map(|point| Vector::new(state.x[point], state.y[point]))
+    voxel.corners.map(|point| place(point, state))
 }
 
 impl Neighbours {
     /// Makes the lists anew if a point has moved too far since they were made.
     #[inline(always)]
-    pub fn refresh(&mut self, lattice: &Lattice, physics: &Physics, state: &State) -> Result<(), BlownUp> {
-        if self.made_x.len() == state.x.len() {
-            let moved = |now: &[f64], then: &[f64]| {
-                // `max` would hide a NaN; the sum keeps it, and what is not a small number makes the lists anew.
-                let (mut most, mut sum) = (0.0f64, 0.0f64);
-                for (a, b) in now.iter().zip(then) {
-                    let distance = (a - b).abs();
-                    most = if distance > most { distance } else { most };
-                    sum += distance * 0.0;
-                }
-                most + sum
-            };
-            let most = moved(&state.x, &self.made_x).max(moved(&state.y, &self.made_y));
-            let finite = moved(&state.x, &self.made_x) + moved(&state.y, &self.made_y);
-            if most <= BUDGET * physics.cell_size && finite.is_finite() {
+    pub fn refresh<L: Lanes>(
+        &mut self,
+        lattice: &Lattice,
+        physics: &Physics,
+        state: &State,
+    ) -> Result<(), BlownUp> {
+        if self.made[X].len() == lattice.len {
+            let budget = L::splat(BUDGET * physics.cell_size);
+            let walked = lattice.points.first().map_or(0.0, |&(p, _)| state.position[X][p] - self.made[X][p]);
+            let mut near = budget.above(L::splat(0.0));
+            for slot in lattice.runs.iter().flat_map(|run| run.clone().step_by(L::WIDTH)) {
+                let moved = each!(axis in [X, Y] => {
+                    L::load(&state.position[axis], slot) - L::load(&self.made[axis], slot)
+                });
+                let strayed = moved[X] - L::splat(walked) * L::load(&lattice.present, slot);
+                // What is no number is not below the budget either.
+                near = near & budget.above(strayed.abs()) & budget.above(moved[Y].abs());
+            }
+            if L::all(near) {
                 return Ok(());
             }
         }
@@ -73,13 +84,12 @@ impl Neighbours {
     #[cold]
     fn make(&mut self, lattice: &Lattice, physics: &Physics, state: &State) -> Result<(), BlownUp> {
         let slack = 2.0 * BUDGET * physics.cell_size;
-        self.made_x.clone_from(&state.x);
-        self.made_y.clone_from(&state.y);
+        self.made.clone_from(&state.position);
         for (_, corners) in &lattice.voxels {
-            let bounds = Bounds::of(&corners.map(|point| Vector::new(state.x[point], state.y[point])));
+            let bounds = Bounds::of(&corners.map(|point| place(point, state)));
             let extent = bounds.high - bounds.low;
             let sane = extent.x <= physics.blow_up_extent && extent.y <= physics.blow_up_extent;
-            if !sane || !corners.iter().all(|&p| state.x[p].is_finite() && state.y[p].is_finite()) {
+            if !sane || !corners.iter().all(|&p| place(p, state).iter().all(|v| v.is_finite())) {
                 return Err(BlownUp);
             }
         }
@@ -102,7 +112,7 @@ impl Neighbours {
                     self.distant.push([mover, host]);
                 }
                 for (corner, point) in voxel.corners.iter().enumerate() {
-                    let place = Vector::new(state.x[*point], state.y[*point]);
+                    let place = place(*point, state);
                     if !other.corners.contains(point) && self.bounds[host].holds(place, slack) {
                         self.candidates.push(Candidate { mover, corner, host });
                     }

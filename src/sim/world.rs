@@ -2,14 +2,13 @@
 
 use super::actuation;
 use super::contact::add_contacts;
-use super::forces::set_rest_lengths;
 use super::integrator::integrate;
 use super::lattice::Lattice;
 use super::limits::{limit_all, limit_rigid};
 use super::params::Physics;
-use super::state::{Scratch, State};
+use super::state::{Scratch, State, X, Y};
 use crate::base::Grid;
-use crate::base::lanes::{InstructionSet, Kernel, dispatch};
+use crate::base::lanes::{InstructionSet, Kernel, Lanes, dispatch};
 
 /// Where a life begins: the grid cell of the lower left corner of the body's box (empty rows and columns count).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -59,12 +58,13 @@ pub struct World<'a> {
 impl<'a> World<'a> {
     /// A robot at rest, all pixels dark.
     pub fn new(lattice: &'a Lattice, physics: &'a Physics, start: Start) -> Self {
+        let state = State::at_rest(lattice, physics, start.row);
         World {
             physics,
             lattice,
             start,
-            state: State::at_rest(lattice, physics, start.row),
-            scratch: Scratch::new(lattice, physics),
+            scratch: Scratch::new(lattice, physics, &state),
+            state,
             pixels: vec![0.0; lattice.active.len()],
             targets: vec![0.0; lattice.active.len()],
             instructions: InstructionSet::in_use(),
@@ -97,6 +97,7 @@ impl<'a> World<'a> {
     /// [`Unstable`] if the life ends in it; the state is then of no use.
     pub fn step(&mut self) -> Result<(), Unstable> {
         let (lattice, physics, control_step) = (self.lattice, self.physics, self.state.control_step);
+        self.scratch.begin();
         let goals = &mut self.scratch.goals;
         actuation::set_goals(lattice, physics, control_step, &self.pixels, &mut self.targets, goals);
         let (state, scratch) = (&mut self.state, &mut self.scratch);
@@ -117,12 +118,13 @@ impl<'a> World<'a> {
     pub fn centre_of_mass(&self) -> [f64; 2] {
         let count = self.lattice.points.len().max(1) as f64;
         let mean = |of: &[f64]| self.lattice.points.iter().map(|&(point, _)| of[point]).sum::<f64>() / count;
-        [mean(&self.state.x), mean(&self.state.y)]
+        [mean(&self.state.position[X]), mean(&self.state.position[Y])]
     }
 
     /// All points [x, y] in world units (as [`World::centre_of_mass`]), in EvoGym's order of creation.
     pub fn points(&self) -> impl Iterator<Item = [f64; 2]> + '_ {
-        self.lattice.points.iter().map(|&(point, _)| [self.state.x[point], self.state.y[point]])
+        let [x, y] = &self.state.position;
+        self.lattice.points.iter().map(|&(point, _)| [x[point], y[point]])
     }
 
     /// Every non-empty voxel's (row, column) and its corners (top left, top right, bottom right, bottom left) as
@@ -152,10 +154,10 @@ impl Kernel for ControlStep<'_> {
     type Output = Result<(), UnstableReason>;
 
     #[inline(always)]
-    fn run(self) -> Self::Output {
+    fn run<L: Lanes>(self) -> Self::Output {
         let ControlStep { lattice, physics, start_column, state, scratch } = self;
         for _ in 0..physics.substeps {
-            substep(lattice, physics, start_column, state, scratch)?;
+            substep::<L>(lattice, physics, start_column, state, scratch)?;
         }
         Ok(())
     }
@@ -163,27 +165,22 @@ impl Kernel for ControlStep<'_> {
 
 /// physics.md, "One substep, in this order".
 #[inline(always)]
-fn substep(
+fn substep<L: Lanes>(
     lattice: &Lattice,
     physics: &Physics,
     start_column: i64,
     state: &mut State,
     scratch: &mut Scratch,
 ) -> Result<(), UnstableReason> {
-    scratch.neighbours.refresh(lattice, physics, state).map_err(|_| UnstableReason::BlownUp)?;
+    scratch.neighbours.refresh::<L>(lattice, physics, state).map_err(|_| UnstableReason::BlownUp)?;
     let unstable = scratch.neighbours.too_many_overlaps(lattice, physics, state);
 
-    scratch.external.x.fill(0.0);
-    scratch.external.y.copy_from_slice(&scratch.weight);
-    add_contacts(lattice, physics, start_column, state, &scratch.neighbours, &mut scratch.external);
-
-    set_rest_lengths(lattice, physics, &state.x, &state.y, scratch);
-    // Velocities are "true" from here to the next substep's contacts: position now less position then.
-    state.previous_x.copy_from_slice(&state.x);
-    state.previous_y.copy_from_slice(&state.y);
-    integrate(lattice, physics, state, scratch);
-    limit_all(lattice, physics, state, scratch);
-    limit_rigid(lattice, physics, state);
+    add_contacts(lattice, physics, start_column, state, &scratch.neighbours, &mut scratch.contact);
+    // Contacts see true velocities: position now less position then. The integrator knows its own.
+    integrate::<L>(lattice, physics, state, scratch);
+    let Scratch { passing: [passing, _], extra, .. } = scratch;
+    limit_all::<L>(lattice, physics, &mut state.position, passing, extra.as_mut());
+    limit_rigid(lattice, physics, &mut state.position);
 
     if unstable { Err(UnstableReason::Overlaps) } else { Ok(()) }
 }

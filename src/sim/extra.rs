@@ -1,0 +1,162 @@
+//! Springs that end in an extra point, where two voxels touch only at a corner: few, and anywhere.
+
+use super::forces::{Springs, shrink};
+use super::lattice::{FAMILIES, Lattice};
+use super::limits::Limits;
+use super::params::Physics;
+use super::state::{Pair, X, Y, pair};
+use crate::base::lanes::{BLOCK, Buffer, Lanes, each};
+
+/// Extra springs that are computed together.
+pub(super) const GROUP: usize = FAMILIES * BLOCK;
+
+/// The extra springs' share of a substep: their ends are fetched and fed one by one, but the work between is as
+/// wide as the lattice's.
+#[derive(Clone, Debug)]
+pub(super) struct Extra {
+    /// By groups.
+    springs: Vec<Springs>,
+    /// 1/(length at rest)².
+    inverse_rest_square: Buffer,
+    /// Vectors of the springs at the positions last fetched, and what they do to their first ends.
+    vector: Pair,
+    change: Pair,
+    /// What acts on the points besides the lattice's springs, in the two stages of a sweep.
+    pub load: [Pair; 2],
+}
+
+impl Extra {
+    /// None for a body without such springs.
+    pub fn new(lattice: &Lattice, mass: f64) -> Option<Self> {
+        let count = lattice.extra_springs.len().next_multiple_of(GROUP);
+        let mut stiffness = Buffer::zeros(count);
+        let mut inverse_rest_square = Buffer::filled(count, 1.0);
+        for (i, spring) in lattice.extra_springs.iter().enumerate() {
+            stiffness[i] = spring.stiffness;
+            inverse_rest_square[i] = 1.0 / (spring.length * spring.length);
+        }
+        let half = std::f64::consts::FRAC_1_SQRT_2;
+        (count > 0).then(|| Extra {
+            springs: Springs::blocks(&stiffness, mass),
+            inverse_rest_square,
+            // Beyond the last spring unit vectors: no springs, but of good length.
+            vector: [Buffer::filled(count, half), Buffer::filled(count, half)],
+            change: pair(count),
+            load: [pair(lattice.len), pair(lattice.len)],
+        })
+    }
+
+    /// Forgets the lengths of the last substep.
+    pub fn forget(&mut self) {
+        self.springs.iter_mut().for_each(Springs::forget);
+    }
+
+    /// Adds what the springs do to their ends.
+    pub fn feed(&self, lattice: &Lattice, to: &mut Pair) {
+        feed(lattice, &self.change, to);
+    }
+
+    /// Sets the rest lengths at the start of a substep, and the load of its first two stages.
+    #[inline(always)]
+    pub fn load_first_half<L: Lanes>(
+        &mut self,
+        lattice: &Lattice,
+        goals: &[f64],
+        gain: f64,
+        load: &Pair,
+        stages: [&Pair; 2],
+    ) {
+        self.fetch(lattice, stages[0]);
+        for at in self.lanes::<L>() {
+            let (vector, square) = self.squares::<L>(at);
+            let goal = each!(i in [0, 1, 2, 3] => L::load(goals, at + i * BLOCK));
+            let pull = self.springs[at / GROUP].servo(at % GROUP, square, goal, gain);
+            self.put(at, vector, pull);
+        }
+        self.load_stage(lattice, load, 0);
+        self.load_later::<L>(lattice, load, stages[1], 1);
+    }
+
+    /// The load of its last two.
+    #[inline(always)]
+    pub fn load_second_half<L: Lanes>(&mut self, lattice: &Lattice, load: &Pair, stages: [&Pair; 2]) {
+        self.load_later::<L>(lattice, load, stages[0], 0);
+        self.load_later::<L>(lattice, load, stages[1], 1);
+    }
+
+    /// Corrections of the springs beyond their limits, to be fed to the positions they come from.
+    #[inline(always)]
+    pub fn limit<L: Lanes>(&mut self, lattice: &Lattice, physics: &Physics, position: &Pair) -> &Self {
+        self.fetch(lattice, position);
+        let share = [L::splat(physics.limit_share / 2.0); 4];
+        let limits = Limits::new(1.0, physics.limit_low, physics.limit_high);
+        for at in self.lanes::<L>() {
+            let (vector, square) = self.squares::<L>(at);
+            let t = each!(i in [0, 1, 2, 3] => {
+                limits.excess(square[i] * L::load(&self.inverse_rest_square, at + i * BLOCK))
+            });
+            self.put(at, vector, shrink(t, share, [L::splat(0.0); 4]));
+        }
+        self
+    }
+
+    /// The first spring of each of the lanes that do four springs each.
+    #[inline(always)]
+    fn lanes<L: Lanes>(&self) -> impl Iterator<Item = usize> + use<L> {
+        let groups = self.springs.len();
+        (0..groups * BLOCK).step_by(L::WIDTH).map(|lane| lane / BLOCK * GROUP + lane % BLOCK)
+    }
+
+    fn fetch(&mut self, lattice: &Lattice, position: &Pair) {
+        for axis in [X, Y] {
+            for (vector, spring) in self.vector[axis].iter_mut().zip(&lattice.extra_springs) {
+                *vector = position[axis][spring.ends[1]] - position[axis][spring.ends[0]];
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn squares<L: Lanes>(&self, at: usize) -> ([[L; 4]; 2], [L; 4]) {
+        let [x, y] = each!(axis in [X, Y] => {
+            each!(i in [0, 1, 2, 3] => L::load(&self.vector[axis], at + i * BLOCK))
+        });
+        ([x, y], each!(i in [0, 1, 2, 3] => x[i].mul_add(x[i], y[i] * y[i])))
+    }
+
+    #[inline(always)]
+    fn put<L: Lanes>(&mut self, at: usize, vector: [[L; 4]; 2], pull: [L; 4]) {
+        for axis in [X, Y] {
+            for i in 0..4 {
+                (pull[i] * vector[axis][i]).store(&mut self.change[axis], at + i * BLOCK);
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn load_later<L: Lanes>(&mut self, lattice: &Lattice, load: &Pair, position: &Pair, stage: usize) {
+        self.fetch(lattice, position);
+        for at in self.lanes::<L>() {
+            let (vector, square) = self.squares::<L>(at);
+            let pull = self.springs[at / GROUP].pull(at % GROUP, square);
+            self.put(at, vector, pull);
+        }
+        self.load_stage(lattice, load, stage);
+    }
+
+    fn load_stage(&mut self, lattice: &Lattice, load: &Pair, stage: usize) {
+        for axis in [X, Y] {
+            self.load[stage][axis].copy_from_slice(&load[axis]);
+        }
+        // Springs act on masses: their stiffness is already per mass.
+        feed(lattice, &self.change, &mut self.load[stage]);
+    }
+}
+
+fn feed(lattice: &Lattice, change: &Pair, to: &mut Pair) {
+    for axis in [X, Y] {
+        for (change, spring) in change[axis].iter().zip(&lattice.extra_springs) {
+            to[axis][spring.ends[0]] += change;
+            to[axis][spring.ends[1]] -= change;
+        }
+    }
+}
