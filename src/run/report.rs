@@ -129,7 +129,10 @@ pub fn wilson(right: usize, total: usize) -> [f64; 2] {
     let centre = share + Z * Z / (2.0 * n);
     let spread = Z * (share * (1.0 - share) / n + Z * Z / (4.0 * n * n)).sqrt();
     let scale = 1.0 + Z * Z / n;
-    [((centre - spread) / scale).max(0.0), ((centre + spread) / scale).min(1.0)]
+    // With none or all right the bounds are exactly 0 and 1, which rounding would miss.
+    let low = if right == 0 { 0.0 } else { ((centre - spread) / scale).max(0.0) };
+    let high = if right == total { 1.0 } else { ((centre + spread) / scale).min(1.0) };
+    [low, high]
 }
 
 impl RobotReport {
