@@ -120,3 +120,100 @@ fn content(path: &Path) -> Result<Option<String>, Error> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::run::samples;
+
+    fn after(generations: u64) -> Checkpoint {
+        let mut known_bodies = KnownBodies::default();
+        (0..generations).for_each(|n| assert!(known_bodies.insert([n as u8; 16])));
+        let run = RunFile { generations, ..samples::run(&[("a", 1.5), ("b", -0.25)]) };
+        Checkpoint {
+            run,
+            totals: Totals { evaluations: 20 * generations, ..Totals::default() },
+            known_bodies,
+        }
+    }
+
+    /// What is read, and whether there was a warning.
+    fn read_quietly(folder: &Path) -> (Option<Checkpoint>, bool) {
+        let mut warned = false;
+        let found = read(folder, |text| warned = text.contains("checkpoint.json")).unwrap();
+        (found, warned)
+    }
+
+    #[test]
+    fn the_newest_checkpoint_is_read_and_the_one_before_is_kept() {
+        let folder = tempfile::tempdir().unwrap();
+        let folder = folder.path();
+        assert_eq!(read_quietly(folder), (None, false));
+        for generations in 1..4 {
+            write(folder, &after(generations)).unwrap();
+            assert_eq!(read_quietly(folder), (Some(after(generations)), false));
+        }
+        assert_eq!(read_one(&folder.join(NAMES[1])).unwrap(), Some(after(2)));
+    }
+
+    #[test]
+    fn a_broken_newest_one_is_passed_over_and_never_pushes_the_good_one_out() {
+        let folder = tempfile::tempdir().unwrap();
+        let folder = folder.path();
+        write(folder, &after(1)).unwrap();
+        write(folder, &after(2)).unwrap();
+        let newest = folder.join(NAMES[0]);
+        let whole = std::fs::read(&newest).unwrap();
+        for at in [0, 63, 64, 65, whole.len() / 2, whole.len() - 3] {
+            let mut broken = whole.clone();
+            broken[at] ^= 0x10;
+            std::fs::write(&newest, &broken).unwrap();
+            assert_eq!(read_quietly(folder), (Some(after(1)), true), "byte {at}");
+            std::fs::write(&newest, &whole[..at]).unwrap();
+            assert_eq!(read_quietly(folder), (Some(after(1)), true), "cut at {at}");
+        }
+        // Two bad writes in a row.
+        write(folder, &after(3)).unwrap();
+        assert_eq!(read_one(&folder.join(NAMES[1])).unwrap(), Some(after(1)));
+        std::fs::write(&newest, b"").unwrap();
+        assert_eq!(read_quietly(folder), (Some(after(1)), true));
+    }
+
+    #[test]
+    fn a_write_that_fails_leaves_a_good_checkpoint() {
+        let folder = tempfile::tempdir().unwrap();
+        let folder = folder.path();
+        write(folder, &after(1)).unwrap();
+        std::fs::rename(folder.join(NAMES[0]), folder.join(NAMES[1])).unwrap();
+        // A folder is in the way of the newest.
+        std::fs::create_dir(folder.join(NAMES[0])).unwrap();
+        assert!(write(folder, &after(2)).is_err());
+        assert_eq!(read_one(&folder.join(NAMES[1])).unwrap(), Some(after(1)));
+        assert_eq!(std::fs::read_dir(folder).unwrap().count(), 2, "nothing half-written is left");
+    }
+
+    #[test]
+    fn two_broken_ones_are_an_error_that_says_what_to_do() {
+        let folder = tempfile::tempdir().unwrap();
+        let folder = folder.path();
+        NAMES.iter().for_each(|name| std::fs::write(folder.join(name), "x").unwrap());
+        let error = read(folder, |_| ()).unwrap_err();
+        assert_eq!(error.kind, crate::run::ErrorKind::Input);
+        assert!(
+            error.message.contains("checksum") && error.hint.is_some_and(|hint| hint.contains("--force"))
+        );
+    }
+
+    #[test]
+    fn known_bodies_survive_their_text_form_and_other_texts_are_refused() {
+        let known = after(5).known_bodies;
+        let text = String::from(known.clone());
+        assert_eq!(text.len(), 5 * 32);
+        assert_eq!(KnownBodies::try_from(text.clone()), Ok(known));
+        assert_eq!(KnownBodies::try_from(String::new()), Ok(KnownBodies::default()));
+        for wrong in [&text[1..], "g0000000000000000000000000000000", "\u{e9}0000000000000000000000000000000"]
+        {
+            assert!(KnownBodies::try_from(wrong.to_string()).is_err(), "{wrong}");
+        }
+    }
+}

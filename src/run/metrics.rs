@@ -100,3 +100,72 @@ impl Metrics {
         self.file.flush().map_err(|error| Error::writing(&self.path, &error))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::qd::Archive;
+
+    fn lines(folder: &Path) -> Vec<String> {
+        let text = std::fs::read_to_string(folder.join("metrics.csv")).unwrap();
+        assert!(text.ends_with('\n'));
+        text.lines().map(str::to_string).collect()
+    }
+
+    fn write(folder: &Path, from: u64, to: u64, evaluations: u64) {
+        let mut metrics = Metrics::open(folder, from).unwrap();
+        let stats = Archive::<()>::new().stats(90, 0.0);
+        let totals = Totals { evaluations, ..Totals::default() };
+        (from..to).for_each(|generation| metrics.write(generation, &stats, &totals).unwrap());
+        metrics.flush().unwrap();
+    }
+
+    #[test]
+    fn every_line_has_a_field_per_column_and_none_for_what_there_is_not() {
+        let folder = tempfile::tempdir().unwrap();
+        write(folder.path(), 0, 2, 7);
+        let lines = lines(folder.path());
+        let columns = HEADER.split(',').count();
+        assert!(lines.len() == 3 && lines.iter().all(|line| line.split(',').count() == columns), "{lines:?}");
+        assert_eq!(lines[1], "0,0,0,0,0,,,7,0,0,0,0,0,0,0.000");
+    }
+
+    #[test]
+    fn lines_after_the_resumed_generation_are_dropped_and_written_anew() {
+        let folder = tempfile::tempdir().unwrap();
+        write(folder.path(), 0, 5, 1);
+        write(folder.path(), 3, 6, 2);
+        let evaluations: Vec<String> = lines(folder.path())[1..]
+            .iter()
+            .map(|line| line.split(',').nth(7).unwrap().to_string())
+            .collect();
+        assert_eq!(evaluations, ["1", "1", "1", "2", "2", "2"]);
+    }
+
+    #[test]
+    fn a_line_cut_short_is_dropped_even_if_its_number_is_right() {
+        let folder = tempfile::tempdir().unwrap();
+        write(folder.path(), 0, 3, 1);
+        let path = folder.path().join("metrics.csv");
+        let text = std::fs::read_to_string(&path).unwrap();
+        std::fs::write(&path, &text[..text.len() - 4]).unwrap();
+        assert_eq!(
+            {
+                write(folder.path(), 3, 3, 1);
+                lines(folder.path()).len()
+            },
+            3
+        );
+    }
+
+    #[test]
+    fn a_new_run_begins_a_new_file() {
+        let folder = tempfile::tempdir().unwrap();
+        write(folder.path(), 0, 3, 1);
+        write(folder.path(), 0, 0, 1);
+        assert_eq!(lines(folder.path()), [HEADER]);
+        std::fs::remove_file(folder.path().join("metrics.csv")).unwrap();
+        write(folder.path(), 4, 5, 1);
+        assert_eq!(lines(folder.path()).len(), 2, "a lost file is no reason not to go on");
+    }
+}

@@ -15,6 +15,8 @@ pub mod replay;
 pub mod report;
 mod resume;
 pub mod robots;
+#[cfg(test)]
+mod samples;
 pub mod signals;
 pub mod simulate;
 mod toml_text;

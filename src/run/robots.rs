@@ -92,3 +92,60 @@ fn by_id<'a>(robots: &[&'a Robot], id: &str) -> Result<&'a Robot, Error> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::run::samples;
+
+    fn run() -> RunFile {
+        samples::run(&[("aa10", 1.0), ("ab20", 3.0), ("b300", 2.0), ("b3ff", 3.0), ("c400", -1.0)])
+    }
+
+    fn selected(text: &str, seed: u64) -> Result<Vec<String>, Error> {
+        let run = run();
+        let robots = Selection::from_str(text).unwrap().of(&run, seed)?;
+        Ok(robots.into_iter().map(|robot| robot.id.clone()).collect())
+    }
+
+    #[test]
+    fn all_and_top_are_the_fittest_first_and_equally_fit_ones_in_the_order_of_their_cells() {
+        assert_eq!(selected("all", 1).unwrap(), ["ab20", "b3ff", "b300", "aa10", "c400"]);
+        assert_eq!(selected("top:2", 1).unwrap(), ["ab20", "b3ff"]);
+        assert_eq!(selected("top:99", 1).unwrap().len(), 5);
+    }
+
+    #[test]
+    fn random_ones_are_different_robots_fixed_by_the_seed() {
+        let drawn = selected("random:3", 7).unwrap();
+        assert_eq!(selected("random:3", 7).unwrap(), drawn);
+        assert!((0..20).any(|seed| selected("random:3", seed).unwrap() != drawn));
+        for seed in 0..20 {
+            let mut all = selected("random:9", seed).unwrap();
+            all.sort();
+            assert_eq!(all, ["aa10", "ab20", "b300", "b3ff", "c400"]);
+        }
+    }
+
+    #[test]
+    fn ids_are_found_by_unique_beginnings_in_the_order_given() {
+        assert_eq!(selected("c, aa,best,B3F", 1).unwrap(), ["c400", "aa10", "ab20", "b3ff"]);
+        let error = selected("aa,b3", 1).unwrap_err();
+        assert!(error.message.contains("2 robots") && error.message.contains("b3ff, b300"), "{error}");
+        assert!(error.hint.is_some());
+        for none in ["d", "aa100", "aa,,c", "aa 10"] {
+            let error = selected(none, 1).unwrap_err();
+            assert!(error.message.contains("no robot"), "{error}");
+            assert!(error.hint.is_some_and(|hint| hint.contains("ab20")), "the fittest are offered");
+        }
+    }
+
+    #[test]
+    fn words_that_select_nothing_are_refused() {
+        for wrong in ["top:0", "top:", "top:-1", "random:x", "random:0", "worst:3", "top:1:2"] {
+            assert!(Selection::from_str(wrong).is_err(), "{wrong}");
+        }
+        let empty = samples::run(&[]);
+        assert!(Selection::All.of(&empty, 1).unwrap_err().message.contains("empty"));
+    }
+}

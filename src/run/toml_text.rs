@@ -76,3 +76,91 @@ pub(super) fn set<T: Serialize + DeserializeOwned>(config: &T, assignment: &str)
         refuse(message)
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde::Deserialize;
+
+    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+    #[serde(deny_unknown_fields)]
+    struct Outer {
+        name: String,
+        #[serde(default)]
+        inner: Inner,
+    }
+
+    #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+    #[serde(deny_unknown_fields, default)]
+    struct Inner {
+        count: u8,
+        list: Vec<f64>,
+        maybe: Option<i64>,
+    }
+
+    fn toml_error(text: &str) -> String {
+        read::<Outer>(text, Format::Toml, "own.toml").unwrap_err().message
+    }
+
+    fn json_error(text: &str) -> String {
+        read::<Outer>(text, Format::Json, "own.json").unwrap_err().message
+    }
+
+    #[test]
+    fn what_is_wrong_in_toml_is_said_with_file_line_and_key() {
+        let error = toml_error("name = 'a'\n\n[inner]\ncount = 'x'\n");
+        assert!(error.starts_with("own.toml:4: inner.count: ") && error.contains("expected u8"), "{error}");
+        let error = toml_error("name = 'a'\n[inner]\nlist = [1.0,\n 2.0,\n 'x']\n");
+        assert!(error.starts_with("own.toml:5: inner.list[2]: "), "{error}");
+        let error = toml_error("name = 'a'\n[inner]\ncont = 1\n");
+        assert!(
+            error.starts_with("own.toml:3: ") && error.contains("cont") && error.contains("count"),
+            "{error}"
+        );
+        assert!(toml_error("name = 'a'\n[inner]\ncount = 256\n").starts_with("own.toml:3: inner.count: "));
+        assert!(toml_error("name = 'a'\nname = = 3\n").starts_with("own.toml:2: "));
+        assert!(toml_error("").contains("name"));
+    }
+
+    #[test]
+    fn what_is_wrong_in_json_is_said_with_file_line_and_key() {
+        let error = json_error("{\"name\": \"a\",\n\"inner\": {\n\"count\": -1}}");
+        assert!(error.starts_with("own.json:3: inner.count: ") && error.contains("expected u8"), "{error}");
+        assert!(!error.contains("column"), "the place is said once: {error}");
+        let error = json_error("{\"name\": \"a\",\n\"inner\": {\"list\": [1, null]}}");
+        assert!(error.starts_with("own.json:2: inner.list[1]: "), "{error}");
+        assert!(json_error("{\"name\": \"a\"}\n}").starts_with("own.json:2: "));
+        assert!(json_error("{\"name\": \"a\"").starts_with("own.json:1: "));
+        assert!(json_error("{\"nam\": \"a\"}").contains("nam"));
+    }
+
+    #[test]
+    fn nesting_without_end_is_refused_and_no_stack_overflow() {
+        let deep = 200_000;
+        assert!(json_error(&format!("{{\"name\": {}", "[".repeat(deep))).contains("own.json"));
+        assert!(toml_error(&format!("name = {}", "[".repeat(deep))).contains("own.toml"));
+        assert!(toml_error(&format!("name = {}", "{a=".repeat(deep))).contains("own.toml"));
+        assert!(toml_error(&format!("{}b = 1", "a.".repeat(deep))).contains("own.toml"));
+    }
+
+    #[test]
+    fn one_key_is_set_and_the_others_stay() {
+        let outer = Outer { name: "a".to_string(), inner: Inner { count: 3, ..Inner::default() } };
+        let set = |assignment: &str| set(&outer, assignment);
+        assert_eq!(set("inner.count=4").unwrap().inner.count, 4);
+        assert_eq!(set(" inner.count = 4 ").unwrap().inner.count, 4);
+        assert_eq!(set("inner.list=[1.5, 2]").unwrap().inner.list, [1.5, 2.0]);
+        assert_eq!(set("inner.list=['x']").unwrap_err().kind, crate::run::ErrorKind::Usage);
+        // A key that is not there yet, and text with or without quotes.
+        assert_eq!(set("inner.maybe=-5").unwrap().inner.maybe, Some(-5));
+        assert_eq!(set("name=b c").unwrap().name, "b c");
+        assert_eq!(set("name=\"b=c\"").unwrap().name, "b=c");
+        assert_eq!(set("name=b").unwrap().inner, outer.inner);
+        for wrong in
+            ["inner.count", "inner.count=x", "inner.count=-1", "inner.cont=1", "name.x=1", "=1", "", "inner="]
+        {
+            let error = set(wrong).unwrap_err();
+            assert!(error.message.starts_with(&format!("--set {wrong}: ")), "{}", error.message);
+        }
+    }
+}

@@ -121,3 +121,108 @@ pub fn record(
     }
     recording
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::task::protocol::Life;
+
+    const STEPS: u32 = 12;
+
+    fn protocol() -> Protocol {
+        Protocol { life: Life::Fresh, control_steps: STEPS, ..Protocol::default() }
+    }
+
+    fn body() -> Body {
+        "4663/4005/3305".parse().unwrap()
+    }
+
+    /// An image of one brightness but for a pixel over the empty middle.
+    fn image(brightness: f64, middle: f64) -> Grid<f64> {
+        Grid::from_fn(3, 4, |r, c| if (r, c) == (1, 1) { middle } else { brightness })
+    }
+
+    #[test]
+    fn a_displacement_is_the_way_of_the_centre_of_mass_in_voxel_lengths() {
+        let (physics, protocol) = (Physics::default(), protocol());
+        let lattice = Lattice::new(&body(), &physics);
+        let mut rollout = Rollout::new(&lattice, &physics, &protocol);
+        let mut way = Vec::new();
+        let start = rollout.world.centre_of_mass()[0];
+        let first = rollout.show(&image(1.0, 0.0), |world| way.push(world.centre_of_mass()[0])).unwrap();
+        assert_eq!(way.len(), STEPS as usize);
+        assert!((first - 10.0 * (way[STEPS as usize - 1] - start)).abs() < 1e-12 && first != 0.0);
+        // It lives on from there; after a reset, from the beginning.
+        assert_ne!(rollout.show(&image(1.0, 0.0), |_| ()).unwrap(), first);
+        rollout.reset();
+        assert_eq!(rollout.show(&image(1.0, 0.0), |_| ()).unwrap(), first);
+        assert_eq!(fresh_life(&lattice, &physics, &protocol, &image(1.0, 0.0)), Ok(first));
+    }
+
+    #[test]
+    fn images_are_the_same_to_sensors_if_they_differ_elsewhere_only() {
+        let images = [image(0.0, 0.0), image(0.5, 0.0), image(0.0, 1.0), image(0.5, 0.7), image(0.25, 0.0)];
+        let views: Vec<&Grid<f64>> = images.iter().collect();
+        assert_eq!(same_to_sensors(&body(), &views), [0, 1, 0, 1, 4]);
+        let blind: Body = "4113/4001/3301".parse().unwrap();
+        assert_eq!(same_to_sensors(&blind, &views), [0; 5]);
+        assert!(same_to_sensors(&blind, &[]).is_empty());
+        // Lives under images that are the same to the sensors are the same life.
+        let (physics, protocol) = (Physics::default(), protocol());
+        let lattice = Lattice::new(&body(), &physics);
+        let live = |image| fresh_life(&lattice, &physics, &protocol, image).unwrap();
+        assert_eq!(live(&images[1]), live(&images[3]));
+        assert_ne!(live(&images[0]), live(&images[1]));
+    }
+
+    fn recorded(fresh: bool, physics: &Physics) -> Recording {
+        let images = [("dark".to_string(), image(0.0, 0.0)), ("bright".to_string(), image(1.0, 0.0))];
+        record("r", &body(), physics, &protocol(), fresh, &images)
+    }
+
+    #[test]
+    fn a_continuous_life_is_recorded_as_one_with_a_frame_per_control_step() {
+        let physics = Physics::default();
+        let recording = recorded(false, &physics);
+        let steps = STEPS as usize;
+        assert_eq!(recording.frames.len(), 1 + 2 * steps);
+        let begin: Vec<usize> = recording.phases.iter().map(|phase| phase.first_frame).collect();
+        assert_eq!((begin, recording.unstable), (vec![0, steps], false));
+        assert_eq!(recording.phases[1].label, "bright");
+        assert_eq!((recording.voxels.len(), recording.cycle), (9, 50));
+        for (phase, end) in recording.phases.iter().zip([steps, 2 * steps]) {
+            let way = recording.frames[end].centre[0] - recording.frames[phase.first_frame].centre[0];
+            assert!((phase.displacement - way).abs() < 1e-9, "{} {way}", phase.displacement);
+        }
+        // y counts from the ground, on which it stands; x from its left edge; a voxel is 1.
+        let points = &recording.frames[0].points;
+        let least = |axis: usize| points.iter().map(|p| p[axis]).fold(f64::INFINITY, f64::min);
+        assert!(least(0).abs() < 1e-9 && least(1).abs() < 1e-9, "{} {}", least(0), least(1));
+        let [top_left, _, bottom_right, _] = recording.voxels[0].corners;
+        let side = points[bottom_right][0] - points[top_left][0];
+        assert!((side - 1.0).abs() < 1e-9 && points[top_left][1] > points[bottom_right][1]);
+    }
+
+    #[test]
+    fn a_fresh_life_jumps_back_to_the_start_for_every_image() {
+        let physics = Physics::default();
+        let (fresh, continuous) = (recorded(true, &physics), recorded(false, &physics));
+        let steps = STEPS as usize;
+        assert_eq!(fresh.frames.len(), 2 * (1 + steps));
+        assert_eq!(fresh.phases[1].first_frame, 1 + steps);
+        assert_eq!(fresh.frames[1 + steps], fresh.frames[0]);
+        assert_eq!(fresh.frames[..1 + steps], continuous.frames[..1 + steps]);
+        let lattice = Lattice::new(&body(), &physics);
+        let alone = fresh_life(&lattice, &physics, &protocol(), &image(1.0, 0.0)).unwrap();
+        assert_eq!(fresh.phases[1].displacement, alone);
+    }
+
+    #[test]
+    fn an_unstable_life_is_recorded_up_to_its_end() {
+        let physics = Physics { blow_up_extent: 0.12, ..Physics::default() };
+        let recording = recorded(true, &physics);
+        assert!(recording.unstable && recording.phases.len() == 1);
+        assert!((1..=STEPS as usize).contains(&recording.frames.len()), "{}", recording.frames.len());
+        assert!(recording.phases[0].displacement.is_finite());
+    }
+}
