@@ -2,10 +2,13 @@
 
 mod args;
 
+use crate::base::lanes::InstructionSet;
 use crate::run::data::catalogue::Catalogue;
 use crate::run::data::fetch::{FetchOptions, fetch};
 use crate::run::folder::IfExists;
-use crate::run::{Config, Error, config, data, eval, evolve, folder, gallery, replay, signals, simulate};
+use crate::run::{
+    Config, Error, bench, config, data, eval, evolve, folder, gallery, replay, signals, simulate,
+};
 use crate::task::dataset::{Dataset, Split};
 use crate::task::files::places;
 use crate::view::console::Console;
@@ -43,7 +46,20 @@ pub fn run(cli: Cli, console: &Console) -> Result<(), Error> {
             console.text(&String::from_utf8_lossy(&text));
             Ok(())
         }
-        Command::Man => {
+        Command::Bench { all } => {
+            let sets: Vec<InstructionSet> = match all {
+                true => InstructionSet::ALL.into_iter().filter(|set| set.is_available()).collect(),
+                false => vec![InstructionSet::in_use()],
+            };
+            summary::speeds(console, &bench::table(&sets));
+            Ok(())
+        }
+        Command::Man { out: Some(out) } => {
+            let written =
+                std::fs::create_dir_all(&out).and_then(|()| clap_mangen::generate_to(Cli::command(), &out));
+            written.map_err(|error| Error::writing(&out, &error))
+        }
+        Command::Man { out: None } => {
             let mut text = Vec::new();
             let page = clap_mangen::Man::new(Cli::command()).render(&mut text);
             page.map_err(|error| Error::other(error.to_string()))?;
@@ -113,14 +129,15 @@ fn run_eval(args: EvalArgs, console: &Console) -> Result<(), Error> {
 }
 
 fn run_replay(args: ReplayArgs, console: &Console) -> Result<(), Error> {
-    let ReplayArgs { robot, archive, images, dataset, data, format, out, width, open } = args;
+    let ReplayArgs { robot, archive, images, dataset, data, format, out, width, every, open } = args;
     let folder = pictures::folder(archive.as_deref(), &robot)?;
     let replay = replay::replay(&replay::Options { robot, archive, images, data, dataset })?;
     let wanted = match &out {
         Some(path) => pictures::Wanted::named(path, &format)?,
         None => pictures::Wanted::beside(&folder, &replay.name, &format),
     };
-    let made = pictures::make(console, &replay, &pictures::Wanted { width, ..wanted })?;
+    let made =
+        pictures::make(console, &replay, &pictures::Wanted { width, every: usize::from(every), ..wanted })?;
     match made.last().filter(|_| open) {
         Some(path) => open::that(path).map_err(|error| Error::other(format!("cannot open it: {error}"))),
         None => Ok(()),

@@ -2,8 +2,9 @@
 
 use clap::Parser;
 use morphcog::cli::{self, Cli};
+use morphcog::run::ErrorKind;
 use morphcog::view::console::{Console, Mode};
-use std::io::ErrorKind;
+use std::io;
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
@@ -16,7 +17,13 @@ fn main() -> ExitCode {
         Ok(()) if console.has_lost_results() => ExitCode::FAILURE,
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            console.error(&error, error.hint.as_deref());
+            // To stop is what the user asked for, and no error.
+            if error.kind == ErrorKind::Stopped {
+                let next = error.hint.as_ref().map_or(String::new(), |hint| format!("; {hint}"));
+                console.info(&format!("{}{next}", error.message));
+            } else {
+                console.error(&error, error.hint.as_deref());
+            }
             ExitCode::from(error.kind.exit_code())
         }
     }
@@ -25,7 +32,7 @@ fn main() -> ExitCode {
 /// Help, the version, or what is wrong with the command line.
 fn say(help: &clap::Error) -> ExitCode {
     match help.print() {
-        Err(error) if error.kind() != ErrorKind::BrokenPipe => {
+        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
             Console::new(Mode::Human).error(&error, None);
             ExitCode::FAILURE
         }

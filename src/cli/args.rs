@@ -108,9 +108,22 @@ Examples:
         /// The shell.
         shell: clap_complete::Shell,
     },
-    /// The man page.
-    #[command(after_help = "Example:\n  morphcog man > morphcog.1 && man ./morphcog.1")]
-    Man,
+    /// The man pages.
+    #[command(
+        after_help = "Examples:\n  morphcog man > morphcog.1 && man ./morphcog.1\n  morphcog man --out ~/.local/share/man/man1"
+    )]
+    Man {
+        /// Folder for the pages of all commands (default: the page of morphcog itself, to standard output).
+        #[arg(short, long, value_name = "DIR")]
+        out: Option<PathBuf>,
+    },
+    /// How fast this machine simulates.
+    #[command(after_help = "Examples:\n  morphcog bench\n  morphcog bench --all")]
+    Bench {
+        /// Every instruction set of this machine, not only the one in use.
+        #[arg(long)]
+        all: bool,
+    },
 }
 
 #[derive(Debug, Args)]
@@ -204,6 +217,9 @@ pub(super) struct ReplayArgs {
     /// Width of GIF and PNG in pixels.
     #[arg(long, default_value_t = 480)]
     pub(super) width: u32,
+    /// Control steps from one frame of the GIF to the next: 2 is the robot's own time, more is faster and a smaller file.
+    #[arg(long, default_value_t = 2, value_parser = clap::value_parser!(u16).range(1..=500))]
+    pub(super) every: u16,
     /// Open the result.
     #[arg(long)]
     pub(super) open: bool,

@@ -31,6 +31,9 @@ pub struct Speed {
     pub control_steps: f64,
 }
 
+/// Material by row and column.
+type Pattern = dyn Fn(usize, usize) -> Material;
+
 /// Bodies of every kind that differ in cost. Their voxels are a fixed pattern, so that figures of different machines and
 /// versions can be compared.
 pub fn specimens() -> Vec<Specimen> {
@@ -41,8 +44,8 @@ pub fn specimens() -> Vec<Specimen> {
         2 => MuscleAntiphase,
         _ => SensorShrink,
     };
-    let soft = |r: usize, c: usize| if (r / 3 + c / 3) % 2 == 0 { Soft } else { active(r, c) };
-    let kinds: [(&'static str, Box<dyn Fn(usize, usize) -> Material>); 5] = [
+    let soft = |r: usize, c: usize| if (r / 3 + c / 3).is_multiple_of(2) { Soft } else { active(r, c) };
+    let kinds: [(&'static str, Box<Pattern>); 5] = [
         ("full, soft and active", Box::new(soft)),
         (
             "half, soft and active",
@@ -56,7 +59,7 @@ pub fn specimens() -> Vec<Specimen> {
             Box::new(move |r, c| if matches!((r % 4, c % 4), (1, 2) | (2, 1)) { Empty } else { soft(r, c) }),
         ),
     ];
-    let specimen = |(name, material): (&'static str, Box<dyn Fn(usize, usize) -> Material>)| {
+    let specimen = |(name, material): (&'static str, Box<Pattern>)| {
         Body::new(Grid::from_fn(14, 14, material)).ok().map(|body| Specimen { name, body })
     };
     kinds.into_iter().filter_map(specimen).collect()
@@ -74,7 +77,7 @@ pub fn measure(specimen: &Specimen, set: InstructionSet, repetitions: usize) -> 
     let lattice = Lattice::new(&specimen.body, &physics);
     let start = Start { column: 493, row: physics.ground_row };
     let mut world = World::new(&lattice, &physics, start).with_instructions(set);
-    let stimulus = |r: usize, c: usize| if (r + c) % 3 == 0 { 1.0 } else { 0.0 };
+    let stimulus = |r: usize, c: usize| if (r + c).is_multiple_of(3) { 1.0 } else { 0.0 };
     world.set_stimulus(&Grid::from_fn(specimen.body.height(), specimen.body.width(), stimulus));
     let mut live = |steps: u32| {
         let begin = Instant::now();
@@ -97,6 +100,16 @@ pub fn measure(specimen: &Specimen, set: InstructionSet, repetitions: usize) -> 
         microseconds: 1e6 * median / f64::from(physics.substeps),
         control_steps: 1.0 / median,
     }
+}
+
+/// Repetitions in a table: about a second per body.
+const REPETITIONS: usize = 101;
+
+/// All specimens on some instruction sets, one after the other.
+pub fn table(sets: &[InstructionSet]) -> Vec<Speed> {
+    let measured =
+        |set: &InstructionSet| specimens().iter().map(|s| measure(s, *set, REPETITIONS)).collect::<Vec<_>>();
+    sets.iter().flat_map(measured).collect()
 }
 
 #[cfg(test)]

@@ -181,6 +181,13 @@ impl RobotReport {
     }
 }
 
+impl RobotReport {
+    /// The report in short: its figures.
+    pub fn without_displacements(&self) -> Self {
+        RobotReport { displacements: Vec::new(), ..self.clone() }
+    }
+}
+
 impl EvalFile {
     pub(super) fn new(
         run: &RunFile,

@@ -1,6 +1,7 @@
 //! Text in pictures: a small bitmap font, 5 × 7 dots a letter, drawn in `font.txt`.
 //!
-//! `font.txt` holds bands of eight lines: the letters, six columns apart, then their seven rows of dots.
+//! `font.txt` holds bands of eight lines: the letters, six columns apart, then their seven rows of dots. Letters of
+//! [`DESCENDERS`] stand [`DESCENT`] dots lower.
 
 use super::colour::Colour;
 use super::scene::Primitive;
@@ -11,6 +12,11 @@ use std::sync::LazyLock;
 pub const ADVANCE: f64 = 6.0;
 /// Dots of a letter's height.
 pub const HEIGHT: f64 = 7.0;
+
+/// Letters that reach below the line.
+const DESCENDERS: &str = "gpqy";
+/// By how many dots.
+const DESCENT: f64 = 2.0;
 
 type Glyph = [[bool; 5]; 7];
 
@@ -39,6 +45,7 @@ pub fn text(text: &str, [x, y]: [f64; 2], dot: f64, colour: Colour) -> Vec<Primi
     let mut out = Vec::new();
     for (k, letter) in text.chars().enumerate().filter(|(_, c)| *c != ' ') {
         let Some(glyph) = GLYPHS.get(&letter).or_else(|| GLYPHS.get(&'\u{fffd}')) else { continue };
+        let y = if DESCENDERS.contains(letter) { y + DESCENT * dot } else { y };
         for (r, row) in glyph.iter().enumerate() {
             let mut c = 0;
             while c < row.len() {

@@ -48,6 +48,8 @@ pub struct Wanted {
     pub files: Vec<(Format, PathBuf)>,
     /// Width of GIF and PNG, pixels.
     pub width: u32,
+    /// Control steps from one frame of the GIF to the next.
+    pub every: usize,
 }
 
 const WIDTH: u32 = 480;
@@ -56,7 +58,7 @@ impl Wanted {
     /// `replay-<name>.<format>` in a folder.
     pub fn beside(folder: &Path, name: &str, formats: &[Format]) -> Self {
         let file = |&format: &Format| (format, folder.join(format!("replay-{name}.{format}")));
-        Wanted { files: formats.iter().map(file).collect(), width: WIDTH }
+        Wanted { files: formats.iter().map(file).collect(), width: WIDTH, every: EVERY }
     }
 
     /// A file whose ending says the format; without an ending, one file for each of `formats`.
@@ -77,7 +79,7 @@ impl Wanted {
                 vec![(format, path.to_path_buf())]
             }
         };
-        Ok(Wanted { files, width: WIDTH })
+        Ok(Wanted { files, width: WIDTH, every: EVERY })
     }
 }
 
@@ -109,7 +111,11 @@ pub fn make(console: &Console, replay: &Replay, wanted: &Wanted) -> Result<Vec<P
     for (format, path) in &wanted.files {
         match format {
             Format::Gif => {
-                let options = gif::GifOptions { width: wanted.width, ..gif::GifOptions::default() };
+                let options = gif::GifOptions {
+                    width: wanted.width,
+                    every: wanted.every,
+                    ..gif::GifOptions::default()
+                };
                 gif::write(path, recording, &options).map_err(failed)?;
             }
             Format::Html => html::write(path, recording, &title, &replay.about).map_err(failed)?,
@@ -144,7 +150,7 @@ pub fn make(console: &Console, replay: &Replay, wanted: &Wanted) -> Result<Vec<P
 
 /// Columns and rows of the view in the terminal: what fits the smallest usual one.
 const VIEW: (usize, usize) = (78, 22);
-/// Control steps between two pictures; at [`FRAME`] each that is the robot's own time.
+/// Control steps between two pictures, if nobody says; at [`FRAME`] each that is the robot's own time.
 const EVERY: usize = 2;
 const FRAME: Duration = Duration::from_millis(40);
 

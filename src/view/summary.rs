@@ -2,12 +2,13 @@
 
 use super::console::{Console, Mode};
 use super::progress::duration;
+use crate::run::bench::Speed;
 use crate::run::data::Found;
 use crate::run::data::fetch::{Fetched, Outcome};
 use crate::run::evolve::Finished;
 use crate::run::folder::RUN_JSON;
 use crate::run::gallery::Published;
-use crate::run::report::EvalFile;
+use crate::run::report::{EvalFile, RobotReport};
 use std::path::Path;
 
 /// Robots shown after an evolution.
@@ -85,6 +86,14 @@ pub fn evaluation(console: &Console, report: &EvalFile, out: &Path) {
     if report.robots.is_empty() {
         return console.warning("no robot was evaluated");
     }
+    if console.mode() == Mode::Json {
+        let done = serde_json::json!({
+            "file": out.display().to_string(), "stopped": report.stopped, "images": report.images.len(),
+            "means": report.means, "baselines": report.baselines,
+            "robots": report.robots.iter().map(RobotReport::without_displacements).collect::<Vec<_>>(),
+        });
+        return console.event("evaluated", &done);
+    }
     let classes: Vec<u8> = report.robots[0].per_class.keys().copied().collect();
     let names: Vec<String> = classes.iter().map(|class| format!("% of {class}")).collect();
     let mut headers = vec!["robot", "task", "fitness", "accuracy %", "95 % interval", "balanced %"];
@@ -141,6 +150,26 @@ pub fn evaluation(console: &Console, report: &EvalFile, out: &Path) {
         report.threshold
     ));
     console.line(&format!("wrote {} and {}", out.display(), out.with_extension("csv").display()));
+}
+
+/// How fast this machine simulates.
+pub fn speeds(console: &Console, speeds: &[Speed]) {
+    if console.mode() == Mode::Json {
+        return speeds.iter().for_each(|speed| console.event("speed", speed));
+    }
+    let rows = speeds.iter().map(|speed| {
+        let (micros, steps) = (format!("{:.2}", speed.microseconds), format!("{:.0}", speed.control_steps));
+        vec![
+            speed.body.to_string(),
+            speed.voxels.to_string(),
+            speed.instruction_set.to_string(),
+            micros,
+            steps,
+        ]
+    });
+    let headers =
+        ["body", "voxels", "instruction set", "µs per substep", "control steps per second and core"];
+    console.table(&headers, &rows.collect::<Vec<_>>());
 }
 
 /// The published robots.
