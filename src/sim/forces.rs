@@ -8,13 +8,13 @@
 //! A spring of stiffness k and rest length ρ, of length d₀ at the start of the substep, pulls with k(1 − ρ/d)w when
 //! its vector w has length d. With t = d²/d₀² − 1 that is
 //!
-//!   k(1 − ρ/d₀) + k(ρ/d₀)·(1 − 1/√(1 + t)) = `initial` + `change`·(1 − 1/√(1 + t)).
+//!   k(1 − ρ/d₀) + k(ρ/d₀)·(1 − 1/√(1 + t)) = `initial` + (k − `initial`)·(1 − 1/√(1 + t)).
 //!
 //! Within a substep t is small, and [`shrink`] is a short series: neither root nor division.
 
-use super::lattice::{FAMILIES, Lattice};
+use super::lattice::FAMILIES;
 use super::state::{X, Y};
-use crate::base::lanes::{BLOCK, Buffer, Lanes, each};
+use crate::base::lanes::{BLOCK, Lanes, each};
 
 /// Greatest |t| for the series: the terms left out are then below 3.5e-12, and 5e-14 at half of it. Springs beyond it
 /// (well below one in 1000) are computed with root and division.
@@ -27,7 +27,10 @@ pub(super) const SERIES: [f64; 5] = [1.0 / 2.0, -3.0 / 8.0, 5.0 / 16.0, -35.0 / 
 #[inline(always)]
 fn series<L: Lanes>(t: L) -> L {
     let [c0, c1, c2, c3, c4] = each!(i in [0, 1, 2, 3, 4] => L::splat(SERIES[i]));
-    c4.mul_add(t, c3).mul_add(t, c2).mul_add(t, c1).mul_add(t, c0)
+    // In the order with the shortest chain: the processor's window spans little more than one block's springs.
+    let square = t * t;
+    let high = c4.mul_add(square, c3.mul_add(t, c2));
+    high.mul_add(square, c1.mul_add(t, c0))
 }
 
 /// The greatest of four |t|.
@@ -58,9 +61,7 @@ pub(super) type Wide = [f64; BLOCK];
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
 pub(super) struct Springs {
-    /// 1/d₀² and what follows from it, see the module \[1/s²\].
-    inverse_square: [Wide; FAMILIES],
-    change: [Wide; FAMILIES],
+    /// See the module \[1/s²\].
     initial: [Wide; FAMILIES],
     /// 1/d₀. Within a control step the next substep's is found from it by the same series; the first substep of
     /// each control step starts from 0, which is out of the series' range, and so from root and division: a
@@ -75,8 +76,6 @@ impl Springs {
     pub fn blocks(stiffness: &[f64], mass: f64) -> Vec<Self> {
         let zeros = [[0.0; BLOCK]; FAMILIES];
         let block = |of: &[f64]| Springs {
-            inverse_square: zeros,
-            change: zeros,
             initial: zeros,
             inverse_length: zeros,
             stiffness: std::array::from_fn(|f| std::array::from_fn(|i| of[f * BLOCK + i] / mass)),
@@ -87,7 +86,6 @@ impl Springs {
     /// Forgets the lengths of the last substep.
     pub fn forget(&mut self) {
         self.inverse_length = [[0.0; BLOCK]; FAMILIES];
-        self.inverse_square = self.inverse_length;
     }
 
     /// Sets this substep's rest lengths, a small part (`gain`) of the way from the present lengths to the goals
@@ -95,13 +93,9 @@ impl Springs {
     #[inline(always)]
     pub fn servo<L: Lanes>(&mut self, lane: usize, square: [L; 4], goal: [L; 4], gain: f64) -> [L; 4] {
         let (one, gain) = (L::splat(1.0), L::splat(gain));
-        let t = each!(i in [0, 1, 2, 3] => {
-            square[i].mul_add(L::load(&self.inverse_square[i], lane), L::splat(-1.0))
-        });
-        let mut inverse = each!(i in [0, 1, 2, 3] => {
-            let before = L::load(&self.inverse_length[i], lane);
-            (before * t[i]).mul_sub_from(series(t[i]), before)
-        });
+        let before = each!(i in [0, 1, 2, 3] => L::load(&self.inverse_length[i], lane));
+        let t = each!(i in [0, 1, 2, 3] => square[i].mul_add(before[i] * before[i], L::splat(-1.0)));
+        let mut inverse = each!(i in [0, 1, 2, 3] => (before[i] * t[i]).mul_sub_from(series(t[i]), before[i]));
         let range = L::splat(SERIES_RANGE);
         if L::any(greatest(&t).above(range)) {
             for i in 0..4 {
@@ -115,9 +109,7 @@ impl Springs {
             let stiffness = L::load(&self.stiffness[i], lane);
             let initial = (stiffness * gain) * goal[i].mul_sub_from(inverse[i], one);
             inverse[i].store(&mut self.inverse_length[i], lane);
-            (inverse[i] * inverse[i]).store(&mut self.inverse_square[i], lane);
             initial.store(&mut self.initial[i], lane);
-            (stiffness - initial).store(&mut self.change[i], lane);
             initial
         })
     }
@@ -125,11 +117,11 @@ impl Springs {
     /// The pull of each spring per vector at some later squared lengths in the same substep.
     #[inline(always)]
     pub fn pull<L: Lanes>(&self, lane: usize, square: [L; 4]) -> [L; 4] {
-        let t = each!(i in [0, 1, 2, 3] => {
-            square[i].mul_add(L::load(&self.inverse_square[i], lane), L::splat(-1.0))
-        });
-        let change = each!(i in [0, 1, 2, 3] => L::load(&self.change[i], lane));
-        shrink(t, change, each!(i in [0, 1, 2, 3] => L::load(&self.initial[i], lane)))
+        let inverse = each!(i in [0, 1, 2, 3] => L::load(&self.inverse_length[i], lane));
+        let initial = each!(i in [0, 1, 2, 3] => L::load(&self.initial[i], lane));
+        let change = each!(i in [0, 1, 2, 3] => L::load(&self.stiffness[i], lane) - initial[i]);
+        let t = each!(i in [0, 1, 2, 3] => square[i].mul_add(inverse[i] * inverse[i], L::splat(-1.0)));
+        shrink(t, change, initial)
     }
 }
 
@@ -153,41 +145,24 @@ pub(super) fn squares<L: Lanes>([x, y]: &Vectors<L>) -> [L; FAMILIES] {
     each!(i in [0, 1, 2, 3] => x[i].mul_add(x[i], y[i] * y[i]))
 }
 
-/// What the springs of slots gone by do to points below: by slot, with a margin of zeros in front.
-#[derive(Clone, Debug)]
-pub(super) struct Passing {
-    below: [Buffer; 2],
-    margin: usize,
-    pitch: usize,
-}
-
-/// A sweep's hold on what passes, and what the springs of the block before do to points at their right: in their
-/// own row, and in the row below.
+/// Sums on the points of what their own springs and those of slots gone by do to them. What slots gone by do to
+/// points below waits in `passing`, by point; zeros in the first row.
 pub(super) struct Gather<'a, L> {
     passing: [&'a mut [f64]; 2],
-    margin: usize,
     pitch: usize,
+    /// What the springs of the block before do to points at their right: in their own row, and in the row below.
     beside: [L; 2],
     below: [L; 2],
 }
 
-impl Passing {
-    pub fn new(lattice: &Lattice) -> Self {
-        let margin = lattice.pitch.next_multiple_of(BLOCK);
-        let zeros = || Buffer::zeros(margin + lattice.slots);
-        Passing { below: [zeros(), zeros()], margin, pitch: lattice.pitch }
-    }
-
+impl<'a, L: Lanes> Gather<'a, L> {
     /// For a run of blocks.
     #[inline(always)]
-    pub fn gather<L: Lanes>(&mut self) -> Gather<'_, L> {
-        let [x, y] = &mut self.below;
+    pub fn new(passing: [&'a mut [f64]; 2], pitch: usize) -> Self {
         let nothing = [L::splat(0.0); 2];
-        Gather { passing: [x, y], margin: self.margin, pitch: self.pitch, beside: nothing, below: nothing }
+        Gather { passing, pitch, beside: nothing, below: nothing }
     }
-}
 
-impl<L: Lanes> Gather<'_, L> {
     /// The sum of all springs' pulls on the points at the next slot, given how the slot's own pull.
     #[inline(always)]
     pub fn next(&mut self, pull: [L; FAMILIES], vectors: &Vectors<L>, slot: usize) -> [L; 2] {
@@ -199,8 +174,8 @@ impl<L: Lanes> Gather<'_, L> {
             let beside = rising - horizontal;
             let below = (vertical + rising) + falling.after(self.below[axis]);
             // In this order: of a narrow body the row above is in the same block.
-            below.store(self.passing[axis], self.margin + slot);
-            let above = L::load(self.passing[axis], self.margin + slot - self.pitch);
+            below.store(self.passing[axis], slot + self.pitch);
+            let above = L::load(self.passing[axis], slot);
             let sum = (own - above) + beside.after(self.beside[axis]);
             self.beside[axis] = beside;
             self.below[axis] = falling;

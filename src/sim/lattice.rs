@@ -39,7 +39,7 @@ pub(super) struct ExtraSpring {
 /// A horizontal side that active voxels actuate.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ActuatedSide {
-    /// Index into the goals: a slot of the horizontal family, or (number of slots + index of the extra spring).
+    /// Index into the goals: a slot of the horizontal family, or (`len` + index of the extra spring).
     pub goal: usize,
     /// The one or two active voxels that share it, as indices into [`Lattice::active`].
     pub voxels: [usize; 2],
@@ -109,9 +109,9 @@ impl Lattice {
         let mut lattice = Lattice {
             pitch,
             slots,
-            // Springs reach from a slot to the one below and to the right; the last lanes look as far.
+            // Sweeps look from a slot to the row below, one block ahead.
             len: slots + pitch + BLOCK,
-            present: Buffer::zeros(slots),
+            present: Buffer::zeros(slots + pitch + BLOCK),
             runs: Vec::new(),
             lengths: [length, length, diagonal, diagonal],
             stiffness: Buffer::zeros(slots * FAMILIES),
@@ -249,7 +249,7 @@ impl Lattice {
             self.active.push(ActiveVoxel { material, place });
             for ends in [[tl, tr], [bl, br]] {
                 let extra = self.extra_springs.iter().position(|spring| spring.ends == ends);
-                let goal = extra.map_or(ends[0], |index| self.slots + index);
+                let goal = extra.map_or(ends[0], |index| self.len + index);
                 owner.entry(goal).or_insert([voxel, voxel])[1] = voxel;
             }
         }

@@ -4,10 +4,10 @@
 //! `shrink(t)` again: mostly neither root nor division.
 
 use super::extra::Extra;
-use super::forces::{Passing, SERIES, SERIES_RANGE, shrink, squares, vectors};
+use super::forces::{Gather, SERIES, SERIES_RANGE, shrink, squares, vectors};
 use super::lattice::{FAMILIES, Lattice};
 use super::params::Physics;
-use super::state::{Pair, X, Y};
+use super::state::{Pair, X, Y, slices_mut};
 use crate::base::lanes::{BLOCK, Lanes, each};
 
 /// Limits of springs of one length at rest.
@@ -43,7 +43,7 @@ pub(super) fn limit_all<L: Lanes>(
     lattice: &Lattice,
     physics: &Physics,
     position: &mut Pair,
-    passing: &mut Passing,
+    passing: &mut Pair,
     extra: Option<&mut Extra>,
 ) {
     let limits = lattice.lengths.map(|length| Limits::new(length, physics.limit_low, physics.limit_high));
@@ -53,10 +53,10 @@ pub(super) fn limit_all<L: Lanes>(
         None => None,
     };
     let (exists, _) = lattice.exists.as_chunks::<{ FAMILIES * BLOCK }>();
-    let [x, y] = &mut *position;
-    let [x, y] = [&mut x[..], &mut y[..]];
+    let [x, y] = slices_mut(position, lattice.len);
+    let [passing_x, passing_y] = slices_mut(passing, lattice.len);
     for run in &lattice.runs {
-        let mut gather = passing.gather::<L>();
+        let mut gather = Gather::<L>::new([passing_x, passing_y], lattice.pitch);
         for slot in run.clone().step_by(L::WIDTH) {
             let vectors = vectors([x, y], slot, lattice.pitch);
             let exists = &exists[slot / BLOCK];

@@ -1,7 +1,7 @@
 //! [`State`]: what a life must remember; and the scratch memory of a substep, which is never kept.
 
 use super::extra::Extra;
-use super::forces::{Passing, Springs};
+use super::forces::Springs;
 use super::lattice::Lattice;
 use super::neighbours::Neighbours;
 use super::params::Physics;
@@ -17,6 +17,18 @@ pub(super) const Y: usize = 1;
 
 /// Both coordinates of something for all slots.
 pub(super) type Pair = [Buffer; 2];
+
+/// Its coordinates, cut to a length that the compiler then knows to be the same for many.
+#[inline(always)]
+pub(super) fn slices([x, y]: &Pair, len: usize) -> [&[f64]; 2] {
+    [&x[..len], &y[..len]]
+}
+
+/// The same, to be written.
+#[inline(always)]
+pub(super) fn slices_mut([x, y]: &mut Pair, len: usize) -> [&mut [f64]; 2] {
+    [&mut x[..len], &mut y[..len]]
+}
 
 /// A pair of zeros.
 pub(super) fn pair(len: usize) -> Pair {
@@ -60,8 +72,8 @@ pub(super) struct Scratch {
     pub goals: Buffer,
     /// By blocks.
     pub springs: Vec<Springs>,
-    /// For each of the two stages of a sweep.
-    pub passing: [Passing; 2],
+    /// See [`Gather`](super::forces::Gather).
+    pub passing: Pair,
     /// Contact force per point [mass·wu/s²].
     pub contact: Pair,
     /// Acceleration by all but springs and the stages' differences in drag.
@@ -69,8 +81,8 @@ pub(super) struct Scratch {
     /// Positions of the second, then of the third stage; and of the fourth.
     pub near: Pair,
     pub far: Pair,
-    /// Acceleration of the second stage; the first's and twice the second's.
-    pub second: Pair,
+    /// Acceleration of the latest stage; and sum of the stages' so far, weighted as in the new velocity.
+    pub latest: Pair,
     pub sum: Pair,
     pub extra: Option<Extra>,
     /// Which contacts are possible.
@@ -80,19 +92,19 @@ pub(super) struct Scratch {
 impl Scratch {
     pub fn new(lattice: &Lattice, physics: &Physics, state: &State) -> Self {
         let zeros = || pair(lattice.len);
-        let horizontal = (0..lattice.slots).map(|_| physics.cell_size);
+        let horizontal = (0..lattice.len).map(|_| physics.cell_size);
         let extra = lattice.extra_springs.iter().map(|spring| spring.length);
         let padding = [physics.cell_size; super::extra::GROUP];
         Scratch {
             goals: horizontal.chain(extra).chain(padding).collect(),
             springs: Springs::blocks(&lattice.stiffness, physics.mass),
-            passing: [Passing::new(lattice), Passing::new(lattice)],
+            passing: zeros(),
             contact: zeros(),
             load: zeros(),
             // Slots without a point stay where they are parked.
             near: state.position.clone(),
             far: state.position.clone(),
-            second: zeros(),
+            latest: zeros(),
             sum: zeros(),
             extra: Extra::new(lattice, physics.mass),
             neighbours: Neighbours::default(),

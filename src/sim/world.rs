@@ -178,7 +178,7 @@ fn substep<L: Lanes>(
     add_contacts(lattice, physics, start_column, state, &scratch.neighbours, &mut scratch.contact);
     // Contacts see true velocities: position now less position then. The integrator knows its own.
     integrate::<L>(lattice, physics, state, scratch);
-    let Scratch { passing: [passing, _], extra, .. } = scratch;
+    let Scratch { passing, extra, .. } = scratch;
     limit_all::<L>(lattice, physics, &mut state.position, passing, extra.as_mut());
     limit_rigid(lattice, physics, &mut state.position);
 
