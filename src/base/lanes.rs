@@ -1,9 +1,9 @@
 //! Wide lanes: numerical loops written once, compiled for every instruction set, chosen when the program runs.
 //!
 //! A loop is a [`Kernel`] that is generic over [`Lanes`], a few `f64` side by side. [`dispatch`] runs it with the
-//! widest lanes that the machine has. Every operation of [`Lanes`] is IEEE 754's, exactly rounded, also the fused
-//! multiply-add (which the narrowest machines get from the C library, slowly), and lanes never mix but in
-//! [`Lanes::after`]. So every instruction set gives the same bits (`tests/lanes_agree.rs`).
+//! widest lanes that the machine has. Every operation of [`Lanes`] is one of IEEE 754's, exactly rounded and never
+//! fused with another, and lanes never mix but in [`Lanes::after`]. So every instruction set gives the same bits
+//! (`tests/lanes_agree.rs`).
 
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Sub};
 use std::sync::OnceLock;
@@ -23,7 +23,7 @@ pub const BLOCK: usize = 8;
 pub enum InstructionSet {
     /// What every machine of the target has (SSE2 on x86-64, NEON on AArch64).
     Baseline,
-    /// x86-64 with 256-bit vectors and fused multiply-add.
+    /// x86-64 with 256-bit vectors.
     Avx2,
     /// x86-64 with 512-bit vectors.
     Avx512,
@@ -48,7 +48,7 @@ impl InstructionSet {
         match self {
             InstructionSet::Baseline => true,
             #[cfg(target_arch = "x86_64")]
-            InstructionSet::Avx2 => is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma"),
+            InstructionSet::Avx2 => is_x86_feature_detected!("avx2"),
             #[cfg(target_arch = "x86_64")]
             InstructionSet::Avx512 => is_x86_feature_detected!("avx512f"),
             #[cfg(not(target_arch = "x86_64"))]
@@ -86,10 +86,17 @@ pub trait Lanes:
     fn load(from: &[f64], at: usize) -> Self;
     /// To `to[at..at + WIDTH]`; panics beyond the end.
     fn store(self, to: &mut [f64], at: usize);
-    /// self · factor + more, rounded once.
-    fn mul_add(self, factor: Self, more: Self) -> Self;
-    /// more − self · factor, rounded once.
-    fn mul_sub_from(self, factor: Self, more: Self) -> Self;
+    /// self · factor + more, the product and the sum rounded each: fusing them would be a little faster where there is
+    /// an instruction for it, and far slower where there is none, for it would have to be so everywhere.
+    #[inline(always)]
+    fn mul_add(self, factor: Self, more: Self) -> Self {
+        self * factor + more
+    }
+    /// more − self · factor, the product and the difference rounded each.
+    #[inline(always)]
+    fn mul_sub_from(self, factor: Self, more: Self) -> Self {
+        more - self * factor
+    }
     /// Square root.
     fn sqrt(self) -> Self;
     /// Absolute value.

@@ -86,7 +86,7 @@ impl Extra {
 
     /// Corrections of the springs beyond their limits, to be fed to the positions they come from.
     #[inline(always)]
-    pub fn limit<L: Lanes>(&mut self, lattice: &Lattice, physics: &Physics, position: &Pair) -> &Self {
+    pub fn limit<L: Lanes>(&mut self, lattice: &Lattice, physics: &Physics, position: &Pair) {
         self.fetch(lattice, position);
         let share = [L::splat(physics.limit_share / 2.0); 4];
         let limits = Limits::new(1.0, physics.limit_low, physics.limit_high);
@@ -97,7 +97,6 @@ impl Extra {
             });
             self.put(at, vector, shrink(t, share, [L::splat(0.0); 4]));
         }
-        self
     }
 
     /// The first spring of each of the lanes that do four springs each.

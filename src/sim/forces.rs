@@ -8,7 +8,7 @@
 //! A spring of stiffness k and rest length ρ, of length d₀ at the start of the substep, pulls with k(1 − ρ/d)w when
 //! its vector w has length d. With t = d²/d₀² − 1 that is
 //!
-//!   k(1 − ρ/d₀) + k(ρ/d₀)·(1 − 1/√(1 + t)) = `initial` + (k − `initial`)·(1 − 1/√(1 + t)).
+//!   k(1 − ρ/d₀) + k(ρ/d₀)·(1 − 1/√(1 + t)) = `initial` + `change`·(1 − 1/√(1 + t)).
 //!
 //! Within a substep t is small, and [`shrink`] is a short series: neither root nor division.
 
@@ -27,10 +27,7 @@ pub(super) const SERIES: [f64; 5] = [1.0 / 2.0, -3.0 / 8.0, 5.0 / 16.0, -35.0 / 
 #[inline(always)]
 fn series<L: Lanes>(t: L) -> L {
     let [c0, c1, c2, c3, c4] = each!(i in [0, 1, 2, 3, 4] => L::splat(SERIES[i]));
-    // In the order with the shortest chain: the processor's window spans little more than one block's springs.
-    let square = t * t;
-    let high = c4.mul_add(square, c3.mul_add(t, c2));
-    high.mul_add(square, c1.mul_add(t, c0))
+    c4.mul_add(t, c3).mul_add(t, c2).mul_add(t, c1).mul_add(t, c0)
 }
 
 /// The greatest of four |t|.
@@ -61,8 +58,10 @@ pub(super) type Wide = [f64; BLOCK];
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
 pub(super) struct Springs {
-    /// See the module \[1/s²\].
+    /// 1/d₀², and see the module \[1/s²\].
+    inverse_square: [Wide; FAMILIES],
     initial: [Wide; FAMILIES],
+    change: [Wide; FAMILIES],
     /// 1/d₀. Within a control step the next substep's is found from it by the same series; the first substep of
     /// each control step starts from 0, which is out of the series' range, and so from root and division: a
     /// life continued from its state is the same bits.
@@ -76,7 +75,9 @@ impl Springs {
     pub fn blocks(stiffness: &[f64], mass: f64) -> Vec<Self> {
         let zeros = [[0.0; BLOCK]; FAMILIES];
         let block = |of: &[f64]| Springs {
+            inverse_square: zeros,
             initial: zeros,
+            change: zeros,
             inverse_length: zeros,
             stiffness: std::array::from_fn(|f| std::array::from_fn(|i| of[f * BLOCK + i] / mass)),
         };
@@ -86,6 +87,7 @@ impl Springs {
     /// Forgets the lengths of the last substep.
     pub fn forget(&mut self) {
         self.inverse_length = [[0.0; BLOCK]; FAMILIES];
+        self.inverse_square = self.inverse_length;
     }
 
     /// Sets this substep's rest lengths, a small part (`gain`) of the way from the present lengths to the goals
@@ -94,8 +96,11 @@ impl Springs {
     pub fn servo<L: Lanes>(&mut self, lane: usize, square: [L; 4], goal: [L; 4], gain: f64) -> [L; 4] {
         let (one, gain) = (L::splat(1.0), L::splat(gain));
         let before = each!(i in [0, 1, 2, 3] => L::load(&self.inverse_length[i], lane));
-        let t = each!(i in [0, 1, 2, 3] => square[i].mul_add(before[i] * before[i], L::splat(-1.0)));
-        let mut inverse = each!(i in [0, 1, 2, 3] => (before[i] * t[i]).mul_sub_from(series(t[i]), before[i]));
+        let t = each!(i in [0, 1, 2, 3] => {
+            square[i].mul_add(L::load(&self.inverse_square[i], lane), L::splat(-1.0))
+        });
+        let mut inverse =
+            each!(i in [0, 1, 2, 3] => (before[i] * t[i]).mul_sub_from(series(t[i]), before[i]));
         let range = L::splat(SERIES_RANGE);
         if L::any(greatest(&t).above(range)) {
             for i in 0..4 {
@@ -109,7 +114,9 @@ impl Springs {
             let stiffness = L::load(&self.stiffness[i], lane);
             let initial = (stiffness * gain) * goal[i].mul_sub_from(inverse[i], one);
             inverse[i].store(&mut self.inverse_length[i], lane);
+            (inverse[i] * inverse[i]).store(&mut self.inverse_square[i], lane);
             initial.store(&mut self.initial[i], lane);
+            (stiffness - initial).store(&mut self.change[i], lane);
             initial
         })
     }
@@ -117,11 +124,11 @@ impl Springs {
     /// The pull of each spring per vector at some later squared lengths in the same substep.
     #[inline(always)]
     pub fn pull<L: Lanes>(&self, lane: usize, square: [L; 4]) -> [L; 4] {
-        let inverse = each!(i in [0, 1, 2, 3] => L::load(&self.inverse_length[i], lane));
-        let initial = each!(i in [0, 1, 2, 3] => L::load(&self.initial[i], lane));
-        let change = each!(i in [0, 1, 2, 3] => L::load(&self.stiffness[i], lane) - initial[i]);
-        let t = each!(i in [0, 1, 2, 3] => square[i].mul_add(inverse[i] * inverse[i], L::splat(-1.0)));
-        shrink(t, change, initial)
+        let t = each!(i in [0, 1, 2, 3] => {
+            square[i].mul_add(L::load(&self.inverse_square[i], lane), L::splat(-1.0))
+        });
+        let change = each!(i in [0, 1, 2, 3] => L::load(&self.change[i], lane));
+        shrink(t, change, each!(i in [0, 1, 2, 3] => L::load(&self.initial[i], lane)))
     }
 }
 

@@ -201,8 +201,8 @@ fn floor<L: Lanes>(physics: &Physics, y: L, acceleration: [L; 2], velocity: L) -
     }
     let mut lanes = Aligned([[0.0; BLOCK]; 4]);
     let values = [acceleration[X], acceleration[Y], y, velocity];
-    for i in 0..4 {
-        values[i].store(&mut lanes.0[i], 0);
+    for (value, lanes) in values.into_iter().zip(&mut lanes.0) {
+        value.store(lanes, 0);
     }
     add_floor(physics, L::WIDTH, &mut lanes.0);
     [L::load(&lanes.0[0], 0), L::load(&lanes.0[1], 0)]

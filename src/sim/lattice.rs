@@ -5,6 +5,7 @@
 //! the lattice. So each of the four spring families (sides and diagonals) joins points a fixed offset apart and
 //! is a plain sweep over arrays; the few springs that end in an extra are kept in a list.
 
+use super::limits::in_rounds;
 use super::params::Physics;
 use crate::base::Grid;
 use crate::base::lanes::{BLOCK, Buffer};
@@ -129,7 +130,7 @@ impl Lattice {
         lattice.add_points();
         lattice.add_springs(body, physics);
         lattice.add_actuation(body);
-        lattice.order_rigid_links();
+        lattice.rigid_links = in_rounds(&lattice.rigid_links, lattice.len);
         lattice.find_runs();
         lattice
     }
@@ -199,21 +200,6 @@ impl Lattice {
             Some(_) => {}
             None => self.extra_springs.push(ExtraSpring { ends, length: self.lengths[family], stiffness }),
         }
-    }
-
-    /// Brings links that have nothing to do with each other together, so that the processor can work on several at
-    /// once. Links that share a point stay in their order, so results are the same bits.
-    fn order_rigid_links(&mut self) {
-        let mut taken = vec![0; self.len];
-        let mut rounds: Vec<(usize, [usize; 2])> = Vec::with_capacity(self.rigid_links.len());
-        for &ends in &self.rigid_links {
-            // After every earlier link at either end.
-            let round = 1 + taken[ends[0]].max(taken[ends[1]]);
-            ends.iter().for_each(|&end| taken[end] = round);
-            rounds.push((round, ends));
-        }
-        rounds.sort_by_key(|(round, _)| *round);
-        self.rigid_links = rounds.into_iter().map(|(_, ends)| ends).collect();
     }
 
     fn find_runs(&mut self) {

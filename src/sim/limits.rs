@@ -44,14 +44,13 @@ pub(super) fn limit_all<L: Lanes>(
     physics: &Physics,
     position: &mut Pair,
     passing: &mut Pair,
-    extra: Option<&mut Extra>,
+    mut extra: Option<&mut Extra>,
 ) {
     let limits = lattice.lengths.map(|length| Limits::new(length, physics.limit_low, physics.limit_high));
     let share = L::splat(physics.limit_share / 2.0);
-    let extra = match extra {
-        Some(extra) => Some(extra.limit::<L>(lattice, physics, position)),
-        None => None,
-    };
+    if let Some(extra) = &mut extra {
+        extra.limit::<L>(lattice, physics, position);
+    }
     let (exists, _) = lattice.exists.as_chunks::<{ FAMILIES * BLOCK }>();
     let [x, y] = slices_mut(position, lattice.len);
     let [passing_x, passing_y] = slices_mut(passing, lattice.len);
@@ -92,6 +91,21 @@ fn corrections<L: Lanes>(
     shrink(t, [share; FAMILIES], [zero; FAMILIES])
 }
 
+/// Brings links of the rigid pass that have nothing to do with each other together, so that the processor can work on
+/// several at once. Links that share a point stay in their order: results are the same bits.
+pub(super) fn in_rounds(links: &[[usize; 2]], points: usize) -> Vec<[usize; 2]> {
+    let mut taken = vec![0; points];
+    let mut round = |&[a, b]: &[usize; 2]| {
+        // After every earlier link at either end.
+        let round = 1 + taken[a].max(taken[b]);
+        (taken[a], taken[b]) = (round, round);
+        (round, [a, b])
+    };
+    let mut rounds: Vec<_> = links.iter().map(&mut round).collect();
+    rounds.sort_by_key(|(round, _)| *round);
+    rounds.into_iter().map(|(_, link)| link).collect()
+}
+
 /// The sides of rigid voxels, one after the other on current positions; a side shared by two comes up twice.
 pub(super) fn limit_rigid(lattice: &Lattice, physics: &Physics, [x, y]: &mut Pair) {
     let limits = Limits::new(physics.cell_size, physics.rigid_limit_low, physics.rigid_limit_high);
@@ -121,4 +135,22 @@ fn shrink_one(t: f64) -> f64 {
     let [c0, c1, c2, c3, c4] = SERIES;
     let square = t * t;
     ((c0 + c1 * t) + square * ((c2 + c3 * t) + square * c4)) * t
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rounds_hold_every_link_and_keep_the_order_of_those_that_share_a_point() {
+        let links: Vec<[usize; 2]> = (0..60).map(|i| [i * 7 % 13, 13 + i * 5 % 11]).collect();
+        let rounds = in_rounds(&links, 24);
+        assert_ne!(rounds, links);
+        for point in 0..24 {
+            let at = |links: &[[usize; 2]]| {
+                links.iter().filter(|link| link.contains(&point)).copied().collect::<Vec<_>>()
+            };
+            assert_eq!(at(&rounds), at(&links));
+        }
+    }
 }

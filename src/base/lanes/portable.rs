@@ -64,16 +64,6 @@ impl Lanes for Few {
     }
 
     #[inline(always)]
-    fn mul_add(self, factor: Self, more: Self) -> Self {
-        Few(each!(i in [0, 1, 2, 3] => self.0[i].mul_add(factor.0[i], more.0[i])))
-    }
-
-    #[inline(always)]
-    fn mul_sub_from(self, factor: Self, more: Self) -> Self {
-        Few(each!(i in [0, 1, 2, 3] => (-self.0[i]).mul_add(factor.0[i], more.0[i])))
-    }
-
-    #[inline(always)]
     fn sqrt(self) -> Self {
         Few(each!(i in [0, 1, 2, 3] => self.0[i].sqrt()))
     }

@@ -6,17 +6,17 @@ use super::{Kernel, Lanes};
 use std::arch::x86_64::*;
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Sub};
 
-#[target_feature(enable = "avx512f,avx2,fma")]
+#[target_feature(enable = "avx512f,avx2")]
 pub(super) fn avx512<K: Kernel>(kernel: K) -> K::Output {
     kernel.run::<Eight>()
 }
 
-#[target_feature(enable = "avx2,fma")]
+#[target_feature(enable = "avx2")]
 pub(super) fn avx2<K: Kernel>(kernel: K) -> K::Output {
     kernel.run::<Four>()
 }
 
-/// Four lanes (AVX2 and FMA).
+/// Four lanes (AVX2).
 #[derive(Clone, Copy)]
 pub(super) struct Four(__m256d);
 
@@ -86,18 +86,6 @@ impl Lanes for Four {
         let to = &mut to[at..at + 4];
         // SAFETY: room for four values was just found to be there; stores need no alignment.
         unsafe { _mm256_storeu_pd(to.as_mut_ptr(), self.0) }
-    }
-
-    #[inline(always)]
-    fn mul_add(self, factor: Self, more: Self) -> Self {
-        // SAFETY: the processor has the instruction (see the module).
-        unsafe { Four(_mm256_fmadd_pd(self.0, factor.0, more.0)) }
-    }
-
-    #[inline(always)]
-    fn mul_sub_from(self, factor: Self, more: Self) -> Self {
-        // SAFETY: the processor has the instruction (see the module).
-        unsafe { Four(_mm256_fnmadd_pd(self.0, factor.0, more.0)) }
     }
 
     #[inline(always)]
@@ -175,18 +163,6 @@ impl Lanes for Eight {
         let to = &mut to[at..at + 8];
         // SAFETY: room for eight values was just found to be there; stores need no alignment.
         unsafe { _mm512_storeu_pd(to.as_mut_ptr(), self.0) }
-    }
-
-    #[inline(always)]
-    fn mul_add(self, factor: Self, more: Self) -> Self {
-        // SAFETY: the processor has the instruction (see the module).
-        unsafe { Eight(_mm512_fmadd_pd(self.0, factor.0, more.0)) }
-    }
-
-    #[inline(always)]
-    fn mul_sub_from(self, factor: Self, more: Self) -> Self {
-        // SAFETY: the processor has the instruction (see the module).
-        unsafe { Eight(_mm512_fnmadd_pd(self.0, factor.0, more.0)) }
     }
 
     #[inline(always)]
