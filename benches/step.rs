@@ -6,6 +6,9 @@ use morphcog::base::lanes::InstructionSet;
 use morphcog::body::{Body, Material};
 use morphcog::sim::{Lattice, Physics, Start, World};
 
+/// A body as the material of each of its 14 × 14 voxels.
+type Kind = fn(usize, usize) -> Material;
+
 /// A full soft body with sensors in the middle and muscles as feet.
 fn soft(row: usize, column: usize) -> Material {
     match (row, column) {
@@ -67,7 +70,7 @@ fn steps(criterion: &mut Criterion) {
         let square = (row as f64 - 6.5).powi(2) + (column as f64 - 6.5).powi(2);
         if (9.0..30.0).contains(&square) { 1.0 } else { 0.0 }
     });
-    let bodies: [(&str, fn(usize, usize) -> Material); 5] =
+    let bodies: [(&str, Kind); 5] =
         [("soft", soft), ("ring", ring), ("small", small), ("rigid", rigid), ("cornered", cornered)];
     for (name, material) in bodies {
         let body = Body::new(Grid::from_fn(14, 14, material)).expect("the body is valid");

@@ -494,6 +494,7 @@ fn a_broken_run_json_is_refused_saying_how() {
     let edge = whole.find("\"edges\":[[").unwrap() + "\"edges\":[".len();
     let cyclic = format!("{}[4,4,1.0],{}", &whole[..edge], &whole[edge..]);
     let elite = whole.lines().nth(1).unwrap();
+    let id = &sandbox.run_file("run").elites[0].id;
     for (content, word) in [
         (String::new(), "run.json"),
         (whole[..whole.len() / 2].to_string(), "run.json:"),
@@ -507,6 +508,11 @@ fn a_broken_run_json_is_refused_saying_how() {
         (replaced("\"cell\":[", "\"cell\":[999,"), "cell"),
         (replaced("\"gravity\":110.0", "\"gravity\":null"), "config.physics.gravity"),
         (replaced("\"body\":[[", "\"body\":[[9],["), "body"),
+        (replaced(&format!("\"id\":\"{id}\""), "\"id\":\"../../x\""), "its id"),
+        (replaced("\"voxels\":{\"muscle\":", "\"voxels\":{\"muscle\":1"), "voxel counts"),
+        (replaced("\"task\":\"0|1\"", "\"task\":\"0|2\""), "task"),
+        (replaced("\"label\":0", "\"label\":7"), "training_images"),
+        (replaced("\"possible_cells\":", "\"possible_cells\":1"), "dimensions"),
     ] {
         sandbox.write("bad/run.json", &content);
         for command in ["eval -n 2 --cycles 1 -a bad/run.json", "replay -a bad/run.json"] {

@@ -7,6 +7,7 @@ use crate::genome::Genome;
 use crate::qd::descriptor::possible_cells;
 use crate::qd::{Archive, ArchiveStats, DescriptorSpace, Elite};
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeSet;
 use std::path::Path;
 
 /// What `run.json` calls itself.
@@ -141,12 +142,29 @@ impl RunFile {
         if self.dimensions != Dimensions::of(&self.config)? {
             return Err(Error::input("dimensions: they are not those of the config".to_string()));
         }
+        let shown: BTreeSet<u8> = self.training_images.iter().map(|image| image.label).collect();
+        if shown != self.config.classes().into_iter().collect() {
+            let text = "training_images: their labels are not the classes of the config's task";
+            return Err(Error::input(text.to_string()));
+        }
         let space = self.space();
         for robot in &self.elites {
             let refuse = |what: &str| Err(Error::input(format!("elite {}: {what}", robot.id)));
             let (height, width) = (self.config.body.height, self.config.body.width);
             if (robot.body.height(), robot.body.width()) != (height, width) {
                 return refuse(&format!("its body is not {height} × {width} voxels, as the config says"));
+            }
+            if robot.genome.id() != robot.id {
+                return refuse("its id is not its genome's");
+            }
+            if robot.genome.body(height, width).as_ref() != Ok(&robot.body) {
+                return refuse("its body is not what its genome describes");
+            }
+            if robot.voxels != robot.body.counts() {
+                return refuse("its voxel counts are not its body's");
+            }
+            if !self.dimensions.tasks.contains(&robot.task) {
+                return refuse("there is no such task in this run");
             }
             if space.index(&robot.cell).is_none() {
                 return refuse("there is no such cell in the archive");

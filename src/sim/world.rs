@@ -104,6 +104,10 @@ impl<'a> World<'a> {
         let steps = ControlStep { lattice, physics, start_column: self.start.column, state, scratch };
         let outcome = dispatch(self.instructions, steps);
         outcome.map_err(|reason| Unstable { control_step, reason })?;
+        // What a substep leaves behind is looked at by the next; here, at the end, by nobody else.
+        if !self.centre_of_mass().iter().all(|coordinate| coordinate.is_finite()) {
+            return Err(Unstable { control_step, reason: UnstableReason::BlownUp });
+        }
         self.state.control_step += 1;
         Ok(())
     }

@@ -1,0 +1,113 @@
+use super::*;
+use crate::body::Material;
+use crate::sim::UnstableReason;
+use std::collections::BTreeSet;
+
+/// A sensor that expands at both ends: under a bright image it is wider than `Physics::blow_up_extent` here allows.
+fn body() -> Body {
+    let row = [Material::SensorExpand, Material::Soft, Material::SensorExpand];
+    Body::new(Grid::from_fn(1, 3, |_, column| row[column])).unwrap()
+}
+
+fn physics() -> Physics {
+    Physics { blow_up_extent: 0.115, ..Physics::default() }
+}
+
+/// Images by their three pixels.
+fn images(rows: &[[f64; 3]]) -> Vec<Grid<f64>> {
+    rows.iter().map(|row| Grid::from_fn(1, 3, |_, column| row[column])).collect()
+}
+
+/// The second and the fourth look the same to the sensors, and so do the first and the last.
+const CALM: [[f64; 3]; 5] =
+    [[0.4, 0.0, 0.3], [0.2, 0.5, 0.4], [0.1, 0.0, 0.4], [0.2, 0.9, 0.4], [0.4, 1.0, 0.3]];
+/// The third is too bright, and so is the last.
+const WILD: [[f64; 3]; 5] =
+    [[0.4, 0.0, 0.3], [0.2, 0.5, 0.4], [1.0, 0.0, 1.0], [0.2, 0.9, 0.4], [1.0, 0.7, 1.0]];
+
+fn run(
+    rows: &[[f64; 3]],
+    life: Life,
+    savings: Savings,
+    first_image: usize,
+    may_win: Box<MayWin>,
+) -> Evaluation {
+    let protocol = Protocol { life, control_steps: 8, ..Protocol::default() };
+    let body = body();
+    let job = Job { body: &body, first_image, may_win };
+    let mut evaluations = evaluate(&[job], &images(rows), &physics(), &protocol, savings);
+    assert_eq!(evaluations.len(), 1);
+    let evaluation = evaluations.remove(0);
+    let Evaluation { simulated, shared, stopped, .. } = evaluation;
+    assert_eq!(simulated + shared + stopped, rows.len() as u64, "{evaluation:?}");
+    assert!(savings.shared_lives || shared == 0, "{evaluation:?}");
+    evaluation
+}
+
+fn all_savings() -> impl Iterator<Item = Savings> {
+    (0..4).map(|mask| Savings { known_bodies: true, early_stop: mask & 1 > 0, shared_lives: mask & 2 > 0 })
+}
+
+#[test]
+fn every_image_is_simulated_shared_or_stopped_in_every_outcome() {
+    for (life, savings) in
+        [Life::Fresh, Life::Sequential].into_iter().flat_map(|l| all_savings().map(move |s| (l, s)))
+    {
+        for (rows, first_image) in [(&CALM, 0), (&CALM, 3), (&WILD, 0), (&WILD, 2), (&WILD, 4)] {
+            // After none, after some, never.
+            for patience in [0, 1, 2, 5] {
+                let may_win = move |known: &[Option<f64>]| known.iter().flatten().count() <= patience;
+                let evaluation = run(rows, life, savings, first_image, Box::new(may_win));
+                let is_stopped = evaluation.outcome == Outcome::Stopped;
+                assert!(!is_stopped || savings.early_stop && patience < 5, "{evaluation:?}");
+                assert_eq!(matches!(evaluation.outcome, Outcome::Walked(_)), rows == &CALM && !is_stopped);
+            }
+        }
+    }
+}
+
+#[test]
+fn the_outcome_is_the_same_with_each_saving_and_with_any_first_image() {
+    for life in [Life::Fresh, Life::Sequential] {
+        let none = Savings { known_bodies: false, early_stop: false, shared_lives: false };
+        let walked = run(&CALM, life, none, 0, Box::new(|_| true));
+        let Outcome::Walked(displacements) = &walked.outcome else { panic!("{walked:?}") };
+        assert!(displacements.len() == 5 && displacements.iter().any(|d| *d != 0.0));
+        assert_eq!(walked.simulated, 5);
+        for (savings, first_image) in
+            all_savings().flat_map(|savings| (0..5).map(move |first| (savings, first)))
+        {
+            let other = run(&CALM, life, savings, first_image, Box::new(|_| true));
+            assert_eq!(other.outcome, walked.outcome);
+            let lives = if savings.shared_lives && life == Life::Fresh { 3 } else { 5 };
+            assert_eq!((other.simulated, other.stopped), (lives, 0));
+            let wild = run(&WILD, life, savings, first_image, Box::new(|_| true));
+            let Outcome::Unstable(end) = wild.outcome else { panic!("{wild:?}") };
+            assert_eq!(end.reason, UnstableReason::BlownUp);
+        }
+    }
+}
+
+#[test]
+fn fresh_lives_begin_with_the_limiting_image_and_stop_when_nothing_can_be_won() {
+    // Image 3 is image 1's life, image 0 image 4's: with both known, nothing can be won any more.
+    let may_win = |known: &[Option<f64>]| {
+        assert!(known[3].is_some() && known[1] == known[3], "the limiting image comes first: {known:?}");
+        known[0].is_none()
+    };
+    let evaluation = run(&CALM, Life::Fresh, Savings::default(), 3, Box::new(may_win));
+    assert_eq!(evaluation, Evaluation { outcome: Outcome::Stopped, simulated: 2, shared: 2, stopped: 1 });
+}
+
+#[test]
+fn a_sequential_life_keeps_the_order_of_the_images() {
+    let asked = Mutex::new(BTreeSet::new());
+    let may_win = |known: &[Option<f64>]| {
+        let first = known.iter().map_while(|displacement| *displacement).count();
+        assert_eq!(known.iter().flatten().count(), first, "{known:?}");
+        asked.lock().unwrap().insert(first);
+        true
+    };
+    run(&CALM, Life::Sequential, Savings::default(), 3, Box::new(may_win));
+    assert_eq!(*asked.lock().unwrap(), BTreeSet::from([1, 2, 3, 4]));
+}
