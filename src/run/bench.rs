@@ -70,7 +70,7 @@ const STEPS: u32 = 50;
 /// Control steps lived before measuring: the robot has landed and walks.
 const WARM_UP: u32 = 50;
 
-/// Measures one body on one instruction set: the median of `repetitions` repetitions of [`STEPS`] control steps of one
+/// Measures one body on one instruction set: the median of `repetitions` repetitions of fifty control steps of one
 /// life.
 pub fn measure(specimen: &Specimen, set: InstructionSet, repetitions: usize) -> Speed {
     let physics = Physics::default();

@@ -1,7 +1,7 @@
 //! Text in pictures: a small bitmap font, 5 × 7 dots a letter, drawn in `font.txt`.
 //!
 //! `font.txt` holds bands of eight lines: the letters, six columns apart, then their seven rows of dots. Letters of
-//! [`DESCENDERS`] stand [`DESCENT`] dots lower.
+//! `DESCENDERS` stand `DESCENT` dots lower.
 
 use super::colour::Colour;
 use super::scene::Primitive;
