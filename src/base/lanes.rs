@@ -1,14 +1,16 @@
 //! Wide lanes: numerical loops written once, compiled for every instruction set, chosen when the program runs.
 //!
 //! A loop is a [`Kernel`] that is generic over [`Lanes`], a few `f64` side by side. [`dispatch`] runs it with the
-//! widest lanes that the machine has. Every operation of [`Lanes`] is one of IEEE 754's, exactly rounded and never
-//! fused with another, and lanes never mix but in [`Lanes::after`]. So every instruction set gives the same bits
-//! (`tests/lanes_agree.rs`).
+//! widest lanes that the machine has. Every operation of [`Lanes`] is one of IEEE 754's, exactly rounded (products and
+//! sums are fused where the loop says so, and nowhere else), and lanes never mix but in [`Lanes::after`]. So every
+//! instruction set gives the same bits (`tests/lanes_agree.rs`). On the few x86-64 machines that cannot fuse (before
+//! 2013, and some small ones since) it is worked out exactly, slowly.
 
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Sub};
 use std::sync::OnceLock;
 
 mod buffer;
+mod fused;
 mod portable;
 #[cfg(target_arch = "x86_64")]
 mod x86;
@@ -23,9 +25,9 @@ pub const BLOCK: usize = 8;
 pub enum InstructionSet {
     /// What every machine of the target has (SSE2 on x86-64, NEON on AArch64).
     Baseline,
-    /// x86-64 with 256-bit vectors.
+    /// x86-64 with 256-bit vectors (AVX2 and FMA).
     Avx2,
-    /// x86-64 with 512-bit vectors.
+    /// x86-64 with 512-bit vectors (AVX-512 F and DQ).
     Avx512,
 }
 
@@ -48,9 +50,13 @@ impl InstructionSet {
         match self {
             InstructionSet::Baseline => true,
             #[cfg(target_arch = "x86_64")]
-            InstructionSet::Avx2 => is_x86_feature_detected!("avx2"),
+            InstructionSet::Avx2 => is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma"),
             #[cfg(target_arch = "x86_64")]
-            InstructionSet::Avx512 => is_x86_feature_detected!("avx512f"),
+            InstructionSet::Avx512 => {
+                InstructionSet::Avx2.is_available()
+                    && is_x86_feature_detected!("avx512f")
+                    && is_x86_feature_detected!("avx512dq")
+            }
             #[cfg(not(target_arch = "x86_64"))]
             _ => false,
         }
@@ -86,23 +92,25 @@ pub trait Lanes:
     fn load(from: &[f64], at: usize) -> Self;
     /// To `to[at..at + WIDTH]`; panics beyond the end.
     fn store(self, to: &mut [f64], at: usize);
-    /// self · factor + more, the product and the sum rounded each: fusing them would be a little faster where there is
-    /// an instruction for it, and far slower where there is none, for it would have to be so everywhere.
-    #[inline(always)]
-    fn mul_add(self, factor: Self, more: Self) -> Self {
-        self * factor + more
-    }
-    /// more − self · factor, the product and the difference rounded each.
-    #[inline(always)]
-    fn mul_sub_from(self, factor: Self, more: Self) -> Self {
-        more - self * factor
-    }
+    /// self · factor + more, rounded once.
+    fn mul_add(self, factor: Self, more: Self) -> Self;
+    /// more − self · factor, rounded once.
+    fn mul_sub_from(self, factor: Self, more: Self) -> Self;
+    /// self · factor − less, rounded once.
+    fn mul_sub(self, factor: Self, less: Self) -> Self;
+    /// The bits that both have: with a number of all bits but the sign's, the absolute value; with 0, 0.
+    fn bits_and(self, other: Self) -> Self;
     /// Square root.
     fn sqrt(self) -> Self;
     /// Absolute value.
     fn abs(self) -> Self;
     /// self > other ? self : other (so `other` where one is no number).
     fn max(self, other: Self) -> Self;
+    /// The greater absolute value (`other`'s where self is no number).
+    #[inline(always)]
+    fn max_abs(self, other: Self) -> Self {
+        self.abs().max(other.abs())
+    }
     /// Lanes in which self > other (false where one is no number).
     fn above(self, other: Self) -> Self::Mask;
     /// Where the mask holds `self`, elsewhere `other`.

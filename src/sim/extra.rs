@@ -1,6 +1,6 @@
 //! Springs that end in an extra point, where two voxels touch only at a corner: few, and anywhere.
 
-use super::forces::{Springs, shrink};
+use super::forces::{Pulls, Springs, Watch, carefully};
 use super::lattice::{FAMILIES, Lattice};
 use super::limits::Limits;
 use super::params::Physics;
@@ -16,18 +16,19 @@ pub(super) const GROUP: usize = FAMILIES * BLOCK;
 pub(super) struct Extra {
     /// By groups.
     springs: Vec<Springs>,
+    pulls: Vec<Pulls>,
     /// 1/(length at rest)².
     inverse_rest_square: Buffer,
     /// Vectors of the springs at the positions last fetched, and what they do to their first ends.
     vector: Pair,
     change: Pair,
-    /// What acts on the points besides the lattice's springs, in the two stages of a sweep.
-    pub load: [Pair; 2],
+    /// What they do to the points in a stage.
+    pub load: Pair,
 }
 
 impl Extra {
     /// None for a body without such springs.
-    pub fn new(lattice: &Lattice, mass: f64) -> Option<Self> {
+    pub fn new(lattice: &Lattice, mass: f64, gain: f64) -> Option<Self> {
         let count = lattice.extra_springs.len().next_multiple_of(GROUP);
         let mut stiffness = Buffer::zeros(count);
         let mut inverse_rest_square = Buffer::filled(count, 1.0);
@@ -37,12 +38,13 @@ impl Extra {
         }
         let half = std::f64::consts::FRAC_1_SQRT_2;
         (count > 0).then(|| Extra {
-            springs: Springs::blocks(&stiffness, mass),
+            springs: Springs::blocks(&stiffness, mass, gain),
+            pulls: vec![Pulls::ZERO; count / GROUP],
             inverse_rest_square,
             // Beyond the last spring unit vectors: no springs, but of good length.
             vector: [Buffer::filled(count, half), Buffer::filled(count, half)],
             change: pair(count),
-            load: [pair(lattice.len), pair(lattice.len)],
+            load: pair(lattice.len),
         })
     }
 
@@ -56,46 +58,48 @@ impl Extra {
         feed(lattice, &self.change, to);
     }
 
-    /// Sets the rest lengths at the start of a substep, and the load of its first two stages.
+    /// Sets the rest lengths at the start of a substep, and the load of its first stage.
     #[inline(always)]
-    pub fn load_first_half<L: Lanes>(
-        &mut self,
-        lattice: &Lattice,
-        goals: &[f64],
-        gain: f64,
-        load: &Pair,
-        stages: [&Pair; 2],
-    ) {
-        self.fetch(lattice, stages[0]);
+    pub fn first_stage<L: Lanes>(&mut self, lattice: &Lattice, goals: &[f64], gain: f64, position: &Pair) {
+        self.fetch(lattice, position);
         for at in self.lanes::<L>() {
             let (vector, square) = self.squares::<L>(at);
             let goal = each!(i in [0, 1, 2, 3] => L::load(goals, at + i * BLOCK));
-            let pull = self.springs[at / GROUP].servo(at % GROUP, square, goal, gain);
+            let pulls = &mut self.pulls[at / GROUP];
+            let springs = &mut self.springs[at / GROUP];
+            let pull = springs.servo::<L, true>(pulls, at % GROUP, square, (goal, gain), &mut Watch::new());
             self.put(at, vector, pull);
         }
-        self.load_stage(lattice, load, 0);
-        self.load_later::<L>(lattice, load, stages[1], 1);
+        self.load_points(lattice);
     }
 
-    /// The load of its last two.
+    /// The load of a later stage.
     #[inline(always)]
-    pub fn load_second_half<L: Lanes>(&mut self, lattice: &Lattice, load: &Pair, stages: [&Pair; 2]) {
-        self.load_later::<L>(lattice, load, stages[0], 0);
-        self.load_later::<L>(lattice, load, stages[1], 1);
+    pub fn later_stage<L: Lanes>(&mut self, lattice: &Lattice, position: &Pair) {
+        self.fetch(lattice, position);
+        for at in self.lanes::<L>() {
+            let (vector, square) = self.squares::<L>(at);
+            let pull = self.pulls[at / GROUP].at::<L, true>(at % GROUP, square, None);
+            self.put(at, vector, pull);
+        }
+        self.load_points(lattice);
     }
 
     /// Corrections of the springs beyond their limits, to be fed to the positions they come from.
     #[inline(always)]
     pub fn limit<L: Lanes>(&mut self, lattice: &Lattice, physics: &Physics, position: &Pair) {
         self.fetch(lattice, position);
-        let share = [L::splat(physics.limit_share / 2.0); 4];
+        let share = L::splat(physics.limit_share / 2.0);
         let limits = Limits::new(1.0, physics.limit_low, physics.limit_high);
         for at in self.lanes::<L>() {
             let (vector, square) = self.squares::<L>(at);
-            let t = each!(i in [0, 1, 2, 3] => {
-                limits.excess(square[i] * L::load(&self.inverse_rest_square, at + i * BLOCK))
+            let all = L::splat(f64::from_bits(u64::MAX >> 1));
+            let pull = each!(i in [0, 1, 2, 3] => {
+                let square = square[i] * L::load(&self.inverse_rest_square, at + i * BLOCK);
+                let t = limits.excess(square).or_else(limits.beyond(square, all), L::splat(0.0));
+                share * carefully(t)
             });
-            self.put(at, vector, shrink(t, share, [L::splat(0.0); 4]));
+            self.put(at, vector, pull);
         }
     }
 
@@ -131,23 +135,12 @@ impl Extra {
         }
     }
 
-    #[inline(always)]
-    fn load_later<L: Lanes>(&mut self, lattice: &Lattice, load: &Pair, position: &Pair, stage: usize) {
-        self.fetch(lattice, position);
-        for at in self.lanes::<L>() {
-            let (vector, square) = self.squares::<L>(at);
-            let pull = self.springs[at / GROUP].pull(at % GROUP, square);
-            self.put(at, vector, pull);
-        }
-        self.load_stage(lattice, load, stage);
-    }
-
-    fn load_stage(&mut self, lattice: &Lattice, load: &Pair, stage: usize) {
-        for axis in [X, Y] {
-            self.load[stage][axis].copy_from_slice(&load[axis]);
+    fn load_points(&mut self, lattice: &Lattice) {
+        for spring in &lattice.extra_springs {
+            spring.ends.iter().for_each(|&end| (self.load[X][end], self.load[Y][end]) = (0.0, 0.0));
         }
         // Springs act on masses: their stiffness is already per mass.
-        feed(lattice, &self.change, &mut self.load[stage]);
+        feed(lattice, &self.change, &mut self.load);
     }
 }
 

@@ -10,18 +10,28 @@
 //!
 //!   k(1 − ρ/d₀) + k(ρ/d₀)·(1 − 1/√(1 + t)) = `initial` + `change`·(1 − 1/√(1 + t)).
 //!
-//! Within a substep t is small, and [`shrink`] is a short series: neither root nor division.
+//! Within a substep t is small, and a short series does: neither root nor division.
 
 use super::lattice::FAMILIES;
 use super::state::{X, Y};
 use crate::base::lanes::{BLOCK, Lanes, each};
 
-/// Greatest |t| for the series: the terms left out are then below 3.5e-12, and 5e-14 at half of it. Springs beyond it
-/// (well below one in 1000) are computed with root and division.
+/// Greatest |t| for the series. Springs beyond it (well below one in 1000) are computed with root and division.
 pub(super) const SERIES_RANGE: f64 = 1.0 / 64.0;
 
-/// (1 − 1/√(1 + t))/t up to t⁴: the binomial series.
-pub(super) const SERIES: [f64; 5] = [1.0 / 2.0, -3.0 / 8.0, 5.0 / 16.0, -35.0 / 128.0, 63.0 / 256.0];
+/// (1 − 1/√(1 + t))/t up to t⁴: the binomial series to t⁶ with its last two terms spread over the others as
+/// Chebyshev's polynomials prescribe. 1 − 1/√(1 + t) is then off by no more than 2e-13 anywhere in the range.
+pub(super) const SERIES: [f64; 5] = {
+    const SQUARE: f64 = SERIES_RANGE * SERIES_RANGE;
+    const SIXTH: f64 = -231.0 / 1024.0;
+    [
+        1.0 / 2.0,
+        -3.0 / 8.0 - SIXTH * SQUARE * SQUARE * 9.0 / 16.0,
+        5.0 / 16.0,
+        -35.0 / 128.0 + SIXTH * SQUARE * 3.0 / 2.0,
+        63.0 / 256.0,
+    ]
+};
 
 /// (1 − 1/√(1 + t))/t for |t| in the series' range.
 #[inline(always)]
@@ -30,56 +40,117 @@ fn series<L: Lanes>(t: L) -> L {
     c4.mul_add(t, c3).mul_add(t, c2).mul_add(t, c1).mul_add(t, c0)
 }
 
-/// The greatest of four |t|.
-#[inline(always)]
-fn greatest<L: Lanes>(t: &[L; 4]) -> L {
-    (t[0].abs().max(t[1].abs())).max(t[2].abs().max(t[3].abs()))
+/// What a sweep looks out for while it takes everything for regular. A branch in every block would cost more than the
+/// rare second sweep that treats each irregular spring and point as it must be.
+#[derive(Clone, Copy)]
+pub(super) struct Watch<L> {
+    stretch: L,
+    depth: L,
 }
 
-/// offset + factor·(1 − 1/√(1 + t)) by the series or, beyond its range, exactly: spring by spring.
-#[inline(always)]
-pub(super) fn shrink<L: Lanes>(t: [L; 4], factor: [L; 4], offset: [L; 4]) -> [L; 4] {
-    let mut out = each!(i in [0, 1, 2, 3] => (factor[i] * t[i]).mul_add(series(t[i]), offset[i]));
-    let range = L::splat(SERIES_RANGE);
-    if L::any(greatest(&t).above(range)) {
-        let one = L::splat(1.0);
-        for i in 0..4 {
-            let exact = factor[i].mul_add(one - one / (one + t[i]).sqrt(), offset[i]);
-            out[i] = exact.or_else(t[i].abs().above(range), out[i]);
-        }
+impl<L: Lanes> Watch<L> {
+    #[inline(always)]
+    pub fn new() -> Self {
+        Watch { stretch: L::splat(0.0), depth: L::splat(0.0) }
     }
-    out
+
+    /// Springs for which the series is to hold.
+    #[inline(always)]
+    pub fn springs(&mut self, t: &[L; 4]) {
+        let [first, second] = each!(i in [0, 2] => t[i].max_abs(t[i + 1]));
+        self.stretch = first.max_abs(second).max_abs(self.stretch);
+    }
+
+    /// Points that are to be above the floor plane.
+    #[inline(always)]
+    pub fn points(&mut self, y: L) {
+        self.depth = (L::splat(0.0) - y).max(self.depth);
+    }
+
+    /// Whether all was as it was taken to be.
+    #[inline(always)]
+    pub fn regular(self) -> bool {
+        let beyond = self.stretch.above(L::splat(SERIES_RANGE)) | self.depth.above(L::splat(0.0));
+        !L::any(beyond)
+    }
+}
+
+/// 1 − 1/√(1 + t) by the series.
+#[inline(always)]
+pub(super) fn briefly<L: Lanes>(t: L) -> L {
+    t * series(t)
+}
+
+/// 1 − 1/√(1 + t) by the series or, beyond its range, with root and division.
+#[inline(always)]
+pub(super) fn carefully<L: Lanes>(t: L) -> L {
+    let brief = briefly(t);
+    let beyond = t.abs().above(L::splat(SERIES_RANGE));
+    if !L::any(beyond) {
+        return brief;
+    }
+    let one = L::splat(1.0);
+    (one - one / (one + t).sqrt()).or_else(beyond, brief)
 }
 
 /// A number for each slot of a block.
 pub(super) type Wide = [f64; BLOCK];
 
-/// What a substep needs to know of four springs each of a block of slots.
+/// What is known of four springs each of a block of slots from one substep to the next.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
 pub(super) struct Springs {
+    /// 1/d₀ of the latest substep. Within a control step the next substep's is found from it by the series; the
+    /// first substep of each control step starts from 0, which is out of the series' range, and so from root and
+    /// division: a life continued from its state is the same bits.
+    inverse_length: [Wide; FAMILIES],
+    /// Stiffness per mass of a point, times the servo's gain \[1/s²\]; 0 where there is no spring.
+    driven: [Wide; FAMILIES],
+}
+
+/// What the later stages of a substep need to know of the springs of a block.
+#[derive(Clone, Copy, Debug)]
+#[repr(C, align(64))]
+pub(super) struct Pulls {
     /// 1/d₀², and see the module \[1/s²\].
     inverse_square: [Wide; FAMILIES],
     initial: [Wide; FAMILIES],
     change: [Wide; FAMILIES],
-    /// 1/d₀. Within a control step the next substep's is found from it by the same series; the first substep of
-    /// each control step starts from 0, which is out of the series' range, and so from root and division: a
-    /// life continued from its state is the same bits.
-    inverse_length: [Wide; FAMILIES],
-    /// Stiffness per mass of a point \[1/s²\]; 0 where there is no spring.
-    stiffness: [Wide; FAMILIES],
+}
+
+impl Pulls {
+    pub const ZERO: Pulls = {
+        let zeros = [[0.0; BLOCK]; FAMILIES];
+        Pulls { inverse_square: zeros, initial: zeros, change: zeros }
+    };
+
+    /// The pull of each spring per vector at some later squared lengths in the same substep.
+    #[inline(always)]
+    pub fn at<L: Lanes, const CAREFUL: bool>(
+        &self,
+        lane: usize,
+        square: [L; 4],
+        watch: Option<&mut Watch<L>>,
+    ) -> [L; 4] {
+        let t = each!(i in [0, 1, 2, 3] => {
+            square[i].mul_add(L::load(&self.inverse_square[i], lane), L::splat(-1.0))
+        });
+        if let Some(watch) = watch {
+            watch.springs(&t);
+        }
+        each!(i in [0, 1, 2, 3] => {
+            let shrunk = if CAREFUL { carefully(t[i]) } else { briefly(t[i]) };
+            L::load(&self.change[i], lane).mul_add(shrunk, L::load(&self.initial[i], lane))
+        })
+    }
 }
 
 impl Springs {
     /// Of springs of some stiffness, by blocks, in a block by families.
-    pub fn blocks(stiffness: &[f64], mass: f64) -> Vec<Self> {
-        let zeros = [[0.0; BLOCK]; FAMILIES];
+    pub fn blocks(stiffness: &[f64], mass: f64, gain: f64) -> Vec<Self> {
         let block = |of: &[f64]| Springs {
-            inverse_square: zeros,
-            initial: zeros,
-            change: zeros,
-            inverse_length: zeros,
-            stiffness: std::array::from_fn(|f| std::array::from_fn(|i| of[f * BLOCK + i] / mass)),
+            inverse_length: [[0.0; BLOCK]; FAMILIES],
+            driven: std::array::from_fn(|f| std::array::from_fn(|i| of[f * BLOCK + i] / mass * gain)),
         };
         stiffness.chunks_exact(FAMILIES * BLOCK).map(block).collect()
     }
@@ -87,48 +158,42 @@ impl Springs {
     /// Forgets the lengths of the last substep.
     pub fn forget(&mut self) {
         self.inverse_length = [[0.0; BLOCK]; FAMILIES];
-        self.inverse_square = self.inverse_length;
     }
 
     /// Sets this substep's rest lengths, a small part (`gain`) of the way from the present lengths to the goals
-    /// (physics.md, 2); gives the pull of each spring per vector.
+    /// (physics.md, 2), in `pulls`; gives the pull of each spring per vector. A careful servo finds all lengths with
+    /// root and division.
     #[inline(always)]
-    pub fn servo<L: Lanes>(&mut self, lane: usize, square: [L; 4], goal: [L; 4], gain: f64) -> [L; 4] {
-        let (one, gain) = (L::splat(1.0), L::splat(gain));
-        let before = each!(i in [0, 1, 2, 3] => L::load(&self.inverse_length[i], lane));
-        let t = each!(i in [0, 1, 2, 3] => {
-            square[i].mul_add(L::load(&self.inverse_square[i], lane), L::splat(-1.0))
-        });
-        let mut inverse =
-            each!(i in [0, 1, 2, 3] => (before[i] * t[i]).mul_sub_from(series(t[i]), before[i]));
-        let range = L::splat(SERIES_RANGE);
-        if L::any(greatest(&t).above(range)) {
-            for i in 0..4 {
-                // The floor is for what is no spring, between points at the same place.
-                let exact = one / square[i].max(L::splat(1e-60)).sqrt();
-                inverse[i] = exact.or_else(t[i].abs().above(range), inverse[i]);
-            }
-        }
+    pub fn servo<L: Lanes, const CAREFUL: bool>(
+        &mut self,
+        pulls: &mut Pulls,
+        lane: usize,
+        square: [L; 4],
+        (goal, gain): ([L; 4], f64),
+        watch: &mut Watch<L>,
+    ) -> [L; 4] {
+        let (one, inverse_gain) = (L::splat(1.0), L::splat(1.0 / gain));
+        let inverse = if CAREFUL {
+            // The floor is for what is no spring, between points at the same place.
+            each!(i in [0, 1, 2, 3] => one / square[i].max(L::splat(1e-60)).sqrt())
+        } else {
+            let before = each!(i in [0, 1, 2, 3] => L::load(&self.inverse_length[i], lane));
+            let t = each!(i in [0, 1, 2, 3] => {
+                square[i].mul_add(before[i] * before[i], L::splat(-1.0))
+            });
+            watch.springs(&t);
+            each!(i in [0, 1, 2, 3] => before[i].mul_sub_from(briefly(t[i]), before[i]))
+        };
         each!(i in [0, 1, 2, 3] => {
             // rest/d₀ = 1 − gain·(1 − goal/d₀)
-            let stiffness = L::load(&self.stiffness[i], lane);
-            let initial = (stiffness * gain) * goal[i].mul_sub_from(inverse[i], one);
+            let driven = L::load(&self.driven[i], lane);
+            let initial = driven * goal[i].mul_sub_from(inverse[i], one);
             inverse[i].store(&mut self.inverse_length[i], lane);
-            (inverse[i] * inverse[i]).store(&mut self.inverse_square[i], lane);
-            initial.store(&mut self.initial[i], lane);
-            (stiffness - initial).store(&mut self.change[i], lane);
+            (inverse[i] * inverse[i]).store(&mut pulls.inverse_square[i], lane);
+            initial.store(&mut pulls.initial[i], lane);
+            driven.mul_sub(inverse_gain, initial).store(&mut pulls.change[i], lane);
             initial
         })
-    }
-
-    /// The pull of each spring per vector at some later squared lengths in the same substep.
-    #[inline(always)]
-    pub fn pull<L: Lanes>(&self, lane: usize, square: [L; 4]) -> [L; 4] {
-        let t = each!(i in [0, 1, 2, 3] => {
-            square[i].mul_add(L::load(&self.inverse_square[i], lane), L::splat(-1.0))
-        });
-        let change = each!(i in [0, 1, 2, 3] => L::load(&self.change[i], lane));
-        shrink(t, change, each!(i in [0, 1, 2, 3] => L::load(&self.initial[i], lane)))
     }
 }
 
@@ -186,6 +251,17 @@ impl<'a, L: Lanes> Gather<'a, L> {
             let sum = (own - above) + beside.after(self.beside[axis]);
             self.beside[axis] = beside;
             self.below[axis] = falling;
+            sum
+        })
+    }
+
+    /// As [`Gather::next`] in a sweep in which only horizontal springs pull.
+    #[inline(always)]
+    pub fn next_horizontal(&mut self, pull: L, vectors: &Vectors<L>) -> [L; 2] {
+        each!(axis in [X, Y] => {
+            let horizontal = pull * vectors[axis][0];
+            let sum = horizontal - horizontal.after(self.beside[axis]);
+            self.beside[axis] = horizontal;
             sum
         })
     }

@@ -6,14 +6,15 @@
 //! registers than there are, and what is spilled fills the queue of stores.
 
 use super::extra::Extra;
-use super::forces::{Gather, squares, vectors};
+use super::forces::{Gather, Watch, squares, vectors};
 use super::lattice::Lattice;
+use super::limits::limit_all;
 use super::params::Physics;
-use super::state::{Pair, Scratch, State, X, Y, slices, slices_mut};
+use super::state::{Scratch, State, Work, X, Y, slices, slices_mut};
 use crate::base::lanes::{BLOCK, Lanes, each};
 
-/// Advances positions and velocities by one substep; contact forces are held constant. The positions at its start
-/// become the previous ones.
+/// Advances positions and velocities by one substep, contact forces held constant, and limits the springs' lengths. The
+/// positions at its start become the previous ones.
 #[inline(always)]
 pub(super) fn integrate<L: Lanes>(
     lattice: &Lattice,
@@ -21,171 +22,232 @@ pub(super) fn integrate<L: Lanes>(
     state: &mut State,
     scratch: &mut Scratch,
 ) {
-    prepare::<L>(lattice, physics, state, scratch);
-    if let Some(extra) = &mut scratch.extra {
-        let goals = &scratch.goals[lattice.len..];
-        let stages = [&state.position, &scratch.near];
-        extra.load_first_half::<L>(lattice, goals, physics.servo_gain, &scratch.load, stages);
+    if !stages::<L, false>(lattice, physics, state, scratch) {
+        stages::<L, true>(lattice, physics, state, scratch);
     }
-    first_stage::<L>(lattice, physics, state, scratch);
-    second_stage::<L>(lattice, physics, state, scratch);
-    if let Some(extra) = &mut scratch.extra {
-        extra.load_second_half::<L>(lattice, &scratch.load, [&scratch.near, &scratch.far]);
+    std::mem::swap(&mut state.velocity, &mut scratch.velocity);
+    let Scratch { position: new, passing, extra, .. } = scratch;
+    limit_all::<L>(lattice, physics, new, &mut state.previous, passing);
+    if let Some(extra) = extra {
+        extra.limit::<L>(lattice, physics, new);
+        extra.feed(lattice, &mut state.previous);
     }
-    third_stage::<L>(lattice, physics, state, scratch);
-    fourth_stage::<L>(lattice, physics, state, scratch);
     std::mem::swap(&mut state.position, &mut state.previous);
 }
 
-/// The second stage's positions, and what acts on the points besides springs. Contact forces are used up.
+/// The four stages. Taken for regular, they are not to be used if they were not, which is seen in the first and in the
+/// last: between them springs hardly stretch, and points hardly fall, any further.
 #[inline(always)]
-fn prepare<L: Lanes>(lattice: &Lattice, physics: &Physics, state: &State, scratch: &mut Scratch) {
-    let half = L::splat(physics.time_step / 2.0);
-    let (inverse_mass, drag) = (L::splat(1.0 / physics.mass), L::splat(physics.drag / physics.mass));
-    let zero = L::splat(0.0);
-    let gravity = L::splat(-physics.gravity);
-    let Scratch { near, contact, load, .. } = scratch;
-    for slot in lattice.runs.iter().flat_map(|run| run.clone().step_by(L::WIDTH)) {
-        let falling = [zero, gravity * L::load(&lattice.present, slot)];
-        for axis in [X, Y] {
-            let velocity = L::load(&state.velocity[axis], slot);
-            velocity.mul_add(half, L::load(&state.position[axis], slot)).store(&mut near[axis], slot);
-            let pushed = L::load(&contact[axis], slot).mul_add(inverse_mass, falling[axis]);
-            velocity.mul_sub_from(drag, pushed).store(&mut load[axis], slot);
-            zero.store(&mut contact[axis], slot);
-        }
+fn stages<L: Lanes, const CAREFUL: bool>(
+    lattice: &Lattice,
+    physics: &Physics,
+    state: &State,
+    scratch: &mut Scratch,
+) -> bool {
+    if let Some(extra) = &mut scratch.extra {
+        let goals = &scratch.goals[lattice.len..];
+        extra.first_stage::<L>(lattice, goals, physics.servo_gain, &state.position);
+    }
+    if !first_stage::<L, CAREFUL>(lattice, physics, state, scratch) {
+        return false;
+    }
+    extra_stage::<L>(lattice, scratch, 0);
+    second_stage::<L, CAREFUL>(lattice, physics, state, scratch);
+    extra_stage::<L>(lattice, scratch, 1);
+    third_stage::<L, CAREFUL>(lattice, physics, state, scratch);
+    extra_stage::<L>(lattice, scratch, 2);
+    fourth_stage::<L, CAREFUL>(lattice, physics, state, scratch)
+}
+
+/// The extra springs' part of the second stage or a later one.
+#[inline(always)]
+fn extra_stage<L: Lanes>(lattice: &Lattice, scratch: &mut Scratch, stage: usize) {
+    if let Some(extra) = &mut scratch.extra {
+        extra.later_stage::<L>(lattice, &scratch.stages[stage]);
     }
 }
 
-/// The first stage: the springs' rest lengths, and accelerations into `sum`.
+/// What acts besides the lattice's springs on a slot's points.
 #[inline(always)]
-fn first_stage<L: Lanes>(lattice: &Lattice, physics: &Physics, state: &State, scratch: &mut Scratch) {
+fn load_of<L: Lanes>(work: &Work, extra: Option<&Extra>, slot: usize) -> [L; 2] {
+    let of = each!(axis in [X, Y] => L::load(&work.load[axis], slot % BLOCK));
+    let Some(extra) = extra else { return of };
+    each!(axis in [X, Y] => of[axis] + L::load(&extra.load[axis], slot))
+}
+
+/// The first stage: what acts besides springs, the springs' rest lengths, and the second stage's positions. Gives whether
+/// all was regular.
+#[inline(always)]
+fn first_stage<L: Lanes, const CAREFUL: bool>(
+    lattice: &Lattice,
+    physics: &Physics,
+    state: &State,
+    scratch: &mut Scratch,
+) -> bool {
     let (len, pitch) = (lattice.len, lattice.pitch);
-    let Scratch { springs, goals, passing, sum, .. } = scratch;
-    let load = stage_load(&scratch.load, scratch.extra.as_ref(), 0, len);
-    let (goals, gain) = (&goals[..len], physics.servo_gain);
+    let Scratch { springs, goals, passing, work, extra, contact, stages: [next, ..], .. } = scratch;
+    let (goals, present, gain) = (&goals[..len], &lattice.present[..len], physics.servo_gain);
     let (straight, diagonal) = (L::splat(physics.cell_size), L::splat(lattice.lengths[2]));
+    let half = L::splat(physics.time_step / 2.0);
+    let (inverse_mass, drag) = (L::splat(1.0 / physics.mass), L::splat(physics.drag / physics.mass));
+    let gravity = L::splat(-physics.gravity);
     let (position, velocity) = (slices(&state.position, len), slices(&state.velocity, len));
-    let ([px, py], sum) = (slices_mut(passing, len), slices_mut(sum, len));
+    let (contact, next) = (slices(contact, len), slices_mut(next, len));
+    let ([px, py], extra) = (slices_mut(passing, len), extra.as_ref());
+    let mut watch = Watch::<L>::new();
     for run in &lattice.runs {
         let mut gather = Gather::<L>::new([&mut *px, &mut *py], pitch);
         for slot in run.clone().step_by(L::WIDTH) {
+            let (work, lane) = (&mut work[slot / BLOCK], slot % BLOCK);
             let goal = [L::load(goals, slot), straight, diagonal, diagonal];
             let vectors = vectors(position, slot, pitch);
-            let pull = springs[slot / BLOCK].servo(slot % BLOCK, squares(&vectors), goal, gain);
+            let springs = &mut springs[slot / BLOCK];
+            let square = squares(&vectors);
+            let pull = springs.servo::<L, CAREFUL>(&mut work.pulls, lane, square, (goal, gain), &mut watch);
             let force = gather.next(pull, &vectors, slot);
-            let first = each!(axis in [X, Y] => force[axis] + L::load(load[axis], slot));
-            let first = floor(physics, L::load(position[Y], slot), first, L::load(velocity[X], slot));
-            each!(axis in [X, Y] => first[axis].store(sum[axis], slot));
+            let falling = [L::splat(0.0), gravity * L::load(present, slot)];
+            let velocity = each!(axis in [X, Y] => L::load(velocity[axis], slot));
+            each!(axis in [X, Y] => {
+                velocity[axis].mul_add(half, L::load(position[axis], slot)).store(next[axis], slot);
+                let pushed = L::load(contact[axis], slot).mul_add(inverse_mass, falling[axis]);
+                velocity[axis].mul_sub_from(drag, pushed).store(&mut work.load[axis], lane);
+            });
+            let load = load_of::<L>(work, extra, slot);
+            let mut first = each!(axis in [X, Y] => force[axis] + load[axis]);
+            let y = L::load(position[Y], slot);
+            watch.points(y);
+            if CAREFUL {
+                first = floor(physics, y, first, velocity[X]);
+            }
+            each!(axis in [X, Y] => first[axis].store(&mut work.first[axis], lane));
         }
     }
+    CAREFUL || watch.regular()
 }
 
 /// The second stage; leaves the positions of the third and of the fourth.
 #[inline(always)]
-fn second_stage<L: Lanes>(lattice: &Lattice, physics: &Physics, state: &State, scratch: &mut Scratch) {
+fn second_stage<L: Lanes, const CAREFUL: bool>(
+    lattice: &Lattice,
+    physics: &Physics,
+    state: &State,
+    scratch: &mut Scratch,
+) {
     let (h, len, pitch) = (physics.time_step, lattice.len, lattice.pitch);
-    let Scratch { springs, passing, near, far, latest, sum, .. } = scratch;
-    let load = stage_load(&scratch.load, scratch.extra.as_ref(), 1, len);
+    let Scratch { passing, work, extra, stages: [here, next, last], .. } = scratch;
     let drag = L::splat(physics.drag / physics.mass * h / 2.0);
     let (position, velocity) = (slices(&state.position, len), slices(&state.velocity, len));
-    let ([near_x, near_y], far) = (slices_mut(near, len), slices_mut(far, len));
-    let ([px, py], latest, sum) = (slices_mut(passing, len), slices_mut(latest, len), slices_mut(sum, len));
+    let (here, next, last) = (slices(here, len), slices_mut(next, len), slices_mut(last, len));
+    let ([px, py], extra) = (slices_mut(passing, len), extra.as_ref());
     for run in &lattice.runs {
         let mut gather = Gather::<L>::new([&mut *px, &mut *py], pitch);
         for slot in run.clone().step_by(L::WIDTH) {
-            let vectors = vectors([near_x, near_y], slot, pitch);
-            let pull = springs[slot / BLOCK].pull(slot % BLOCK, squares(&vectors));
+            let (work, lane) = (&mut work[slot / BLOCK], slot % BLOCK);
+            let vectors = vectors(here, slot, pitch);
+            let pull = work.pulls.at::<L, CAREFUL>(lane, squares(&vectors), None);
             let force = gather.next(pull, &vectors, slot);
-            let first = each!(axis in [X, Y] => L::load(sum[axis], slot));
+            let load = load_of::<L>(work, extra, slot);
+            let first = each!(axis in [X, Y] => L::load(&work.first[axis], lane));
             let velocity = each!(axis in [X, Y] => L::load(velocity[axis], slot));
-            let second = each!(axis in [X, Y] => {
-                first[axis].mul_sub_from(drag, force[axis] + L::load(load[axis], slot))
+            let mut second = each!(axis in [X, Y] => {
+                first[axis].mul_sub_from(drag, force[axis] + load[axis])
             });
-            let here = [L::load(near_x, slot), L::load(near_y, slot)];
-            let vx = first[X].mul_add(L::splat(h / 2.0), velocity[X]);
-            let second = floor(physics, here[Y], second, vx);
-            first[X].mul_add(L::splat(h * h / 4.0), here[X]).store(near_x, slot);
-            first[Y].mul_add(L::splat(h * h / 4.0), here[Y]).store(near_y, slot);
+            let here = each!(axis in [X, Y] => L::load(here[axis], slot));
+            if CAREFUL {
+                second = floor(physics, here[Y], second, first[X].mul_add(L::splat(h / 2.0), velocity[X]));
+            }
             each!(axis in [X, Y] => {
+                first[axis].mul_add(L::splat(h * h / 4.0), here[axis]).store(next[axis], slot);
                 let coasted = velocity[axis].mul_add(L::splat(h), L::load(position[axis], slot));
-                second[axis].mul_add(L::splat(h * h / 2.0), coasted).store(far[axis], slot);
-                second[axis].store(latest[axis], slot);
-                second[axis].mul_add(L::splat(2.0), first[axis]).store(sum[axis], slot);
+                second[axis].mul_add(L::splat(h * h / 2.0), coasted).store(last[axis], slot);
+                second[axis].store(&mut work.second[axis], lane);
             });
         }
     }
 }
 
-/// The third stage, after which the new positions are known: they go over the previous ones.
+/// The third stage, after which the new positions are known.
 #[inline(always)]
-fn third_stage<L: Lanes>(lattice: &Lattice, physics: &Physics, state: &mut State, scratch: &mut Scratch) {
+fn third_stage<L: Lanes, const CAREFUL: bool>(
+    lattice: &Lattice,
+    physics: &Physics,
+    state: &State,
+    scratch: &mut Scratch,
+) {
     let (h, len, pitch) = (physics.time_step, lattice.len, lattice.pitch);
-    let Scratch { springs, passing, near, latest, sum, .. } = scratch;
-    let load = stage_load(&scratch.load, scratch.extra.as_ref(), 0, len);
+    let Scratch { passing, work, extra, stages: [_, here, _], position: new, .. } = scratch;
     let drag = L::splat(physics.drag / physics.mass * h / 2.0);
     let (position, velocity) = (slices(&state.position, len), slices(&state.velocity, len));
-    let (near, result) = (slices(near, len), slices_mut(&mut state.previous, len));
-    let ([px, py], latest, sum) = (slices_mut(passing, len), slices_mut(latest, len), slices_mut(sum, len));
+    let (here, new) = (slices(here, len), slices_mut(new, len));
+    let ([px, py], extra) = (slices_mut(passing, len), extra.as_ref());
     for run in &lattice.runs {
         let mut gather = Gather::<L>::new([&mut *px, &mut *py], pitch);
         for slot in run.clone().step_by(L::WIDTH) {
-            let vectors = vectors(near, slot, pitch);
-            let pull = springs[slot / BLOCK].pull(slot % BLOCK, squares(&vectors));
+            let (work, lane) = (&mut work[slot / BLOCK], slot % BLOCK);
+            let vectors = vectors(here, slot, pitch);
+            let pull = work.pulls.at::<L, CAREFUL>(lane, squares(&vectors), None);
             let force = gather.next(pull, &vectors, slot);
-            let second = each!(axis in [X, Y] => L::load(latest[axis], slot));
+            let load = load_of::<L>(work, extra, slot);
+            let second = each!(axis in [X, Y] => L::load(&work.second[axis], lane));
             let velocity = each!(axis in [X, Y] => L::load(velocity[axis], slot));
-            let third = each!(axis in [X, Y] => {
-                second[axis].mul_sub_from(drag, force[axis] + L::load(load[axis], slot))
+            let mut third = each!(axis in [X, Y] => {
+                second[axis].mul_sub_from(drag, force[axis] + load[axis])
             });
-            let vx = second[X].mul_add(L::splat(h / 2.0), velocity[X]);
-            let third = floor(physics, L::load(near[Y], slot), third, vx);
+            if CAREFUL {
+                let y = L::load(here[Y], slot);
+                third = floor(physics, y, third, second[X].mul_add(L::splat(h / 2.0), velocity[X]));
+            }
             each!(axis in [X, Y] => {
-                let sums = L::load(sum[axis], slot);
                 let coasted = velocity[axis].mul_add(L::splat(h), L::load(position[axis], slot));
-                let three = (sums - second[axis]) + third[axis];
-                three.mul_add(L::splat(h * h / 6.0), coasted).store(result[axis], slot);
-                third[axis].mul_add(L::splat(2.0), sums).store(sum[axis], slot);
-                third[axis].store(latest[axis], slot);
+                let three = (L::load(&work.first[axis], lane) + second[axis]) + third[axis];
+                three.mul_add(L::splat(h * h / 6.0), coasted).store(new[axis], slot);
+                third[axis].store(&mut work.third[axis], lane);
             });
         }
     }
 }
 
-/// The fourth stage, after which the new velocities are known.
+/// The fourth stage, after which the new velocities are known. Gives whether all was regular.
 #[inline(always)]
-fn fourth_stage<L: Lanes>(lattice: &Lattice, physics: &Physics, state: &mut State, scratch: &mut Scratch) {
+fn fourth_stage<L: Lanes, const CAREFUL: bool>(
+    lattice: &Lattice,
+    physics: &Physics,
+    state: &State,
+    scratch: &mut Scratch,
+) -> bool {
     let (h, len, pitch) = (physics.time_step, lattice.len, lattice.pitch);
-    let Scratch { springs, passing, far, latest, sum, .. } = scratch;
-    let load = stage_load(&scratch.load, scratch.extra.as_ref(), 1, len);
+    let Scratch { passing, work, extra, stages: [_, _, here], velocity: new, .. } = scratch;
     let drag = L::splat(physics.drag / physics.mass * h);
-    let (far, latest, sum) = (slices(far, len), slices(latest, len), slices(sum, len));
-    let ([px, py], velocity) = (slices_mut(passing, len), slices_mut(&mut state.velocity, len));
+    let (here, velocity, new) = (slices(here, len), slices(&state.velocity, len), slices_mut(new, len));
+    let ([px, py], extra) = (slices_mut(passing, len), extra.as_ref());
+    let mut watch = Watch::<L>::new();
     for run in &lattice.runs {
         let mut gather = Gather::<L>::new([&mut *px, &mut *py], pitch);
         for slot in run.clone().step_by(L::WIDTH) {
-            let vectors = vectors(far, slot, pitch);
-            let pull = springs[slot / BLOCK].pull(slot % BLOCK, squares(&vectors));
+            let (work, lane) = (&work[slot / BLOCK], slot % BLOCK);
+            let vectors = vectors(here, slot, pitch);
+            let pull = work.pulls.at::<L, CAREFUL>(lane, squares(&vectors), Some(&mut watch));
             let force = gather.next(pull, &vectors, slot);
-            let third = each!(axis in [X, Y] => L::load(latest[axis], slot));
-            let before = each!(axis in [X, Y] => L::load(velocity[axis], slot));
-            let fourth = each!(axis in [X, Y] => {
-                third[axis].mul_sub_from(drag, force[axis] + L::load(load[axis], slot))
+            let load = load_of::<L>(work, extra, slot);
+            let third = each!(axis in [X, Y] => L::load(&work.third[axis], lane));
+            let velocity = each!(axis in [X, Y] => L::load(velocity[axis], slot));
+            let mut fourth = each!(axis in [X, Y] => {
+                third[axis].mul_sub_from(drag, force[axis] + load[axis])
             });
-            let vx = third[X].mul_add(L::splat(h), before[X]);
-            let fourth = floor(physics, L::load(far[Y], slot), fourth, vx);
+            let y = L::load(here[Y], slot);
+            watch.points(y);
+            if CAREFUL {
+                fourth = floor(physics, y, fourth, third[X].mul_add(L::splat(h), velocity[X]));
+            }
             each!(axis in [X, Y] => {
-                let six = L::load(sum[axis], slot) + fourth[axis];
-                six.mul_add(L::splat(h / 6.0), before[axis]).store(velocity[axis], slot);
+                let middle = L::load(&work.second[axis], lane) + third[axis];
+                let ends = L::load(&work.first[axis], lane) + fourth[axis];
+                let six = (middle + middle) + ends;
+                six.mul_add(L::splat(h / 6.0), velocity[axis]).store(new[axis], slot);
             });
         }
     }
-}
-
-/// What acts besides the lattice's springs in the first or second stage of a pair.
-#[inline(always)]
-fn stage_load<'a>(load: &'a Pair, extra: Option<&'a Extra>, stage: usize, len: usize) -> [&'a [f64]; 2] {
-    slices(extra.map_or(load, |extra| &extra.load[stage]), len)
+    CAREFUL || watch.regular()
 }
 
 /// Lanes in memory. Their alignment matters beyond them: a compiler that need not align the stack for anything else

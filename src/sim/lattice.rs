@@ -84,7 +84,7 @@ pub struct Lattice {
     pub(super) lengths: [f64; FAMILIES],
     /// Stiffness of every spring ([`spring_index`]), 0 where there is none.
     pub(super) stiffness: Buffer,
-    /// Where there is a spring 1, elsewhere 0.
+    /// Where there is a spring a number of all bits but the sign's, elsewhere 0 (see [`Lanes::bits_and`]).
     pub(super) exists: Buffer,
     pub(super) extra_springs: Vec<ExtraSpring>,
     pub(super) actuated: Vec<ActuatedSide>,
@@ -189,10 +189,10 @@ impl Lattice {
         let slot = ends[0].wrapping_sub(from);
         if slot < self.lattice_slots && ends[0] < self.lattice_slots && ends[1] == slot + to {
             let index = spring_index(slot, family);
-            if !keep || self.exists[index] == 0.0 {
+            if !keep || self.exists[index].to_bits() == 0 {
                 self.stiffness[index] = stiffness;
             }
-            self.exists[index] = 1.0;
+            self.exists[index] = f64::from_bits(u64::MAX >> 1);
             return;
         }
         match self.extra_springs.iter_mut().find(|spring| spring.ends == ends) {
@@ -208,10 +208,13 @@ impl Lattice {
             self.present[*point] = 1.0;
             used[point / BLOCK] = true;
         }
-        // Springs reach from their slot to the next one's column: the next block passes that on.
         for slot in 0..self.slots {
-            if (0..FAMILIES).any(|family| self.exists[spring_index(slot, family)] != 0.0) {
+            let exists = |family: &usize| self.exists[spring_index(slot, *family)].to_bits() != 0;
+            if (0..FAMILIES).any(|family| exists(&family)) {
                 used[slot / BLOCK] = true;
+            }
+            // All but vertical springs reach into the next column: the next block passes that on.
+            if [0, 2, 3].iter().any(exists) {
                 used[(slot + 1) / BLOCK] = true;
             }
         }

@@ -1,13 +1,12 @@
 //! Length limits: positions are corrected so that no spring is far from its rest length (physics.md, 4).
 //!
 //! A spring beyond a limit l is corrected by (1 − l/d) of its vector; with t = d²/l² − 1, which is small, that is
-//! `shrink(t)` again: mostly neither root nor division.
+//! 1 − 1/√(1 + t) again: mostly neither root nor division.
 
-use super::extra::Extra;
-use super::forces::{Gather, SERIES, SERIES_RANGE, shrink, squares, vectors};
+use super::forces::{Gather, SERIES, SERIES_RANGE, briefly, carefully, squares, vectors};
 use super::lattice::{FAMILIES, Lattice};
 use super::params::Physics;
-use super::state::{Pair, X, Y, slices_mut};
+use super::state::{Pair, X, Y, slices, slices_mut};
 use crate::base::lanes::{BLOCK, Lanes, each};
 
 /// Limits of springs of one length at rest.
@@ -26,14 +25,18 @@ impl Limits {
         Limits { squares: [low, high], middle: (low + high) / 2.0, half: (high - low) / 2.0 }
     }
 
-    /// t for a squared length beyond the limits (positive when too long, negative when too short), 0 within them.
+    /// t for a squared length beyond the limits (positive when too long, negative when too short).
     #[inline(always)]
     pub fn excess<L: Lanes>(&self, square: L) -> L {
-        let [low, high] = each!(i in [0, 1] => L::splat(self.squares[i]));
-        let [short, long] =
-            each!(i in [0, 1] => square.mul_add(L::splat(1.0 / self.squares[i]), L::splat(-1.0)));
-        let zero = L::splat(0.0);
-        long.or_else(square.above(high), short.or_else(low.above(square), zero))
+        let [low, high] = each!(i in [0, 1] => L::splat(1.0 / self.squares[i]));
+        let limit = high.or_else(square.above(L::splat(self.middle)), low);
+        square.mul_add(limit, L::splat(-1.0))
+    }
+
+    /// Where a squared length is beyond the limits; nowhere that `exists` is 0.
+    #[inline(always)]
+    pub fn beyond<L: Lanes>(&self, square: L, exists: L) -> L::Mask {
+        (square - L::splat(self.middle)).bits_and(exists).above(L::splat(self.half))
     }
 }
 
@@ -42,53 +45,74 @@ impl Limits {
 pub(super) fn limit_all<L: Lanes>(
     lattice: &Lattice,
     physics: &Physics,
-    position: &mut Pair,
+    from: &Pair,
+    to: &mut Pair,
     passing: &mut Pair,
-    mut extra: Option<&mut Extra>,
 ) {
-    let limits = lattice.lengths.map(|length| Limits::new(length, physics.limit_low, physics.limit_high));
-    let share = L::splat(physics.limit_share / 2.0);
-    if let Some(extra) = &mut extra {
-        extra.limit::<L>(lattice, physics, position);
+    if !limit_horizontal::<L>(lattice, physics, from, to) {
+        limit_any::<L>(lattice, physics, from, to, passing);
     }
+}
+
+/// Limits of the families' springs.
+#[inline(always)]
+fn limits(lattice: &Lattice, physics: &Physics) -> [Limits; FAMILIES] {
+    each!(i in [0, 1, 2, 3] => Limits::new(lattice.lengths[i], physics.limit_low, physics.limit_high))
+}
+
+/// As if only horizontal springs, the ones that are actuated, were beyond their limits; whether it is so.
+#[inline(always)]
+fn limit_horizontal<L: Lanes>(lattice: &Lattice, physics: &Physics, from: &Pair, to: &mut Pair) -> bool {
+    let limits = limits(lattice, physics);
+    let share = L::splat(physics.limit_share / 2.0);
     let (exists, _) = lattice.exists.as_chunks::<{ FAMILIES * BLOCK }>();
-    let [x, y] = slices_mut(position, lattice.len);
+    let (from, to) = (slices(from, lattice.len), slices_mut(to, lattice.len));
+    let zero = L::splat(0.0);
+    let mut others = zero.above(zero);
+    for run in &lattice.runs {
+        let mut gather = Gather::<L>::new([&mut [], &mut []], lattice.pitch);
+        for slot in run.clone().step_by(L::WIDTH) {
+            let vectors = vectors(from, slot, lattice.pitch);
+            let (exists, lane) = (&exists[slot / BLOCK], slot % BLOCK);
+            let squares = squares(&vectors);
+            let [beyond, other @ ..] = each!(i in [0, 1, 2, 3] => {
+                limits[i].beyond(squares[i], L::load(exists, i * BLOCK + lane))
+            });
+            let t = limits[0].excess(squares[0]).or_else(beyond, zero);
+            let far = t.abs().above(L::splat(SERIES_RANGE));
+            others = others | ((other[0] | other[1]) | (other[2] | far));
+            let sums = gather.next_horizontal(share * briefly(t), &vectors);
+            (L::load(from[X], slot) + sums[X]).store(to[X], slot);
+            (L::load(from[Y], slot) + sums[Y]).store(to[Y], slot);
+        }
+    }
+    !L::any(others)
+}
+
+/// Whatever is beyond its limits.
+#[inline(always)]
+fn limit_any<L: Lanes>(lattice: &Lattice, physics: &Physics, from: &Pair, to: &mut Pair, passing: &mut Pair) {
+    let limits = limits(lattice, physics);
+    let share = L::splat(physics.limit_share / 2.0);
+    let (exists, _) = lattice.exists.as_chunks::<{ FAMILIES * BLOCK }>();
+    let (from, to) = (slices(from, lattice.len), slices_mut(to, lattice.len));
     let [passing_x, passing_y] = slices_mut(passing, lattice.len);
     for run in &lattice.runs {
         let mut gather = Gather::<L>::new([passing_x, passing_y], lattice.pitch);
         for slot in run.clone().step_by(L::WIDTH) {
-            let vectors = vectors([x, y], slot, lattice.pitch);
-            let exists = &exists[slot / BLOCK];
-            let pull = corrections(&limits, squares(&vectors), exists, slot % BLOCK, share);
+            let vectors = vectors(from, slot, lattice.pitch);
+            let (exists, lane) = (&exists[slot / BLOCK], slot % BLOCK);
+            let squares = squares(&vectors);
+            let pull = each!(i in [0, 1, 2, 3] => {
+                let beyond = limits[i].beyond(squares[i], L::load(exists, i * BLOCK + lane));
+                let t = limits[i].excess(squares[i]).or_else(beyond, L::splat(0.0));
+                share * carefully(t)
+            });
             let sums = gather.next(pull, &vectors, slot);
-            (L::load(x, slot) + sums[X]).store(x, slot);
-            (L::load(y, slot) + sums[Y]).store(y, slot);
+            (L::load(from[X], slot) + sums[X]).store(to[X], slot);
+            (L::load(from[Y], slot) + sums[Y]).store(to[Y], slot);
         }
     }
-    if let Some(extra) = extra {
-        extra.feed(lattice, position);
-    }
-}
-
-/// By how much of its vector each spring of a slot is corrected; mostly none is.
-#[inline(always)]
-fn corrections<L: Lanes>(
-    limits: &[Limits; FAMILIES],
-    squares: [L; FAMILIES],
-    exists: &[f64; FAMILIES * BLOCK],
-    lane: usize,
-    share: L,
-) -> [L; FAMILIES] {
-    let zero = L::splat(0.0);
-    let out = each!(i in [0, 1, 2, 3] => {
-        let off = (squares[i] - L::splat(limits[i].middle)).abs();
-        (off * L::load(exists, i * BLOCK + lane)).above(L::splat(limits[i].half))
-    });
-    if !L::any((out[0] | out[1]) | (out[2] | out[3])) {
-        return [zero; FAMILIES];
-    }
-    let t = each!(i in [0, 1, 2, 3] => limits[i].excess(squares[i]).or_else(out[i], zero));
-    shrink(t, [share; FAMILIES], [zero; FAMILIES])
 }
 
 /// Brings links of the rigid pass that have nothing to do with each other together, so that the processor can work on
@@ -117,7 +141,7 @@ pub(super) fn limit_rigid(lattice: &Lattice, physics: &Physics, [x, y]: &mut Pai
         let square = dx * dx + dy * dy;
         if square > high || square < low {
             let limit = if square > high { high } else { low };
-            let factor = share * shrink_one((square - limit) * (1.0 / limit));
+            let factor = share * shrink_scalar((square - limit) * (1.0 / limit));
             x[a] += factor * dx;
             y[a] += factor * dy;
             x[b] -= factor * dx;
@@ -128,7 +152,7 @@ pub(super) fn limit_rigid(lattice: &Lattice, physics: &Physics, [x, y]: &mut Pai
 
 /// 1 − 1/√(1 + t), in the order with the shortest chain.
 #[inline(always)]
-fn shrink_one(t: f64) -> f64 {
+fn shrink_scalar(t: f64) -> f64 {
     if t.abs() > SERIES_RANGE {
         return 1.0 - 1.0 / (1.0 + t).sqrt();
     }

@@ -1,11 +1,11 @@
 //! [`State`]: what a life must remember; and the scratch memory of a substep, which is never kept.
 
 use super::extra::Extra;
-use super::forces::Springs;
+use super::forces::{Pulls, Springs, Wide};
 use super::lattice::Lattice;
 use super::neighbours::Neighbours;
 use super::params::Physics;
-use crate::base::lanes::Buffer;
+use crate::base::lanes::{BLOCK, Buffer};
 use serde::{Deserialize, Serialize};
 
 /// Height at which slots without a point are parked [wu]: out of every point's way, and above the floor.
@@ -65,6 +65,19 @@ impl State {
     }
 }
 
+/// What the stages of a substep leave to each other about a block of slots.
+#[derive(Clone, Copy, Debug)]
+#[repr(C, align(64))]
+pub(super) struct Work {
+    pub pulls: Pulls,
+    /// Acceleration by all but springs and the stages' differences in drag.
+    pub load: [Wide; 2],
+    /// Accelerations of the first three stages.
+    pub first: [Wide; 2],
+    pub second: [Wide; 2],
+    pub third: [Wide; 2],
+}
+
 /// Memory of a substep, allocated once.
 #[derive(Clone, Debug)]
 pub(super) struct Scratch {
@@ -72,18 +85,16 @@ pub(super) struct Scratch {
     pub goals: Buffer,
     /// By blocks.
     pub springs: Vec<Springs>,
+    pub work: Vec<Work>,
     /// See [`Gather`](super::forces::Gather).
     pub passing: Pair,
     /// Contact force per point [mass·wu/s²].
     pub contact: Pair,
-    /// Acceleration by all but springs and the stages' differences in drag.
-    pub load: Pair,
-    /// Positions of the second, then of the third stage; and of the fourth.
-    pub near: Pair,
-    pub far: Pair,
-    /// Acceleration of the latest stage; and sum of the stages' so far, weighted as in the new velocity.
-    pub latest: Pair,
-    pub sum: Pair,
+    /// Positions of the second, third and fourth stage.
+    pub stages: [Pair; 3],
+    /// New positions and velocities.
+    pub position: Pair,
+    pub velocity: Pair,
     pub extra: Option<Extra>,
     /// Which contacts are possible.
     pub neighbours: Neighbours,
@@ -91,22 +102,23 @@ pub(super) struct Scratch {
 
 impl Scratch {
     pub fn new(lattice: &Lattice, physics: &Physics, state: &State) -> Self {
-        let zeros = || pair(lattice.len);
         let horizontal = (0..lattice.len).map(|_| physics.cell_size);
         let extra = lattice.extra_springs.iter().map(|spring| spring.length);
         let padding = [physics.cell_size; super::extra::GROUP];
+        let zeros = [[0.0; BLOCK]; 2];
+        let work = Work { pulls: Pulls::ZERO, load: zeros, first: zeros, second: zeros, third: zeros };
+        // Slots without a point stay where they are parked.
+        let parked = || state.position.clone();
         Scratch {
             goals: horizontal.chain(extra).chain(padding).collect(),
-            springs: Springs::blocks(&lattice.stiffness, physics.mass),
-            passing: zeros(),
-            contact: zeros(),
-            load: zeros(),
-            // Slots without a point stay where they are parked.
-            near: state.position.clone(),
-            far: state.position.clone(),
-            latest: zeros(),
-            sum: zeros(),
-            extra: Extra::new(lattice, physics.mass),
+            springs: Springs::blocks(&lattice.stiffness, physics.mass, physics.servo_gain),
+            work: vec![work; lattice.slots / BLOCK],
+            passing: pair(lattice.len),
+            contact: pair(lattice.len),
+            stages: [parked(), parked(), parked()],
+            position: parked(),
+            velocity: pair(lattice.len),
+            extra: Extra::new(lattice, physics.mass, physics.servo_gain),
             neighbours: Neighbours::default(),
         }
     }

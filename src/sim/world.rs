@@ -4,7 +4,7 @@ use super::actuation;
 use super::contact::add_contacts;
 use super::integrator::integrate;
 use super::lattice::Lattice;
-use super::limits::{limit_all, limit_rigid};
+use super::limits::limit_rigid;
 use super::params::Physics;
 use super::state::{Scratch, State, X, Y};
 use crate::base::Grid;
@@ -179,11 +179,10 @@ fn substep<L: Lanes>(
     scratch.neighbours.refresh::<L>(lattice, physics, state).map_err(|_| UnstableReason::BlownUp)?;
     let unstable = scratch.neighbours.too_many_overlaps(lattice, physics, state);
 
+    scratch.contact.iter_mut().for_each(|axis| axis.fill(0.0));
     add_contacts(lattice, physics, start_column, state, &scratch.neighbours, &mut scratch.contact);
     // Contacts see true velocities: position now less position then. The integrator knows its own.
     integrate::<L>(lattice, physics, state, scratch);
-    let Scratch { passing, extra, .. } = scratch;
-    limit_all::<L>(lattice, physics, &mut state.position, passing, extra.as_mut());
     limit_rigid(lattice, physics, &mut state.position);
 
     if unstable { Err(UnstableReason::Overlaps) } else { Ok(()) }

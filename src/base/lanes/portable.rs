@@ -1,5 +1,6 @@
 //! Lanes of any machine: an array that the compiler turns into what vectors there are.
 
+use super::fused::mul_add;
 use super::{Lanes, each};
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Sub};
 
@@ -61,6 +62,26 @@ impl Lanes for Few {
     #[inline(always)]
     fn store(self, to: &mut [f64], at: usize) {
         to[at..at + 4].copy_from_slice(&self.0);
+    }
+
+    #[inline(always)]
+    fn mul_add(self, factor: Self, more: Self) -> Self {
+        Few(mul_add(self.0, factor.0, more.0))
+    }
+
+    #[inline(always)]
+    fn mul_sub_from(self, factor: Self, more: Self) -> Self {
+        Few(mul_add(each!(i in [0, 1, 2, 3] => -self.0[i]), factor.0, more.0))
+    }
+
+    #[inline(always)]
+    fn mul_sub(self, factor: Self, less: Self) -> Self {
+        Few(mul_add(self.0, factor.0, each!(i in [0, 1, 2, 3] => -less.0[i])))
+    }
+
+    #[inline(always)]
+    fn bits_and(self, other: Self) -> Self {
+        Few(each!(i in [0, 1, 2, 3] => f64::from_bits(self.0[i].to_bits() & other.0[i].to_bits())))
     }
 
     #[inline(always)]

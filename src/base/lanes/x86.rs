@@ -6,12 +6,12 @@ use super::{Kernel, Lanes};
 use std::arch::x86_64::*;
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Sub};
 
-#[target_feature(enable = "avx512f,avx2")]
+#[target_feature(enable = "avx512f,avx512dq,avx2,fma")]
 pub(super) fn avx512<K: Kernel>(kernel: K) -> K::Output {
     kernel.run::<Eight>()
 }
 
-#[target_feature(enable = "avx2")]
+#[target_feature(enable = "avx2,fma")]
 pub(super) fn avx2<K: Kernel>(kernel: K) -> K::Output {
     kernel.run::<Four>()
 }
@@ -86,6 +86,30 @@ impl Lanes for Four {
         let to = &mut to[at..at + 4];
         // SAFETY: room for four values was just found to be there; stores need no alignment.
         unsafe { _mm256_storeu_pd(to.as_mut_ptr(), self.0) }
+    }
+
+    #[inline(always)]
+    fn mul_add(self, factor: Self, more: Self) -> Self {
+        // SAFETY: the processor has the instruction (see the module).
+        unsafe { Four(_mm256_fmadd_pd(self.0, factor.0, more.0)) }
+    }
+
+    #[inline(always)]
+    fn mul_sub_from(self, factor: Self, more: Self) -> Self {
+        // SAFETY: the processor has the instruction (see the module).
+        unsafe { Four(_mm256_fnmadd_pd(self.0, factor.0, more.0)) }
+    }
+
+    #[inline(always)]
+    fn mul_sub(self, factor: Self, less: Self) -> Self {
+        // SAFETY: the processor has the instruction (see the module).
+        unsafe { Four(_mm256_fmsub_pd(self.0, factor.0, less.0)) }
+    }
+
+    #[inline(always)]
+    fn bits_and(self, other: Self) -> Self {
+        // SAFETY: the processor has the instruction (see the module).
+        unsafe { Four(_mm256_and_pd(self.0, other.0)) }
     }
 
     #[inline(always)]
@@ -166,6 +190,35 @@ impl Lanes for Eight {
     }
 
     #[inline(always)]
+    fn mul_add(self, factor: Self, more: Self) -> Self {
+        // SAFETY: the processor has the instruction (see the module).
+        unsafe { Eight(_mm512_fmadd_pd(self.0, factor.0, more.0)) }
+    }
+
+    #[inline(always)]
+    fn mul_sub_from(self, factor: Self, more: Self) -> Self {
+        // SAFETY: the processor has the instruction (see the module).
+        unsafe { Eight(_mm512_fnmadd_pd(self.0, factor.0, more.0)) }
+    }
+
+    #[inline(always)]
+    fn mul_sub(self, factor: Self, less: Self) -> Self {
+        // SAFETY: the processor has the instruction (see the module).
+        unsafe { Eight(_mm512_fmsub_pd(self.0, factor.0, less.0)) }
+    }
+
+    #[inline(always)]
+    fn bits_and(self, other: Self) -> Self {
+        // SAFETY: the processor has the instruction (see the module).
+        unsafe {
+            Eight(_mm512_castsi512_pd(_mm512_and_si512(
+                _mm512_castpd_si512(self.0),
+                _mm512_castpd_si512(other.0),
+            )))
+        }
+    }
+
+    #[inline(always)]
     fn sqrt(self) -> Self {
         // SAFETY: the processor has the instruction (see the module).
         unsafe { Eight(_mm512_sqrt_pd(self.0)) }
@@ -181,6 +234,12 @@ impl Lanes for Eight {
     fn max(self, other: Self) -> Self {
         // SAFETY: the processor has the instruction (see the module).
         unsafe { Eight(_mm512_max_pd(self.0, other.0)) }
+    }
+
+    #[inline(always)]
+    fn max_abs(self, other: Self) -> Self {
+        // SAFETY: the processor has the instruction (see the module). Selected: the greater value of the absolute ones.
+        unsafe { Eight(_mm512_range_pd::<0b1011>(self.0, other.0)) }
     }
 
     #[inline(always)]
