@@ -2,11 +2,11 @@
 
 use super::archive::{Robot, RunFile};
 use super::audit_file::{AuditFile, RobotAudit, fingerprint};
+use super::eval::check_out;
 use super::robots::Selection;
 use super::training::{Training, load_dataset, see};
 use super::verdict::{Behaviour, Criteria, PerturbedLife};
 use super::{Config, Error, gallery};
-use crate::base::files::check_writable;
 use crate::base::hash::sha256_hex;
 use crate::body::Body;
 use crate::sim::{Energy, Lattice};
@@ -15,7 +15,7 @@ use crate::task::grouping::Grouping;
 use crate::task::perturbation::{Perturbation, Setting};
 use crate::task::rollout::walk;
 use rayon::prelude::*;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 /// Robots whose lives are lived side by side; what is finished is saved after so many.
@@ -94,18 +94,13 @@ struct Trial {
 /// # Errors
 /// What is wrong with archive, data, selection or criteria.
 pub fn audit(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Result<Finished, Error> {
-    check_writable(&options.out).map_err(|error| Error::writing(&options.out, &error))?;
-    if options.out.extension().is_none_or(|ending| ending != "json") {
-        let text = format!("--out {}: expected a name that ends in .json", options.out.display());
-        return Err(Error::usage(text));
-    }
     let (config, training, subjects, order, mut file) = open(options)?;
     let trial = Trial {
         grouping: config.grouping()?,
-        config,
         training,
-        perturbations: Perturbation::all(&options.criteria.perturbations),
+        perturbations: Perturbation::all(&options.criteria.perturbations, config.protocol.life),
         criteria: options.criteria.clone(),
+        config,
     };
     if let Ok(earlier) = AuditFile::read(&options.out) {
         let same = AuditFile { robots: Vec::new(), ..earlier.clone() } == file;
@@ -147,12 +142,15 @@ fn open(options: &Options) -> Result<Opened, Error> {
     let data = options.data.as_deref();
     match &options.source {
         Source::Gallery => {
+            check_out(&options.out, Path::new(""))?;
             let config = gallery::config()?;
             let training = Training::load(&config, data)?;
             let all = gallery::gallery()?;
             let order: Vec<String> = all.iter().map(|robot| robot.name.clone()).collect();
             let is_asked = |name: &str| match &options.robots {
-                Selection::Ids(ids) => ids.iter().any(|id| id.eq_ignore_ascii_case(name)),
+                Selection::Ids(ids) if !ids.iter().any(|id| id == gallery::ALL) => {
+                    ids.iter().any(|id| id.eq_ignore_ascii_case(name))
+                }
                 _ => true,
             };
             let subject = |robot: gallery::Published| Subject {
@@ -168,6 +166,7 @@ fn open(options: &Options) -> Result<Opened, Error> {
         }
         Source::Archive(path) => {
             let run = RunFile::read(path)?;
+            check_out(&options.out, path)?;
             let training = training_of(&run, options)?;
             let subject = |robot: &Robot| Subject {
                 id: robot.id.clone(),
@@ -237,13 +236,19 @@ impl Trial {
             Some(behaviour.compare(perturbation.name(), perturbation.kind, walked))
         };
         let lives: Vec<PerturbedLife> = match behaviour.is_walker() {
-            true => self.perturbations.par_iter().map(life).collect::<Option<_>>()?,
+            true => {
+                let lives: Option<Vec<_>> = self.perturbations.par_iter().map(life).collect();
+                let counts = |(life, perturbation): &(PerturbedLife, &Perturbation)| {
+                    life.displacements.is_some() || perturbation.counts_if_unstable()
+                };
+                lives?.into_iter().zip(&self.perturbations).filter(counts).map(|(life, _)| life).collect()
+            }
             false => {
                 count(self.perturbations.len());
                 Vec::new()
             }
         };
-        let (verdict, reason) = behaviour.judge(&lives, energy);
+        let (verdict, reason) = behaviour.judge(&lives);
         let persisting = lives.iter().filter(|life| life.persists).count() as f64;
         let steps = f64::from(setting.protocol.control_steps) * setting.stimuli.len() as f64;
         let cycles = steps / f64::from(setting.physics.cycle_steps);
@@ -266,3 +271,7 @@ fn live(setting: &Setting, measured: bool) -> Option<(Vec<f64>, Energy)> {
     let Setting { body, physics, protocol, stimuli } = setting;
     walk(&Lattice::new(body, physics), physics, protocol, stimuli, measured).ok()
 }
+
+#[cfg(test)]
+#[path = "audit_tests.rs"]
+mod tests;

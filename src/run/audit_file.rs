@@ -126,7 +126,8 @@ impl AuditFile {
         let archive = path.with_file_name(super::folder::RUN_JSON);
         let make = format!("morphcog audit --archive {}", archive.display());
         if !path.exists() {
-            let text = format!("{}: there is no such file: these robots have not been audited", path.display());
+            let text =
+                format!("{}: there is no such file: these robots have not been audited", path.display());
             return Err(Error::input(text).hint(make));
         }
         let file = AuditFile::read(path)?;
@@ -165,10 +166,18 @@ impl AuditFile {
         let images = self.robots.iter().filter_map(|r| r.displacements.as_ref()).map(Vec::len).max();
         let images = images.unwrap_or(0);
         let mut writer = csv::Writer::from_writer(Vec::new());
-        let mut header: Vec<String> =
-            ["id", "task", "verdict", "reason", "persisting", "spread", "drive_per_cycle", "limits_per_cycle"]
-                .map(str::to_string)
-                .to_vec();
+        let mut header: Vec<String> = [
+            "id",
+            "task",
+            "verdict",
+            "reason",
+            "persisting",
+            "spread",
+            "drive_per_cycle",
+            "limits_per_cycle",
+        ]
+        .map(str::to_string)
+        .to_vec();
         header.extend(["life", "kept", "distance", "persists"].map(str::to_string));
         header.extend((0..images).map(|image| format!("displacement_{image}")));
         writer.write_record(&header)?;
@@ -182,7 +191,10 @@ impl AuditFile {
                 let walks = walks.map(|d| d.map_or(String::new(), f64::to_string));
                 writer.write_record(about.iter().cloned().chain(life).chain(walks))
             };
-            row(["unchanged".to_string(), String::new(), String::new(), String::new()], &robot.displacements)?;
+            row(
+                ["unchanged".to_string(), String::new(), String::new(), String::new()],
+                &robot.displacements,
+            )?;
             for life in &robot.lives {
                 let about = [
                     life.name.clone(),

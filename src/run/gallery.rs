@@ -8,6 +8,9 @@ use serde::Deserialize;
 /// The config under which the published robots were evolved.
 const CONFIG: &str = "zero_one_published.toml";
 
+/// What all published robots are called together.
+pub const ALL: &str = "gallery";
+
 /// The list of them.
 pub(super) const TEXT: &str = include_str!("../../data/gallery.json");
 

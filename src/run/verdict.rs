@@ -2,7 +2,6 @@
 
 use super::Error;
 use super::toml_text::{self, Format};
-use crate::sim::Energy;
 use crate::task::direction::{Assignment, Direction};
 use crate::task::grouping::{Group, Split};
 use crate::task::perturbation::{Kind, Sizes};
@@ -22,11 +21,9 @@ pub struct Criteria {
     pub least_kept: f64,
     /// And if the walks under them, together, are at least this share of what they were. Default 0.5.
     pub least_distance: f64,
-    /// Who keeps at least this share of the lives in a changed world (stiffness, friction, gravity, pixels) is robust in
-    /// its own simulator: if only the simulator's changes break it, it exploits the simulator. Default 0.75.
+    /// Who keeps at least this share of the lives in a changed world (stiffness, friction, gravity, pixels) is robust; if
+    /// another change breaks it all the same, it exploits what was changed, else it is fragile. Default 0.75.
     pub least_robust: f64,
-    /// Greatest energy from the length limits, as a share of what the actuators give. Default 1.
-    pub most_limits: f64,
     /// Which changes, and how large.
     pub perturbations: Sizes,
 }
@@ -39,7 +36,6 @@ impl Default for Criteria {
             least_kept: 0.9,
             least_distance: 0.5,
             least_robust: 0.75,
-            most_limits: 1.0,
             perturbations: Sizes::default(),
         }
     }
@@ -77,9 +73,6 @@ impl Criteria {
         if !shares.iter().all(|share| (0.0..=1.0).contains(share)) {
             return refuse("least_…: expected shares from 0 to 1");
         }
-        if self.most_limits.is_nan() || self.most_limits < 0.0 {
-            return refuse("most_limits: expected 0 or more");
-        }
         if raised.iter().any(|&rows| rows == 0 || rows > 100) {
             return refuse("perturbations.raised: expected 1 to 100 rows");
         }
@@ -87,7 +80,9 @@ impl Criteria {
             return refuse("perturbations.time_step: expected divisors from 2 to 64");
         }
         if !(*share > 0.0 && *share < 1.0) || *pixels > 1000 || *seed > i64::MAX as u64 {
-            return refuse("perturbations: expected share above 0 and below 1, pixels up to 1000, seed below 2⁶³");
+            return refuse(
+                "perturbations: expected share above 0 and below 1, pixels up to 1000, seed below 2⁶³",
+            );
         }
         Ok(())
     }
@@ -101,7 +96,7 @@ pub enum Verdict {
     Physical,
     /// Small changes of the world break it.
     Fragile,
-    /// The world may change, the simulator may not: it lives off how the simulator computes.
+    /// The world may change, but not how it is computed or how images are shown: it lives off that.
     Exploits,
     /// It does not answer its training images to begin with.
     NotAWalker,
@@ -198,30 +193,27 @@ impl<'a> Behaviour<'a> {
     }
 
     /// Verdict and reason.
-    pub fn judge(&self, lives: &[PerturbedLife], energy: Energy) -> (Verdict, String) {
+    pub fn judge(&self, lives: &[PerturbedLife]) -> (Verdict, String) {
         if let Some(flaw) = &self.flaw {
             return (Verdict::NotAWalker, flaw.clone());
         }
         let failed = |kind: &&Kind| lives.iter().any(|life| life.kind == **kind && !life.persists);
         let failed: Vec<Kind> = Kind::ALL.iter().filter(failed).copied().collect();
-        let world = || lives.iter().filter(|life| !life.kind.is_of_the_simulator());
+        let world = || lives.iter().filter(|life| life.kind.is_of_the_world());
         let robust = world().filter(|life| life.persists).count() as f64;
         let is_robust = robust >= self.criteria.least_robust * world().count() as f64;
-        let names = |of_simulator: bool| {
-            let names = failed.iter().filter(|kind| kind.is_of_the_simulator() == of_simulator);
+        let names = |of_the_world: bool| {
+            let names = failed.iter().filter(|kind| kind.is_of_the_world() == of_the_world);
             names.map(|kind| kind.name().to_string()).collect::<Vec<_>>()
         };
-        let (mut simulator, mut broken) = (names(true), names(false));
-        if energy.limits > self.criteria.most_limits * energy.drive {
-            simulator.push("energy of the length limits".to_string());
-        }
-        if simulator.is_empty() && broken.is_empty() {
+        let (artefacts, mut broken) = (names(false), names(true));
+        if artefacts.is_empty() && broken.is_empty() {
             return (Verdict::Physical, format!("persists in all {} changed lives", lives.len()));
         }
-        if is_robust && !simulator.is_empty() {
-            return (Verdict::Exploits, simulator.join(", "));
+        if is_robust && !artefacts.is_empty() {
+            return (Verdict::Exploits, artefacts.join(", "));
         }
-        broken.extend(simulator);
+        broken.extend(artefacts);
         (Verdict::Fragile, broken.join(", "))
     }
 
@@ -231,7 +223,8 @@ impl<'a> Behaviour<'a> {
         let stable = lives.iter().filter_map(|life| life.displacements.as_ref());
         let squares: Vec<f64> =
             stable.flat_map(|d| d.iter().zip(&self.plain).map(|(a, b)| (a - b) * (a - b))).collect();
-        (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt()
+        // + 0.0: the sum of nothing is −0.
+        ((squares.iter().sum::<f64>() + 0.0) / squares.len().max(1) as f64).sqrt()
     }
 }
 
@@ -249,14 +242,12 @@ mod tests {
     use super::*;
     use crate::task::grouping::Grouping;
 
-    const DRIVEN: Energy = Energy { drive: 10.0, limits: 1.0 };
-
-    fn judged(lives: &[(Kind, [f64; 2])], energy: Energy) -> (Verdict, String) {
+    fn judged(lives: &[(Kind, [f64; 2])]) -> (Verdict, String) {
         let criteria = Criteria::default();
         let split = Grouping::two_groups(&[0], &[1]).unwrap().tasks()[0].clone();
         let behaviour = Behaviour::new(&criteria, &split, &[0, 1], vec![-10.0, 12.0]);
         let life = |(kind, d): &(Kind, [f64; 2])| behaviour.compare(String::new(), *kind, Some(d.to_vec()));
-        behaviour.judge(&lives.iter().map(life).collect::<Vec<_>>(), energy)
+        behaviour.judge(&lives.iter().map(life).collect::<Vec<_>>())
     }
 
     const SAME: [f64; 2] = [-9.0, 13.0];
@@ -265,17 +256,13 @@ mod tests {
     #[test]
     fn who_keeps_its_directions_in_all_lives_is_physical() {
         let lives = Kind::ALL.map(|kind| (kind, SAME));
-        assert_eq!(judged(&lives, DRIVEN).0, Verdict::Physical);
-        // Not if the limits give more than the actuators.
-        let (verdict, reason) = judged(&lives, Energy { drive: 1.0, limits: 2.0 });
-        assert_eq!((verdict, reason.as_str()), (Verdict::Exploits, "energy of the length limits"));
+        assert_eq!(judged(&lives).0, Verdict::Physical);
     }
 
     #[test]
     fn who_is_broken_by_the_simulator_alone_exploits_it_and_by_the_world_is_fragile() {
-        let but = |lost: &[Kind]| {
-            judged(&Kind::ALL.map(|k| (k, if lost.contains(&k) { LOST } else { SAME })), DRIVEN)
-        };
+        let but =
+            |lost: &[Kind]| judged(&Kind::ALL.map(|k| (k, if lost.contains(&k) { LOST } else { SAME })));
         assert_eq!(but(&[Kind::TimeStep]), (Verdict::Exploits, "time step".to_string()));
         assert_eq!(but(&[Kind::Start, Kind::LengthLimits]).1, "start, length limits");
         assert_eq!(but(&[Kind::Gravity]), (Verdict::Fragile, "gravity".to_string()));
@@ -310,7 +297,7 @@ mod tests {
         assert_eq!(flaw([5.0, -4.0, -1.0, -2.0]).unwrap(), "answers 2 of 4 training images");
         assert_eq!(flaw([2.0, -4.0, -9.0, -8.0]).unwrap(), "no walk of more than 3 voxels for 0");
         let still = Behaviour::new(&criteria, split, &[0, 1, 2, 3], vec![0.0; 4]);
-        assert_eq!(still.judge(&[], Energy::default()).0, Verdict::NotAWalker);
+        assert_eq!(still.judge(&[]).0, Verdict::NotAWalker);
     }
 
     #[test]
@@ -318,7 +305,13 @@ mod tests {
         let set = |text: &str| Criteria::load(None, &[text.to_string()]);
         assert_eq!(set("perturbations.time_step=[8]").unwrap().perturbations.time_step, [8]);
         assert_eq!(set("threshold=2").unwrap().threshold, 2.0);
-        let wrong = ["threshold=-1", "least_kept=2", "perturbations.time_step=[1]", "treshold=1", "perturbations.share=0"];
+        let wrong = [
+            "threshold=-1",
+            "least_kept=2",
+            "perturbations.time_step=[1]",
+            "treshold=1",
+            "perturbations.share=0",
+        ];
         for wrong in wrong {
             assert!(set(wrong).is_err(), "{wrong}");
         }

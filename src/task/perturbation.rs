@@ -3,7 +3,7 @@
 //! To start at another column is none: the simulator is the same bits wherever on the ground a robot stands (but for
 //! pegs below the ground, which a robot can reach only by tunnelling). A raised start also changes the column.
 
-use super::protocol::Protocol;
+use super::protocol::{Life, Protocol};
 use crate::base::Grid;
 use crate::base::random::{Purpose, stream};
 use crate::body::Body;
@@ -20,10 +20,13 @@ pub enum Kind {
     Mirror,
     /// The same material at a shorter time step ([`Physics::refined`]).
     TimeStep,
-    /// The length limits remove an excess half as fast.
+    /// The length limits remove an excess half as fast; or they are beyond every goal, so that no spring is held at a
+    /// limit against its goal, and given energy there, any more.
     LengthLimits,
     /// A contact of the robot with itself counts once instead of twice.
     SelfContact,
+    /// In a sequential life the images come in the reverse order: who turns round by the clock is found out.
+    Order,
     /// Stiffness of all springs.
     Stiffness,
     /// Friction of contacts.
@@ -36,22 +39,23 @@ pub enum Kind {
 
 impl Kind {
     /// All of them, in the order of a report.
-    pub const ALL: [Kind; 9] = [
+    pub const ALL: [Kind; 10] = [
         Kind::Start,
         Kind::Mirror,
         Kind::TimeStep,
         Kind::LengthLimits,
         Kind::SelfContact,
+        Kind::Order,
         Kind::Stiffness,
         Kind::Friction,
         Kind::Gravity,
         Kind::Pixel,
     ];
 
-    /// Whether it changes how the simulator computes, and nothing in the world it stands for. What breaks a walk then is
-    /// no physics.
-    pub fn is_of_the_simulator(self) -> bool {
-        self <= Kind::SelfContact
+    /// Whether it changes the world that is simulated. The others change only how that is computed, or how images are
+    /// shown: who does not survive those lives off something else than body and image.
+    pub fn is_of_the_world(self) -> bool {
+        self >= Kind::Stiffness
     }
 
     /// For people.
@@ -62,6 +66,7 @@ impl Kind {
             Kind::TimeStep => "time step",
             Kind::LengthLimits => "length limits",
             Kind::SelfContact => "self-contact",
+            Kind::Order => "order of images",
             Kind::Stiffness => "stiffness",
             Kind::Friction => "friction",
             Kind::Gravity => "gravity",
@@ -105,25 +110,31 @@ pub struct Setting {
     pub stimuli: Vec<Grid<f64>>,
 }
 
+/// How fast length limits work: half as fast, or, as they are out of reach, not at all.
+const HALF_AS_FAST: f64 = 0.5;
+const OUT_OF_REACH: f64 = 0.0;
+
 /// One change.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Perturbation {
     /// What is changed.
     pub kind: Kind,
-    /// Rows, divisor of the time step, factor, or number of the draw; unused elsewhere.
+    /// Rows, divisor of the time step, factor, speed, or number of the draw; unused elsewhere.
     amount: f64,
     seed: u64,
 }
 
 impl Perturbation {
-    /// All changes of these sizes, in the order of a report.
-    pub fn all(sizes: &Sizes) -> Vec<Self> {
+    /// All changes of these sizes that mean something under a protocol, in the order of a report.
+    pub fn all(sizes: &Sizes, life: Life) -> Vec<Self> {
         let amounts = |kind| match kind {
             Kind::Start => sizes.raised.iter().map(|&rows| f64::from(rows)).collect(),
             Kind::TimeStep => sizes.time_step.iter().map(|&by| f64::from(by)).collect(),
             Kind::Stiffness | Kind::Friction | Kind::Gravity => vec![1.0 - sizes.share, 1.0 + sizes.share],
             Kind::Pixel => (1..=sizes.pixels).map(f64::from).collect(),
-            Kind::Mirror | Kind::LengthLimits | Kind::SelfContact => vec![0.5],
+            Kind::Order if life == Life::Fresh => Vec::new(),
+            Kind::LengthLimits => vec![HALF_AS_FAST, OUT_OF_REACH],
+            Kind::Mirror | Kind::SelfContact | Kind::Order => vec![0.5],
         };
         let of = |kind| {
             amounts(kind).into_iter().map(move |amount| Perturbation { kind, amount, seed: sizes.seed })
@@ -137,7 +148,9 @@ impl Perturbation {
         match self.kind {
             Kind::Start => format!("{kind} raised by {amount}"),
             Kind::Mirror => kind.to_string(),
+            Kind::Order => format!("{kind} reversed"),
             Kind::TimeStep => format!("{kind} / {amount}"),
+            Kind::LengthLimits if amount == OUT_OF_REACH => format!("{kind} beyond all goals"),
             Kind::LengthLimits => format!("{kind} half as fast"),
             Kind::SelfContact => format!("{kind} counted once"),
             Kind::Stiffness | Kind::Friction | Kind::Gravity => {
@@ -145,6 +158,12 @@ impl Perturbation {
             }
             Kind::Pixel => format!("{kind} {amount}"),
         }
+    }
+
+    /// Whether an unstable life speaks against the robot. Not without limits: a body that needs a stop, as any material
+    /// has one, does not live off it.
+    pub fn counts_if_unstable(&self) -> bool {
+        (self.kind, self.amount) != (Kind::LengthLimits, OUT_OF_REACH)
     }
 
     /// The changed setting. Displacements under it are to be compared after [`Perturbation::undo`].
@@ -162,8 +181,13 @@ impl Perturbation {
                 changed.stimuli = setting.stimuli.iter().map(Grid::mirrored).collect();
             }
             Kind::TimeStep => changed.physics = physics.refined(self.amount as u32),
-            Kind::LengthLimits => changed.physics = physics.with_slower_limits(2.0),
+            Kind::LengthLimits if self.amount == OUT_OF_REACH => {
+                changed.physics.limit_low = physics.limit_low.min(physics.target_min);
+                changed.physics.limit_high = physics.limit_high.max(physics.target_max);
+            }
+            Kind::LengthLimits => changed.physics = physics.with_slower_limits(1.0 / self.amount),
             Kind::SelfContact => changed.physics.self_contact_weight *= self.amount,
+            Kind::Order => changed.stimuli.reverse(),
             Kind::Stiffness => changed.physics = physics.with_stiffness(self.amount),
             Kind::Friction => changed.physics.friction *= self.amount,
             Kind::Gravity => changed.physics.gravity *= self.amount,
@@ -176,10 +200,13 @@ impl Perturbation {
         changed
     }
 
-    /// Displacements as they would be in the unchanged setting: those of a mirror image are mirrored.
+    /// Displacements as they would be in the unchanged setting: those of a mirror image are mirrored, and they stand in
+    /// the unchanged order.
     pub fn undo(&self, mut displacements: Vec<f64>) -> Vec<f64> {
-        if self.kind == Kind::Mirror {
-            displacements.iter_mut().for_each(|d| *d = -*d);
+        match self.kind {
+            Kind::Mirror => displacements.iter_mut().for_each(|d| *d = -*d),
+            Kind::Order => displacements.reverse(),
+            _ => {}
         }
         displacements
     }
@@ -208,14 +235,14 @@ mod tests {
     }
 
     fn of(kind: Kind) -> Vec<Setting> {
-        let all = Perturbation::all(&Sizes::default());
+        let all = Perturbation::all(&Sizes::default(), Life::Sequential);
         all.iter().filter(|p| p.kind == kind).map(|p| p.apply(&setting())).collect()
     }
 
     #[test]
     fn every_perturbation_changes_what_it_says_and_nothing_else() {
         let plain = setting();
-        for perturbation in Perturbation::all(&Sizes::default()) {
+        for perturbation in Perturbation::all(&Sizes::default(), Life::Sequential) {
             let changed = perturbation.apply(&plain);
             let parts = [
                 changed.body != plain.body,
@@ -227,7 +254,7 @@ mod tests {
             let expected = match perturbation.kind {
                 Kind::Start => [false, false, true, false],
                 Kind::Mirror => [true, false, false, false],
-                Kind::Pixel => [false, false, false, true],
+                Kind::Pixel | Kind::Order => [false, false, false, true],
                 _ => [false, true, false, false],
             };
             assert_eq!(parts, expected, "{}", perturbation.name());
@@ -236,6 +263,9 @@ mod tests {
         assert_eq!(of(Kind::Start)[1].protocol.start_row, 4);
         assert_eq!(of(Kind::Gravity)[0].physics.gravity, 110.0 * 0.95);
         assert_eq!(of(Kind::TimeStep)[1].physics.substeps, 120);
+        let [slow, far] = [&of(Kind::LengthLimits)[0].physics, &of(Kind::LengthLimits)[1].physics];
+        assert!((0.55..0.56).contains(&slow.limit_share) && far.limit_share == 0.8);
+        assert_eq!((far.limit_low, far.limit_high, slow.limit_low), (0.6, 1.6, 0.75));
         assert_eq!(of(Kind::SelfContact)[0].physics.self_contact_weight, 1.0);
     }
 
@@ -259,15 +289,25 @@ mod tests {
 
     #[test]
     fn names_are_distinct_and_a_mirror_image_walks_the_other_way() {
-        let all = Perturbation::all(&Sizes::default());
+        let all = Perturbation::all(&Sizes::default(), Life::Sequential);
         let mut names: Vec<String> = all.iter().map(Perturbation::name).collect();
         assert!(names.contains(&"time step / 4".to_string()) && names.contains(&"gravity -5 %".to_string()));
         names.sort();
         names.dedup();
         assert_eq!(names.len(), all.len());
+        let excused: Vec<String> =
+            all.iter().filter(|p| !p.counts_if_unstable()).map(Perturbation::name).collect();
+        assert_eq!(excused, ["length limits beyond all goals"]);
         for perturbation in all {
-            let sign = if perturbation.kind == Kind::Mirror { -1.0 } else { 1.0 };
-            assert_eq!(perturbation.undo(vec![2.0]), [2.0 * sign]);
+            let expected = match perturbation.kind {
+                Kind::Mirror => [-2.0, -3.0],
+                Kind::Order => [3.0, 2.0],
+                _ => [2.0, 3.0],
+            };
+            assert_eq!(perturbation.undo(vec![2.0, 3.0]), expected);
         }
+        // Fresh lives have no order.
+        let fresh = Perturbation::all(&Sizes::default(), Life::Fresh);
+        assert!(fresh.iter().all(|p| p.kind != Kind::Order) && fresh.len() + 1 == names.len());
     }
 }
