@@ -8,13 +8,13 @@ use morphcog::run::verdict::Verdict;
 use std::collections::BTreeSet;
 
 /// What tiny robots in short lives can be held to, so that some are physical and some are not.
-const MILD: &str = "--set threshold=0.1 --set least_distance=0 --set perturbations.time_step=[2]";
+const MILD: &str = "--set threshold=0 --set least_kept=0.5 --set least_distance=0 --set perturbations.time_step=[2] --set perturbations.raised=[] --set perturbations.least_sensors=1";
 
-/// A sandbox with a tiny run in `run`, whose lives last two cycles.
+/// A sandbox with a tiny run in `run`, whose lives last three cycles.
 fn evolved() -> Sandbox {
     let sandbox = Sandbox::new();
-    sandbox.write("tiny.toml", TINY.replace("control_steps = 20", "control_steps = 100"));
-    sandbox.run("evolve --config tiny.toml --out run").ended(0, &[]);
+    sandbox.write("tiny.toml", TINY.replace("control_steps = 20", "control_steps = 150"));
+    sandbox.run("evolve --config tiny.toml --out run --generations 40").ended(0, &[]);
     sandbox
 }
 
@@ -108,7 +108,7 @@ fn without_verdicts_on_this_very_archive_nothing_is_drawn() {
     audit(&sandbox, "");
     draw(&sandbox).ended(0, &[]);
     // The run goes on: its verdicts are stale.
-    sandbox.run("evolve --config tiny.toml --out run --generations 30 --resume").ended(0, &[]);
+    sandbox.run("evolve --config tiny.toml --out run --generations 45 --resume").ended(0, &[]);
     draw(&sandbox).ended(3, &["audit.json", "stale", "hint: morphcog audit --archive run/run.json"]);
     audit(&sandbox, "");
     draw(&sandbox).ended(0, &[]);

@@ -84,7 +84,6 @@ struct Trial {
     config: Config,
     grouping: Grouping,
     training: Training,
-    perturbations: Vec<Perturbation>,
     criteria: Criteria,
 }
 
@@ -95,13 +94,7 @@ struct Trial {
 /// What is wrong with archive, data, selection or criteria.
 pub fn audit(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Result<Finished, Error> {
     let (config, training, subjects, order, mut file) = open(options)?;
-    let trial = Trial {
-        grouping: config.grouping()?,
-        training,
-        perturbations: Perturbation::all(&options.criteria.perturbations, config.protocol.life),
-        criteria: options.criteria.clone(),
-        config,
-    };
+    let trial = Trial { grouping: config.grouping()?, training, criteria: options.criteria.clone(), config };
     if let Ok(earlier) = AuditFile::read(&options.out) {
         let same = AuditFile { robots: Vec::new(), ..earlier.clone() } == file;
         file.robots = if same { earlier.robots } else { Vec::new() };
@@ -109,7 +102,7 @@ pub fn audit(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> R
     let asked = subjects.iter().map(|subject| subject.id.clone()).collect();
     let open: Vec<Subject> =
         subjects.into_iter().filter(|subject| file.robot(&subject.id).is_none()).collect();
-    observer.started(open.len(), open.len() * (1 + trial.perturbations.len()));
+    observer.started(open.len(), open.iter().map(|subject| 1 + trial.perturbations(subject).len()).sum());
     let pool = rayon::ThreadPoolBuilder::new().num_threads(options.threads.unwrap_or(0)).build();
     let pool = pool.map_err(|error| Error::other(format!("no threads: {error}")))?;
     let done = AtomicU64::new(0);
@@ -200,6 +193,10 @@ fn training_of(run: &RunFile, options: &Options) -> Result<Training, Error> {
 }
 
 impl Trial {
+    fn perturbations(&self, subject: &Subject) -> Vec<Perturbation> {
+        Perturbation::all(&self.criteria.perturbations, &subject.body, self.config.protocol.life)
+    }
+
     /// One robot's audit; `None` if stopped before its end.
     fn robot(
         &self,
@@ -235,16 +232,17 @@ impl Trial {
             count(1);
             Some(behaviour.compare(perturbation.name(), perturbation.kind, walked))
         };
+        let perturbations = self.perturbations(subject);
         let lives: Vec<PerturbedLife> = match behaviour.is_walker() {
             true => {
-                let lives: Option<Vec<_>> = self.perturbations.par_iter().map(life).collect();
+                let lives: Option<Vec<_>> = perturbations.par_iter().map(life).collect();
                 let counts = |(life, perturbation): &(PerturbedLife, &Perturbation)| {
                     life.displacements.is_some() || perturbation.counts_if_unstable()
                 };
-                lives?.into_iter().zip(&self.perturbations).filter(counts).map(|(life, _)| life).collect()
+                lives?.into_iter().zip(&perturbations).filter(counts).map(|(life, _)| life).collect()
             }
             false => {
-                count(self.perturbations.len());
+                count(perturbations.len());
                 Vec::new()
             }
         };

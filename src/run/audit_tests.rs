@@ -17,7 +17,6 @@ fn trial(height: usize, width: usize, physics: Physics) -> Trial {
     Trial {
         grouping: config.grouping().unwrap(),
         training: Training { dataset, images, stimuli },
-        perturbations: Perturbation::all(&criteria.perturbations, config.protocol.life),
         criteria,
         config,
     }
@@ -55,7 +54,7 @@ fn a_symmetric_passive_block_is_not_a_walker() {
 fn a_plain_walker_is_physical() {
     let found = audited(WALKER, "same way", Physics::default());
     assert_eq!(found.verdict, Verdict::Physical, "{found:#?}");
-    assert_eq!((found.persisting, found.lives.len()), (1.0, 17));
+    assert_eq!((found.persisting, found.lives.len()), (1.0, 14));
     assert!(found.displacements.unwrap().iter().all(|d| *d > 5.0));
     assert!(found.spread < 1.0 && found.energy_per_cycle.drive > 0.0);
     // It sees nothing, so that it cannot tell classes apart.

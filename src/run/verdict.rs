@@ -64,7 +64,7 @@ impl Criteria {
     }
 
     fn check(&self) -> Result<(), Error> {
-        let Sizes { raised, time_step, share, pixels, seed } = &self.perturbations;
+        let Sizes { raised, time_step, share, pixels, least_sensors: _, seed } = &self.perturbations;
         let shares = [self.least_answered, self.least_kept, self.least_distance, self.least_robust];
         let refuse = |text: &str| Err(Error::input(format!("audit criteria: {text}")));
         if !(self.threshold >= 0.0 && self.threshold.is_finite()) {

@@ -87,13 +87,22 @@ pub struct Sizes {
     pub share: f64,
     /// Lives with a changed pixel in every image. Default 3.
     pub pixels: u32,
+    /// Only for robots with at least so many sensors: to fewer, one pixel is no noise but what they see. Default 10.
+    pub least_sensors: usize,
     /// Seed of the pixels. Default 1.
     pub seed: u64,
 }
 
 impl Default for Sizes {
     fn default() -> Self {
-        Sizes { raised: vec![1, 2], time_step: vec![2, 4], share: 0.05, pixels: 3, seed: 1 }
+        Sizes {
+            raised: vec![1, 2],
+            time_step: vec![2, 4],
+            share: 0.05,
+            pixels: 3,
+            least_sensors: 10,
+            seed: 1,
+        }
     }
 }
 
@@ -125,14 +134,16 @@ pub struct Perturbation {
 }
 
 impl Perturbation {
-    /// All changes of these sizes that mean something under a protocol, in the order of a report.
-    pub fn all(sizes: &Sizes, life: Life) -> Vec<Self> {
+    /// All changes of these sizes that mean something to a body under a protocol, in the order of a report.
+    pub fn all(sizes: &Sizes, body: &Body, life: Life) -> Vec<Self> {
+        let sees = body.counts().sensor >= sizes.least_sensors;
         let amounts = |kind| match kind {
             Kind::Start => sizes.raised.iter().map(|&rows| f64::from(rows)).collect(),
             Kind::TimeStep => sizes.time_step.iter().map(|&by| f64::from(by)).collect(),
             Kind::Stiffness | Kind::Friction | Kind::Gravity => vec![1.0 - sizes.share, 1.0 + sizes.share],
-            Kind::Pixel => (1..=sizes.pixels).map(f64::from).collect(),
             Kind::Order if life == Life::Fresh => Vec::new(),
+            Kind::Pixel if !sees => Vec::new(),
+            Kind::Pixel => (1..=sizes.pixels).map(f64::from).collect(),
             Kind::LengthLimits => vec![HALF_AS_FAST, OUT_OF_REACH],
             Kind::Mirror | Kind::SelfContact | Kind::Order => vec![0.5],
         };
@@ -234,15 +245,19 @@ mod tests {
         Setting { body, physics: Physics::default(), protocol: Protocol::default(), stimuli }
     }
 
+    fn all(life: Life) -> Vec<Perturbation> {
+        let sizes = Sizes { least_sensors: 2, ..Sizes::default() };
+        Perturbation::all(&sizes, &setting().body, life)
+    }
+
     fn of(kind: Kind) -> Vec<Setting> {
-        let all = Perturbation::all(&Sizes::default(), Life::Sequential);
-        all.iter().filter(|p| p.kind == kind).map(|p| p.apply(&setting())).collect()
+        all(Life::Sequential).iter().filter(|p| p.kind == kind).map(|p| p.apply(&setting())).collect()
     }
 
     #[test]
     fn every_perturbation_changes_what_it_says_and_nothing_else() {
         let plain = setting();
-        for perturbation in Perturbation::all(&Sizes::default(), Life::Sequential) {
+        for perturbation in all(Life::Sequential) {
             let changed = perturbation.apply(&plain);
             let parts = [
                 changed.body != plain.body,
@@ -282,6 +297,9 @@ mod tests {
             }
         }
         assert!(changed.iter().any(|other| *other != changed[0]));
+        // To two sensors one pixel is no noise.
+        let few = Perturbation::all(&Sizes::default(), &setting().body, Life::Fresh);
+        assert!(few.iter().all(|p| p.kind != Kind::Pixel));
         let blind = Setting { body: "33/44".parse().unwrap(), ..setting() };
         let pixel = Perturbation { kind: Kind::Pixel, amount: 1.0, seed: 1 };
         assert_eq!(pixel.apply(&blind), blind);
@@ -289,7 +307,7 @@ mod tests {
 
     #[test]
     fn names_are_distinct_and_a_mirror_image_walks_the_other_way() {
-        let all = Perturbation::all(&Sizes::default(), Life::Sequential);
+        let all = all(Life::Sequential);
         let mut names: Vec<String> = all.iter().map(Perturbation::name).collect();
         assert!(names.contains(&"time step / 4".to_string()) && names.contains(&"gravity -5 %".to_string()));
         names.sort();
@@ -307,7 +325,7 @@ mod tests {
             assert_eq!(perturbation.undo(vec![2.0, 3.0]), expected);
         }
         // Fresh lives have no order.
-        let fresh = Perturbation::all(&Sizes::default(), Life::Fresh);
+        let fresh = super::tests::all(Life::Fresh);
         assert!(fresh.iter().all(|p| p.kind != Kind::Order) && fresh.len() + 1 == names.len());
     }
 }
