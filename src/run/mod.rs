@@ -17,6 +17,7 @@ pub mod replay;
 pub mod report;
 mod resume;
 pub mod robots;
+pub mod robust;
 #[cfg(test)]
 mod samples;
 pub mod signals;
