@@ -15,6 +15,9 @@ use std::path::Path;
 pub struct Criteria {
     /// A walk this far or shorter is no answer \[voxel lengths\]. Default 3, as in `eval`.
     pub threshold: f64,
+    /// In a changed life a walk the right way that is longer than this is an answer still \[voxel lengths\]: else whoever
+    /// walks just beyond the threshold would be called an exploiter for a hair's breadth. Default 1.5.
+    pub least_walk: f64,
     /// A walker answers at least this share of its training images right (and one of each group). Default 0.75.
     pub least_answered: f64,
     /// A life persists if at least this share of the images answered right still is. Default 0.9.
@@ -32,6 +35,7 @@ impl Default for Criteria {
     fn default() -> Self {
         Criteria {
             threshold: 3.0,
+            least_walk: 1.5,
             least_answered: 0.75,
             least_kept: 0.9,
             least_distance: 0.5,
@@ -67,8 +71,8 @@ impl Criteria {
         let Sizes { raised, time_step, share, pixels, least_sensors: _, seed } = &self.perturbations;
         let shares = [self.least_answered, self.least_kept, self.least_distance, self.least_robust];
         let refuse = |text: &str| Err(Error::input(format!("audit criteria: {text}")));
-        if !(self.threshold >= 0.0 && self.threshold.is_finite()) {
-            return refuse("threshold: expected 0 or more voxel lengths");
+        if ![self.threshold, self.least_walk].iter().all(|walk| (0.0..1e9).contains(walk)) {
+            return refuse("threshold, least_walk: expected 0 or more voxel lengths");
         }
         if !shares.iter().all(|share| (0.0..=1.0).contains(share)) {
             return refuse("least_…: expected shares from 0 to 1");
@@ -124,7 +128,7 @@ pub struct PerturbedLife {
     pub kind: Kind,
     /// Displacement under each training image, voxel lengths (a mirrored life's mirrored back); none if unstable.
     pub displacements: Option<Vec<f64>>,
-    /// Share of the images answered right in the unchanged life that are here, too.
+    /// Share of the images answered right in the unchanged life under which it still walks the right way.
     pub kept: f64,
     /// Walks under them, towards the right sides, as a share of the unchanged life's.
     pub distance: f64,
@@ -182,7 +186,7 @@ impl<'a> Behaviour<'a> {
         let along = |of: &[f64], image: usize| towards(self.rightward[image], of[image]);
         let (mut kept, mut distance) = (0.0, 0.0);
         if let Some(changed) = &displacements {
-            let right = self.answered.iter().filter(|&&i| along(changed, i) > self.criteria.threshold);
+            let right = self.answered.iter().filter(|&&i| along(changed, i) > self.criteria.least_walk);
             kept = right.count() as f64 / self.answered.len().max(1) as f64;
             let sum = |of: &[f64]| self.answered.iter().map(|&i| along(of, i)).sum::<f64>();
             let whole = sum(&self.plain);
@@ -251,7 +255,7 @@ mod tests {
     }
 
     const SAME: [f64; 2] = [-9.0, 13.0];
-    const LOST: [f64; 2] = [-9.0, 2.0];
+    const LOST: [f64; 2] = [-9.0, 1.0];
 
     #[test]
     fn who_keeps_its_directions_in_all_lives_is_physical() {
@@ -277,6 +281,8 @@ mod tests {
         let behaviour = Behaviour::new(&criteria, &split, &[0, 1], vec![-10.0, 12.0]);
         let compare = |d: Option<[f64; 2]>| behaviour.compare("x".into(), Kind::Start, d.map(Vec::from));
         assert!(compare(Some([-9.0, 30.0])).persists);
+        // Just below the threshold that makes an answer.
+        assert!(compare(Some([-9.0, 2.9])).persists && !compare(Some([-9.0, 1.5])).persists);
         let turned = compare(Some([9.0, 30.0]));
         assert_eq!((turned.kept, turned.persists), (0.5, false));
         let short = compare(Some([-4.0, 4.0]));
