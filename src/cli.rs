@@ -1,6 +1,7 @@
 //! The command line: one short function per command.
 
 mod args;
+mod audit;
 
 use crate::base::lanes::InstructionSet;
 use crate::run::data::catalogue::Catalogue;
@@ -28,6 +29,7 @@ pub fn run(cli: Cli, console: &Console) -> Result<(), Error> {
     match cli.command {
         Command::Evolve(args) => run_evolve(args, console),
         Command::Eval(args) => run_eval(args, console),
+        Command::Audit(args) => audit::run(args, console),
         Command::Replay(args) => run_replay(args, console),
         Command::Simulate(args) => run_simulate(&args, console),
         Command::Data { command } => run_data(command, console),
@@ -96,8 +98,9 @@ fn run_evolve(args: EvolveArgs, console: &Console) -> Result<(), Error> {
     }
     if args.replay {
         let archive = Some(out.join(folder::RUN_JSON));
-        let (robot, images, dataset) = ("best".to_string(), Vec::new(), None);
-        let replay = replay::replay(&replay::Options { robot, archive, images, data: args.data, dataset })?;
+        let robot = "best".to_string();
+        let replay = replay::Options { robot, archive, data: args.data, ..replay::Options::default() };
+        let replay = replay::replay(&replay)?;
         let wanted = pictures::Wanted::beside(&out, &replay.name, &[Format::Gif, Format::Html]);
         pictures::make(console, &replay, &wanted)?;
     }
@@ -108,7 +111,7 @@ fn run_eval(args: EvalArgs, console: &Console) -> Result<(), Error> {
     let archive = args.archive.map_or_else(folder::newest_run, Ok)?;
     let out = args.out.unwrap_or_else(|| archive.with_file_name("eval.json"));
     let options = eval::Options {
-        robots: args.robots,
+        robots: args.robots.physical(args.physical_only, &archive),
         images: args.images as usize,
         seed: args.seed,
         threshold: args.threshold,
@@ -129,9 +132,10 @@ fn run_eval(args: EvalArgs, console: &Console) -> Result<(), Error> {
 }
 
 fn run_replay(args: ReplayArgs, console: &Console) -> Result<(), Error> {
-    let ReplayArgs { robot, archive, images, dataset, data, format, out, width, every, open } = args;
+    let ReplayArgs { robot, physical_only, archive, images, dataset, data, format, out, width, every, open } =
+        args;
     let folder = pictures::folder(archive.as_deref(), &robot)?;
-    let replay = replay::replay(&replay::Options { robot, archive, images, data, dataset })?;
+    let replay = replay::replay(&replay::Options { robot, physical_only, archive, images, data, dataset })?;
     let wanted = match &out {
         Some(path) => pictures::Wanted::named(path, &format)?,
         None => pictures::Wanted::beside(&folder, &replay.name, &format),

@@ -23,6 +23,8 @@ pub enum Purpose {
     BuiltinDigits = 5,
     /// Which robots of an archive are looked at.
     Robots = 6,
+    /// Which pixels an audit changes.
+    AuditPixels = 20,
 }
 
 /// One stream of random numbers.

@@ -1,5 +1,6 @@
 //! The words of the command line: clap's types, help and examples.
 
+use super::audit::{self, AuditArgs};
 use crate::run::replay::Shown;
 use crate::run::robots::Selection;
 use crate::task::dataset::BUILTIN;
@@ -56,6 +57,9 @@ Examples:
   morphcog eval --archive runs/zero_one-seed1/run.json --robots top:10
   morphcog eval --archive runs/zero_one-seed1/run.json --robots 3fa,b02 -o two.json")]
     Eval(EvalArgs),
+    /// Tell robots that walk from robots that live off the simulator.
+    #[command(after_help = audit::EXAMPLES)]
+    Audit(AuditArgs),
     /// Watch a robot: an animated GIF and a page for the browser.
     #[command(after_help = "\
 Examples:
@@ -169,8 +173,11 @@ pub(super) struct EvalArgs {
     #[arg(short = 'n', long, default_value_t = 1000, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pub(super) images: u32,
     /// all, top:N, random:N, or ids (or beginnings of ids) separated by commas.
-    #[arg(short, long, default_value = "top:10")]
+    #[arg(short, long, visible_alias = "select", default_value = "top:10")]
     pub(super) robots: Selection,
+    /// Only robots that morphcog audit found physical.
+    #[arg(long)]
+    pub(super) physical_only: bool,
     /// Seed of what is drawn: images, and robots with random:N.
     #[arg(long, default_value_t = 1)]
     pub(super) seed: u64,
@@ -196,6 +203,9 @@ pub(super) struct ReplayArgs {
     /// Id (or the beginning of one), "best", or the name of a published robot.
     #[arg(short, long, default_value = "best")]
     pub(super) robot: String,
+    /// Only robots that morphcog audit found physical: "best" is the fittest of them.
+    #[arg(long)]
+    pub(super) physical_only: bool,
     /// The run.json (default: the newest under runs/).
     #[arg(short, long, value_name = "FILE")]
     pub(super) archive: Option<PathBuf>,

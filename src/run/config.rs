@@ -1,6 +1,7 @@
 //! [`Config`]: everything a run depends on, in TOML or JSON with the same keys.
 
 use super::Error;
+use super::robust::EvaluationConfig;
 use super::toml_text::{self, Format};
 use crate::body::MAX_SIDE;
 use crate::genome::{BodySpec, MutationParams};
@@ -67,6 +68,9 @@ pub struct Config {
     /// When the run is saved.
     #[serde(default)]
     pub checkpoint: CheckpointConfig,
+    /// How robots are evaluated. Left out of files where it is the default.
+    #[serde(default, skip_serializing_if = "EvaluationConfig::is_default")]
+    pub evaluation: EvaluationConfig,
     /// Constants of the simulator.
     #[serde(default)]
     pub physics: Physics,

@@ -72,7 +72,7 @@ pub fn eval(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Re
         )));
     }
     let run = RunFile::read(&options.archive)?;
-    check_out(options)?;
+    check_out(&options.out, &options.archive)?;
     let config = &run.config;
     let grouping = config.grouping()?;
     let dataset = load_dataset(config, options.data.as_deref(), &Split::ALL)?;
@@ -120,8 +120,7 @@ fn task_of<'a>(grouping: &'a Grouping, robot: &Robot) -> Option<&'a grouping::Sp
 }
 
 /// Whether the results can be written, and overwrite neither each other nor a file of the run.
-fn check_out(options: &Options) -> Result<(), Error> {
-    let Options { out, archive, .. } = options;
+pub(super) fn check_out(out: &Path, archive: &Path) -> Result<(), Error> {
     let refuse = |text: &str| Err(Error::usage(format!("--out {}: {text}", out.display())));
     let csv = out.with_extension("csv");
     if csv == *out {
@@ -130,7 +129,7 @@ fn check_out(options: &Options) -> Result<(), Error> {
     let folder_of =
         |path: &Path| path.parent().and_then(|folder| Path::new(".").join(folder).canonicalize().ok());
     let same_folder = folder_of(out) == folder_of(archive);
-    for path in [out, &csv] {
+    for path in [out, csv.as_path()] {
         let name = path.file_name();
         let is_of_run = RunFolder::files().iter().any(|own| name == Some(own.as_ref()));
         if same_folder && (is_of_run || name == archive.file_name()) {

@@ -4,6 +4,7 @@ use super::archive::{Dimensions, FORMAT, FORMAT_VERSION, Robot, RunFile};
 use super::checkpoint::{self, Checkpoint, KnownBodies};
 use super::folder::{self, IfExists, RunFolder};
 use super::metrics::{Metrics, Totals};
+use super::robust::{Scored, with_perturbed_lives};
 use super::training::Training;
 use super::variation::Mutations;
 use super::{Config, Error, resume};
@@ -200,14 +201,15 @@ impl<'a> Run<'a> {
         let jobs: Vec<Job> = fresh.iter().map(|(proposal, robot)| self.job(proposal.parent, robot)).collect();
         let evaluations =
             evaluate(&jobs, &self.training.stimuli, &config.physics, &config.protocol, config.savings);
+        let scored = with_perturbed_lives(config, self.training, &self.grouping, &jobs, evaluations);
         drop(jobs);
 
         let mut told = Vec::new();
-        for ((proposal, robot), evaluation) in fresh.into_iter().zip(evaluations) {
+        for ((proposal, robot), Scored { evaluation, at_most }) in fresh.into_iter().zip(scored) {
             self.totals.count(&evaluation);
             match evaluation.outcome {
                 Outcome::Walked(displacements) => {
-                    told.push(self.scored(proposal.child, robot, displacements))
+                    told.push(self.scored(proposal.child, robot, displacements, at_most))
                 }
                 Outcome::Unstable(_) => self.totals.unstable += 1,
                 Outcome::Stopped => {}
@@ -245,14 +247,14 @@ impl<'a> Run<'a> {
         Job { body: &robot.body, first_image, may_win: Box::new(may_win) }
     }
 
-    fn scored(&self, child: u64, robot: Robot, displacements: Vec<f64>) -> Evaluated<Robot> {
+    fn scored(&self, child: u64, robot: Robot, displacements: Vec<f64>, at_most: f64) -> Evaluated<Robot> {
         let answers = self.training.answers(displacements.iter().copied().map(Some));
         let score = self.grouping.score(&answers);
         let coordinates = self.cell(self.bins(&robot), score.task);
         // The coordinates are bins of this very space.
         let cell = self.space.index(&coordinates).unwrap_or_default();
         let task = self.grouping.tasks()[score.task].name();
-        let objective = score.fitness;
+        let objective = score.fitness.min(at_most);
         let solution = Robot { cell: coordinates, task, objective, displacements, ..robot };
         Evaluated { child, cell, objective, solution }
     }

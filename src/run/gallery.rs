@@ -8,6 +8,12 @@ use serde::Deserialize;
 /// The config under which the published robots were evolved.
 const CONFIG: &str = "zero_one_published.toml";
 
+/// What all published robots are called together.
+pub const ALL: &str = "gallery";
+
+/// The list of them.
+pub(super) const TEXT: &str = include_str!("../../data/gallery.json");
+
 /// A published robot.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Published {
@@ -30,8 +36,7 @@ pub fn gallery() -> Result<Vec<Published>, Error> {
         published_fitness: f64,
         body: String,
     }
-    let entries: Vec<Entry> =
-        super::toml_text::read_json(include_str!("../../data/gallery.json"), "gallery.json")?;
+    let entries: Vec<Entry> = super::toml_text::read_json(TEXT, "gallery.json")?;
     let robot = |Entry { name, published_fitness, body }: Entry| {
         let body = body.parse().map_err(|error| Error::other(format!("gallery.json: {name}: {error}")))?;
         Ok(Published { name, fitness: published_fitness, body })

@@ -1,6 +1,8 @@
 //! Floor 4: what the commands do, one file per command. Reports through observers, never prints.
 
 pub mod archive;
+pub mod audit;
+pub mod audit_file;
 pub mod bench;
 pub mod checkpoint;
 pub mod config;
@@ -15,6 +17,7 @@ pub mod replay;
 pub mod report;
 mod resume;
 pub mod robots;
+pub mod robust;
 #[cfg(test)]
 mod samples;
 pub mod signals;
@@ -22,6 +25,7 @@ pub mod simulate;
 mod toml_text;
 pub mod training;
 mod variation;
+pub mod verdict;
 
 pub use config::Config;
 pub use error::{Error, ErrorKind};

@@ -40,10 +40,12 @@ impl FromStr for Shown {
 }
 
 /// What to record.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Options {
     /// The robot: an id, the beginning of one, "best", or a name in the gallery.
     pub robot: String,
+    /// Whether only robots will do that an audit found physical.
+    pub physical_only: bool,
     /// The run.json; `None`: the newest under `runs/`.
     pub archive: Option<PathBuf>,
     /// The images; none: the training images.
@@ -143,6 +145,10 @@ fn find(options: &Options) -> Result<Found, Error> {
     if options.archive.is_none()
         && let Some(robot) = gallery::find(&options.robot)?
     {
+        if options.physical_only {
+            let text = "--physical-only: expected a robot of an archive, not a published one";
+            return Err(Error::usage(text.to_string()).hint("morphcog audit --robots gallery".to_string()));
+        }
         let about = vec![
             ("Robot".to_string(), robot.name.clone()),
             ("From".to_string(), "the robots published with the paper".to_string()),
@@ -157,8 +163,8 @@ fn find(options: &Options) -> Result<Found, Error> {
         None => folder::newest_run()?,
     };
     let run = RunFile::read(&archive)?;
-    let robots = Selection::Ids(vec![options.robot.clone()]).of(&run, 0);
-    let robots = robots.map_err(|error| error.within(&archive.display().to_string()))?;
+    let robots = Selection::Ids(vec![options.robot.clone()]).physical(options.physical_only, &archive);
+    let robots = robots.of(&run, 0).map_err(|error| error.within(&archive.display().to_string()))?;
     let robot = robots[0];
     let about = vec![
         ("Robot".to_string(), robot.id.clone()),

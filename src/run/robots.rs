@@ -2,7 +2,9 @@
 
 use super::Error;
 use super::archive::{Robot, RunFile};
+use super::audit_file::{AUDIT_JSON, AuditFile};
 use crate::base::random::{Purpose, stream};
+use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 /// Which robots of a run.
@@ -16,6 +18,13 @@ pub enum Selection {
     Random(usize),
     /// Those with these ids, or unique beginnings of ids; "best" is the fittest.
     Ids(Vec<String>),
+    /// So selected, but from those robots only that an audit found physical.
+    Physical {
+        /// The selection among them.
+        of: Box<Selection>,
+        /// The audit's file.
+        audit: PathBuf,
+    },
 }
 
 impl FromStr for Selection {
@@ -36,6 +45,15 @@ impl FromStr for Selection {
 }
 
 impl Selection {
+    /// The same among the robots only that the audit beside an archive found physical, if `only` says so.
+    #[must_use]
+    pub fn physical(self, only: bool, archive: &Path) -> Self {
+        match only {
+            true => Selection::Physical { of: Box::new(self), audit: archive.with_file_name(AUDIT_JSON) },
+            false => self,
+        }
+    }
+
     /// What it says, for people.
     pub fn describe(&self) -> String {
         match self {
@@ -43,13 +61,14 @@ impl Selection {
             Selection::Top(count) => format!("the {count} fittest on the training images"),
             Selection::Random(count) => format!("{count} elites drawn at random"),
             Selection::Ids(ids) => format!("chosen by id: {}", ids.join(", ")),
+            Selection::Physical { of, .. } => format!("{}, of those audited as physical", of.describe()),
         }
     }
 
     /// The robots, fittest first where no order is given; `seed` is for the random ones.
     ///
     /// # Errors
-    /// If there is no robot, or no single one, of an id.
+    /// If there is no robot, or no single one, of an id; if only physical ones are asked for, and they are not known.
     pub fn of<'a>(&self, run: &'a RunFile, seed: u64) -> Result<Vec<&'a Robot>, Error> {
         let mut fittest: Vec<&Robot> = run.elites.iter().collect();
         // Stable: equally fit ones stay in the order of their cells.
@@ -57,6 +76,15 @@ impl Selection {
         if fittest.is_empty() {
             return Err(Error::input(format!("{}: the archive is empty", run.name)));
         }
+        self.among(fittest, run, seed)
+    }
+
+    fn among<'a>(
+        &self,
+        fittest: Vec<&'a Robot>,
+        run: &'a RunFile,
+        seed: u64,
+    ) -> Result<Vec<&'a Robot>, Error> {
         match self {
             Selection::All => Ok(fittest),
             Selection::Top(count) => Ok(fittest.into_iter().take(*count).collect()),
@@ -65,8 +93,46 @@ impl Selection {
                 Ok(picked.into_iter().map(|index| fittest[index]).collect())
             }
             Selection::Ids(ids) => ids.iter().map(|id| by_id(&fittest, id)).collect(),
+            Selection::Physical { of, audit } => of.among(physical(of, audit, fittest, run)?, run, seed),
         }
     }
+}
+
+/// The physical ones, fittest first; those that are named must be among them.
+fn physical<'a>(
+    selection: &Selection,
+    path: &Path,
+    fittest: Vec<&'a Robot>,
+    run: &RunFile,
+) -> Result<Vec<&'a Robot>, Error> {
+    let audit = AuditFile::of_run(run, path)?;
+    let name = path.display();
+    let hint = "morphcog audit goes on with the robots that are missing; give it the same --archive";
+    let mut named = Vec::new();
+    if let Selection::Ids(ids) = selection {
+        for id in ids.iter().filter(|id| *id != "best") {
+            named.push(by_id(&fittest, id)?);
+        }
+    }
+    // Who names robots needs to know of those only; of a part of an archive nothing can be drawn fairly.
+    let is_named = matches!(selection, Selection::Ids(ids) if ids.len() == named.len());
+    for robot in if is_named { &named } else { &fittest } {
+        if audit.robot(&robot.id).is_none() {
+            let (known, all) = (audit.robots.len(), audit.elites);
+            let text = format!("{name}: robot {} has not been audited ({known} of {all} have)", robot.id);
+            return Err(Error::input(text).hint(hint.to_string()));
+        }
+    }
+    if let Some(found) = named.iter().filter_map(|robot| audit.robot(&robot.id)).find(|r| !r.is_physical()) {
+        let text = format!("{name}: robot {} is not physical: {}", found.id, found.conclusion());
+        return Err(Error::input(text).hint("leave --physical-only away to take it all the same".to_string()));
+    }
+    let physical: Vec<&Robot> =
+        fittest.into_iter().filter(|robot| audit.robot(&robot.id).is_some_and(|r| r.is_physical())).collect();
+    if physical.is_empty() {
+        return Err(Error::input(format!("{name}: none of {} robots is physical", audit.robots.len())));
+    }
+    Ok(physical)
 }
 
 /// The robot of an id, or of the unique beginning of one; "best" is the first.

@@ -13,8 +13,7 @@ use super::params::Physics;
 use super::state::{Scratch, State, Work, X, Y, slices, slices_mut};
 use crate::base::lanes::{BLOCK, Lanes, each};
 
-/// Advances positions and velocities by one substep, contact forces held constant, and limits the springs' lengths. The
-/// positions at its start become the previous ones.
+/// Advances velocities by one substep, contact forces held constant; the new positions are in `scratch`.
 #[inline(always)]
 pub(super) fn integrate<L: Lanes>(
     lattice: &Lattice,
@@ -22,10 +21,28 @@ pub(super) fn integrate<L: Lanes>(
     state: &mut State,
     scratch: &mut Scratch,
 ) {
-    if !stages::<L, false>(lattice, physics, state, scratch) {
-        stages::<L, true>(lattice, physics, state, scratch);
+    if let Some(extra) = &mut scratch.extra {
+        let goals = &scratch.goals[lattice.len..];
+        extra.first_stage::<L>(lattice, goals, physics.servo_gain, &state.position);
+    }
+    if !first_stage::<L, false>(lattice, physics, state, scratch) {
+        first_stage::<L, true>(lattice, physics, state, scratch);
+    }
+    if !later_stages::<L, false>(lattice, physics, state, scratch) {
+        later_stages::<L, true>(lattice, physics, state, scratch);
     }
     std::mem::swap(&mut state.velocity, &mut scratch.velocity);
+}
+
+/// Limits the lengths of all springs at the new positions. The positions at the start of the substep become the
+/// previous ones.
+#[inline(always)]
+pub(super) fn limit<L: Lanes>(
+    lattice: &Lattice,
+    physics: &Physics,
+    state: &mut State,
+    scratch: &mut Scratch,
+) {
     let Scratch { position: new, passing, extra, .. } = scratch;
     limit_all::<L>(lattice, physics, new, &mut state.previous, passing);
     if let Some(extra) = extra {
@@ -35,22 +52,15 @@ pub(super) fn integrate<L: Lanes>(
     std::mem::swap(&mut state.position, &mut state.previous);
 }
 
-/// The four stages. Taken for regular, they are not to be used if they were not, which is seen in the first and in the
-/// last: between them springs hardly stretch, and points hardly fall, any further.
+/// The other three stages. Taken for regular, they are to be done again carefully if they were not, which is seen in
+/// the first and in the last stage: between them springs hardly stretch, and points hardly fall, any further.
 #[inline(always)]
-fn stages<L: Lanes, const CAREFUL: bool>(
+fn later_stages<L: Lanes, const CAREFUL: bool>(
     lattice: &Lattice,
     physics: &Physics,
     state: &State,
     scratch: &mut Scratch,
 ) -> bool {
-    if let Some(extra) = &mut scratch.extra {
-        let goals = &scratch.goals[lattice.len..];
-        extra.first_stage::<L>(lattice, goals, physics.servo_gain, &state.position);
-    }
-    if !first_stage::<L, CAREFUL>(lattice, physics, state, scratch) {
-        return false;
-    }
     extra_stage::<L>(lattice, scratch, 0);
     second_stage::<L, CAREFUL>(lattice, physics, state, scratch);
     extra_stage::<L>(lattice, scratch, 1);

@@ -8,6 +8,7 @@
 
 mod actuation;
 mod contact;
+mod energy;
 mod extra;
 mod forces;
 mod geometry;
@@ -16,9 +17,11 @@ mod lattice;
 mod limits;
 mod neighbours;
 pub mod params;
+mod refinement;
 mod state;
 mod world;
 
+pub use energy::Energy;
 pub use lattice::Lattice;
 pub use params::{Physics, PhysicsError};
 pub use state::State;

@@ -2,7 +2,8 @@
 
 use super::actuation;
 use super::contact::add_contacts;
-use super::integrator::integrate;
+use super::energy::{Energy, Meter};
+use super::integrator::{integrate, limit};
 use super::lattice::Lattice;
 use super::limits::limit_rigid;
 use super::params::Physics;
@@ -53,6 +54,7 @@ pub struct World<'a> {
     pixels: Vec<f64>,
     targets: Vec<f64>,
     instructions: InstructionSet,
+    meter: Option<Meter>,
 }
 
 impl<'a> World<'a> {
@@ -68,6 +70,7 @@ impl<'a> World<'a> {
             pixels: vec![0.0; lattice.active.len()],
             targets: vec![0.0; lattice.active.len()],
             instructions: InstructionSet::in_use(),
+            meter: None,
         }
     }
 
@@ -78,9 +81,22 @@ impl<'a> World<'a> {
         self
     }
 
+    /// Measures energies; results are the same bits, but slower.
+    #[must_use]
+    pub fn with_energy_meter(mut self) -> Self {
+        self.meter = Some(Meter::new(self.lattice, self.physics));
+        self
+    }
+
+    /// Energies put in so far, all lives together; 0 without a meter.
+    pub fn energy(&self) -> Energy {
+        self.meter.as_ref().map_or_else(Energy::default, |meter| meter.energy)
+    }
+
     /// Begins the life anew; the stimulus stays.
     pub fn reset(&mut self) {
         self.state = State::at_rest(self.lattice, self.physics, self.start.row);
+        self.meter.iter_mut().for_each(Meter::rest);
     }
 
     /// Shows an image: H × W in [0, 1], pixel (row, column) to voxel (row, column); outside it is dark.
@@ -100,8 +116,9 @@ impl<'a> World<'a> {
         self.scratch.begin();
         let goals = &mut self.scratch.goals;
         actuation::set_goals(lattice, physics, control_step, &self.pixels, &mut self.targets, goals);
-        let (state, scratch) = (&mut self.state, &mut self.scratch);
-        let steps = ControlStep { lattice, physics, start_column: self.start.column, state, scratch };
+        self.meter.iter_mut().for_each(|meter| meter.drive(&self.scratch.goals, &self.state.position));
+        let (state, scratch, meter) = (&mut self.state, &mut self.scratch, self.meter.as_mut());
+        let steps = ControlStep { lattice, physics, start_column: self.start.column, state, scratch, meter };
         let outcome = dispatch(self.instructions, steps);
         outcome.map_err(|reason| Unstable { control_step, reason })?;
         // What a substep leaves behind is looked at by the next; here, at the end, by nobody else.
@@ -152,6 +169,7 @@ struct ControlStep<'a> {
     start_column: i64,
     state: &'a mut State,
     scratch: &'a mut Scratch,
+    meter: Option<&'a mut Meter>,
 }
 
 impl Kernel for ControlStep<'_> {
@@ -159,9 +177,9 @@ impl Kernel for ControlStep<'_> {
 
     #[inline(always)]
     fn run<L: Lanes>(self) -> Self::Output {
-        let ControlStep { lattice, physics, start_column, state, scratch } = self;
+        let ControlStep { lattice, physics, start_column, state, scratch, mut meter } = self;
         for _ in 0..physics.substeps {
-            substep::<L>(lattice, physics, start_column, state, scratch)?;
+            substep::<L>(lattice, physics, start_column, state, scratch, meter.as_deref_mut())?;
         }
         Ok(())
     }
@@ -175,6 +193,7 @@ fn substep<L: Lanes>(
     start_column: i64,
     state: &mut State,
     scratch: &mut Scratch,
+    mut meter: Option<&mut Meter>,
 ) -> Result<(), UnstableReason> {
     scratch.neighbours.refresh::<L>(lattice, physics, state).map_err(|_| UnstableReason::BlownUp)?;
     let unstable = scratch.neighbours.too_many_overlaps(lattice, physics, state);
@@ -183,7 +202,10 @@ fn substep<L: Lanes>(
     add_contacts(lattice, physics, start_column, state, &scratch.neighbours, &mut scratch.contact);
     // Contacts see true velocities: position now less position then. The integrator knows its own.
     integrate::<L>(lattice, physics, state, scratch);
+    meter.iter_mut().for_each(|meter| meter.before_limits(&scratch.position));
+    limit::<L>(lattice, physics, state, scratch);
     limit_rigid(lattice, physics, &mut state.position);
+    meter.iter_mut().for_each(|meter| meter.after_limits(&state.position));
 
     if unstable { Err(UnstableReason::Overlaps) } else { Ok(()) }
 }

@@ -10,6 +10,7 @@ pub mod grouping;
 pub mod idx;
 pub mod info;
 mod pen;
+pub mod perturbation;
 pub mod protocol;
 pub mod recording;
 pub mod rollout;

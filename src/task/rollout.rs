@@ -1,10 +1,10 @@
 //! Rollouts: a body, a protocol and stimuli → displacements.
 
-use super::protocol::Protocol;
+use super::protocol::{Life, Protocol};
 use super::recording::{Frame, Phase, Recording, VoxelCorners};
 use crate::base::Grid;
 use crate::body::Body;
-use crate::sim::{Lattice, Physics, Start, Unstable, World};
+use crate::sim::{Energy, Lattice, Physics, Start, Unstable, World};
 
 /// World units → voxel lengths: distances are reported in voxel lengths, as in the paper.
 fn voxel_lengths(world_units: f64, physics: &Physics) -> f64 {
@@ -58,6 +58,32 @@ pub fn fresh_life(
     stimulus: &Grid<f64>,
 ) -> Result<f64, Unstable> {
     Rollout::new(lattice, physics, protocol).show(stimulus, |_| ())
+}
+
+/// A robot shown images as the protocol has it, in fresh lives or one: its displacement under each in voxel lengths, and
+/// the energies that were put into it if they are to be `measured`.
+///
+/// # Errors
+/// [`Unstable`] if a life ends early.
+pub fn walk(
+    lattice: &Lattice,
+    physics: &Physics,
+    protocol: &Protocol,
+    stimuli: &[Grid<f64>],
+    measured: bool,
+) -> Result<(Vec<f64>, Energy), Unstable> {
+    let mut rollout = Rollout::new(lattice, physics, protocol);
+    if measured {
+        rollout.world = rollout.world.with_energy_meter();
+    }
+    let mut displacements = Vec::with_capacity(stimuli.len());
+    for stimulus in stimuli {
+        if protocol.life == Life::Fresh {
+            rollout.reset();
+        }
+        displacements.push(rollout.show(stimulus, |_| ())?);
+    }
+    Ok((displacements, rollout.world.energy()))
 }
 
 /// For each stimulus the first one (its index) that shows the body's sensors the same pixels: those are one life.
@@ -125,7 +151,6 @@ pub fn record(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::task::protocol::Life;
 
     const STEPS: u32 = 12;
 
@@ -215,6 +240,21 @@ mod tests {
         let lattice = Lattice::new(&body(), &physics);
         let alone = fresh_life(&lattice, &physics, &protocol(), &image(1.0, 0.0)).unwrap();
         assert_eq!(fresh.phases[1].displacement, alone);
+    }
+
+    #[test]
+    fn a_walk_is_what_the_protocol_says() {
+        let (physics, lattice) = (Physics::default(), Lattice::new(&body(), &Physics::default()));
+        let images = [image(0.0, 0.0), image(1.0, 0.0)];
+        for life in [Life::Fresh, Life::Sequential] {
+            let protocol = Protocol { life, ..protocol() };
+            let (plain, nothing) = walk(&lattice, &physics, &protocol, &images, false).unwrap();
+            let (measured, energy) = walk(&lattice, &physics, &protocol, &images, true).unwrap();
+            let recorded = recorded(life == Life::Fresh, &physics).phases;
+            assert_eq!(plain, recorded.iter().map(|phase| phase.displacement).collect::<Vec<_>>());
+            assert_eq!((plain, nothing), (measured, Energy::default()));
+            assert!(energy.drive > 0.0, "{energy:?}");
+        }
     }
 
     #[test]

@@ -22,6 +22,7 @@ pub mod stage;
 pub mod summary;
 pub mod table;
 pub mod terminal;
+pub mod verdicts;
 pub mod walk;
 #[cfg(test)]
 mod wobble;

@@ -5,7 +5,7 @@ use crate::run::data::catalogue::RemoteFile;
 use crate::run::data::fetch::{Attempt, FetchObserver};
 use crate::run::folder::RunFolder;
 use crate::run::training::Training;
-use crate::run::{eval, evolve};
+use crate::run::{audit, eval, evolve};
 use std::sync::OnceLock;
 
 /// Shows an evolution.
@@ -72,6 +72,36 @@ impl eval::Observer for Evaluation<'_> {
         let total = (robots * images) as u64;
         let label = format!("evaluating {robots} robots on {images} images:");
         self.counter.get_or_init(|| self.console.counter(&label, total, "lives"));
+    }
+
+    fn progress(&self, done: u64) {
+        if let Some(counter) = self.counter.get() {
+            counter.update(done);
+        }
+    }
+
+    fn warning(&self, text: &str) {
+        self.console.warning(text);
+    }
+}
+
+/// Shows an audit.
+pub struct Audit<'c> {
+    console: &'c Console,
+    counter: OnceLock<Counter<'c>>,
+}
+
+impl<'c> Audit<'c> {
+    /// Shows it on a console.
+    pub fn new(console: &'c Console) -> Self {
+        Audit { console, counter: OnceLock::new() }
+    }
+}
+
+impl audit::Observer for Audit<'_> {
+    fn started(&self, robots: usize, lives: usize) {
+        let label = format!("auditing {robots} robots:");
+        self.counter.get_or_init(|| self.console.counter(&label, lives as u64, "lives"));
     }
 
     fn progress(&self, done: u64) {

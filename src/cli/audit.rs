@@ -1,0 +1,99 @@
+//! `morphcog audit`: its words, and what it calls.
+
+use crate::run::audit::{self, Options, Source};
+use crate::run::audit_file::AUDIT_JSON;
+use crate::run::robots::Selection;
+use crate::run::verdict::Criteria;
+use crate::run::{Error, folder, gallery, signals};
+use crate::view::console::Console;
+use crate::view::{reporters, verdicts};
+use clap::Args;
+use std::path::{Path, PathBuf};
+
+pub(super) const EXAMPLES: &str = "\
+Examples:
+  morphcog audit --archive runs/zero_one-seed1/run.json
+  morphcog audit --archive runs/zero_one-seed1/run.json --robots top:10
+  morphcog audit --archive runs/a/run.json --archive runs/b/run.json
+  morphcog audit --robots gallery                     the robots published with the paper
+  morphcog audit --set perturbations.time_step=[2,4,8] --set threshold=2
+then
+  morphcog eval --archive runs/zero_one-seed1/run.json --robots random:10 --physical-only";
+
+#[derive(Debug, Args)]
+pub(super) struct AuditArgs {
+    /// A run.json (default: the newest under runs/); may be given several times.
+    #[arg(short, long, value_name = "FILE")]
+    archive: Vec<PathBuf>,
+    /// all, top:N, random:N, or ids (or beginnings of ids) separated by commas; or gallery, or names of published robots.
+    #[arg(short, long, visible_alias = "select", default_value = "all")]
+    robots: Selection,
+    /// Seed of robots drawn with random:N.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// How to judge: a TOML file (or JSON); keys that are not in it have their defaults.
+    #[arg(long, value_name = "FILE")]
+    criteria: Option<PathBuf>,
+    /// Change a criterion, as in threshold=2; may be given several times.
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<String>,
+    /// Folder with the images.
+    #[arg(long, value_name = "DIR")]
+    data: Option<PathBuf>,
+    /// Result file; a CSV goes beside it (default: audit.json beside run.json, where --physical-only looks).
+    #[arg(short, long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Threads (default: one per core).
+    #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    threads: Option<u16>,
+}
+
+pub(super) fn run(args: AuditArgs, console: &Console) -> Result<(), Error> {
+    let criteria = Criteria::load(args.criteria.as_deref(), &args.set)?;
+    let stop = signals::stop_flag()?;
+    let sources = sources(&args)?;
+    if sources.len() > 1 && args.out.is_some() {
+        let text = "--out: expected with one --archive only; of several, each gets an audit.json beside it";
+        return Err(Error::usage(text.to_string()));
+    }
+    for source in sources {
+        let beside = match &source {
+            Source::Archive(path) => path.with_file_name(AUDIT_JSON),
+            Source::Gallery => Path::new("gallery-audit.json").to_path_buf(),
+        };
+        let options = Options {
+            source,
+            robots: args.robots.clone(),
+            seed: args.seed,
+            criteria: criteria.clone(),
+            data: args.data.clone(),
+            out: args.out.clone().unwrap_or(beside),
+            threads: args.threads.map(usize::from),
+        };
+        let finished = audit::audit(&options, &stop, &reporters::Audit::new(console))?;
+        verdicts::audit(console, &finished, &options.out);
+        if finished.stopped {
+            let text = format!("stopped; {} robots are audited and saved", finished.file.robots.len());
+            return Err(Error::stopped(text).hint("the same command goes on".to_string()));
+        }
+    }
+    Ok(())
+}
+
+/// The archives, or the gallery if that is what the robots are named from.
+fn sources(args: &AuditArgs) -> Result<Vec<Source>, Error> {
+    if !args.archive.is_empty() {
+        return Ok(args.archive.iter().cloned().map(Source::Archive).collect());
+    }
+    if let Selection::Ids(ids) = &args.robots {
+        if matches!(ids.as_slice(), [word] if word == gallery::ALL) {
+            return Ok(vec![Source::Gallery]);
+        }
+        let published: Result<Vec<bool>, Error> =
+            ids.iter().map(|id| Ok(gallery::find(id)?.is_some())).collect();
+        if published?.iter().all(|is_published| *is_published) {
+            return Ok(vec![Source::Gallery]);
+        }
+    }
+    Ok(vec![Source::Archive(folder::newest_run()?)])
+}

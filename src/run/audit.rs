@@ -1,0 +1,275 @@
+//! `morphcog audit`: does a robot's behaviour survive changes that no honest walker should notice?
+
+use super::archive::{Robot, RunFile};
+use super::audit_file::{AuditFile, RobotAudit, fingerprint};
+use super::eval::check_out;
+use super::robots::Selection;
+use super::training::{Training, load_dataset, see};
+use super::verdict::{Behaviour, Criteria, PerturbedLife};
+use super::{Config, Error, gallery};
+use crate::base::hash::sha256_hex;
+use crate::body::Body;
+use crate::sim::{Energy, Lattice};
+use crate::task::dataset::Split;
+use crate::task::grouping::Grouping;
+use crate::task::perturbation::{Perturbation, Setting};
+use crate::task::rollout::walk;
+use rayon::prelude::*;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+
+/// Robots whose lives are lived side by side; what is finished is saved after so many.
+const BATCH: usize = 8;
+
+/// Whose robots are audited.
+#[derive(Clone, Debug)]
+pub enum Source {
+    /// Those of a run.json.
+    Archive(PathBuf),
+    /// The published ones.
+    Gallery,
+}
+
+/// What to audit, and how.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// Where the robots are from.
+    pub source: Source,
+    /// Which of them; of the gallery all, or names.
+    pub robots: Selection,
+    /// Seed of `random:N`.
+    pub seed: u64,
+    /// How they are judged.
+    pub criteria: Criteria,
+    /// Where the data are, if the command line says.
+    pub data: Option<PathBuf>,
+    /// Where the verdicts go (audit.json; audit.csv beside it).
+    pub out: PathBuf,
+    /// Number of threads; `None`: one per core.
+    pub threads: Option<usize>,
+}
+
+/// Who is told how an audit goes.
+pub trait Observer: Sync {
+    /// Before the first life: robots still to be audited, and lives that takes.
+    fn started(&self, robots: usize, lives: usize);
+    /// Lives done.
+    fn progress(&self, done: u64);
+    /// Something the user should know.
+    fn warning(&self, text: &str);
+}
+
+/// An audit's end.
+#[derive(Clone, Debug)]
+pub struct Finished {
+    /// The content of audit.json.
+    pub file: AuditFile,
+    /// Ids of the robots that were asked for.
+    pub asked: Vec<String>,
+    /// Whether a signal stopped it before the last of them.
+    pub stopped: bool,
+}
+
+/// A robot to be audited.
+struct Subject {
+    id: String,
+    task: String,
+    body: Body,
+    /// Displacements its run knows.
+    known: Option<Vec<f64>>,
+}
+
+/// What all robots of a source have in common.
+struct Trial {
+    config: Config,
+    grouping: Grouping,
+    training: Training,
+    criteria: Criteria,
+}
+
+/// Audits robots. What an earlier audit of the same robots by the same criteria found is kept and not done again; the file is
+/// the same bytes however often it was stopped.
+///
+/// # Errors
+/// What is wrong with archive, data, selection or criteria.
+pub fn audit(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Result<Finished, Error> {
+    let (config, training, subjects, order, mut file) = open(options)?;
+    let trial = Trial { grouping: config.grouping()?, training, criteria: options.criteria.clone(), config };
+    if let Ok(earlier) = AuditFile::read(&options.out) {
+        let same = AuditFile { robots: Vec::new(), ..earlier.clone() } == file;
+        file.robots = if same { earlier.robots } else { Vec::new() };
+    }
+    let asked = subjects.iter().map(|subject| subject.id.clone()).collect();
+    let open: Vec<Subject> =
+        subjects.into_iter().filter(|subject| file.robot(&subject.id).is_none()).collect();
+    observer.started(open.len(), open.iter().map(|subject| 1 + trial.perturbations(subject).len()).sum());
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(options.threads.unwrap_or(0)).build();
+    let pool = pool.map_err(|error| Error::other(format!("no threads: {error}")))?;
+    let done = AtomicU64::new(0);
+    for batch in open.chunks(BATCH) {
+        let found: Option<Vec<RobotAudit>> = pool.install(|| {
+            batch.par_iter().map(|subject| trial.robot(subject, stop, &done, observer)).collect()
+        });
+        let Some(found) = found else {
+            file.write(&options.out)?;
+            return Ok(Finished { file, asked, stopped: true });
+        };
+        for (subject, found) in batch.iter().zip(&found) {
+            if subject.known.is_some() && subject.known != found.displacements {
+                let text = "walks otherwise here than its run says: another version of the program made that";
+                observer.warning(&format!("{}: {text}", subject.id));
+            }
+        }
+        file.robots.extend(found);
+        file.robots.sort_by_key(|robot| order.iter().position(|id| *id == robot.id));
+        file.write(&options.out)?;
+    }
+    file.write(&options.out)?;
+    Ok(Finished { file, asked, stopped: false })
+}
+
+type Opened = (Config, Training, Vec<Subject>, Vec<String>, AuditFile);
+
+/// Config, images, the robots asked for, the ids of all there are in order, and an empty file.
+fn open(options: &Options) -> Result<Opened, Error> {
+    let data = options.data.as_deref();
+    match &options.source {
+        Source::Gallery => {
+            check_out(&options.out, Path::new(""))?;
+            let config = gallery::config()?;
+            let training = Training::load(&config, data)?;
+            let all = gallery::gallery()?;
+            let order: Vec<String> = all.iter().map(|robot| robot.name.clone()).collect();
+            let is_asked = |name: &str| match &options.robots {
+                Selection::Ids(ids) if !ids.iter().any(|id| id == gallery::ALL) => {
+                    ids.iter().any(|id| id.eq_ignore_ascii_case(name))
+                }
+                _ => true,
+            };
+            let subject = |robot: gallery::Published| Subject {
+                id: robot.name,
+                task: "0|1".to_string(),
+                body: robot.body,
+                known: None,
+            };
+            let subjects = all.into_iter().filter(|robot| is_asked(&robot.name)).map(subject).collect();
+            let sha = sha256_hex(gallery::TEXT.as_bytes());
+            let file = AuditFile::new("gallery", sha, order.len(), &options.criteria);
+            Ok((config, training, subjects, order, file))
+        }
+        Source::Archive(path) => {
+            let run = RunFile::read(path)?;
+            check_out(&options.out, path)?;
+            let training = training_of(&run, options)?;
+            let subject = |robot: &Robot| Subject {
+                id: robot.id.clone(),
+                task: robot.task.clone(),
+                body: robot.body.clone(),
+                known: Some(robot.displacements.clone()),
+            };
+            let mut subjects: Vec<Subject> = Vec::new();
+            for robot in options.robots.of(&run, options.seed)? {
+                if subjects.iter().all(|other| other.id != robot.id) {
+                    subjects.push(subject(robot));
+                }
+            }
+            let order: Vec<String> = run.elites.iter().map(|robot| robot.id.clone()).collect();
+            let file = AuditFile::new(&run.name, fingerprint(&run), order.len(), &options.criteria);
+            Ok((run.config, training, subjects, order, file))
+        }
+    }
+}
+
+/// The images a run's robots were evolved on. Of other data, verdicts would mean nothing.
+fn training_of(run: &RunFile, options: &Options) -> Result<Training, Error> {
+    let dataset = load_dataset(&run.config, options.data.as_deref(), &[Split::Train])?;
+    if dataset.fingerprint(Split::Train).unwrap_or_default() != run.dataset.train_sha256 {
+        let text = "the training images here are not those the run was made with (another SHA-256)";
+        return Err(Error::input(text.to_string()).hint("name their folder with --data".to_string()));
+    }
+    let see = |image: &super::training::ImageRef| see(&run.config, &dataset, Split::Train, image.index);
+    let stimuli: Result<Vec<_>, Error> = run.training_images.iter().map(see).collect();
+    Ok(Training { dataset: run.dataset.clone(), images: run.training_images.clone(), stimuli: stimuli? })
+}
+
+impl Trial {
+    fn perturbations(&self, subject: &Subject) -> Vec<Perturbation> {
+        Perturbation::all(&self.criteria.perturbations, &subject.body, self.config.protocol.life)
+    }
+
+    /// One robot's audit; `None` if stopped before its end.
+    fn robot(
+        &self,
+        subject: &Subject,
+        stop: &AtomicBool,
+        done: &AtomicU64,
+        observer: &dyn Observer,
+    ) -> Option<RobotAudit> {
+        let count = |lives: usize| {
+            observer.progress(done.fetch_add(lives as u64, Ordering::Relaxed) + lives as u64);
+        };
+        let setting = Setting {
+            body: subject.body.clone(),
+            physics: self.config.physics.clone(),
+            protocol: self.config.protocol.clone(),
+            stimuli: self.training.stimuli.clone(),
+        };
+        let plain = (!stop.load(Ordering::Relaxed)).then(|| live(&setting, true))?;
+        count(1);
+        let (displacements, energy) = plain.map_or((None, Energy::default()), |(d, e)| (Some(d), e));
+        let classes: Vec<u8> = self.training.images.iter().map(|image| image.label).collect();
+        let still = vec![0.0; classes.len()];
+        let split = self.grouping.tasks().iter().find(|split| split.name() == subject.task);
+        // A run's robots are checked to have tasks of the run.
+        let split = split.unwrap_or(&self.grouping.tasks()[0]);
+        let behaviour =
+            Behaviour::new(&self.criteria, split, &classes, displacements.clone().unwrap_or(still));
+        let life = |perturbation: &Perturbation| {
+            if stop.load(Ordering::Relaxed) {
+                return None;
+            }
+            let walked = live(&perturbation.apply(&setting), false).map(|(d, _)| perturbation.undo(d));
+            count(1);
+            Some(behaviour.compare(perturbation.name(), perturbation.kind, walked))
+        };
+        let perturbations = self.perturbations(subject);
+        let lives: Vec<PerturbedLife> = match behaviour.is_walker() {
+            true => {
+                let lives: Option<Vec<_>> = perturbations.par_iter().map(life).collect();
+                let counts = |(life, perturbation): &(PerturbedLife, &Perturbation)| {
+                    life.displacements.is_some() || perturbation.counts_if_unstable()
+                };
+                lives?.into_iter().zip(&perturbations).filter(counts).map(|(life, _)| life).collect()
+            }
+            false => {
+                count(perturbations.len());
+                Vec::new()
+            }
+        };
+        let (verdict, reason) = behaviour.judge(&lives);
+        let persisting = lives.iter().filter(|life| life.persists).count() as f64;
+        let steps = f64::from(setting.protocol.control_steps) * setting.stimuli.len() as f64;
+        let cycles = steps / f64::from(setting.physics.cycle_steps);
+        Some(RobotAudit {
+            id: subject.id.clone(),
+            task: subject.task.clone(),
+            verdict,
+            reason,
+            persisting: persisting / lives.len().max(1) as f64,
+            spread: behaviour.spread(&lives),
+            energy_per_cycle: Energy { drive: energy.drive / cycles, limits: energy.limits / cycles },
+            displacements,
+            lives,
+        })
+    }
+}
+
+/// Displacements and energies of a life; `None` if it is unstable.
+fn live(setting: &Setting, measured: bool) -> Option<(Vec<f64>, Energy)> {
+    let Setting { body, physics, protocol, stimuli } = setting;
+    walk(&Lattice::new(body, physics), physics, protocol, stimuli, measured).ok()
+}
+
+#[cfg(test)]
+#[path = "audit_tests.rs"]
+mod tests;

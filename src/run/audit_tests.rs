@@ -1,0 +1,70 @@
+use super::*;
+use crate::base::Grid;
+use crate::run::config::BUILT_IN;
+use crate::run::training::{DatasetRef, ImageRef};
+use crate::run::verdict::Verdict;
+use crate::sim::Physics;
+
+/// Two images, of classes 0 and 1, the first dark and the second bright, each in a fresh life of five cycles.
+fn trial(height: usize, width: usize, physics: Physics) -> Trial {
+    let set = ["task={splits=[0,1],same_way_bin=true}", "protocol.control_steps=250"].map(str::to_string);
+    let mut config = Config::parse(BUILT_IN[0].1, BUILT_IN[0].0, &set).unwrap();
+    config.physics = physics;
+    let criteria = Criteria::default();
+    let dataset = DatasetRef { name: "none".to_string(), train_sha256: String::new() };
+    let images = [0, 1].map(|label| ImageRef { index: usize::from(label), label }).to_vec();
+    let stimuli = [0.0, 1.0].map(|pixel| Grid::filled(height, width, pixel)).to_vec();
+    Trial {
+        grouping: config.grouping().unwrap(),
+        training: Training { dataset, images, stimuli },
+        criteria,
+        config,
+    }
+}
+
+struct Silent;
+
+impl Observer for Silent {
+    fn started(&self, _: usize, _: usize) {}
+    fn progress(&self, _: u64) {}
+    fn warning(&self, _: &str) {}
+}
+
+fn audited(body: &str, task: &str, physics: Physics) -> RobotAudit {
+    let body: Body = body.parse().unwrap();
+    let trial = trial(body.height(), body.width(), physics);
+    let subject = Subject { id: "x".to_string(), task: task.to_string(), body, known: None };
+    trial.robot(&subject, &AtomicBool::new(false), &AtomicU64::new(0), &Silent).unwrap()
+}
+
+/// Muscles of one phase above, of the other below, a soft front and a rigid foot: it walks to the right.
+const WALKER: &str = "444422/444422/333311/330011";
+
+#[test]
+fn a_symmetric_passive_block_is_not_a_walker() {
+    for task in ["same way", "0|1"] {
+        let found = audited("1221/1221", task, Physics::default());
+        assert_eq!(found.verdict, Verdict::NotAWalker, "{found:?}");
+        assert!(found.reason.contains("no walk of more than 3 voxels for 0"), "{}", found.reason);
+        assert!(found.lives.is_empty() && found.energy_per_cycle.drive == 0.0);
+    }
+}
+
+#[test]
+fn a_plain_walker_is_physical() {
+    let found = audited(WALKER, "same way", Physics::default());
+    assert_eq!(found.verdict, Verdict::Physical, "{found:#?}");
+    assert_eq!((found.persisting, found.lives.len()), (1.0, 14));
+    assert!(found.displacements.unwrap().iter().all(|d| *d > 5.0));
+    assert!(found.spread < 1.0 && found.energy_per_cycle.drive > 0.0);
+    // It sees nothing, so that it cannot tell classes apart.
+    assert_eq!(audited(WALKER, "0|1", Physics::default()).verdict, Verdict::NotAWalker);
+}
+
+#[test]
+fn a_stopped_audit_has_no_verdict() {
+    let body: Body = WALKER.parse().unwrap();
+    let trial = trial(body.height(), body.width(), Physics::default());
+    let subject = Subject { id: "x".to_string(), task: "same way".to_string(), body, known: None };
+    assert!(trial.robot(&subject, &AtomicBool::new(true), &AtomicU64::new(0), &Silent).is_none());
+}

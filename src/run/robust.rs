@@ -1,0 +1,102 @@
+//! Robust evolution (`[evaluation] robust = true`): a robot is as fit as in the worst of its lives, the unchanged one and a
+//! few that no honest walker should notice.
+//!
+//! The task it performs is that of the unchanged life. Its fitness is then never above the unchanged life's, so that
+//! whoever cannot win by that need not live the others, and savings stay lossless.
+
+use super::Config;
+use super::training::Training;
+use crate::body::Body;
+use crate::task::evaluation::{Evaluation, Job, Outcome, Savings, evaluate};
+use crate::task::grouping::Grouping;
+use crate::task::perturbation::{Perturbation, Setting};
+use serde::{Deserialize, Serialize};
+
+/// How robots are evaluated: section `[evaluation]`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct EvaluationConfig {
+    /// Fitness is that of the worst of a few perturbed lives, the unchanged one included. Default false.
+    pub robust: bool,
+}
+
+impl EvaluationConfig {
+    /// Whether all is as by default; it is then left out of files.
+    pub fn is_default(&self) -> bool {
+        *self == EvaluationConfig::default()
+    }
+}
+
+/// A robot's evaluation, and what bounds its fitness besides.
+pub(super) struct Scored {
+    /// Of the unchanged life; unstable if one of the others is. Showings are counted of all.
+    pub evaluation: Evaluation,
+    /// Least fitness, on its task, in the perturbed lives; infinite if there are none.
+    pub at_most: f64,
+}
+
+/// Lets the robots that may still win live their perturbed lives. Results in the jobs' order.
+pub(super) fn with_perturbed_lives(
+    config: &Config,
+    training: &Training,
+    grouping: &Grouping,
+    jobs: &[Job],
+    evaluations: Vec<Evaluation>,
+) -> Vec<Scored> {
+    let unbound = |evaluation| Scored { evaluation, at_most: f64::INFINITY };
+    let mut scored: Vec<Scored> = evaluations.into_iter().map(unbound).collect();
+    if !config.evaluation.robust {
+        return scored;
+    }
+    for perturbation in Perturbation::of_evolution() {
+        let open: Vec<(usize, usize)> = (0..jobs.len())
+            .filter_map(|index| {
+                may_win(config, grouping, training, &jobs[index], &scored[index]).map(|t| (index, t))
+            })
+            .collect();
+        let Some(&(first, _)) = open.first() else { break };
+        // What evolution changes is of the world or the start: the same for every body.
+        let Setting { physics, protocol, stimuli, .. } =
+            perturbation.apply(&setting(config, training, jobs[first].body));
+        let lives: Vec<Job> = open.iter().map(|&(index, _)| all_of(jobs[index].body)).collect();
+        let savings = Savings { early_stop: false, ..config.savings };
+        for (&(index, task), life) in
+            open.iter().zip(evaluate(&lives, &stimuli, &physics, &protocol, savings))
+        {
+            let robot = &mut scored[index];
+            robot.evaluation.simulated += life.simulated;
+            robot.evaluation.shared += life.shared;
+            match life.outcome {
+                Outcome::Walked(displacements) => {
+                    let answers = training.answers(displacements.into_iter().map(Some));
+                    robot.at_most = robot.at_most.min(grouping.tasks()[task].fitness(&answers));
+                }
+                unstable => robot.evaluation.outcome = unstable,
+            }
+        }
+    }
+    scored
+}
+
+/// The task of a robot that walked and is not beaten yet.
+fn may_win(
+    config: &Config,
+    grouping: &Grouping,
+    training: &Training,
+    job: &Job,
+    scored: &Scored,
+) -> Option<usize> {
+    let Outcome::Walked(displacements) = &scored.evaluation.outcome else { return None };
+    let known: Vec<Option<f64>> = displacements.iter().copied().map(Some).collect();
+    let wins = !config.savings.early_stop || (job.may_win)(&known);
+    wins.then(|| grouping.score(&training.answers(known)).task)
+}
+
+fn all_of(body: &Body) -> Job<'_> {
+    Job { body, first_image: 0, may_win: Box::new(|_| true) }
+}
+
+fn setting(config: &Config, training: &Training, body: &Body) -> Setting {
+    let (physics, protocol) = (config.physics.clone(), config.protocol.clone());
+    Setting { body: body.clone(), physics, protocol, stimuli: training.stimuli.clone() }
+}

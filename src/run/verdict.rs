@@ -1,0 +1,325 @@
+//! [`Verdict`]: what an audit makes of a robot's perturbed lives, and by which [`Criteria`].
+
+use super::Error;
+use super::toml_text::{self, Format};
+use crate::task::direction::{Assignment, Direction};
+use crate::task::grouping::{Group, Split};
+use crate::task::perturbation::{Kind, Sizes};
+use crate::task::score::Answer;
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+
+/// What an audit does and how it judges; keys of `--criteria FILE` and `--set`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Criteria {
+    /// A walk this far or shorter is no answer \[voxel lengths\]. Default 3, as in `eval`.
+    pub threshold: f64,
+    /// In a changed life a walk the right way that is longer than this is an answer still \[voxel lengths\]: else whoever
+    /// walks just beyond the threshold would be called an exploiter for a hair's breadth. Default 1.5.
+    pub least_walk: f64,
+    /// A walker answers at least this share of its training images right (and one of each group). Default 0.75.
+    pub least_answered: f64,
+    /// A life persists if at least this share of the images answered right still is. Default 0.9.
+    pub least_kept: f64,
+    /// And if the walks under them, together, are at least this share of what they were. Default 0.5.
+    pub least_distance: f64,
+    /// Who keeps at least this share of the lives in a changed world (stiffness, friction, gravity, pixels) is robust; if
+    /// another change breaks it all the same, it exploits what was changed, else it is fragile. Default 0.75.
+    pub least_robust: f64,
+    /// Which changes, and how large.
+    pub perturbations: Sizes,
+}
+
+impl Default for Criteria {
+    fn default() -> Self {
+        Criteria {
+            threshold: 3.0,
+            least_walk: 1.5,
+            least_answered: 0.75,
+            least_kept: 0.9,
+            least_distance: 0.5,
+            least_robust: 0.75,
+            perturbations: Sizes::default(),
+        }
+    }
+}
+
+impl Criteria {
+    /// Reads criteria from TOML (or JSON, if the name ends so); keys that are not there have their defaults.
+    ///
+    /// # Errors
+    /// What is wrong, with file, line and key.
+    pub fn load(path: Option<&Path>, overrides: &[String]) -> Result<Self, Error> {
+        let mut criteria = match path {
+            None => Criteria::default(),
+            Some(path) => {
+                let text = std::fs::read_to_string(path).map_err(|error| Error::reading(path, &error))?;
+                let is_json = path.extension().is_some_and(|ending| ending == "json");
+                let format = if is_json { Format::Json } else { Format::Toml };
+                toml_text::read(&text, format, &path.display().to_string())?
+            }
+        };
+        for assignment in overrides {
+            criteria = toml_text::set(&criteria, assignment)?;
+        }
+        criteria.check()?;
+        Ok(criteria)
+    }
+
+    fn check(&self) -> Result<(), Error> {
+        let Sizes { raised, time_step, share, pixels, least_sensors: _, seed } = &self.perturbations;
+        let shares = [self.least_answered, self.least_kept, self.least_distance, self.least_robust];
+        let refuse = |text: &str| Err(Error::input(format!("audit criteria: {text}")));
+        if ![self.threshold, self.least_walk].iter().all(|walk| (0.0..1e9).contains(walk)) {
+            return refuse("threshold, least_walk: expected 0 or more voxel lengths");
+        }
+        if !shares.iter().all(|share| (0.0..=1.0).contains(share)) {
+            return refuse("least_…: expected shares from 0 to 1");
+        }
+        if raised.iter().any(|&rows| rows == 0 || rows > 100) {
+            return refuse("perturbations.raised: expected 1 to 100 rows");
+        }
+        if time_step.iter().any(|&by| !(2..=64).contains(&by)) {
+            return refuse("perturbations.time_step: expected divisors from 2 to 64");
+        }
+        if !(*share > 0.0 && *share < 1.0) || *pixels > 1000 || *seed > i64::MAX as u64 {
+            return refuse(
+                "perturbations: expected share above 0 and below 1, pixels up to 1000, seed below 2⁶³",
+            );
+        }
+        Ok(())
+    }
+}
+
+/// What an audit finds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Verdict {
+    /// Its directions survive every change.
+    Physical,
+    /// Small changes of the world break it.
+    Fragile,
+    /// The world may change, but not how it is computed or how images are shown: it lives off that.
+    Exploits,
+    /// It does not answer its training images to begin with.
+    NotAWalker,
+}
+
+impl Verdict {
+    /// For people.
+    pub fn name(self) -> &'static str {
+        match self {
+            Verdict::Physical => "physical",
+            Verdict::Fragile => "fragile",
+            Verdict::Exploits => "exploits",
+            Verdict::NotAWalker => "not a walker",
+        }
+    }
+}
+
+/// A perturbed life.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PerturbedLife {
+    /// What was changed, and how much.
+    pub name: String,
+    /// What was changed.
+    pub kind: Kind,
+    /// Displacement under each training image, voxel lengths (a mirrored life's mirrored back); none if unstable.
+    pub displacements: Option<Vec<f64>>,
+    /// Share of the images answered right in the unchanged life under which it still walks the right way.
+    pub kept: f64,
+    /// Walks under them, towards the right sides, as a share of the unchanged life's.
+    pub distance: f64,
+    /// Whether the behaviour persists.
+    pub persists: bool,
+}
+
+/// How a robot is to walk, and how it does in its own simulator.
+pub(super) struct Behaviour<'a> {
+    criteria: &'a Criteria,
+    /// Displacements in the unchanged life.
+    plain: Vec<f64>,
+    /// For each image whether its class is to walk right; none if it is in no group.
+    rightward: Vec<Option<bool>>,
+    /// Images answered right.
+    answered: Vec<usize>,
+    /// Why it is no walker, if it is none.
+    flaw: Option<String>,
+}
+
+impl<'a> Behaviour<'a> {
+    /// Of a robot that performs a task and answers these classes with these displacements.
+    pub fn new(criteria: &'a Criteria, split: &Split, classes: &[u8], plain: Vec<f64>) -> Self {
+        let answer = |(&class, &displacement): (&u8, &f64)| Answer { class, displacement };
+        let answers: Vec<_> = classes.iter().zip(&plain).map(answer).collect();
+        let assignment = Assignment::from_training(split, &answers);
+        let right = |group| assignment.expected(group) == Direction::Right;
+        let rightward: Vec<Option<bool>> =
+            classes.iter().map(|&class| split.group(class).map(right)).collect();
+        let is_right = |&image: &usize| towards(rightward[image], plain[image]) > criteria.threshold;
+        let answered: Vec<usize> = (0..plain.len()).filter(is_right).collect();
+        let silent = [Group::A, Group::B].into_iter().find(|&group| {
+            let of_group = |image: &usize| split.group(classes[*image]) == Some(group);
+            !split.classes(group).is_empty() && !answered.iter().any(of_group)
+        });
+        let asked = rightward.iter().flatten().count();
+        let flaw = if let Some(group) = silent {
+            let classes: Vec<String> = split.classes(group).iter().map(u8::to_string).collect();
+            Some(format!("no walk of more than {} voxels for {}", criteria.threshold, classes.join(", ")))
+        } else if (answered.len() as f64) < criteria.least_answered * asked as f64 {
+            Some(format!("answers {} of {asked} training images", answered.len()))
+        } else {
+            None
+        };
+        Behaviour { criteria, plain, rightward, answered, flaw }
+    }
+
+    /// Whether there is anything to audit.
+    pub fn is_walker(&self) -> bool {
+        self.flaw.is_none()
+    }
+
+    /// Compares a perturbed life with the unchanged one.
+    pub fn compare(&self, name: String, kind: Kind, displacements: Option<Vec<f64>>) -> PerturbedLife {
+        let along = |of: &[f64], image: usize| towards(self.rightward[image], of[image]);
+        let (mut kept, mut distance) = (0.0, 0.0);
+        if let Some(changed) = &displacements {
+            let right = self.answered.iter().filter(|&&i| along(changed, i) > self.criteria.least_walk);
+            kept = right.count() as f64 / self.answered.len().max(1) as f64;
+            let sum = |of: &[f64]| self.answered.iter().map(|&i| along(of, i)).sum::<f64>();
+            let whole = sum(&self.plain);
+            distance = if whole > 0.0 { sum(changed) / whole } else { 0.0 };
+        }
+        let persists = kept >= self.criteria.least_kept && distance >= self.criteria.least_distance;
+        PerturbedLife { name, kind, displacements, kept, distance, persists }
+    }
+
+    /// Verdict and reason.
+    pub fn judge(&self, lives: &[PerturbedLife]) -> (Verdict, String) {
+        if let Some(flaw) = &self.flaw {
+            return (Verdict::NotAWalker, flaw.clone());
+        }
+        let failed = |kind: &&Kind| lives.iter().any(|life| life.kind == **kind && !life.persists);
+        let failed: Vec<Kind> = Kind::ALL.iter().filter(failed).copied().collect();
+        let world = || lives.iter().filter(|life| life.kind.is_of_the_world());
+        let robust = world().filter(|life| life.persists).count() as f64;
+        let is_robust = robust >= self.criteria.least_robust * world().count() as f64;
+        let names = |of_the_world: bool| {
+            let names = failed.iter().filter(|kind| kind.is_of_the_world() == of_the_world);
+            names.map(|kind| kind.name().to_string()).collect::<Vec<_>>()
+        };
+        let (artefacts, mut broken) = (names(false), names(true));
+        if artefacts.is_empty() && broken.is_empty() {
+            return (Verdict::Physical, format!("persists in all {} changed lives", lives.len()));
+        }
+        if is_robust && !artefacts.is_empty() {
+            return (Verdict::Exploits, artefacts.join(", "));
+        }
+        broken.extend(artefacts);
+        (Verdict::Fragile, broken.join(", "))
+    }
+
+    /// Root mean square difference of the perturbed lives' displacements from the unchanged ones, voxel lengths; unstable lives
+    /// have none.
+    pub fn spread(&self, lives: &[PerturbedLife]) -> f64 {
+        let stable = lives.iter().filter_map(|life| life.displacements.as_ref());
+        let squares: Vec<f64> =
+            stable.flat_map(|d| d.iter().zip(&self.plain).map(|(a, b)| (a - b) * (a - b))).collect();
+        // + 0.0: the sum of nothing is −0.
+        ((squares.iter().sum::<f64>() + 0.0) / squares.len().max(1) as f64).sqrt()
+    }
+}
+
+/// How far a displacement leads to the right side.
+fn towards(rightward: Option<bool>, displacement: f64) -> f64 {
+    match rightward {
+        Some(true) => displacement,
+        Some(false) => -displacement,
+        None => f64::NEG_INFINITY,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::task::grouping::Grouping;
+
+    fn judged(lives: &[(Kind, [f64; 2])]) -> (Verdict, String) {
+        let criteria = Criteria::default();
+        let split = Grouping::two_groups(&[0], &[1]).unwrap().tasks()[0].clone();
+        let behaviour = Behaviour::new(&criteria, &split, &[0, 1], vec![-10.0, 12.0]);
+        let life = |(kind, d): &(Kind, [f64; 2])| behaviour.compare(String::new(), *kind, Some(d.to_vec()));
+        behaviour.judge(&lives.iter().map(life).collect::<Vec<_>>())
+    }
+
+    const SAME: [f64; 2] = [-9.0, 13.0];
+    const LOST: [f64; 2] = [-9.0, 1.0];
+
+    #[test]
+    fn who_keeps_its_directions_in_all_lives_is_physical() {
+        let lives = Kind::ALL.map(|kind| (kind, SAME));
+        assert_eq!(judged(&lives).0, Verdict::Physical);
+    }
+
+    #[test]
+    fn who_is_broken_by_the_simulator_alone_exploits_it_and_by_the_world_is_fragile() {
+        let but =
+            |lost: &[Kind]| judged(&Kind::ALL.map(|k| (k, if lost.contains(&k) { LOST } else { SAME })));
+        assert_eq!(but(&[Kind::TimeStep]), (Verdict::Exploits, "time step".to_string()));
+        assert_eq!(but(&[Kind::Start, Kind::LengthLimits]).1, "start, length limits");
+        assert_eq!(but(&[Kind::Gravity]), (Verdict::Fragile, "gravity".to_string()));
+        let all = but(&[Kind::Gravity, Kind::Pixel, Kind::Friction, Kind::TimeStep]);
+        assert_eq!(all, (Verdict::Fragile, "friction, gravity, pixel noise, time step".to_string()));
+    }
+
+    #[test]
+    fn a_walk_persists_by_direction_threshold_and_distance() {
+        let criteria = Criteria::default();
+        let split = Grouping::two_groups(&[0], &[1]).unwrap().tasks()[0].clone();
+        let behaviour = Behaviour::new(&criteria, &split, &[0, 1], vec![-10.0, 12.0]);
+        let compare = |d: Option<[f64; 2]>| behaviour.compare("x".into(), Kind::Start, d.map(Vec::from));
+        assert!(compare(Some([-9.0, 30.0])).persists);
+        // Just below the threshold that makes an answer.
+        assert!(compare(Some([-9.0, 2.9])).persists && !compare(Some([-9.0, 1.5])).persists);
+        let turned = compare(Some([9.0, 30.0]));
+        assert_eq!((turned.kept, turned.persists), (0.5, false));
+        let short = compare(Some([-4.0, 4.0]));
+        assert_eq!((short.kept, short.distance, short.persists), (1.0, 8.0 / 22.0, false));
+        assert!(!compare(None).persists);
+        let lives = [compare(Some([-13.0, 12.0])), compare(None), compare(Some([-10.0, 15.0]))];
+        assert_eq!(behaviour.spread(&lives), (18.0f64 / 4.0).sqrt());
+    }
+
+    #[test]
+    fn who_does_not_answer_its_images_is_not_a_walker() {
+        let criteria = Criteria::default();
+        let splits = Grouping::all_splits(&[0, 1, 2, 3], false).unwrap();
+        let split = &splits.tasks()[0];
+        let flaw = |d: [f64; 4]| Behaviour::new(&criteria, split, &[0, 1, 2, 3], d.to_vec()).flaw;
+        assert_eq!(split.name(), "0|123");
+        assert_eq!(flaw([5.0, -4.0, -9.0, -2.0]), None);
+        assert_eq!(flaw([5.0, -4.0, -1.0, -2.0]).unwrap(), "answers 2 of 4 training images");
+        assert_eq!(flaw([2.0, -4.0, -9.0, -8.0]).unwrap(), "no walk of more than 3 voxels for 0");
+        let still = Behaviour::new(&criteria, split, &[0, 1, 2, 3], vec![0.0; 4]);
+        assert_eq!(still.judge(&[]).0, Verdict::NotAWalker);
+    }
+
+    #[test]
+    fn criteria_are_read_checked_and_named() {
+        let set = |text: &str| Criteria::load(None, &[text.to_string()]);
+        assert_eq!(set("perturbations.time_step=[8]").unwrap().perturbations.time_step, [8]);
+        assert_eq!(set("threshold=2").unwrap().threshold, 2.0);
+        let wrong = [
+            "threshold=-1",
+            "least_kept=2",
+            "perturbations.time_step=[1]",
+            "treshold=1",
+            "perturbations.share=0",
+        ];
+        for wrong in wrong {
+            assert!(set(wrong).is_err(), "{wrong}");
+        }
+    }
+}

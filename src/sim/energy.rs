@@ -1,0 +1,173 @@
+//! [`Energy`]: what the actuators put into a robot, and what the length limits put in besides (physics.md, 4).
+//!
+//! The servo makes a spring of stiffness k and gain g pull towards its goal length with k·g·(d − goal) at the start of
+//! every substep: over many substeps that is a spring of stiffness k·g, and its energy is ½·k·g·(d − goal)². The length
+//! limits move points and leave their velocities alone, so what they change of that energy nobody pays for. They move
+//! both ends of a spring by as much, so that gravity's part of the change is 0 but for rounding.
+
+use super::lattice::{FAMILIES, Lattice, spring_index};
+use super::params::Physics;
+use super::state::{Pair, X, Y};
+use serde::{Deserialize, Serialize};
+
+/// Energies put into a robot \[mass·wu²/s²\].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Energy {
+    /// By the actuators, whose goals move while the springs are as they are.
+    pub drive: f64,
+    /// By the length limits, which move the points while goals are as they are.
+    pub limits: f64,
+}
+
+/// A spring, as far as its energy goes.
+#[derive(Clone, Copy, Debug)]
+struct Spring {
+    ends: [usize; 2],
+    /// ½·k·g.
+    half: f64,
+    /// Its goal: an index into the goals, if it may be actuated.
+    goal: Option<usize>,
+    length: f64,
+}
+
+/// Measures a life. It only looks: the life is the same bits as without it.
+#[derive(Clone, Debug)]
+pub(super) struct Meter {
+    springs: Vec<Spring>,
+    points: Vec<usize>,
+    /// Weight of a point.
+    weight: f64,
+    /// Goals of the present control step; empty before the first, when every spring's is its length.
+    goals: Vec<f64>,
+    before: f64,
+    pub energy: Energy,
+}
+
+impl Meter {
+    pub fn new(lattice: &Lattice, physics: &Physics) -> Self {
+        let half = physics.servo_gain / 2.0;
+        // From a slot to the ends of its springs, by family.
+        let ends = [[0, 1], [0, lattice.pitch], [0, lattice.pitch + 1], [1, lattice.pitch]];
+        let mut springs = Vec::new();
+        for (slot, family) in (0..lattice.slots).flat_map(|slot| (0..FAMILIES).map(move |f| (slot, f))) {
+            let index = spring_index(slot, family);
+            if lattice.exists[index].to_bits() != 0 {
+                springs.push(Spring {
+                    ends: ends[family].map(|offset| slot + offset),
+                    half: half * lattice.stiffness[index],
+                    goal: (family == 0).then_some(slot),
+                    length: lattice.lengths[family],
+                });
+            }
+        }
+        springs.extend(lattice.extra_springs.iter().enumerate().map(|(i, spring)| Spring {
+            ends: spring.ends,
+            half: half * spring.stiffness,
+            goal: Some(lattice.len + i),
+            length: spring.length,
+        }));
+        Meter {
+            springs,
+            points: lattice.points.iter().map(|&(point, _)| point).collect(),
+            weight: physics.mass * physics.gravity,
+            goals: Vec::new(),
+            before: 0.0,
+            energy: Energy::default(),
+        }
+    }
+
+    /// A new life begins at rest; energies go on adding up.
+    pub fn rest(&mut self) {
+        self.goals.clear();
+    }
+
+    /// The goals of a control step are set.
+    pub fn drive(&mut self, goals: &[f64], position: &Pair) {
+        let before = self.potential(position);
+        self.goals.clear();
+        self.goals.extend_from_slice(goals);
+        self.energy.drive += self.potential(position) - before;
+    }
+
+    /// The limits are about to be applied.
+    pub fn before_limits(&mut self, position: &Pair) {
+        self.before = self.potential(position);
+    }
+
+    /// They have been.
+    pub fn after_limits(&mut self, position: &Pair) {
+        self.energy.limits += self.potential(position) - self.before;
+    }
+
+    fn potential(&self, position: &Pair) -> f64 {
+        let [x, y] = [&position[X], &position[Y]];
+        let elastic = |spring: &Spring| {
+            let [a, b] = spring.ends;
+            let (dx, dy) = (x[b] - x[a], y[b] - y[a]);
+            let goal = spring.goal.and_then(|index| self.goals.get(index)).unwrap_or(&spring.length);
+            let excess = (dx * dx + dy * dy).sqrt() - goal;
+            spring.half * excess * excess
+        };
+        let height: f64 = self.points.iter().map(|&point| y[point]).sum();
+        self.springs.iter().map(elastic).sum::<f64>() + self.weight * height
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sim::{Start, World};
+
+    fn lived(body: &str, physics: &Physics) -> (Energy, [f64; 2]) {
+        let body = body.parse().unwrap();
+        let lattice = Lattice::new(&body, physics);
+        let start = Start { column: 0, row: 20 };
+        let mut world = World::new(&lattice, physics, start).with_energy_meter();
+        (0..50).for_each(|_| world.step().unwrap());
+        (world.energy(), world.centre_of_mass())
+    }
+
+    #[test]
+    fn a_passive_body_in_free_fall_is_given_no_energy() {
+        let (energy, _) = lived("111/202", &Physics::default());
+        assert_eq!(energy.drive, 0.0);
+        assert!(energy.limits.abs() < 1e-6, "{energy:?}");
+    }
+
+    #[test]
+    fn muscles_give_energy_and_limits_only_where_they_are_reached() {
+        let (driven, _) = lived("344/044", &Physics::default());
+        assert!(driven.drive > 1.0 && driven.limits > 0.0, "{driven:?}");
+        let wide = Physics { limit_low: 0.0, limit_high: 9.0, ..Physics::default() };
+        let (free, _) = lived("344/044", &wide);
+        assert!(free.drive > 1.0 && free.limits.abs() < 1e-6, "{free:?}");
+    }
+
+    #[test]
+    fn the_drive_of_one_step_is_the_energy_of_the_springs_it_stretches() {
+        // One in-phase muscle at rest; at step 0 its target is 1.1 rest widths, of two sides.
+        let physics = Physics::default();
+        let lattice = Lattice::new(&"3".parse().unwrap(), &physics);
+        let mut world = World::new(&lattice, &physics, Start { column: 0, row: 20 }).with_energy_meter();
+        world.step().unwrap();
+        let expected = 2.0 * 0.5 * physics.active_stiffness * physics.servo_gain * 0.01 * 0.01;
+        let drive = world.energy().drive;
+        assert!((drive - expected).abs() < 1e-6 * expected, "{drive}, expected {expected}");
+    }
+
+    #[test]
+    fn a_measured_life_is_the_same_bits() {
+        let physics = Physics::default();
+        let lattice = Lattice::new(&"3443/1044/3005".parse().unwrap(), &physics);
+        let start = Start { column: 0, row: 2 };
+        let mut plain = World::new(&lattice, &physics, start);
+        let mut measured = World::new(&lattice, &physics, start).with_energy_meter();
+        for _ in 0..60 {
+            plain.step().unwrap();
+            measured.step().unwrap();
+        }
+        assert_eq!(plain.state(), measured.state());
+        assert_eq!(plain.energy(), Energy::default());
+    }
+}

@@ -1,0 +1,99 @@
+//! The same material at a finer time step: [`Physics::refined`].
+//!
+//! What a material does is not what its constants say but what they do together with the time step h. In a substep a spring
+//! of stiffness k and gain g, of length d₀ at its start, pulls with k·(d − d₀) + k·g·(d₀ − goal):
+//! - the second term is, substep after substep, a spring of stiffness **k·g** towards the goal;
+//! - the first forgets its length at every substep. Ends that part with speed v are d − d₀ = v·t apart after t, a mean
+//!   pull of k·v·h/2 over the substep: a dashpot of **k·h/2**.
+//!
+//! So the modelled material is a Kelvin–Voigt solid, and h/n with k·n and g/n leaves both as they are. (With g/n alone
+//! stiffness and viscosity would both fall with n, and a robot would be another at every time step.)
+//! The length limits remove a share s of an excess per substep; 1 − (1 − s)^(1/n) removes as much in n of them. Drag,
+//! gravity, contacts and the floor are forces already, per time, and stay. Displacements converge as n grows (`docs/audit.md`).
+
+use super::params::Physics;
+
+/// The share to be removed in each of `by` passes that together remove `share`.
+fn spread_out(share: f64, by: f64) -> f64 {
+    if share < 1.0 { 1.0 - libm::pow(1.0 - share, 1.0 / by) } else { share }
+}
+
+impl Physics {
+    /// The same material and world with `by` substeps for each one: the time step is so much shorter.
+    #[must_use]
+    pub fn refined(&self, by: u32) -> Self {
+        let n = f64::from(by.max(1));
+        Physics {
+            time_step: self.time_step / n,
+            substeps: self.substeps.saturating_mul(by.max(1)),
+            servo_gain: self.servo_gain / n,
+            ..self.with_stiffness(n).with_slower_limits(n)
+        }
+    }
+
+    /// All springs `by` times as stiff.
+    #[must_use]
+    pub fn with_stiffness(&self, by: f64) -> Self {
+        Physics {
+            rigid_stiffness: self.rigid_stiffness * by,
+            soft_stiffness: self.soft_stiffness * by,
+            active_stiffness: self.active_stiffness * by,
+            ..self.clone()
+        }
+    }
+
+    /// Length limits that take `by` times as long to remove an excess.
+    #[must_use]
+    pub fn with_slower_limits(&self, by: f64) -> Self {
+        Physics {
+            limit_share: spread_out(self.limit_share, by),
+            rigid_limit_share: spread_out(self.rigid_limit_share, by),
+            ..self.clone()
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sim::{Lattice, Start, World};
+
+    #[test]
+    fn a_refined_material_has_the_same_stiffness_viscosity_and_limits() {
+        let coarse = Physics::default();
+        for n in [2, 4, 8] {
+            let fine = coarse.refined(n);
+            fine.validate().unwrap();
+            let near = |a: f64, b: f64| assert!((a / b - 1.0).abs() < 1e-12, "{a} {b}");
+            near(fine.active_stiffness * fine.servo_gain, coarse.active_stiffness * coarse.servo_gain);
+            near(fine.soft_stiffness * fine.time_step, coarse.soft_stiffness * coarse.time_step);
+            near(fine.time_step * f64::from(fine.substeps), coarse.time_step * f64::from(coarse.substeps));
+            near(libm::pow(1.0 - fine.limit_share, f64::from(n)), 1.0 - coarse.limit_share);
+        }
+        assert_eq!(coarse.refined(1), coarse);
+    }
+
+    #[test]
+    fn the_walk_of_a_plain_walker_converges_with_the_time_step() {
+        let body = "444422/444422/333311/330011".parse().unwrap();
+        let walk = |physics: &Physics| {
+            let lattice = Lattice::new(&body, physics);
+            let mut world = World::new(&lattice, physics, Start { column: 0, row: 2 });
+            let start = world.centre_of_mass()[0];
+            (0..250).for_each(|_| world.step().unwrap());
+            10.0 * (world.centre_of_mass()[0] - start)
+        };
+        let coarse = Physics::default();
+        let walks = [1, 2, 4, 8].map(|n| walk(&coarse.refined(n)));
+        assert!(walks.iter().all(|d| (d / walks[3] - 1.0).abs() < 0.05), "{walks:?}");
+        // The gain alone is not enough: the material then softens with the time step.
+        let softened = Physics {
+            rigid_stiffness: coarse.rigid_stiffness,
+            soft_stiffness: coarse.soft_stiffness,
+            active_stiffness: coarse.active_stiffness,
+            ..coarse.refined(4)
+        };
+        let softened = walk(&softened);
+        assert!((softened / walks[3] - 1.0).abs() > 0.2, "{softened} beside {walks:?}");
+    }
+}

@@ -1,0 +1,340 @@
+//! [`Perturbation`]: changes that no honest walker should notice, for `morphcog audit`.
+//!
+//! To start at another column is none: the simulator is the same bits wherever on the ground a robot stands (but for
+//! pegs below the ground, which a robot can reach only by tunnelling). A raised start also changes the column.
+
+use super::protocol::{Life, Protocol};
+use crate::base::Grid;
+use crate::base::random::{Purpose, stream};
+use crate::body::Body;
+use crate::sim::Physics;
+use serde::{Deserialize, Serialize};
+
+/// What is changed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Kind {
+    /// The robot starts above the ground, and so touches it first in another way; at another column, too.
+    Start,
+    /// Robot and images are mirrored: ties, and whatever goes from left to right, are decided the other way round.
+    Mirror,
+    /// The same material at a shorter time step ([`Physics::refined`]).
+    TimeStep,
+    /// The length limits remove an excess half as fast; or they are beyond every goal, so that no spring is held at a
+    /// limit against its goal, and given energy there, any more.
+    LengthLimits,
+    /// A contact of the robot with itself counts once instead of twice.
+    SelfContact,
+    /// In a sequential life the images come in the reverse order: who turns round by the clock is found out.
+    Order,
+    /// Stiffness of all springs.
+    Stiffness,
+    /// Friction of contacts.
+    Friction,
+    /// Gravity.
+    Gravity,
+    /// A pixel that a sensor sees, another one in each image, is inverted.
+    Pixel,
+}
+
+impl Kind {
+    /// All of them, in the order of a report.
+    pub const ALL: [Kind; 10] = [
+        Kind::Start,
+        Kind::Mirror,
+        Kind::TimeStep,
+        Kind::LengthLimits,
+        Kind::SelfContact,
+        Kind::Order,
+        Kind::Stiffness,
+        Kind::Friction,
+        Kind::Gravity,
+        Kind::Pixel,
+    ];
+
+    /// Whether it changes the world that is simulated. The others change only how that is computed, or how images are
+    /// shown: who does not survive those lives off something else than body and image.
+    pub fn is_of_the_world(self) -> bool {
+        self >= Kind::Stiffness
+    }
+
+    /// For people.
+    pub fn name(self) -> &'static str {
+        match self {
+            Kind::Start => "start",
+            Kind::Mirror => "ties (mirror image)",
+            Kind::TimeStep => "time step",
+            Kind::LengthLimits => "length limits",
+            Kind::SelfContact => "self-contact",
+            Kind::Order => "order of images",
+            Kind::Stiffness => "stiffness",
+            Kind::Friction => "friction",
+            Kind::Gravity => "gravity",
+            Kind::Pixel => "pixel noise",
+        }
+    }
+}
+
+/// How much is changed.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Sizes {
+    /// Rows by which the start is raised, a life each. Default 1 and 2.
+    pub raised: Vec<u32>,
+    /// The time step is divided by these, a life each. Default 2 and 4.
+    pub time_step: Vec<u32>,
+    /// Share by which stiffness, friction and gravity are raised and lowered. Default 0.05.
+    pub share: f64,
+    /// Lives with a changed pixel in every image. Default 3.
+    pub pixels: u32,
+    /// Only for robots with at least so many sensors: to fewer, one pixel is no noise but what they see. Default 10.
+    pub least_sensors: usize,
+    /// Seed of the pixels. Default 1.
+    pub seed: u64,
+}
+
+impl Default for Sizes {
+    fn default() -> Self {
+        Sizes {
+            raised: vec![1, 2],
+            time_step: vec![2, 4],
+            share: 0.05,
+            pixels: 3,
+            least_sensors: 10,
+            seed: 1,
+        }
+    }
+}
+
+/// A robot and how it lives.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Setting {
+    /// Its body.
+    pub body: Body,
+    /// The simulator's constants.
+    pub physics: Physics,
+    /// How it is shown images.
+    pub protocol: Protocol,
+    /// What it sees, image by image.
+    pub stimuli: Vec<Grid<f64>>,
+}
+
+/// How fast length limits work: half as fast, or, as they are out of reach, not at all.
+const HALF_AS_FAST: f64 = 0.5;
+const OUT_OF_REACH: f64 = 0.0;
+
+/// One change.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Perturbation {
+    /// What is changed.
+    pub kind: Kind,
+    /// Rows, divisor of the time step, factor, speed, or number of the draw; unused elsewhere.
+    amount: f64,
+    seed: u64,
+}
+
+impl Perturbation {
+    /// All changes of these sizes that mean something to a body under a protocol, in the order of a report.
+    pub fn all(sizes: &Sizes, body: &Body, life: Life) -> Vec<Self> {
+        let sees = body.counts().sensor >= sizes.least_sensors;
+        let amounts = |kind| match kind {
+            Kind::Start => sizes.raised.iter().map(|&rows| f64::from(rows)).collect(),
+            Kind::TimeStep => sizes.time_step.iter().map(|&by| f64::from(by)).collect(),
+            Kind::Stiffness | Kind::Friction | Kind::Gravity => vec![1.0 - sizes.share, 1.0 + sizes.share],
+            Kind::Order if life == Life::Fresh => Vec::new(),
+            Kind::Pixel if !sees => Vec::new(),
+            Kind::Pixel => (1..=sizes.pixels).map(f64::from).collect(),
+            Kind::LengthLimits => vec![HALF_AS_FAST, OUT_OF_REACH],
+            Kind::Mirror | Kind::SelfContact | Kind::Order => vec![0.5],
+        };
+        let of = |kind| {
+            amounts(kind).into_iter().map(move |amount| Perturbation { kind, amount, seed: sizes.seed })
+        };
+        Kind::ALL.into_iter().flat_map(of).collect()
+    }
+
+    /// Those that robust evolution lives besides: a start raised by 1, and stiffness less by 5 %.
+    pub fn of_evolution() -> [Self; 2] {
+        [(Kind::Start, 1.0), (Kind::Stiffness, 0.95)].map(|(kind, amount)| Perturbation {
+            kind,
+            amount,
+            seed: 0,
+        })
+    }
+
+    /// For people: "time step / 4".
+    pub fn name(&self) -> String {
+        let (kind, amount) = (self.kind.name(), self.amount);
+        match self.kind {
+            Kind::Start => format!("{kind} raised by {amount}"),
+            Kind::Mirror => kind.to_string(),
+            Kind::Order => format!("{kind} reversed"),
+            Kind::TimeStep => format!("{kind} / {amount}"),
+            Kind::LengthLimits if amount == OUT_OF_REACH => format!("{kind} beyond all goals"),
+            Kind::LengthLimits => format!("{kind} half as fast"),
+            Kind::SelfContact => format!("{kind} counted once"),
+            Kind::Stiffness | Kind::Friction | Kind::Gravity => {
+                format!("{kind} {:+.3} %", 100.0 * (amount - 1.0)).replace(".000", "")
+            }
+            Kind::Pixel => format!("{kind} {amount}"),
+        }
+    }
+
+    /// Whether an unstable life speaks against the robot. Not without limits: a body that needs a stop, as any material
+    /// has one, does not live off it.
+    pub fn counts_if_unstable(&self) -> bool {
+        (self.kind, self.amount) != (Kind::LengthLimits, OUT_OF_REACH)
+    }
+
+    /// The changed setting. Displacements under it are to be compared after [`Perturbation::undo`].
+    pub fn apply(&self, setting: &Setting) -> Setting {
+        let mut changed = setting.clone();
+        let physics = &setting.physics;
+        match self.kind {
+            Kind::Start => {
+                let rows = self.amount as u32;
+                changed.protocol.start_row = setting.protocol.start_row.saturating_add(rows);
+                changed.protocol.start_column = setting.protocol.start_column - i64::from(rows);
+            }
+            Kind::Mirror => {
+                changed.body = setting.body.mirrored();
+                changed.stimuli = setting.stimuli.iter().map(Grid::mirrored).collect();
+            }
+            Kind::TimeStep => changed.physics = physics.refined(self.amount as u32),
+            Kind::LengthLimits if self.amount == OUT_OF_REACH => {
+                changed.physics.limit_low = physics.limit_low.min(physics.target_min);
+                changed.physics.limit_high = physics.limit_high.max(physics.target_max);
+            }
+            Kind::LengthLimits => changed.physics = physics.with_slower_limits(1.0 / self.amount),
+            Kind::SelfContact => changed.physics.self_contact_weight *= self.amount,
+            Kind::Order => changed.stimuli.reverse(),
+            Kind::Stiffness => changed.physics = physics.with_stiffness(self.amount),
+            Kind::Friction => changed.physics.friction *= self.amount,
+            Kind::Gravity => changed.physics.gravity *= self.amount,
+            Kind::Pixel => {
+                for (image, stimulus) in changed.stimuli.iter_mut().enumerate() {
+                    *stimulus = self.with_pixel_inverted(&setting.body, stimulus, image as u64);
+                }
+            }
+        }
+        changed
+    }
+
+    /// Displacements as they would be in the unchanged setting: those of a mirror image are mirrored, and they stand in
+    /// the unchanged order.
+    pub fn undo(&self, mut displacements: Vec<f64>) -> Vec<f64> {
+        match self.kind {
+            Kind::Mirror => displacements.iter_mut().for_each(|d| *d = -*d),
+            Kind::Order => displacements.reverse(),
+            _ => {}
+        }
+        displacements
+    }
+
+    fn with_pixel_inverted(&self, body: &Body, stimulus: &Grid<f64>, image: u64) -> Grid<f64> {
+        let sensors: Vec<_> =
+            body.voxels().iter().filter(|(_, m)| m.is_sensor()).map(|(place, _)| place).collect();
+        let mut random = stream(self.seed, Purpose::AuditPixels, self.amount as u64, image);
+        let chosen = random.choose(&sensors).copied();
+        let pixel = |row, column| {
+            let pixel = stimulus[(row, column)];
+            if chosen == Some((row, column)) { 1.0 - pixel } else { pixel }
+        };
+        Grid::from_fn(stimulus.height(), stimulus.width(), pixel)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn setting() -> Setting {
+        let stimuli = vec![Grid::filled(2, 4, 0.25), Grid::filled(2, 4, 1.0)];
+        let body = "3516/4442".parse().unwrap();
+        Setting { body, physics: Physics::default(), protocol: Protocol::default(), stimuli }
+    }
+
+    fn all(life: Life) -> Vec<Perturbation> {
+        let sizes = Sizes { least_sensors: 2, ..Sizes::default() };
+        Perturbation::all(&sizes, &setting().body, life)
+    }
+
+    fn of(kind: Kind) -> Vec<Setting> {
+        all(Life::Sequential).iter().filter(|p| p.kind == kind).map(|p| p.apply(&setting())).collect()
+    }
+
+    #[test]
+    fn every_perturbation_changes_what_it_says_and_nothing_else() {
+        let plain = setting();
+        for perturbation in all(Life::Sequential) {
+            let changed = perturbation.apply(&plain);
+            let parts = [
+                changed.body != plain.body,
+                changed.physics != plain.physics,
+                changed.protocol != plain.protocol,
+                changed.stimuli != plain.stimuli,
+            ];
+            // The images of this setting are symmetric: mirrored they are themselves.
+            let expected = match perturbation.kind {
+                Kind::Start => [false, false, true, false],
+                Kind::Mirror => [true, false, false, false],
+                Kind::Pixel | Kind::Order => [false, false, false, true],
+                _ => [false, true, false, false],
+            };
+            assert_eq!(parts, expected, "{}", perturbation.name());
+            changed.physics.validate().unwrap();
+        }
+        assert_eq!(of(Kind::Start)[1].protocol.start_row, 4);
+        assert_eq!(of(Kind::Gravity)[0].physics.gravity, 110.0 * 0.95);
+        assert_eq!(of(Kind::TimeStep)[1].physics.substeps, 120);
+        let [slow, far] = [&of(Kind::LengthLimits)[0].physics, &of(Kind::LengthLimits)[1].physics];
+        assert!((0.55..0.56).contains(&slow.limit_share) && far.limit_share == 0.8);
+        assert_eq!((far.limit_low, far.limit_high, slow.limit_low), (0.6, 1.6, 0.75));
+        assert_eq!(of(Kind::SelfContact)[0].physics.self_contact_weight, 1.0);
+    }
+
+    #[test]
+    fn one_pixel_under_a_sensor_is_inverted_in_each_image_and_draws_differ() {
+        let changed = of(Kind::Pixel);
+        assert_eq!(changed, of(Kind::Pixel));
+        for setting in &changed {
+            for (stimulus, plain) in setting.stimuli.iter().zip([0.25, 1.0]) {
+                let differing: Vec<_> = stimulus.iter().filter(|(_, v)| **v != plain).collect();
+                assert_eq!(differing.len(), 1);
+                assert!([(0, 1), (0, 3)].contains(&differing[0].0));
+                assert_eq!(*differing[0].1, 1.0 - plain);
+            }
+        }
+        assert!(changed.iter().any(|other| *other != changed[0]));
+        // To two sensors one pixel is no noise.
+        let few = Perturbation::all(&Sizes::default(), &setting().body, Life::Fresh);
+        assert!(few.iter().all(|p| p.kind != Kind::Pixel));
+        let blind = Setting { body: "33/44".parse().unwrap(), ..setting() };
+        let pixel = Perturbation { kind: Kind::Pixel, amount: 1.0, seed: 1 };
+        assert_eq!(pixel.apply(&blind), blind);
+    }
+
+    #[test]
+    fn names_are_distinct_and_a_mirror_image_walks_the_other_way() {
+        let all = all(Life::Sequential);
+        let mut names: Vec<String> = all.iter().map(Perturbation::name).collect();
+        assert!(names.contains(&"time step / 4".to_string()) && names.contains(&"gravity -5 %".to_string()));
+        names.sort();
+        names.dedup();
+        assert_eq!(names.len(), all.len());
+        let excused: Vec<String> =
+            all.iter().filter(|p| !p.counts_if_unstable()).map(Perturbation::name).collect();
+        assert_eq!(excused, ["length limits beyond all goals"]);
+        for perturbation in all {
+            let expected = match perturbation.kind {
+                Kind::Mirror => [-2.0, -3.0],
+                Kind::Order => [3.0, 2.0],
+                _ => [2.0, 3.0],
+            };
+            assert_eq!(perturbation.undo(vec![2.0, 3.0]), expected);
+        }
+        // Fresh lives have no order.
+        let fresh = super::tests::all(Life::Fresh);
+        assert!(fresh.iter().all(|p| p.kind != Kind::Order) && fresh.len() + 1 == names.len());
+    }
+}

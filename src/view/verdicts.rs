@@ -1,0 +1,86 @@
+//! What `morphcog audit` says at its end.
+
+use super::console::{Console, Mode};
+use crate::run::audit::Finished;
+use crate::run::audit_file::{AuditFile, RobotAudit};
+use crate::run::verdict::Verdict;
+use std::path::Path;
+
+/// After an audit: a line per robot, how many there are of each verdict, and what breaks walks.
+pub fn audit(console: &Console, finished: &Finished, out: &Path) {
+    let Finished { file, asked, stopped } = finished;
+    let robots: Vec<&RobotAudit> = asked.iter().filter_map(|id| file.robot(id)).collect();
+    if console.mode() == Mode::Json {
+        let short = |robot: &&RobotAudit| RobotAudit { lives: Vec::new(), ..(*robot).clone() };
+        let done = serde_json::json!({
+            "file": out.display().to_string(), "stopped": stopped, "run": file.run, "elites": file.elites,
+            "robots": robots.iter().map(short).collect::<Vec<_>>(),
+        });
+        return console.event("audited", &done);
+    }
+    let headers =
+        ["robot", "task", "verdict", "persists %", "spread", "limits/drive", "displacements", "reason"];
+    console.table(&headers, &robots.iter().map(|robot| row(robot)).collect::<Vec<_>>());
+    console.line("");
+    let verdicts = [Verdict::Physical, Verdict::Exploits, Verdict::Fragile, Verdict::NotAWalker];
+    let count = |verdict: Verdict| robots.iter().filter(|robot| robot.verdict == verdict).count();
+    let counts: Vec<String> = verdicts.map(|v| format!("{} {}", count(v), v.name())).to_vec();
+    console.line(&format!("{}: {} robots: {}", file.run, robots.len(), counts.join(", ")));
+    breaking(console, &robots);
+    let csv = out.with_extension("csv");
+    console.line(&format!("wrote {} and {}", out.display(), csv.display()));
+    if file.robots.len() < file.elites {
+        note(console, file);
+    }
+}
+
+fn note(console: &Console, file: &AuditFile) {
+    let (known, all) = (file.robots.len(), file.elites);
+    console.info(&format!(
+        "{known} of {all} robots are audited; --physical-only draws from whole archives only"
+    ));
+}
+
+fn row(robot: &RobotAudit) -> Vec<String> {
+    let walks = |d: &Vec<f64>| match d.len() {
+        0..=4 => d.iter().map(|d| format!("{d:+.1}")).collect::<Vec<_>>().join(" "),
+        many => format!("{many} images"),
+    };
+    let energy = robot.energy_per_cycle;
+    let is_walker = robot.verdict != Verdict::NotAWalker;
+    let of_walker = |text: String| if is_walker { text } else { "–".to_string() };
+    vec![
+        robot.id.clone(),
+        robot.task.clone(),
+        robot.verdict.name().to_string(),
+        of_walker(format!("{:.0}", 100.0 * robot.persisting)),
+        of_walker(format!("{:.2}", robot.spread)),
+        if energy.drive > 0.0 { format!("{:.3}", energy.limits / energy.drive) } else { "–".to_string() },
+        robot.displacements.as_ref().map_or("unstable".to_string(), walks),
+        robot.reason.clone(),
+    ]
+}
+
+/// For every change, in how many robots the walk does not persist.
+fn breaking(console: &Console, robots: &[&RobotAudit]) {
+    let mut names: Vec<&str> = Vec::new();
+    let lives = || robots.iter().flat_map(|robot| &robot.lives);
+    for life in lives() {
+        if !names.contains(&life.name.as_str()) {
+            names.push(&life.name);
+        }
+    }
+    if names.is_empty() {
+        return;
+    }
+    let rows = names.into_iter().map(|name| {
+        let lives: Vec<_> = lives().filter(|life| life.name == name).collect();
+        let broken = lives.iter().filter(|life| !life.persists).count();
+        let mean = lives.iter().map(|life| life.distance).sum::<f64>() / lives.len() as f64;
+        let counts = [broken, lives.len()].map(|count| count.to_string());
+        [vec![name.to_string()], counts.to_vec(), vec![format!("{:.1}", 100.0 * mean)]].concat()
+    });
+    let rows: Vec<Vec<String>> = rows.collect();
+    console.line("");
+    console.table(&["change", "walks broken", "of", "mean distance kept %"], &rows);
+}

@@ -1,0 +1,156 @@
+//! Verdicts: deterministic, resumable, never stale; and `--physical-only` means what it says.
+
+mod common;
+
+use common::program::{Sandbox, TINY};
+use morphcog::run::audit_file::AuditFile;
+use morphcog::run::verdict::Verdict;
+use std::collections::BTreeSet;
+
+/// What tiny robots in short lives can be held to, so that some are physical and some are not.
+const MILD: &str = "--set threshold=0 --set least_walk=0 --set least_kept=0.5 --set least_distance=0 --set perturbations.time_step=[2] --set perturbations.raised=[] --set perturbations.least_sensors=1";
+
+/// A sandbox with a tiny run in `run`, whose lives last three cycles.
+fn evolved() -> Sandbox {
+    let sandbox = Sandbox::new();
+    sandbox.write("tiny.toml", TINY.replace("control_steps = 20", "control_steps = 150"));
+    sandbox.run("evolve --config tiny.toml --out run --generations 40").ended(0, &[]);
+    sandbox
+}
+
+fn audit(sandbox: &Sandbox, more: &str) {
+    sandbox.run(&format!("audit --archive run/run.json {MILD} {more}")).ended(0, &[]);
+}
+
+fn verdicts(sandbox: &Sandbox) -> AuditFile {
+    AuditFile::read(&sandbox.path("run/audit.json")).unwrap()
+}
+
+#[test]
+fn verdicts_are_the_same_bytes_on_any_number_of_threads_and_however_often_it_was_stopped() {
+    let sandbox = evolved();
+    let written = |sandbox: &Sandbox| [sandbox.read("run/audit.json"), sandbox.read("run/audit.csv")];
+    audit(&sandbox, "--threads 1");
+    let alone = written(&sandbox);
+    std::fs::remove_file(sandbox.path("run/audit.json")).unwrap();
+    audit(&sandbox, "--threads 3 --robots top:2");
+    assert_eq!(verdicts(&sandbox).robots.len(), 2);
+    audit(&sandbox, "--threads 3 --robots random:3");
+    audit(&sandbox, "--threads 2");
+    assert_eq!(written(&sandbox), alone);
+    let file = verdicts(&sandbox);
+    let run = sandbox.run_file("run");
+    let ids = |ids: Vec<&String>| ids.into_iter().cloned().collect::<Vec<_>>();
+    assert_eq!(
+        ids(file.robots.iter().map(|r| &r.id).collect()),
+        ids(run.elites.iter().map(|r| &r.id).collect())
+    );
+    for (robot, elite) in file.robots.iter().zip(&run.elites) {
+        assert_eq!(robot.displacements.as_ref(), Some(&elite.displacements), "its life in its own run");
+        assert_eq!(robot.lives.is_empty(), robot.verdict == Verdict::NotAWalker);
+        assert!(robot.lives.iter().all(|life| life.persists) || robot.verdict != Verdict::Physical);
+    }
+    // Other criteria are another audit.
+    sandbox.run("audit --archive run/run.json --set threshold=1000").ended(0, &[]);
+    assert!(verdicts(&sandbox).robots.iter().all(|robot| robot.verdict == Verdict::NotAWalker));
+}
+
+#[test]
+fn physical_only_selects_physical_robots_and_nothing_else() {
+    let sandbox = evolved();
+    audit(&sandbox, "");
+    let file = verdicts(&sandbox);
+    let of = |physical: bool| -> BTreeSet<String> {
+        let robots = file.robots.iter().filter(|robot| (robot.verdict == Verdict::Physical) == physical);
+        robots.map(|robot| robot.id.clone()).collect()
+    };
+    let (physical, others) = (of(true), of(false));
+    assert!(!physical.is_empty() && !others.is_empty(), "{file:#?}");
+    for select in ["all", "random:10", "top:3", "best"] {
+        let args =
+            format!("eval --archive run/run.json --images 4 --cycles 1 --select {select} --physical-only");
+        sandbox.run(&args).ended(0, &[]);
+        let report: serde_json::Value = serde_json::from_str(&sandbox.read("run/eval.json")).unwrap();
+        let robots = report["robots"].as_array().unwrap();
+        let ids: BTreeSet<String> =
+            robots.iter().map(|robot| robot["id"].as_str().unwrap().to_string()).collect();
+        assert!(!ids.is_empty() && ids.is_subset(&physical), "{select}: {ids:?}");
+        assert!(select != "all" || ids == physical);
+        assert!(report["selected"].as_str().unwrap().ends_with("of those audited as physical"));
+    }
+    // A robot that is named and is not physical is refused, with the reason.
+    let other = others.first().unwrap();
+    let reason = file.robot(other).unwrap().conclusion();
+    sandbox
+        .run(&format!("eval --archive run/run.json --images 4 --robots {other} --physical-only"))
+        .ended(3, &["not physical", &reason]);
+    sandbox
+        .run(&format!("replay --archive run/run.json --robot {other} --physical-only -o x.png"))
+        .ended(3, &["not physical", &reason]);
+    sandbox.run("replay --archive run/run.json --physical-only -o best.png").ended(0, &[]);
+    assert!(sandbox.path("best.png").exists());
+    let fittest = sandbox.run_file("run").elites.into_iter().filter(|robot| physical.contains(&robot.id));
+    let fittest = fittest.max_by(|a, b| a.objective.total_cmp(&b.objective)).unwrap();
+    let said = sandbox.run("replay --archive run/run.json --physical-only --format html").ended(0, &[]);
+    assert!(sandbox.path(&format!("run/replay-{}.html", fittest.id)).exists(), "{said:?}");
+}
+
+#[test]
+fn without_verdicts_on_this_very_archive_nothing_is_drawn() {
+    let sandbox = evolved();
+    let draw = |sandbox: &Sandbox| {
+        sandbox.run("eval --archive run/run.json --images 4 --cycles 1 --select random:10 --physical-only")
+    };
+    draw(&sandbox).ended(3, &["have not been audited", "hint: morphcog audit --archive run/run.json"]);
+    // Of a part of an archive no fair draw is possible.
+    audit(&sandbox, "--robots top:2");
+    draw(&sandbox).ended(3, &["has not been audited", "2 of"]);
+    audit(&sandbox, "");
+    draw(&sandbox).ended(0, &[]);
+    // The run goes on: its verdicts are stale.
+    sandbox.run("evolve --config tiny.toml --out run --generations 45 --resume").ended(0, &[]);
+    draw(&sandbox).ended(3, &["audit.json", "stale", "hint: morphcog audit --archive run/run.json"]);
+    audit(&sandbox, "");
+    draw(&sandbox).ended(0, &[]);
+    // Broken files are refused as broken.
+    sandbox.write("run/audit.json", "{\"format\": \"morphcog-eval\"}");
+    draw(&sandbox).ended(3, &["audit.json", "morphcog-audit"]);
+    sandbox.write("run/audit.json", "{");
+    draw(&sandbox).ended(3, &["audit.json"]);
+}
+
+#[test]
+fn an_audit_says_what_it_found_in_a_table_and_as_json() {
+    let sandbox = evolved();
+    let said =
+        sandbox.run(&format!("audit --archive run/run.json --robots top:3 {MILD}")).ended(0, &["auditing 3"]);
+    for words in ["verdict", "limits/drive", "time step / 2", "3 robots:", "wrote run/audit.json"] {
+        assert!(said.out.contains(words), "{words} in {}", said.out);
+    }
+    let said =
+        sandbox.run(&format!("--json audit --archive run/run.json --robots top:3 {MILD}")).ended(0, &[]);
+    let last = said.json_lines().pop().unwrap();
+    assert_eq!((last["event"].as_str(), last["robots"].as_array().unwrap().len()), (Some("audited"), 3));
+    assert_eq!(last["robots"][0]["id"], verdict_of_best(&sandbox));
+}
+
+fn verdict_of_best(sandbox: &Sandbox) -> serde_json::Value {
+    let run = sandbox.run_file("run");
+    let best = run.elites.iter().max_by(|a, b| a.objective.total_cmp(&b.objective)).unwrap();
+    best.id.clone().into()
+}
+
+#[test]
+fn what_cannot_be_audited_is_refused_with_what_to_do() {
+    let sandbox = evolved();
+    let audit = |args: &str| sandbox.run(&format!("audit --archive run/run.json {args}"));
+    audit("--set treshold=1").ended(2, &["treshold"]);
+    audit("--set perturbations.time_step=[1]").ended(3, &["perturbations.time_step", "2 to 64"]);
+    audit("--criteria none.toml").ended(3, &["none.toml"]);
+    audit("--robots nobody").ended(3, &["no robot nobody"]);
+    audit("-o run/run.json").ended(2, &["overwrite a file of the run"]);
+    sandbox.write("own.toml", "threshold = -1\n");
+    audit("--criteria own.toml").ended(3, &["threshold"]);
+    sandbox.run("audit --archive none.json").ended(3, &["none.json"]);
+    sandbox.run("replay --robot XFJPI --physical-only").ended(2, &["--physical-only"]);
+}
