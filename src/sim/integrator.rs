@@ -43,8 +43,8 @@ pub(super) fn limit<L: Lanes>(
     state: &mut State,
     scratch: &mut Scratch,
 ) {
-    let Scratch { position: new, passing, extra, .. } = scratch;
-    limit_all::<L>(lattice, physics, new, &mut state.previous, passing);
+    let Scratch { position: new, passing, extra, reach, .. } = scratch;
+    limit_all::<L>(lattice, physics, new, &mut state.previous, passing, reach);
     if let Some(extra) = extra {
         extra.limit::<L>(lattice, physics, new);
         extra.feed(lattice, &mut state.previous);

@@ -40,7 +40,20 @@ impl Limits {
     }
 }
 
-/// All springs at once: corrections from the same positions, then added up.
+/// What a sweep has to reckon with: the rest costs time, and is mostly not there.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Reach {
+    /// Only horizontal springs, the ones that are actuated, are beyond their limits.
+    #[default]
+    Horizontal,
+    /// Any springs are.
+    Any,
+    /// Some so far that the series does not do.
+    Far,
+}
+
+/// All springs at once: corrections from the same positions, then added up. `reach` is a guess, from the substep before,
+/// and then what it was; it makes no difference to the result.
 #[inline(always)]
 pub(super) fn limit_all<L: Lanes>(
     lattice: &Lattice,
@@ -48,9 +61,31 @@ pub(super) fn limit_all<L: Lanes>(
     from: &Pair,
     to: &mut Pair,
     passing: &mut Pair,
+    reach: &mut Reach,
 ) {
-    if !limit_horizontal::<L>(lattice, physics, from, to) {
-        limit_any::<L>(lattice, physics, from, to, passing);
+    loop {
+        let found = match *reach {
+            Reach::Horizontal => limit_horizontal::<L>(lattice, physics, from, to),
+            Reach::Any => limit_any::<L, false>(lattice, physics, from, to, passing),
+            Reach::Far => limit_any::<L, true>(lattice, physics, from, to, passing),
+        };
+        let enough = found <= *reach;
+        *reach = found;
+        if enough {
+            break;
+        }
+    }
+}
+
+/// The greatest that some masks tell of.
+#[inline(always)]
+fn reach<L: Lanes>(any: L::Mask, far: L::Mask) -> Reach {
+    if L::any(far) {
+        Reach::Far
+    } else if L::any(any) {
+        Reach::Any
+    } else {
+        Reach::Horizontal
     }
 }
 
@@ -60,15 +95,14 @@ fn limits(lattice: &Lattice, physics: &Physics) -> [Limits; FAMILIES] {
     each!(i in [0, 1, 2, 3] => Limits::new(lattice.lengths[i], physics.limit_low, physics.limit_high))
 }
 
-/// As if only horizontal springs, the ones that are actuated, were beyond their limits; whether it is so.
 #[inline(always)]
-fn limit_horizontal<L: Lanes>(lattice: &Lattice, physics: &Physics, from: &Pair, to: &mut Pair) -> bool {
+fn limit_horizontal<L: Lanes>(lattice: &Lattice, physics: &Physics, from: &Pair, to: &mut Pair) -> Reach {
     let limits = limits(lattice, physics);
     let share = L::splat(physics.limit_share / 2.0);
     let (exists, _) = lattice.exists.as_chunks::<{ FAMILIES * BLOCK }>();
     let (from, to) = (slices(from, lattice.len), slices_mut(to, lattice.len));
     let zero = L::splat(0.0);
-    let mut others = zero.above(zero);
+    let (mut others, mut far) = (zero.above(zero), zero.above(zero));
     for run in &lattice.runs {
         let mut gather = Gather::<L>::new([&mut [], &mut []], lattice.pitch);
         for slot in run.clone().step_by(L::WIDTH) {
@@ -78,41 +112,52 @@ fn limit_horizontal<L: Lanes>(lattice: &Lattice, physics: &Physics, from: &Pair,
             let [beyond, other @ ..] = each!(i in [0, 1, 2, 3] => {
                 limits[i].beyond(squares[i], L::load(exists, i * BLOCK + lane))
             });
+            others = others | ((other[0] | other[1]) | other[2]);
             let t = limits[0].excess(squares[0]).or_else(beyond, zero);
-            let far = t.abs().above(L::splat(SERIES_RANGE));
-            others = others | ((other[0] | other[1]) | (other[2] | far));
+            far = far | t.abs().above(L::splat(SERIES_RANGE));
             let sums = gather.next_horizontal(share * briefly(t), &vectors);
             (L::load(from[X], slot) + sums[X]).store(to[X], slot);
             (L::load(from[Y], slot) + sums[Y]).store(to[Y], slot);
         }
     }
-    !L::any(others)
+    reach::<L>(others, far)
 }
 
-/// Whatever is beyond its limits.
 #[inline(always)]
-fn limit_any<L: Lanes>(lattice: &Lattice, physics: &Physics, from: &Pair, to: &mut Pair, passing: &mut Pair) {
+fn limit_any<L: Lanes, const FAR: bool>(
+    lattice: &Lattice,
+    physics: &Physics,
+    from: &Pair,
+    to: &mut Pair,
+    passing: &mut Pair,
+) -> Reach {
     let limits = limits(lattice, physics);
     let share = L::splat(physics.limit_share / 2.0);
     let (exists, _) = lattice.exists.as_chunks::<{ FAMILIES * BLOCK }>();
     let (from, to) = (slices(from, lattice.len), slices_mut(to, lattice.len));
     let [passing_x, passing_y] = slices_mut(passing, lattice.len);
+    let zero = L::splat(0.0);
+    let (mut others, mut far) = (zero.above(zero), zero.above(zero));
     for run in &lattice.runs {
         let mut gather = Gather::<L>::new([passing_x, passing_y], lattice.pitch);
         for slot in run.clone().step_by(L::WIDTH) {
             let vectors = vectors(from, slot, lattice.pitch);
             let (exists, lane) = (&exists[slot / BLOCK], slot % BLOCK);
             let squares = squares(&vectors);
-            let pull = each!(i in [0, 1, 2, 3] => {
-                let beyond = limits[i].beyond(squares[i], L::load(exists, i * BLOCK + lane));
-                let t = limits[i].excess(squares[i]).or_else(beyond, L::splat(0.0));
-                share * carefully(t)
+            let beyond = each!(i in [0, 1, 2, 3] => {
+                limits[i].beyond(squares[i], L::load(exists, i * BLOCK + lane))
             });
+            others = others | ((beyond[1] | beyond[2]) | beyond[3]);
+            let t = each!(i in [0, 1, 2, 3] => limits[i].excess(squares[i]).or_else(beyond[i], zero));
+            let greatest = t[0].max_abs(t[1]).max_abs(t[2].max_abs(t[3]));
+            far = far | greatest.above(L::splat(SERIES_RANGE));
+            let pull = each!(i in [0, 1, 2, 3] => share * if FAR { carefully(t[i]) } else { briefly(t[i]) });
             let sums = gather.next(pull, &vectors, slot);
             (L::load(from[X], slot) + sums[X]).store(to[X], slot);
             (L::load(from[Y], slot) + sums[Y]).store(to[Y], slot);
         }
     }
+    reach::<L>(others, far)
 }
 
 /// Brings links of the rigid pass that have nothing to do with each other together, so that the processor can work on

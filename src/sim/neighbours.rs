@@ -84,7 +84,17 @@ impl Neighbours {
     #[cold]
     fn make(&mut self, lattice: &Lattice, physics: &Physics, state: &State) -> Result<(), BlownUp> {
         let slack = 2.0 * BUDGET * physics.cell_size;
-        self.made.clone_from(&state.position);
+        if self.made[X].len() == lattice.len {
+            // `clone_from` would ask for new memory.
+            [X, Y].map(|axis| self.made[axis].copy_from_slice(&state.position[axis]));
+        } else {
+            self.made.clone_from(&state.position);
+            // Room for all but crumpled bodies, for which the lists grow.
+            let surface = lattice.surface.len();
+            self.low.reserve(surface);
+            self.candidates.reserve(16 * surface);
+            self.distant.reserve(4 * surface);
+        }
         for (_, corners) in &lattice.voxels {
             let bounds = Bounds::of(&corners.map(|point| place(point, state)));
             let extent = bounds.high - bounds.low;

@@ -3,6 +3,7 @@
 use super::extra::Extra;
 use super::forces::{Pulls, Springs, Wide};
 use super::lattice::Lattice;
+use super::limits::Reach;
 use super::neighbours::Neighbours;
 use super::params::Physics;
 use crate::base::lanes::{BLOCK, Buffer};
@@ -96,6 +97,8 @@ pub(super) struct Scratch {
     pub position: Pair,
     pub velocity: Pair,
     pub extra: Option<Extra>,
+    /// What the latest length limits had to reckon with.
+    pub reach: Reach,
     /// Which contacts are possible.
     pub neighbours: Neighbours,
 }
@@ -119,6 +122,7 @@ impl Scratch {
             position: parked(),
             velocity: pair(lattice.len),
             extra: Extra::new(lattice, physics.mass, physics.servo_gain),
+            reach: Reach::default(),
             neighbours: Neighbours::default(),
         }
     }

@@ -1,0 +1,24 @@
+//! Simulating asks for no memory: what a life needs is there from its first control steps on.
+
+mod common;
+
+use common::references;
+use morphcog::sim::{Physics, World};
+
+/// In which the lists of possible contacts reach their greatest length.
+const WARM_UP: u64 = 200;
+
+#[test]
+fn a_control_step_allocates_nothing() {
+    let physics = Physics::default();
+    for life in references() {
+        let lattice = life.lattice(&physics);
+        let mut world = World::new(&lattice, &physics, life.start());
+        world.set_stimulus(&life.stimulus);
+        if (0..WARM_UP.min(life.control_steps)).try_for_each(|_| world.step()).is_err() {
+            continue;
+        }
+        let info = allocation_counter::measure(|| (0..100).for_each(|_| world.step().unwrap_or(())));
+        assert_eq!(info.count_total, 0, "{}: {info:?}", life.name);
+    }
+}
