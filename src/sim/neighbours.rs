@@ -86,7 +86,9 @@ impl Neighbours {
         let slack = 2.0 * BUDGET * physics.cell_size;
         if self.made[X].len() == lattice.len {
             // `clone_from` would ask for new memory.
-            [X, Y].map(|axis| self.made[axis].copy_from_slice(&state.position[axis]));
+            for axis in [X, Y] {
+                self.made[axis].copy_from_slice(&state.position[axis]);
+            }
         } else {
             self.made.clone_from(&state.position);
             // Room for all but crumpled bodies, for which the lists grow.
