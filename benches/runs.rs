@@ -7,6 +7,7 @@ use morphcog::body::Body;
 use morphcog::genome::Genome;
 use morphcog::run::checkpoint::{self, Checkpoint, KnownBodies};
 use morphcog::run::config::Config;
+use morphcog::run::curriculum::Period;
 use morphcog::run::evolve::{Observer, Options, Progress, evolve};
 use morphcog::run::folder::{IfExists, RunFolder};
 use morphcog::run::metrics::Totals;
@@ -30,6 +31,7 @@ struct Silent;
 
 impl Observer for Silent {
     fn started(&mut self, _: &RunFolder, _: &Training, _: &Progress) {}
+    fn period(&mut self, _: Period, _: &Training, _: &Progress) {}
     fn generation(&mut self, _: &Progress) {}
     fn warning(&mut self, _: &str) {}
 }

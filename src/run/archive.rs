@@ -6,6 +6,7 @@ use crate::body::{Body, VoxelCounts};
 use crate::genome::Genome;
 use crate::qd::descriptor::possible_cells;
 use crate::qd::{Archive, ArchiveStats, DescriptorSpace, Elite};
+use crate::task::fitness::Fitness;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -179,6 +180,11 @@ impl RunFile {
     fn space(&self) -> DescriptorSpace {
         let Dimensions { names, bins, .. } = &self.dimensions;
         DescriptorSpace::new(names.iter().cloned().zip(bins.iter().copied()).collect())
+    }
+
+    /// How its elites' answers were judged.
+    pub fn fitness(&self) -> Fitness {
+        self.config.fitness(self.generations.saturating_sub(1))
     }
 
     /// The elites as an archive to go on with.

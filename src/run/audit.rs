@@ -11,6 +11,7 @@ use crate::base::hash::sha256_hex;
 use crate::body::Body;
 use crate::sim::{Energy, Lattice};
 use crate::task::dataset::Split;
+use crate::task::fitness::Fitness;
 use crate::task::grouping::Grouping;
 use crate::task::perturbation::{Perturbation, Setting};
 use crate::task::rollout::walk;
@@ -93,8 +94,9 @@ struct Trial {
 /// # Errors
 /// What is wrong with archive, data, selection or criteria.
 pub fn audit(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Result<Finished, Error> {
-    let (config, training, subjects, order, mut file) = open(options)?;
-    let trial = Trial { grouping: config.grouping()?, training, criteria: options.criteria.clone(), config };
+    let (config, fitness, training, subjects, order, mut file) = open(options)?;
+    let grouping = config.grouping()?.with_fitness(fitness);
+    let trial = Trial { grouping, training, criteria: options.criteria.clone(), config };
     if let Ok(earlier) = AuditFile::read(&options.out) {
         let same = AuditFile { robots: Vec::new(), ..earlier.clone() } == file;
         file.robots = if same { earlier.robots } else { Vec::new() };
@@ -128,9 +130,9 @@ pub fn audit(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> R
     Ok(Finished { file, asked, stopped: false })
 }
 
-type Opened = (Config, Training, Vec<Subject>, Vec<String>, AuditFile);
+type Opened = (Config, Fitness, Training, Vec<Subject>, Vec<String>, AuditFile);
 
-/// Config, images, the robots asked for, the ids of all there are in order, and an empty file.
+/// Config, fitness, images, the robots asked for, the ids of all there are in order, and an empty file.
 fn open(options: &Options) -> Result<Opened, Error> {
     let data = options.data.as_deref();
     match &options.source {
@@ -155,7 +157,7 @@ fn open(options: &Options) -> Result<Opened, Error> {
             let subjects = all.into_iter().filter(|robot| is_asked(&robot.name)).map(subject).collect();
             let sha = sha256_hex(gallery::TEXT.as_bytes());
             let file = AuditFile::new("gallery", sha, order.len(), &options.criteria);
-            Ok((config, training, subjects, order, file))
+            Ok((config, Fitness::Min, training, subjects, order, file))
         }
         Source::Archive(path) => {
             let run = RunFile::read(path)?;
@@ -175,7 +177,7 @@ fn open(options: &Options) -> Result<Opened, Error> {
             }
             let order: Vec<String> = run.elites.iter().map(|robot| robot.id.clone()).collect();
             let file = AuditFile::new(&run.name, fingerprint(&run), order.len(), &options.criteria);
-            Ok((run.config, training, subjects, order, file))
+            Ok((run.config.clone(), run.fitness(), training, subjects, order, file))
         }
     }
 }
@@ -222,8 +224,12 @@ impl Trial {
         let split = self.grouping.tasks().iter().find(|split| split.name() == subject.task);
         // A run's robots are checked to have tasks of the run.
         let split = split.unwrap_or(&self.grouping.tasks()[0]);
-        let behaviour =
-            Behaviour::new(&self.criteria, split, &classes, displacements.clone().unwrap_or(still));
+        let behaviour = Behaviour::new(
+            &self.criteria,
+            (split, self.grouping.fitness()),
+            &classes,
+            displacements.clone().unwrap_or(still),
+        );
         let life = |perturbation: &Perturbation| {
             if stop.load(Ordering::Relaxed) {
                 return None;

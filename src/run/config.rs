@@ -1,6 +1,7 @@
 //! [`Config`]: everything a run depends on, in TOML or JSON with the same keys.
 
 use super::Error;
+use super::curriculum::StageConfig;
 use super::robust::EvaluationConfig;
 use super::toml_text::{self, Format};
 use crate::body::MAX_SIDE;
@@ -16,12 +17,14 @@ use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
 /// Configs that are part of the program: name and text.
-pub const BUILT_IN: [(&str, &str); 5] = [
+pub const BUILT_IN: [(&str, &str); 7] = [
     ("quickstart.toml", include_str!("../../configs/quickstart.toml")),
     ("zero_one.toml", include_str!("../../configs/zero_one.toml")),
     ("zero_one_published.toml", include_str!("../../configs/zero_one_published.toml")),
     ("four_digit.toml", include_str!("../../configs/four_digit.toml")),
     ("four_digit_published.toml", include_str!("../../configs/four_digit_published.toml")),
+    ("zero_one_curriculum.toml", include_str!("../../configs/zero_one_curriculum.toml")),
+    ("four_digit_curriculum.toml", include_str!("../../configs/four_digit_curriculum.toml")),
 ];
 
 /// Largest seed: TOML's numbers are signed.
@@ -68,6 +71,9 @@ pub struct Config {
     /// When the run is saved.
     #[serde(default)]
     pub checkpoint: CheckpointConfig,
+    /// Stages of training, if there are several. Left out of files where there are none.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub stage: Vec<StageConfig>,
     /// How robots are evaluated. Left out of files where it is the default.
     #[serde(default, skip_serializing_if = "EvaluationConfig::is_default")]
     pub evaluation: EvaluationConfig,
@@ -254,6 +260,7 @@ impl Config {
             Err(Error::input(format!("{key} = {found}: expected {expected}")))
         };
         self.grouping()?;
+        self.validate_stages()?;
         self.physics.validate().map_err(|error| Error::input(format!("physics.{error}")))?;
         self.stimulus.validate().map_err(|error| Error::input(format!("stimulus: {error}")))?;
         self.data.builtin.check().map_err(|error| Error::input(format!("data.builtin: {error}")))?;

@@ -2,17 +2,19 @@
 
 use super::archive::{Dimensions, FORMAT, FORMAT_VERSION, Robot, RunFile};
 use super::checkpoint::{self, Checkpoint, KnownBodies};
+use super::curriculum::Period;
 use super::folder::{self, IfExists, RunFolder};
 use super::metrics::{Metrics, Totals};
 use super::robust::{Scored, with_perturbed_lives};
-use super::training::Training;
+use super::training::{Training, load_dataset};
 use super::variation::Mutations;
 use super::{Config, Error, resume};
 use crate::base::files::write_atomically;
 use crate::genome::GenomeError;
 use crate::qd::descriptor::count_bin;
 use crate::qd::{Archive, ArchiveStats, DescriptorSpace, Evaluated, MapElites};
-use crate::task::evaluation::{Job, Outcome, evaluate};
+use crate::task::dataset::{Dataset, Split};
+use crate::task::evaluation::{Job, Outcome, Savings, evaluate};
 use crate::task::grouping::Grouping;
 use rayon::prelude::*;
 use std::path::PathBuf;
@@ -53,6 +55,8 @@ pub struct Progress {
 pub trait Observer {
     /// Before the first generation of this session.
     fn started(&mut self, folder: &RunFolder, training: &Training, progress: &Progress);
+    /// When other training images, or another fitness, are begun with.
+    fn period(&mut self, period: Period, training: &Training, progress: &Progress);
     /// After every generation.
     fn generation(&mut self, progress: &Progress);
     /// Something the user should know.
@@ -80,10 +84,15 @@ pub fn evolve(
     observer: &mut (dyn Observer + Send),
 ) -> Result<Finished, Error> {
     let config = &options.config;
-    let training = Training::load(config, options.data.as_deref())?;
+    let dataset = load_dataset(config, options.data.as_deref(), &[Split::Train])?;
+    // Whether there are images for every stage is to be known before anything is written.
+    let first = Training::of(config, &dataset, config.period(0))?;
+    for stage in (0..config.stage.len()).map(|stage| Period { stage, draw: 0 }) {
+        Training::of(config, &dataset, stage)?;
+    }
     let folder = RunFolder::open(&options.out, options.if_exists)?;
     let saved = match options.if_exists {
-        IfExists::Resume => resume::saved(&folder, config, &training, |text| observer.warning(&text))?,
+        IfExists::Resume => resume::saved(&folder, config, &dataset, |text| observer.warning(&text))?,
         _ => None,
     };
     let write = |name: &str, content: &[u8]| {
@@ -93,7 +102,7 @@ pub fn evolve(
     write(folder::CONFIG, config.to_toml().as_bytes())?;
     let pool = rayon::ThreadPoolBuilder::new().num_threads(options.threads.unwrap_or(0)).build();
     let pool = pool.map_err(|error| Error::other(format!("no threads: {error}")))?;
-    let mut run = Run::new(options, &training, saved)?;
+    let mut run = Run::new(options, &dataset, first, saved)?;
     let mut metrics = Metrics::open(folder.path(), run.generation)?;
     pool.install(|| run.live(&folder, &mut metrics, stop, observer))?;
     metrics.flush()?;
@@ -105,7 +114,10 @@ pub fn evolve(
 /// A run under way.
 struct Run<'a> {
     options: &'a Options,
-    training: &'a Training,
+    dataset: &'a Dataset,
+    /// What is being trained on, and since when it is.
+    period: Period,
+    training: Training,
     grouping: Grouping,
     space: DescriptorSpace,
     dimensions: Dimensions,
@@ -118,15 +130,26 @@ struct Run<'a> {
 }
 
 impl<'a> Run<'a> {
-    fn new(options: &'a Options, training: &'a Training, saved: Option<Checkpoint>) -> Result<Self, Error> {
+    fn new(
+        options: &'a Options,
+        dataset: &'a Dataset,
+        first: Training,
+        saved: Option<Checkpoint>,
+    ) -> Result<Self, Error> {
         let config = &options.config;
-        let grouping = config.grouping()?;
         let (archive, known, totals, generation) = match saved {
             Some(saved) => (saved.run.archive()?, saved.known_bodies, saved.totals, saved.run.generations),
             None => (Archive::new(), KnownBodies::default(), Totals::default(), 0),
         };
+        let latest = generation.saturating_sub(1);
+        let period = config.period(latest);
+        let grouping = config.grouping()?.with_fitness(config.fitness(latest));
+        let training =
+            if period == config.period(0) { first } else { Training::of(config, dataset, period)? };
         Ok(Run {
             options,
+            dataset,
+            period,
             training,
             space: DescriptorSpace::voxel_counts(grouping.tasks().len()),
             dimensions: Dimensions::of(config)?,
@@ -161,10 +184,15 @@ impl<'a> Run<'a> {
         observer: &mut (dyn Observer + Send),
     ) -> Result<(), Error> {
         let config = &self.options.config;
-        observer.started(folder, self.training, &self.progress());
+        observer.started(folder, &self.training, &self.progress());
         let every = Duration::try_from_secs_f64(config.checkpoint.seconds).unwrap_or(Duration::MAX);
         let mut saved = Instant::now();
         while self.generation < config.generations && !stop.load(Ordering::Relaxed) {
+            let period = config.period(self.generation);
+            if period != self.period {
+                self.begin(period)?;
+                observer.period(period, &self.training, &self.progress());
+            }
             self.next_generation()?;
             let progress = self.progress();
             metrics.write(self.generation - 1, &progress.stats, &progress.totals)?;
@@ -176,6 +204,31 @@ impl<'a> Run<'a> {
             }
         }
         Ok(())
+    }
+
+    /// Begins a period: other images, perhaps another fitness, and the elites evaluated anew.
+    fn begin(&mut self, period: Period) -> Result<(), Error> {
+        let config = &self.options.config;
+        self.period = period;
+        self.training = Training::of(config, self.dataset, period)?;
+        self.grouping = config.grouping()?.with_fitness(config.fitness(self.generation));
+        let elites: Vec<Robot> = self.search.archive().elites().map(|elite| elite.solution.clone()).collect();
+        self.totals.evaluations += elites.len() as u64;
+        self.known = KnownBodies::default();
+        for robot in &elites {
+            self.known.insert(robot.body.key());
+        }
+        let jobs: Vec<Job> = elites
+            .iter()
+            .map(|robot| Job { body: &robot.body, first_image: 0, may_win: Box::new(|_| true) })
+            .collect();
+        let savings = Savings { early_stop: false, ..config.savings };
+        let evaluations = evaluate(&jobs, &self.training.stimuli, &config.physics, &config.protocol, savings);
+        let scored = with_perturbed_lives(config, &self.training, &self.grouping, &jobs, evaluations);
+        drop(jobs);
+        self.search = MapElites::new(config.seed, config.map_elites.clone(), Archive::new());
+        // In the order of their cells: of equals that now share a cell the first stays.
+        self.tell((0..).zip(elites).zip(scored))
     }
 
     /// Makes, evaluates and tells one generation.
@@ -201,23 +254,29 @@ impl<'a> Run<'a> {
         let jobs: Vec<Job> = fresh.iter().map(|(proposal, robot)| self.job(proposal.parent, robot)).collect();
         let evaluations =
             evaluate(&jobs, &self.training.stimuli, &config.physics, &config.protocol, config.savings);
-        let scored = with_perturbed_lives(config, self.training, &self.grouping, &jobs, evaluations);
+        let scored = with_perturbed_lives(config, &self.training, &self.grouping, &jobs, evaluations);
         drop(jobs);
 
+        let children = fresh.into_iter().map(|(proposal, robot)| (proposal.child, robot));
+        self.tell(children.zip(scored))?;
+        self.generation += 1;
+        Ok(())
+    }
+
+    /// Counts evaluations and puts those who walked into the archive.
+    fn tell(&mut self, evaluated: impl Iterator<Item = ((u64, Robot), Scored)>) -> Result<(), Error> {
         let mut told = Vec::new();
-        for ((proposal, robot), Scored { evaluation, at_most }) in fresh.into_iter().zip(scored) {
+        for ((child, robot), Scored { evaluation, at_most }) in evaluated {
             self.totals.count(&evaluation);
             match evaluation.outcome {
                 Outcome::Walked(displacements) => {
-                    told.push(self.scored(proposal.child, robot, displacements, at_most))
+                    told.push(self.scored(child, robot, displacements, at_most))
                 }
                 Outcome::Unstable(_) => self.totals.unstable += 1,
                 Outcome::Stopped => {}
             }
         }
-        self.search.tell(told).map_err(|error| Error::other(error.to_string()))?;
-        self.generation += 1;
-        Ok(())
+        self.search.tell(told).map(drop).map_err(|error| Error::other(error.to_string()))
     }
 
     /// Bins of the three voxel counts.

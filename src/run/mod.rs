@@ -6,6 +6,7 @@ pub mod audit_file;
 pub mod bench;
 pub mod checkpoint;
 pub mod config;
+pub mod curriculum;
 pub mod data;
 mod error;
 pub mod eval;

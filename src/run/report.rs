@@ -143,7 +143,8 @@ impl RobotReport {
             class: image.label,
             displacement,
         };
-        let assignment = Assignment::from_training(split, &training.map(answer).collect::<Vec<_>>());
+        let assignment =
+            Assignment::from_training(split, run.fitness(), &training.map(answer).collect::<Vec<_>>());
         let is_right = |(image, displacement): (&ImageRef, &Option<f64>)| {
             let (group, displacement) = (split.group(image.label), *displacement);
             group.zip(displacement).is_some_and(|(g, d)| assignment.is_right(g, d, threshold))

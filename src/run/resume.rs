@@ -5,6 +5,7 @@ use super::config::{CheckpointConfig, DataConfig};
 use super::folder::{RUN_JSON, RunFolder};
 use super::training::Training;
 use super::{Config, Error};
+use crate::task::dataset::Dataset;
 use crate::task::evaluation::Savings;
 use std::collections::BTreeMap;
 
@@ -18,13 +19,13 @@ const ANEW: &str = "start the run anew with --force";
 pub(super) fn saved(
     folder: &RunFolder,
     config: &Config,
-    training: &Training,
+    dataset: &Dataset,
     warn: impl FnMut(String),
 ) -> Result<Option<Checkpoint>, Error> {
     let place = folder.path().display().to_string();
     match checkpoint::read(folder.path(), warn)? {
         Some(saved) => {
-            compatible(&saved, config, training).map_err(|error| error.within(&place))?;
+            compatible(&saved, config, dataset).map_err(|error| error.within(&place))?;
             Ok(Some(saved))
         }
         None if folder.path().join(RUN_JSON).exists() => {
@@ -36,7 +37,7 @@ pub(super) fn saved(
 }
 
 /// Whether a saved run can be gone on with under a config: all that its results depend on must be the same.
-fn compatible(saved: &Checkpoint, config: &Config, training: &Training) -> Result<(), Error> {
+fn compatible(saved: &Checkpoint, config: &Config, dataset: &Dataset) -> Result<(), Error> {
     let hint = || format!("resume with the config it was started with, or {ANEW}");
     let (theirs, ours) = (keys(&saved.run.config), keys(config));
     let value = |keys: &Keys, key: &str| keys.get(key).map_or("not set".to_string(), ToString::to_string);
@@ -45,6 +46,7 @@ fn compatible(saved: &Checkpoint, config: &Config, training: &Training) -> Resul
         let text = format!("the run in this folder has another config: {key} = {theirs} there, {ours} now");
         return Err(Error::input(text).hint(hint()));
     }
+    let training = Training::of(config, dataset, config.period(saved.run.generations.saturating_sub(1)))?;
     if saved.run.dataset != training.dataset || saved.run.training_images != training.images {
         let text =
             "data: the run in this folder was made with other images: the dataset has changed".to_string();

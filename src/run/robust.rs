@@ -8,6 +8,7 @@ use super::Config;
 use super::training::Training;
 use crate::body::Body;
 use crate::task::evaluation::{Evaluation, Job, Outcome, Savings, evaluate};
+use crate::task::fitness::Fitness;
 use crate::task::grouping::Grouping;
 use crate::task::perturbation::{Perturbation, Setting};
 use serde::{Deserialize, Serialize};
@@ -18,6 +19,13 @@ use serde::{Deserialize, Serialize};
 pub struct EvaluationConfig {
     /// Fitness is that of the worst of a few perturbed lives, the unchanged one included. Default false.
     pub robust: bool,
+    /// How answers to several images are judged together. Default the smallest margin, the paper's.
+    #[serde(skip_serializing_if = "is_min")]
+    pub fitness: Fitness,
+}
+
+fn is_min(fitness: &Fitness) -> bool {
+    *fitness == Fitness::Min
 }
 
 impl EvaluationConfig {
@@ -69,7 +77,7 @@ pub(super) fn with_perturbed_lives(
             match life.outcome {
                 Outcome::Walked(displacements) => {
                     let answers = training.answers(displacements.into_iter().map(Some));
-                    robot.at_most = robot.at_most.min(grouping.tasks()[task].fitness(&answers));
+                    robot.at_most = robot.at_most.min(grouping.fitness_on(&grouping.tasks()[task], &answers));
                 }
                 unstable => robot.evaluation.outcome = unstable,
             }

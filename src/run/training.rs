@@ -1,5 +1,6 @@
 //! [`Training`]: the images a run evolves on, as its robots see them.
 
+use super::curriculum::Period;
 use super::{Config, Error};
 use crate::base::Grid;
 use crate::task::dataset::{BUILTIN, Dataset, DatasetError, Split};
@@ -64,19 +65,28 @@ pub fn see(config: &Config, dataset: &Dataset, split: Split, index: usize) -> Re
 }
 
 impl Training {
-    /// The training images of a config.
+    /// The training images of a config, in its first period if there are several.
     ///
     /// # Errors
     /// If the data are missing or broken, or an image is of a class that is not in the task, or a class has no image.
     pub fn load(config: &Config, data: Option<&Path>) -> Result<Self, Error> {
-        let dataset = load_dataset(config, data, &[Split::Train])?;
+        Training::of(config, &load_dataset(config, data, &[Split::Train])?, config.period(0))
+    }
+
+    /// The training images of a period.
+    ///
+    /// # Errors
+    /// As [`Training::load`].
+    pub fn of(config: &Config, dataset: &Dataset, period: Period) -> Result<Self, Error> {
         let refuse = |error: DatasetError| Error::input(format!("data.train_images: {error}"));
         let classes = config.classes();
-        let indices = match &config.data.train_images {
-            Some(indices) => indices.clone(),
-            None => dataset
-                .draw(Split::Train, &classes, config.data.images_per_class, config.seed, 0)
-                .map_err(refuse)?,
+        let draw = |per_class, number| {
+            dataset.draw(Split::Train, &classes, per_class, config.seed, number).map_err(refuse)
+        };
+        let indices = match (config.drawn_per_class(period), &config.data.train_images) {
+            (Some(per_class), _) => draw(per_class, period.number())?,
+            (None, Some(indices)) => indices.clone(),
+            (None, None) => draw(config.data.images_per_class, 0)?,
         };
         let mut images = Vec::new();
         let mut stimuli = Vec::new();
@@ -87,7 +97,7 @@ impl Training {
                     format!("data.train_images: image {index} shows a {label}, expected one of {classes:?}");
                 return Err(Error::input(text).hint("see [task] for the classes".to_string()));
             }
-            stimuli.push(see(config, &dataset, Split::Train, index)?);
+            stimuli.push(see(config, dataset, Split::Train, index)?);
             images.push(ImageRef { index, label });
         }
         if let Some(class) = classes.iter().find(|&&class| images.iter().all(|image| image.label != class)) {

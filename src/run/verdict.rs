@@ -3,6 +3,7 @@
 use super::Error;
 use super::toml_text::{self, Format};
 use crate::task::direction::{Assignment, Direction};
+use crate::task::fitness::Fitness;
 use crate::task::grouping::{Group, Split};
 use crate::task::perturbation::{Kind, Sizes};
 use crate::task::score::Answer;
@@ -150,11 +151,16 @@ pub(super) struct Behaviour<'a> {
 }
 
 impl<'a> Behaviour<'a> {
-    /// Of a robot that performs a task and answers these classes with these displacements.
-    pub fn new(criteria: &'a Criteria, split: &Split, classes: &[u8], plain: Vec<f64>) -> Self {
+    /// Of a robot that performs a task, judged by some fitness, and answers these classes with these displacements.
+    pub fn new(
+        criteria: &'a Criteria,
+        (split, fitness): (&Split, Fitness),
+        classes: &[u8],
+        plain: Vec<f64>,
+    ) -> Self {
         let answer = |(&class, &displacement): (&u8, &f64)| Answer { class, displacement };
         let answers: Vec<_> = classes.iter().zip(&plain).map(answer).collect();
-        let assignment = Assignment::from_training(split, &answers);
+        let assignment = Assignment::from_training(split, fitness, &answers);
         let right = |group| assignment.expected(group) == Direction::Right;
         let rightward: Vec<Option<bool>> =
             classes.iter().map(|&class| split.group(class).map(right)).collect();
@@ -249,7 +255,7 @@ mod tests {
     fn judged(lives: &[(Kind, [f64; 2])]) -> (Verdict, String) {
         let criteria = Criteria::default();
         let split = Grouping::two_groups(&[0], &[1]).unwrap().tasks()[0].clone();
-        let behaviour = Behaviour::new(&criteria, &split, &[0, 1], vec![-10.0, 12.0]);
+        let behaviour = Behaviour::new(&criteria, (&split, Fitness::Min), &[0, 1], vec![-10.0, 12.0]);
         let life = |(kind, d): &(Kind, [f64; 2])| behaviour.compare(String::new(), *kind, Some(d.to_vec()));
         behaviour.judge(&lives.iter().map(life).collect::<Vec<_>>())
     }
@@ -278,7 +284,7 @@ mod tests {
     fn a_walk_persists_by_direction_threshold_and_distance() {
         let criteria = Criteria::default();
         let split = Grouping::two_groups(&[0], &[1]).unwrap().tasks()[0].clone();
-        let behaviour = Behaviour::new(&criteria, &split, &[0, 1], vec![-10.0, 12.0]);
+        let behaviour = Behaviour::new(&criteria, (&split, Fitness::Min), &[0, 1], vec![-10.0, 12.0]);
         let compare = |d: Option<[f64; 2]>| behaviour.compare("x".into(), Kind::Start, d.map(Vec::from));
         assert!(compare(Some([-9.0, 30.0])).persists);
         // Just below the threshold that makes an answer.
@@ -297,12 +303,13 @@ mod tests {
         let criteria = Criteria::default();
         let splits = Grouping::all_splits(&[0, 1, 2, 3], false).unwrap();
         let split = &splits.tasks()[0];
-        let flaw = |d: [f64; 4]| Behaviour::new(&criteria, split, &[0, 1, 2, 3], d.to_vec()).flaw;
+        let flaw =
+            |d: [f64; 4]| Behaviour::new(&criteria, (split, Fitness::Min), &[0, 1, 2, 3], d.to_vec()).flaw;
         assert_eq!(split.name(), "0|123");
         assert_eq!(flaw([5.0, -4.0, -9.0, -2.0]), None);
         assert_eq!(flaw([5.0, -4.0, -1.0, -2.0]).unwrap(), "answers 2 of 4 training images");
         assert_eq!(flaw([2.0, -4.0, -9.0, -8.0]).unwrap(), "no walk of more than 3 voxels for 0");
-        let still = Behaviour::new(&criteria, split, &[0, 1, 2, 3], vec![0.0; 4]);
+        let still = Behaviour::new(&criteria, (split, Fitness::Min), &[0, 1, 2, 3], vec![0.0; 4]);
         assert_eq!(still.judge(&[]).0, Verdict::NotAWalker);
     }
 

@@ -1,8 +1,9 @@
 //! [`Direction`] and [`Assignment`]: which way a robot walks, and which way it should (paper, section
 //! "Generalization test").
 
+use super::fitness::Fitness;
 use super::grouping::{Group, Split};
-use super::score::{Answer, fitness_of_assignments, of_split};
+use super::score::{Answer, of_split};
 
 /// A way to walk.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -30,8 +31,8 @@ pub struct Assignment {
 
 impl Assignment {
     /// The assignment under which a robot's training answers are fitter (A left if it makes no difference).
-    pub fn from_training(split: &Split, answers: &[Answer]) -> Self {
-        let (a_right, a_left) = fitness_of_assignments(of_split(split, answers));
+    pub fn from_training(split: &Split, fitness: Fitness, answers: &[Answer]) -> Self {
+        let (a_right, a_left) = fitness.of_assignments(of_split(split, answers), 0);
         Assignment { a: if a_right > a_left { Direction::Right } else { Direction::Left } }
     }
 
@@ -63,7 +64,7 @@ mod tests {
         let split = &grouping.tasks()[0];
         let fixed = |displacements: [f64; 2]| {
             let of = |class| Answer { class, displacement: displacements[usize::from(class)] };
-            Assignment::from_training(split, &[of(0), of(1)])
+            Assignment::from_training(split, Fitness::Min, &[of(0), of(1)])
         };
         assert_eq!((fixed([-5.0, 8.0]).a, fixed([5.0, -8.0]).a), (Left, Right));
         // Both right: the shorter walk is the wrong one. No difference: left.

@@ -1,6 +1,8 @@
 //! [`Grouping`]: which tasks there are: how classes are divided into a group that walks one way and one that
 //! walks the other.
 
+use super::fitness::Fitness;
+
 /// One of the two groups of a [`Split`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Group {
@@ -51,6 +53,7 @@ impl Split {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Grouping {
     tasks: Vec<Split>,
+    fitness: Fitness,
 }
 
 /// Most classes whose splits are all made: 511 of them.
@@ -80,7 +83,8 @@ impl Grouping {
             return Err(GroupingError::EmptyGroup);
         }
         check_unique(&[a, b].concat())?;
-        Ok(Grouping { tasks: vec![Split { a: a.to_vec(), b: b.to_vec() }] })
+        let tasks = vec![Split { a: a.to_vec(), b: b.to_vec() }];
+        Ok(Grouping { tasks, fitness: Fitness::Min })
     }
 
     /// All ways to split the classes in two non-empty groups, 2^(k−1) − 1 for k classes: small first groups come
@@ -106,7 +110,19 @@ impl Grouping {
             Split { a: labels(a), b: labels(b) }
         };
         let same_way = same_way_bin.then(|| Split { a: classes.to_vec(), b: Vec::new() });
-        Ok(Grouping { tasks: firsts.into_iter().map(split).chain(same_way).collect() })
+        let tasks = firsts.into_iter().map(split).chain(same_way).collect();
+        Ok(Grouping { tasks, fitness: Fitness::Min })
+    }
+
+    /// The same tasks with another fitness than the smallest margin.
+    #[must_use]
+    pub fn with_fitness(self, fitness: Fitness) -> Self {
+        Grouping { fitness, ..self }
+    }
+
+    /// How answers to several images are judged together.
+    pub fn fitness(&self) -> Fitness {
+        self.fitness
     }
 
     /// The tasks, in the order of their bins.

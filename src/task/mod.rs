@@ -6,6 +6,7 @@ pub mod dataset;
 pub mod direction;
 pub mod evaluation;
 pub mod files;
+pub mod fitness;
 pub mod grouping;
 pub mod idx;
 pub mod info;

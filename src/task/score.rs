@@ -5,6 +5,7 @@
 //! both cases are then the smallest margin. Two things follow that make savings lossless: fitness is continuous
 //! (d = 0 counts as wrong, with margin 0), and the fitness of some of the images bounds that of all from above.
 
+use super::fitness::{Fitness, better};
 use super::grouping::{Group, Grouping, Split};
 
 /// How a robot answered an image.
@@ -21,56 +22,41 @@ pub struct Answer {
 pub struct Score {
     /// Index in [`Grouping::tasks`].
     pub task: usize,
-    /// In voxel lengths; positive if every image is answered right.
+    /// See [`Fitness`]. The smallest margin is in voxel lengths and positive if every image is answered right.
     pub fitness: f64,
 }
 
 /// Fitness on two groups, in voxel lengths: of both assignments of directions to groups the better one's smallest
 /// margin. Infinite without answers, not a number if an answer is none; never −0.
 pub fn two_group_fitness(answers: &[(Group, f64)]) -> f64 {
-    better(fitness_of_assignments(answers.iter().copied()))
-}
-
-/// Smallest margins if group A is to walk right, and if it is to walk left.
-pub(super) fn fitness_of_assignments(answers: impl Iterator<Item = (Group, f64)>) -> (f64, f64) {
-    answers.fold((f64::INFINITY, f64::INFINITY), |(a_right, a_left), (group, displacement)| {
-        let margin = if group == Group::A { displacement } else { -displacement };
-        (smaller(a_right, margin), smaller(a_left, -margin))
-    })
-}
-
-/// The smaller, or what is not a number: an answer that is none must never be overlooked.
-fn smaller(x: f64, y: f64) -> f64 {
-    if y < x || y.is_nan() { y } else { x }
-}
-
-fn better((x, y): (f64, f64)) -> f64 {
-    // + 0.0 makes −0 a 0: equal numbers, one text in files.
-    (if x >= y { x } else { y }) + 0.0
+    better(Fitness::Min.of_assignments(answers.iter().copied(), 0))
 }
 
 pub(super) fn of_split(split: &Split, answers: &[Answer]) -> impl Iterator<Item = (Group, f64)> {
     answers.iter().filter_map(|answer| Some((split.group(answer.class)?, answer.displacement)))
 }
 
-impl Split {
-    /// Fitness on this task in voxel lengths; see [`two_group_fitness`]. Images of classes in neither group do not
-    /// count. Of some of the images, it is the **upper bound** of the fitness on all of them.
-    pub fn fitness(&self, answers: &[Answer]) -> f64 {
-        better(fitness_of_assignments(of_split(self, answers)))
-    }
-}
-
 impl Grouping {
+    /// Fitness on a task. Images of classes in neither of its groups do not count.
+    pub fn fitness_on(&self, split: &Split, answers: &[Answer]) -> f64 {
+        better(self.fitness().of_assignments(of_split(split, answers), 0))
+    }
+
+    /// The **upper bound** of the fitness on a task if images of the classes `to_come` follow.
+    fn bound(&self, split: &Split, known: &[Answer], to_come: &[u8]) -> f64 {
+        let to_come = to_come.iter().filter(|class| split.group(**class).is_some()).count();
+        better(self.fitness().of_assignments(of_split(split, known), to_come))
+    }
+
     /// The task a robot performs, the one it is fittest on (the first wins a tie), and its fitness there.
     ///
-    /// With one image per class this is the paper's rule: min |d|, and the signs say which task. A robot that
+    /// With one image per class and the smallest margin this is the paper's rule: min |d|, and the signs say which task. A robot that
     /// walks the same way for all classes goes to that bin with min |d| if there is one, else to its best split
     /// with that one's negative fitness.
     pub fn score(&self, answers: &[Answer]) -> Score {
         let mut best = Score { task: 0, fitness: f64::NEG_INFINITY };
         for (task, split) in self.tasks().iter().enumerate() {
-            let fitness = split.fitness(answers);
+            let fitness = self.fitness_on(split, answers);
             if fitness > best.fitness || fitness.is_nan() {
                 best = Score { task, fitness };
             }
@@ -92,9 +78,9 @@ impl Grouping {
             let Score { task, fitness } = self.score(known);
             return wins(task, fitness);
         }
-        let never_negative = self.never_negative(known, to_come);
+        let never_negative = self.fitness() == Fitness::Min && self.never_negative(known, to_come);
         self.tasks().iter().enumerate().any(|(task, split)| {
-            let bound = split.fitness(known);
+            let bound = self.bound(split, known, to_come);
             let possible = bound >= 0.0 || !never_negative;
             possible && wins(task, bound)
         })
@@ -277,11 +263,13 @@ mod tests {
         #[test]
         fn robots_that_cannot_win_any_more_never_enter(
             grouping in any_grouping(),
+            kind in prop_oneof![Just(Fitness::Min), Just(Fitness::MeanClipped), Just(Fitness::RightThenMargin)],
             images in prop::collection::vec((0..5u8, displacement(), prop::bool::ANY), 1..8),
             one_each: bool,
             incumbents in prop::collection::vec(prop::option::of(displacement()), 32),
         ) {
             let mut images = images;
+            let grouping = grouping.with_fitness(kind);
             if one_each {
                 images.sort_by_key(|i| i.0);
                 images.dedup_by_key(|i| i.0);

@@ -1,10 +1,11 @@
 //! What the console shows while a command runs: the observers of `run`.
 
 use super::console::{Bar, Console, Counter, Progress};
+use crate::run::curriculum::Period;
 use crate::run::data::catalogue::RemoteFile;
 use crate::run::data::fetch::{Attempt, FetchObserver};
 use crate::run::folder::RunFolder;
-use crate::run::training::Training;
+use crate::run::training::{ImageRef, Training};
 use crate::run::{audit, eval, evolve};
 use std::sync::OnceLock;
 
@@ -31,16 +32,36 @@ fn shown(progress: &evolve::Progress) -> Progress {
     }
 }
 
+/// Training images for people: one by one if they are few.
+fn listed(training: &Training) -> String {
+    const FEW: usize = 8;
+    if training.images.len() > FEW {
+        let mut classes: Vec<u8> = training.images.iter().map(|image| image.label).collect();
+        classes.sort_unstable();
+        classes.dedup();
+        return format!("{} images of {} classes", training.images.len(), classes.len());
+    }
+    let image = |image: &ImageRef| format!("{} (train {})", image.label, image.index);
+    training.images.iter().map(image).collect::<Vec<_>>().join(", ")
+}
+
 impl evolve::Observer for Evolution<'_> {
     fn started(&mut self, folder: &RunFolder, training: &Training, progress: &evolve::Progress) {
-        let list: Vec<String> =
-            training.images.iter().map(|image| format!("{} (train {})", image.label, image.index)).collect();
         let verb = if progress.done > 0 { "going on with" } else { "evolving in" };
         let (folder, dataset) = (folder.path().display(), &training.dataset.name);
-        self.console.info(&format!("{verb} {folder}; images from {dataset}: {}", list.join(", ")));
+        self.console.info(&format!("{verb} {folder}; images from {dataset}: {}", listed(training)));
         let bar = self.console.progress(progress.generations);
         bar.update(&shown(progress));
         self.bar = Some(bar);
+    }
+
+    fn period(&mut self, period: Period, training: &Training, progress: &evolve::Progress) {
+        let Progress { done, best, .. } = shown(progress);
+        let best = best.map_or("no elite".to_string(), |best| format!("best {best:.2}"));
+        let number = period.stage + 1;
+        let text =
+            format!("stage {number} from generation {done} on: {}; elites anew: {best}", listed(training));
+        self.console.info(&text);
     }
 
     fn generation(&mut self, progress: &evolve::Progress) {

@@ -9,6 +9,7 @@ use crate::run::evolve::Finished;
 use crate::run::folder::RUN_JSON;
 use crate::run::gallery::Published;
 use crate::run::report::{EvalFile, RobotReport};
+use crate::run::training::ImageRef;
 use std::path::Path;
 
 /// Robots shown after an evolution.
@@ -34,18 +35,12 @@ pub fn evolution(console: &Console, finished: &Finished, out: &Path) {
     let mut robots: Vec<_> = run.elites.iter().collect();
     robots.sort_by(|a, b| b.objective.total_cmp(&a.objective));
     let rows = robots.iter().take(SHOWN).map(|robot| {
-        let walks: Vec<String> = run
-            .training_images
-            .iter()
-            .zip(&robot.displacements)
-            .map(|(image, d)| format!("{}: {d:+.1}", image.label))
-            .collect();
         let kinds = robot.voxels;
         vec![
             robot.id.clone(),
             robot.task.clone(),
             format!("{:.2}", robot.objective),
-            walks.join("  "),
+            walks(&run.training_images, &robot.displacements),
             kinds.muscle.to_string(),
             kinds.sensor.to_string(),
             kinds.total.to_string(),
@@ -237,4 +232,19 @@ pub fn dataset(console: &Console, found: &Found) {
     for (split, problem) in &found.problems {
         console.warning(&format!("{split}: {problem}"));
     }
+}
+/// Displacements by class for people: one by one if they are few, else the mean of each class.
+fn walks(images: &[ImageRef], displacements: &[f64]) -> String {
+    const FEW: usize = 8;
+    let shown = images.iter().zip(displacements);
+    if images.len() <= FEW {
+        return shown.map(|(image, d)| format!("{}: {d:+.1}", image.label)).collect::<Vec<_>>().join("  ");
+    }
+    let mut classes = std::collections::BTreeMap::<u8, (f64, f64)>::new();
+    for (image, displacement) in shown {
+        let (sum, count) = classes.entry(image.label).or_default();
+        (*sum, *count) = (*sum + displacement, *count + 1.0);
+    }
+    let mean = |(class, (sum, count)): (u8, (f64, f64))| format!("{class}: mean {:+.1}", sum / count);
+    classes.into_iter().map(mean).collect::<Vec<_>>().join("  ")
 }

@@ -1,0 +1,154 @@
+//! Stages of a run: what robots are trained on, and how they are judged, from which generation on.
+
+use super::{Config, Error};
+use crate::task::fitness::Fitness;
+use serde::{Deserialize, Serialize};
+
+/// A stage: table `[[stage]]`. It starts with the archive of the stage before it, evaluated anew.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct StageConfig {
+    /// Generations it lasts; the last stage lasts to the run's last generation, whatever it says.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub generations: Option<u64>,
+    /// Training images of each class, drawn by the run's seed. Default: the images of the section `[data]`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub images_per_class: Option<usize>,
+    /// How answers to several images are judged together. Default `evaluation.fitness`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub fitness: Option<Fitness>,
+    /// After every so many generations other images are drawn and all elites evaluated anew, so that no luck stays in the
+    /// archive. Default: never.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub redraw: Option<u64>,
+}
+
+/// Generations with the same training images and the same fitness.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Period {
+    /// Its stage, from 0; 0 in a run without stages.
+    pub stage: usize,
+    /// How often the stage's images have been drawn before.
+    pub draw: u64,
+}
+
+impl Period {
+    /// Which draw of images it is: different in every period, and never that of the section `[data]`, which is 0.
+    pub fn number(self) -> u64 {
+        ((self.stage as u64 + 1) << 32) + self.draw
+    }
+}
+
+impl Config {
+    /// The period that a generation (from 0) belongs to.
+    pub fn period(&self, generation: u64) -> Period {
+        let mut begin = 0;
+        for (stage, config) in self.stage.iter().enumerate() {
+            let end = begin + config.generations.unwrap_or(u64::MAX - begin);
+            if generation < end || stage + 1 == self.stage.len() {
+                let draw = config.redraw.map_or(0, |every| (generation - begin) / every.max(1));
+                return Period { stage, draw };
+            }
+            begin = end;
+        }
+        Period { stage: 0, draw: 0 }
+    }
+
+    /// How answers are judged in a generation (from 0).
+    pub fn fitness(&self, generation: u64) -> Fitness {
+        let stage = self.stage.get(self.period(generation).stage);
+        stage.and_then(|stage| stage.fitness).unwrap_or(self.evaluation.fitness)
+    }
+
+    /// Training images of each class in a period; `None`: those of the section `[data]`.
+    pub fn drawn_per_class(&self, period: Period) -> Option<usize> {
+        self.stage.get(period.stage)?.images_per_class
+    }
+
+    /// Checks the stages.
+    pub(super) fn validate_stages(&self) -> Result<(), Error> {
+        let refuse = |number: usize, text: String| Err(Error::input(format!("stage {}: {text}", number + 1)));
+        let mut begin = 0_u64;
+        for (number, stage) in self.stage.iter().enumerate() {
+            let is_last = number + 1 == self.stage.len();
+            match stage.generations {
+                None if !is_last => {
+                    return refuse(
+                        number,
+                        "expected generations: only the last stage lasts to the end".to_string(),
+                    );
+                }
+                Some(0) => return refuse(number, "generations = 0: expected 1 or more".to_string()),
+                generations => begin = begin.saturating_add(generations.unwrap_or(0)),
+            }
+            if begin > u64::from(u32::MAX) {
+                return refuse(number, format!("it ends with generation {begin}: expected less than 2³²"));
+            }
+            if stage.images_per_class == Some(0) {
+                return refuse(number, "images_per_class = 0: expected 1 or more".to_string());
+            }
+            if stage.redraw == Some(0) {
+                return refuse(number, "redraw = 0: expected 1 or more".to_string());
+            }
+            if stage.redraw.is_some() && stage.images_per_class.is_none() {
+                return refuse(
+                    number,
+                    "redraw: expected images_per_class, too: what is to be drawn".to_string(),
+                );
+            }
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::run::config::BUILT_IN;
+
+    fn config(stages: &str) -> Result<Config, Error> {
+        Config::parse(&format!("{}\n{stages}", BUILT_IN[0].1), "stages.toml", &[])
+    }
+
+    #[test]
+    fn stages_follow_each_other_and_the_last_lasts() {
+        let config = config(
+            "[[stage]]\ngenerations = 10\n[[stage]]\ngenerations = 20\nimages_per_class = 4\nfitness = 'mean_clipped'\n\
+             redraw = 8\n[[stage]]\nimages_per_class = 8\nfitness = 'right_then_margin'",
+        )
+        .unwrap();
+        let at = |generation| {
+            let Period { stage, draw } = config.period(generation);
+            (stage, draw)
+        };
+        assert_eq!(
+            [0, 9, 10, 17, 18, 29, 30, 10_000].map(at),
+            [(0, 0), (0, 0), (1, 0), (1, 0), (1, 1), (1, 2), (2, 0), (2, 0)]
+        );
+        let fitness = [Fitness::Min, Fitness::MeanClipped, Fitness::RightThenMargin];
+        assert_eq!([9, 10, 30].map(|generation| config.fitness(generation)), fitness);
+        assert_eq!([9, 10, 30].map(|g| config.drawn_per_class(config.period(g))), [None, Some(4), Some(8)]);
+        assert_ne!(config.period(10).number(), config.period(18).number());
+    }
+
+    #[test]
+    fn without_stages_there_is_one_period() {
+        let config = config("").unwrap();
+        assert_eq!(config.period(12_345), Period { stage: 0, draw: 0 });
+        assert_eq!((config.fitness(9), config.drawn_per_class(config.period(9))), (Fitness::Min, None));
+    }
+
+    #[test]
+    fn stages_that_cannot_be_are_refused() {
+        for (stages, expected) in [
+            ("[[stage]]\nimages_per_class = 2\n[[stage]]", "stage 1: expected generations"),
+            ("[[stage]]\ngenerations = 0", "stage 1: generations = 0"),
+            ("[[stage]]\nimages_per_class = 0", "stage 1: images_per_class = 0"),
+            ("[[stage]]\nredraw = 5", "stage 1: redraw: expected images_per_class"),
+            ("[[stage]]\nimages_per_class = 2\nredraw = 0", "stage 1: redraw = 0"),
+        ] {
+            let error = config(stages).unwrap_err().to_string();
+            assert!(error.contains(expected), "{error}");
+        }
+    }
+}

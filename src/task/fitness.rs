@@ -1,0 +1,144 @@
+//! [`Fitness`]: how good a robot's answers to several images are together.
+
+use super::grouping::Group;
+use serde::{Deserialize, Serialize};
+
+/// Displacement at which an answer is as good as can be, for [`Fitness::MeanClipped`]; and half as good as can be, for
+/// the tie-break of [`Fitness::RightThenMargin`] \[voxel lengths\].
+const ENOUGH: f64 = 10.0;
+
+/// Displacements up to this are wrong, as in the paper's test \[voxel lengths\].
+const WRONG: f64 = 3.0;
+
+/// More than rounding can make of a sum over images.
+const SLACK: f64 = 1e-9;
+
+/// How answers to several images become one number. An answer's *margin* is its displacement towards the right side, in
+/// voxel lengths, negative on the wrong one; of the two ways to assign sides to groups the fitter counts.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Fitness {
+    /// The smallest margin \[voxel lengths\]: the paper's. With many images one wrong answer makes standing still
+    /// the best that is in reach.
+    #[default]
+    Min,
+    /// The mean of the margins, each divided by ten voxel lengths and clipped to −1 … 1.
+    MeanClipped,
+    /// How many images are answered right, by more than three voxel lengths; and, between 0 and 1, the mean of
+    /// (1 + m/(|m| + 10))/2 over the margins m, which tells equals apart and never saturates.
+    RightThenMargin,
+}
+
+/// The two ways to assign sides to groups: group A is to walk right, or left.
+pub(super) type Assignments = (f64, f64);
+
+impl Fitness {
+    /// Fitness under both assignments, of answers by group and displacement; if there are images `to_come`, upper
+    /// bounds of it. Infinite without any; not a number if an answer is none.
+    pub(super) fn of_assignments(
+        self,
+        answers: impl Iterator<Item = (Group, f64)>,
+        to_come: usize,
+    ) -> Assignments {
+        // Towards the right side if group A is to walk right; if it is to walk left, the negative.
+        let margins = answers.map(|(group, d)| if group == Group::A { d } else { -d });
+        if self == Fitness::Min {
+            let nothing = (f64::INFINITY, f64::INFINITY);
+            return margins.fold(nothing, |(right, left), m| (smaller(right, m), smaller(left, -m)));
+        }
+        let begin = (to_come as f64, to_come as f64);
+        let mut images = to_come;
+        let (mut counts, mut sums) = (begin, begin);
+        for margin in margins {
+            images += 1;
+            for (count, sum, m) in
+                [(&mut counts.0, &mut sums.0, margin), (&mut counts.1, &mut sums.1, -margin)]
+            {
+                *count += f64::from(u8::from(m > WRONG));
+                *sum += match self {
+                    Fitness::RightThenMargin => (1.0 + m / (m.abs() + ENOUGH)) / 2.0,
+                    _ => (m / ENOUGH).clamp(-1.0, 1.0),
+                };
+            }
+        }
+        if images == 0 {
+            return (f64::INFINITY, f64::INFINITY);
+        }
+        let slack = if to_come > 0 { SLACK } else { 0.0 };
+        let of = |count: f64, sum: f64| {
+            let right = if self == Fitness::RightThenMargin { count } else { 0.0 };
+            right + sum / images as f64 + slack
+        };
+        (of(counts.0, sums.0), of(counts.1, sums.1))
+    }
+}
+
+/// The smaller, or what is not a number: an answer that is none must never be overlooked.
+fn smaller(x: f64, y: f64) -> f64 {
+    if y < x || y.is_nan() { y } else { x }
+}
+
+/// The fitter of two assignments.
+pub(super) fn better((x, y): Assignments) -> f64 {
+    // + 0.0 makes −0 a 0: equal numbers, one text in files.
+    (if x >= y { x } else { y }) + 0.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use Group::{A, B};
+    use proptest::prelude::*;
+
+    const MANY: [Fitness; 2] = [Fitness::MeanClipped, Fitness::RightThenMargin];
+
+    fn fitness(kind: Fitness, answers: &[(Group, f64)]) -> f64 {
+        better(kind.of_assignments(answers.iter().copied(), 0))
+    }
+
+    #[test]
+    fn long_walks_count_no_more_than_enough() {
+        let mean = |answers: &[(Group, f64)]| fitness(Fitness::MeanClipped, answers);
+        assert_eq!(mean(&[(A, -5.0), (B, 40.0)]), 0.75);
+        assert_eq!(mean(&[(A, 40.0), (A, 40.0), (A, -10.0), (B, -10.0)]), 0.5);
+        assert_eq!(mean(&[(A, 4.0), (B, 4.0)]), 0.0);
+    }
+
+    #[test]
+    fn one_more_right_answer_beats_any_margin() {
+        let right = |answers: &[(Group, f64)]| fitness(Fitness::RightThenMargin, answers);
+        let (short, long) =
+            (right(&[(A, 3.1), (A, 3.1), (B, -3.1)]), right(&[(A, 90.0), (A, 3.0), (B, -90.0)]));
+        assert!((3.0..4.0).contains(&short) && (2.0..3.0).contains(&long), "{short} {long}");
+        // Nor does the tie-break ever saturate.
+        assert!(right(&[(A, 1e4), (B, -1e4)]) > right(&[(A, 1e3), (B, -1e3)]));
+        assert!(right(&[(A, f64::NAN), (B, -9.0)]).is_nan() && mean_of_nan().is_nan());
+    }
+
+    fn mean_of_nan() -> f64 {
+        fitness(Fitness::MeanClipped, &[(A, 1.0), (B, f64::NAN)])
+    }
+
+    proptest! {
+        #[test]
+        fn what_is_known_bounds_what_can_come(
+            answers in prop::collection::vec((any::<bool>(), prop_oneof![-30.0..30.0f64, Just(10.0), Just(-10.0)], any::<bool>()), 1..40)
+        ) {
+            let answer = |a: &(bool, f64, bool)| (if a.0 { A } else { B }, a.1);
+            let all: Vec<_> = answers.iter().map(answer).collect();
+            let known: Vec<_> = answers.iter().filter(|a| a.2).map(answer).collect();
+            for kind in MANY {
+                let bound = better(kind.of_assignments(known.iter().copied(), all.len() - known.len()));
+                prop_assert!(bound >= fitness(kind, &all), "{kind:?}");
+            }
+        }
+
+        #[test]
+        fn mirrored_answers_are_as_fit(answers in prop::collection::vec((any::<bool>(), -30.0..30.0f64), 1..20)) {
+            let of = |sign: f64| answers.iter().map(move |&(a, d)| (if a { A } else { B }, sign * d)).collect::<Vec<_>>();
+            for kind in MANY {
+                prop_assert_eq!(fitness(kind, &of(1.0)), fitness(kind, &of(-1.0)));
+            }
+        }
+    }
+}

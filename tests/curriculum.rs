@@ -1,0 +1,95 @@
+//! Stages: robots trained on more and more images; as exact as any other run.
+
+mod common;
+
+use common::program::{Sandbox, TINY, without_seconds};
+use morphcog::run::archive::RunFile;
+use morphcog::task::fitness::Fitness;
+use morphcog::task::score::Answer;
+
+/// Three stages in twelve generations, the last with three draws of images.
+fn staged() -> String {
+    let stages = "\n[[stage]]\ngenerations = 4\n\
+        [[stage]]\ngenerations = 3\nimages_per_class = 2\nfitness = \"mean_clipped\"\n\
+        [[stage]]\nimages_per_class = 3\nfitness = \"right_then_margin\"\nredraw = 2\n";
+    format!("{TINY}{stages}")
+}
+
+fn sandbox() -> Sandbox {
+    let sandbox = Sandbox::new();
+    sandbox.write("run.toml", staged());
+    sandbox
+}
+
+fn result(sandbox: &Sandbox, folder: &str) -> (String, Vec<String>) {
+    let read = |name: &str| sandbox.read(&format!("{folder}/{name}"));
+    (read("run.json"), without_seconds(&read("metrics.csv")))
+}
+
+#[test]
+fn a_curriculum_stopped_after_any_generation_goes_on_to_the_same_bytes() {
+    let sandbox = sandbox();
+    sandbox.run("evolve -q -c run.toml -o whole").ended(0, &[]);
+    let whole = result(&sandbox, "whole");
+    for generations in 1..12 {
+        sandbox.run(&format!("evolve -q -c run.toml -o part --force -g {generations}")).ended(0, &[]);
+        sandbox.run("evolve -q -c run.toml -o part --resume").ended(0, &[]);
+        assert_eq!(result(&sandbox, "part"), whole, "stopped after {generations}");
+    }
+}
+
+#[test]
+fn neither_threads_nor_savings_change_a_curriculum() {
+    let sandbox = sandbox();
+    let elites = |name: &str, options: &str| {
+        sandbox.run(&format!("evolve -q -c run.toml -o {name} {options}")).ended(0, &[]);
+        sandbox.run_file(name).elites
+    };
+    let plain = elites("plain", "--threads 1");
+    assert!(plain.len() >= 4, "{}", plain.len());
+    assert_eq!(elites("three", "--threads 3"), plain);
+    for saving in ["known_bodies", "early_stop", "shared_lives"] {
+        assert_eq!(elites(saving, &format!("--set savings.{saving}=false")), plain, "{saving}");
+    }
+}
+
+#[test]
+fn elites_stand_in_the_archive_with_what_they_do_on_the_last_images() {
+    let sandbox = sandbox();
+    sandbox.run("evolve -q -c run.toml -o run").ended(0, &[]);
+    let run: RunFile = sandbox.run_file("run");
+    assert_eq!((run.training_images.len(), run.fitness()), (6, Fitness::RightThenMargin));
+    let grouping = run.config.grouping().unwrap().with_fitness(run.fitness());
+    for robot in &run.elites {
+        let answer = |(image, &displacement): (&morphcog::run::training::ImageRef, &f64)| Answer {
+            class: image.label,
+            displacement,
+        };
+        let answers: Vec<_> = run.training_images.iter().zip(&robot.displacements).map(answer).collect();
+        assert_eq!(grouping.score(&answers).fitness, robot.objective, "{}", robot.id);
+    }
+    // Other commands read it.
+    sandbox.run("eval --archive run/run.json --images 20 --robots top:2").ended(0, &[]);
+    sandbox.run("audit --archive run/run.json --robots top:2").ended(0, &[]);
+}
+
+#[test]
+fn a_single_stage_on_the_images_of_the_config_is_the_run_without_stages() {
+    let sandbox = Sandbox::tiny();
+    sandbox.write("staged.toml", format!("{TINY}\n[[stage]]\ngenerations = 5\n"));
+    sandbox.run("evolve -q -c tiny.toml -o plain").ended(0, &[]);
+    sandbox.run("evolve -q -c staged.toml -o staged").ended(0, &[]);
+    assert_eq!(sandbox.run_file("plain").elites, sandbox.run_file("staged").elites);
+    assert_eq!(result(&sandbox, "plain").1, result(&sandbox, "staged").1);
+}
+
+#[test]
+fn stages_that_want_more_images_than_there_are_are_refused_before_the_first_generation() {
+    let sandbox = Sandbox::new();
+    sandbox.write(
+        "run.toml",
+        format!("{TINY}\n[[stage]]\ngenerations = 5\n[[stage]]\nimages_per_class = 1000000\n"),
+    );
+    sandbox.run("evolve -c run.toml -o run").ended(3, &["1000000"]);
+    assert!(!sandbox.path("run/run.json").exists());
+}
