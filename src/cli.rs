@@ -113,6 +113,7 @@ fn run_eval(args: EvalArgs, console: &Console) -> Result<(), Error> {
     let options = eval::Options {
         robots: args.robots.physical(args.physical_only, &archive),
         images: args.images as usize,
+        validation: args.validation as usize,
         seed: args.seed,
         threshold: args.threshold,
         cycles: args.cycles,

@@ -25,6 +25,10 @@ pub enum Purpose {
     Robots = 6,
     /// Which pixels an audit changes.
     AuditPixels = 20,
+    /// Which images robots are selected on.
+    Validation = 21,
+    /// Resamples of a bootstrap.
+    Bootstrap = 22,
 }
 
 /// One stream of random numbers.

@@ -172,9 +172,13 @@ pub(super) struct EvalArgs {
     /// Test images in all, evenly divided between the classes.
     #[arg(short = 'n', long, default_value_t = 1000, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pub(super) images: u32,
-    /// all, top:N, random:N, or ids (or beginnings of ids) separated by commas.
+    /// all, top:N, random:N, best-validation:N (the best of each task on validation images, drawn from the training
+    /// split), or ids (or beginnings of ids) separated by commas.
     #[arg(short, long, visible_alias = "select", default_value = "top:10")]
     pub(super) robots: Selection,
+    /// Validation images in all, for best-validation.
+    #[arg(long, default_value_t = 400, value_name = "IMAGES", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    pub(super) validation: u32,
     /// Only robots that morphcog audit found physical.
     #[arg(long)]
     pub(super) physical_only: bool,

@@ -4,7 +4,7 @@ use super::archive::{Robot, RunFile};
 use super::report::{Baselines, EvalFile, RobotReport, Trial};
 use super::robots::Selection;
 use super::training::{ImageRef, load_dataset, see};
-use super::{Config, Error, folder::RunFolder};
+use super::{Config, Error, folder::RunFolder, validation};
 use crate::base::Grid;
 use crate::base::files::{check_writable, write_atomically};
 use crate::sim::Lattice;
@@ -30,6 +30,8 @@ pub struct Options {
     pub robots: Selection,
     /// Test images in all, evenly divided between the classes.
     pub images: usize,
+    /// Validation images in all, for a selection by them.
+    pub validation: usize,
     /// Seed of what is drawn: images, and robots with `random:N`.
     pub seed: u64,
     /// Displacements up to this count as wrong \[voxel lengths\].
@@ -46,6 +48,8 @@ pub struct Options {
 
 /// Who is told how an evaluation goes.
 pub trait Observer: Sync {
+    /// Before a validation: so many robots, the best of them on so many images; showings in all.
+    fn validating(&self, robots: usize, images: usize, showings: u64);
     /// Before the first life: robots × images.
     fn started(&self, robots: usize, images: usize);
     /// Showings done so far, of robots × images.
@@ -71,6 +75,10 @@ pub fn eval(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Re
             options.threshold
         )));
     }
+    if options.robots.validated().is_some() && options.validation < validation::LEAST {
+        let (asked, least) = (options.validation, validation::LEAST);
+        return Err(Error::usage(format!("--validation {asked}: expected {least} or more images")));
+    }
     let run = RunFile::read(&options.archive)?;
     check_out(&options.out, &options.archive)?;
     let config = &run.config;
@@ -89,21 +97,30 @@ pub fn eval(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Re
     let test_sha256 = dataset.fingerprint(Split::Test).unwrap_or_default();
     let mut report = EvalFile::new(&run, options, control_steps(config, options), &test.images, test_sha256);
     report.baselines = baselines(&run, &grouping, &dataset, &test, &robots, options.seed)?;
-    observer.started(robots.len(), test.images.len());
-
     let pool = rayon::ThreadPoolBuilder::new().num_threads(options.threads.unwrap_or(0)).build();
     let pool = pool.map_err(|error| Error::other(format!("no threads: {error}")))?;
-    let done = AtomicU64::new(0);
+    let walker = Walker { config, options, pool: &pool, stop, observer, done: AtomicU64::new(0) };
+    let (robots, scores) = match options.robots.validated() {
+        None => (robots, Vec::new()),
+        Some(count) => {
+            let best = validation::best(&run, &dataset, &grouping, (robots, count), options, &walker)?;
+            report.stopped = best.is_none();
+            best.unwrap_or_default().into_iter().unzip()
+        }
+    };
+    observer.started(robots.len(), test.images.len());
+    let walker = Walker { done: AtomicU64::new(0), ..walker };
+    let mut scores = scores.into_iter();
     let mut left = robots.len();
-    report.stopped = left > 0;
+    report.stopped |= left > 0;
     for robot in robots {
         let Some(split) = task_of(&grouping, robot) else { continue };
-        let lives = pool.install(|| lives(config, options, robot, &test.stimuli, stop, &done, observer));
-        let Some((displacements, simulated)) = lives else { break };
+        let Some((displacements, simulated)) = walker.lives(robot, &test.stimuli) else { break };
         left -= 1;
         report.stopped = left > 0;
         let trial = Trial { run: &run, robot, split, images: &test.images, threshold: options.threshold };
-        report.robots.push(RobotReport::new(&trial, displacements, simulated));
+        let validation = scores.next();
+        report.robots.push(RobotReport { validation, ..RobotReport::new(&trial, displacements, simulated) });
         report.conclude();
         write(options, &report)?;
     }
@@ -173,38 +190,50 @@ fn test_images(config: &Config, dataset: &Dataset, options: &Options) -> Result<
     Ok(test)
 }
 
-/// The displacement under each image (`None`: unstable), and the number of lives it took: images that show the sensors the
-/// same pixels are one life. `None` if stopped before the end.
-fn lives(
-    config: &Config,
-    options: &Options,
-    robot: &Robot,
-    stimuli: &[Grid<f64>],
-    stop: &AtomicBool,
-    done: &AtomicU64,
-    observer: &dyn Observer,
-) -> Option<(Vec<Option<f64>>, usize)> {
-    let protocol = Protocol {
-        life: Life::Fresh,
-        control_steps: control_steps(config, options),
-        ..config.protocol.clone()
-    };
-    let lattice = Lattice::new(&robot.body, &config.physics);
-    let views: Vec<&Grid<f64>> = stimuli.iter().collect();
-    let same_as = same_to_sensors(&robot.body, &views);
-    let mut shared = BTreeMap::<usize, u64>::new();
-    same_as.iter().for_each(|&first| *shared.entry(first).or_default() += 1);
-    let life = |(&image, &count): (&usize, &u64)| {
-        if stop.load(Ordering::Relaxed) {
-            return None;
-        }
-        let displacement = fresh_life(&lattice, &config.physics, &protocol, &stimuli[image]).ok();
-        observer.progress(done.fetch_add(count, Ordering::Relaxed) + count);
-        Some((image, displacement))
-    };
-    let lives: Option<BTreeMap<usize, Option<f64>>> = shared.par_iter().map(life).collect();
-    let lives = lives?;
-    Some((same_as.iter().map(|first| lives.get(first).copied().flatten()).collect(), lives.len()))
+/// Shows images to robots.
+pub(super) struct Walker<'a> {
+    config: &'a Config,
+    options: &'a Options,
+    pool: &'a rayon::ThreadPool,
+    stop: &'a AtomicBool,
+    observer: &'a dyn Observer,
+    /// Showings so far.
+    done: AtomicU64,
+}
+
+impl Walker<'_> {
+    /// A validation begins; see [`Observer::validating`].
+    pub fn validating(&self, robots: usize, images: usize, showings: u64) {
+        self.observer.validating(robots, images, showings);
+    }
+
+    /// The displacement under each image (`None`: unstable), and the number of lives it took: images that show the sensors
+    /// the same pixels are one life. `None` if stopped before the end.
+    pub fn lives(&self, robot: &Robot, stimuli: &[Grid<f64>]) -> Option<(Vec<Option<f64>>, usize)> {
+        let Walker { config, options, stop, observer, done, .. } = self;
+        let protocol = Protocol {
+            life: Life::Fresh,
+            control_steps: control_steps(config, options),
+            ..config.protocol.clone()
+        };
+        let lattice = Lattice::new(&robot.body, &config.physics);
+        let views: Vec<&Grid<f64>> = stimuli.iter().collect();
+        let same_as = same_to_sensors(&robot.body, &views);
+        let mut shared = BTreeMap::<usize, u64>::new();
+        same_as.iter().for_each(|&first| *shared.entry(first).or_default() += 1);
+        let life = |(&image, &count): (&usize, &u64)| {
+            if stop.load(Ordering::Relaxed) {
+                return None;
+            }
+            let displacement = fresh_life(&lattice, &config.physics, &protocol, &stimuli[image]).ok();
+            observer.progress(done.fetch_add(count, Ordering::Relaxed) + count);
+            Some((image, displacement))
+        };
+        let lives: Option<BTreeMap<usize, Option<f64>>> =
+            self.pool.install(|| shared.par_iter().map(life).collect());
+        let lives = lives?;
+        Some((same_as.iter().map(|first| lives.get(first).copied().flatten()).collect(), lives.len()))
+    }
 }
 
 fn view(list: &[(Grid<f64>, u8)]) -> Vec<Labelled<'_>> {

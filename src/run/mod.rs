@@ -25,6 +25,7 @@ pub mod signals;
 pub mod simulate;
 mod toml_text;
 pub mod training;
+pub mod validation;
 mod variation;
 pub mod verdict;
 

@@ -3,6 +3,8 @@
 use super::archive::{Robot, RunFile};
 use super::eval::Options;
 use super::training::ImageRef;
+use super::validation::Validated;
+use crate::base::random::{Purpose, stream};
 use crate::task::direction::Assignment;
 use crate::task::grouping::{Group, Split};
 use serde::{Deserialize, Serialize};
@@ -72,6 +74,12 @@ pub struct Mean {
     pub accuracy: f64,
     /// Mean balanced accuracy.
     pub balanced_accuracy: f64,
+    /// Standard deviation of the accuracy over the robots; none of a single one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub standard_deviation: Option<f64>,
+    /// 95 % bootstrap interval of the mean accuracy (percentiles of 10,000 resamples of the robots).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub interval: Option<[f64; 2]>,
 }
 
 /// What one robot did.
@@ -105,6 +113,9 @@ pub struct RobotReport {
     pub unstable: usize,
     /// Lives simulated.
     pub simulated: usize,
+    /// How it did on the validation images, if it was selected on them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub validation: Option<Validated>,
     /// Displacement under each image, voxel lengths; none if unstable.
     pub displacements: Vec<Option<f64>>,
 }
@@ -133,6 +144,31 @@ pub fn wilson(right: usize, total: usize) -> [f64; 2] {
     let low = if right == 0 { 0.0 } else { ((centre - spread) / scale).max(0.0) };
     let high = if right == total { 1.0 } else { ((centre + spread) / scale).min(1.0) };
     [low, high]
+}
+
+/// Of a sample; none of fewer than two values.
+fn standard_deviation(values: &[f64]) -> Option<f64> {
+    let n = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / n;
+    let squares = values.iter().map(|value| (value - mean) * (value - mean)).sum::<f64>();
+    (values.len() > 1).then(|| (squares / (n - 1.0)).sqrt())
+}
+
+/// 95 % interval of the mean: percentiles of the means of resamples (Efron 1979), the same every time. None of fewer than two
+/// values.
+fn bootstrap(values: &[f64]) -> Option<[f64; 2]> {
+    const RESAMPLES: usize = 10_000;
+    if values.len() < 2 {
+        return None;
+    }
+    let mut rng = stream(0, Purpose::Bootstrap, 0, 0);
+    let mut mean = |_| {
+        let sum: f64 = (0..values.len()).map(|_| values[rng.below(values.len())]).sum();
+        sum / values.len() as f64
+    };
+    let mut means: Vec<f64> = (0..RESAMPLES).map(&mut mean).collect();
+    means.sort_by(f64::total_cmp);
+    Some([means[RESAMPLES * 25 / 1000], means[RESAMPLES * 975 / 1000 - 1]])
 }
 
 impl RobotReport {
@@ -177,6 +213,7 @@ impl RobotReport {
             not_moved: moved.iter().filter(|&&d| d <= threshold).count() as f64 / count,
             unstable: displacements.len() - moved.len(),
             simulated,
+            validation: None,
             displacements,
         }
     }
@@ -227,7 +264,10 @@ impl EvalFile {
         let means = by_task.into_iter().map(|(task, robots)| {
             let (accuracy, balanced_accuracy) =
                 (mean(&robots, |r| r.accuracy), mean(&robots, |r| r.balanced_accuracy));
-            (task.to_string(), Mean { robots: robots.len(), accuracy, balanced_accuracy })
+            let accuracies: Vec<f64> = robots.iter().map(|robot| robot.accuracy).collect();
+            let (standard_deviation, interval) = (standard_deviation(&accuracies), bootstrap(&accuracies));
+            let robots = robots.len();
+            (task.to_string(), Mean { robots, accuracy, balanced_accuracy, standard_deviation, interval })
         });
         self.means = means.collect();
     }
@@ -279,7 +319,19 @@ impl EvalFile {
 
 #[cfg(test)]
 mod tests {
-    use super::wilson;
+    use super::{bootstrap, standard_deviation, wilson};
+
+    #[test]
+    fn means_have_a_spread_and_an_interval_that_holds_them() {
+        let values = [0.5, 0.6, 0.7, 0.8, 0.9];
+        // √(0.1/4)
+        assert!((standard_deviation(&values).unwrap() - 0.158_113_883).abs() < 1e-9);
+        let [low, high] = bootstrap(&values).unwrap();
+        // The normal approximation: 0.7 ± 1.96·0.1414/√5.
+        assert!((low - 0.576).abs() < 0.02 && (high - 0.824).abs() < 0.02, "{low} {high}");
+        assert_eq!(bootstrap(&values), bootstrap(&values));
+        assert_eq!((standard_deviation(&[0.5]), bootstrap(&[0.5])), (None, None));
+    }
 
     #[test]
     fn the_wilson_interval_is_the_textbooks() {

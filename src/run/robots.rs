@@ -16,6 +16,8 @@ pub enum Selection {
     Top(usize),
     /// So many, drawn at random.
     Random(usize),
+    /// The so many best of each task on validation images; only `eval` shows those.
+    Validated(usize),
     /// Those with these ids, or unique beginnings of ids; "best" is the fittest.
     Ids(Vec<String>),
     /// So selected, but from those robots only that an audit found physical.
@@ -38,7 +40,12 @@ impl FromStr for Selection {
             None if text == "all" => Ok(Selection::All),
             Some(("top", digits)) => count(digits).map(Selection::Top),
             Some(("random", digits)) => count(digits).map(Selection::Random),
-            Some(_) => Err("expected all, top:N, random:N, or ids separated by commas".to_string()),
+            Some(("best-validation", digits)) => count(digits).map(Selection::Validated),
+            None if text == "best-validation" => Ok(Selection::Validated(1)),
+            Some(_) => {
+                Err("expected all, top:N, random:N, best-validation:N, or ids separated by commas"
+                    .to_string())
+            }
             None => Ok(Selection::Ids(text.split(',').map(|id| id.trim().to_string()).collect())),
         }
     }
@@ -54,18 +61,29 @@ impl Selection {
         }
     }
 
+    /// How many of the selected are to be chosen by validation, if that is asked for.
+    pub fn validated(&self) -> Option<usize> {
+        match self {
+            Selection::Validated(count) => Some(*count),
+            Selection::Physical { of, .. } => of.validated(),
+            _ => None,
+        }
+    }
+
     /// What it says, for people.
     pub fn describe(&self) -> String {
         match self {
             Selection::All => "all elites".to_string(),
             Selection::Top(count) => format!("the {count} fittest on the training images"),
             Selection::Random(count) => format!("{count} elites drawn at random"),
+            Selection::Validated(count) => format!("the {count} best of each task on validation images"),
             Selection::Ids(ids) => format!("chosen by id: {}", ids.join(", ")),
             Selection::Physical { of, .. } => format!("{}, of those audited as physical", of.describe()),
         }
     }
 
-    /// The robots, fittest first where no order is given; `seed` is for the random ones.
+    /// The robots, fittest first where no order is given; `seed` is for the random ones. For a validation: all that
+    /// are to be looked at.
     ///
     /// # Errors
     /// If there is no robot, or no single one, of an id; if only physical ones are asked for, and they are not known.
@@ -86,7 +104,7 @@ impl Selection {
         seed: u64,
     ) -> Result<Vec<&'a Robot>, Error> {
         match self {
-            Selection::All => Ok(fittest),
+            Selection::All | Selection::Validated(_) => Ok(fittest),
             Selection::Top(count) => Ok(fittest.into_iter().take(*count).collect()),
             Selection::Random(count) => {
                 let picked = stream(seed, Purpose::Robots, 0, 0).sample(fittest.len(), *count);

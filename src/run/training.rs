@@ -73,6 +73,23 @@ impl Training {
         Training::of(config, &load_dataset(config, data, &[Split::Train])?, config.period(0))
     }
 
+    /// Indices of the training images of a period.
+    ///
+    /// # Errors
+    /// If a class has not as many images as are to be drawn.
+    pub fn indices(config: &Config, dataset: &Dataset, period: Period) -> Result<Vec<usize>, Error> {
+        let refuse = |error: DatasetError| Error::input(format!("data.train_images: {error}"));
+        let classes = config.classes();
+        let draw = |per_class, number| {
+            dataset.draw(Split::Train, &classes, per_class, config.seed, number).map_err(refuse)
+        };
+        match (config.drawn_per_class(period), &config.data.train_images) {
+            (Some(per_class), _) => draw(per_class, period.number()),
+            (None, Some(indices)) => Ok(indices.clone()),
+            (None, None) => draw(config.data.images_per_class, 0),
+        }
+    }
+
     /// The training images of a period.
     ///
     /// # Errors
@@ -80,14 +97,7 @@ impl Training {
     pub fn of(config: &Config, dataset: &Dataset, period: Period) -> Result<Self, Error> {
         let refuse = |error: DatasetError| Error::input(format!("data.train_images: {error}"));
         let classes = config.classes();
-        let draw = |per_class, number| {
-            dataset.draw(Split::Train, &classes, per_class, config.seed, number).map_err(refuse)
-        };
-        let indices = match (config.drawn_per_class(period), &config.data.train_images) {
-            (Some(per_class), _) => draw(per_class, period.number())?,
-            (None, Some(indices)) => indices.clone(),
-            (None, None) => draw(config.data.images_per_class, 0)?,
-        };
+        let indices = Training::indices(config, dataset, period)?;
         let mut images = Vec::new();
         let mut stimuli = Vec::new();
         for index in indices {

@@ -78,17 +78,23 @@ impl evolve::Observer for Evolution<'_> {
 /// Shows an evaluation.
 pub struct Evaluation<'c> {
     console: &'c Console,
+    validation: OnceLock<Counter<'c>>,
     counter: OnceLock<Counter<'c>>,
 }
 
 impl<'c> Evaluation<'c> {
     /// Shows it on a console.
     pub fn new(console: &'c Console) -> Self {
-        Evaluation { console, counter: OnceLock::new() }
+        Evaluation { console, validation: OnceLock::new(), counter: OnceLock::new() }
     }
 }
 
 impl eval::Observer for Evaluation<'_> {
+    fn validating(&self, robots: usize, images: usize, showings: u64) {
+        let label = format!("validating {robots} robots on up to {images} images:");
+        self.validation.get_or_init(|| self.console.counter(&label, showings, "lives"));
+    }
+
     fn started(&self, robots: usize, images: usize) {
         let total = (robots * images) as u64;
         let label = format!("evaluating {robots} robots on {images} images:");
@@ -96,7 +102,7 @@ impl eval::Observer for Evaluation<'_> {
     }
 
     fn progress(&self, done: u64) {
-        if let Some(counter) = self.counter.get() {
+        if let Some(counter) = self.counter.get().or(self.validation.get()) {
             counter.update(done);
         }
     }

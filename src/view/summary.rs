@@ -94,6 +94,8 @@ pub fn evaluation(console: &Console, report: &EvalFile, out: &Path) {
     let mut headers = vec!["robot", "task", "fitness", "accuracy %", "95 % interval", "balanced %"];
     headers.extend(names.iter().map(String::as_str));
     headers.extend(["mean |d|", "not moved %", "unstable", "lives"]);
+    let validated = report.robots.iter().any(|robot| robot.validation.is_some());
+    headers.extend(validated.then_some("validated %"));
     let rows = report.robots.iter().map(|robot| {
         let [low, high] = robot.interval.map(percent);
         let mut row = vec![
@@ -107,6 +109,7 @@ pub fn evaluation(console: &Console, report: &EvalFile, out: &Path) {
         row.extend(robot.per_class.values().map(|share| percent(*share)));
         row.extend([format!("{:.1}", robot.mean_distance), percent(robot.not_moved)]);
         row.extend([robot.unstable.to_string(), robot.simulated.to_string()]);
+        row.extend(robot.validation.as_ref().map(|v| percent(v.balanced_accuracy)));
         row
     });
     console.table(&headers, &rows.collect::<Vec<_>>());
@@ -120,6 +123,10 @@ pub fn evaluation(console: &Console, report: &EvalFile, out: &Path) {
             task.clone(),
             mean.robots.to_string(),
             percent(mean.accuracy),
+            mean.standard_deviation.map_or("–".to_string(), percent),
+            mean.interval
+                .map_or("–".to_string(), |[low, high]| format!("{}–{}", percent(low), percent(high))),
+            published(&report.dataset, task).map_or("–".to_string(), |accuracy| format!("{accuracy:.1}")),
             percent(mean.balanced_accuracy),
             baseline(|b| b.larger_group),
             baseline(|b| b.best_single_pixel),
@@ -130,6 +137,9 @@ pub fn evaluation(console: &Console, report: &EvalFile, out: &Path) {
         "task",
         "robots",
         "mean accuracy %",
+        "deviation",
+        "95 % interval",
+        "paper's %",
         "mean balanced %",
         "larger group %",
         "best pixel %",
@@ -233,6 +243,22 @@ pub fn dataset(console: &Console, found: &Found) {
         console.warning(&format!("{split}: {problem}"));
     }
 }
+/// Mean accuracy on a task that the paper published \[%\] (section "Generalization test").
+fn published(dataset: &str, task: &str) -> Option<f64> {
+    const PAPER: [(&str, f64); 8] = [
+        ("0|1", 76.57),
+        ("0|123", 68.47),
+        ("1|023", 58.96),
+        ("2|013", 70.01),
+        ("3|012", 72.00),
+        ("01|23", 58.22),
+        ("02|13", 62.02),
+        ("03|12", 57.14),
+    ];
+    let of_task = |(name, accuracy): &(&str, f64)| (*name == task).then_some(*accuracy);
+    (dataset == "mnist").then(|| PAPER.iter().find_map(of_task))?
+}
+
 /// Displacements by class for people: one by one if they are few, else the mean of each class.
 fn walks(images: &[ImageRef], displacements: &[f64]) -> String {
     const FEW: usize = 8;

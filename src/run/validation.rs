@@ -1,0 +1,202 @@
+//! Choosing robots by their answers to images that are neither training nor test images.
+//!
+//! Validation images are drawn from the training split, by the run's seed; none of them is one that the run was ever trained
+//! on. Robots are screened in rounds: all on a tenth of the images, the better third of each task on three tenths, the better
+//! tenth on all. Results are kept beside the run.
+
+use super::archive::{Robot, RunFile};
+use super::audit_file::fingerprint;
+use super::eval::{Options, Walker};
+use super::report::{RobotReport, Trial};
+use super::training::{ImageRef, Training, see};
+use super::{Config, Error};
+use crate::base::files::write_atomically;
+use crate::base::hash::sha256_hex;
+use crate::base::random::{Purpose, stream};
+use crate::task::dataset::{Dataset, Split};
+use crate::task::grouping::{self, Grouping};
+use serde::{Deserialize, Serialize};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// Its name beside `run.json`.
+pub const VALIDATION_JSON: &str = "validation.json";
+
+/// What `validation.json` calls itself, and the version of its schema.
+const FORMAT: (&str, u32) = ("morphcog-validation", 1);
+
+/// A round: of the images, and of the robots of each task the share that gets so far.
+const ROUNDS: [(f64, f64); 3] = [(0.1, 1.0), (0.3, 1.0 / 3.0), (1.0, 0.1)];
+
+/// Least number of validation images.
+pub const LEAST: usize = 40;
+
+/// How a robot did on all validation images.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Validated {
+    /// Its id.
+    pub id: String,
+    /// Its task.
+    pub task: String,
+    /// Images.
+    pub images: usize,
+    /// Images answered right.
+    pub right: usize,
+    /// Mean over the two groups of the share answered right.
+    pub balanced_accuracy: f64,
+}
+
+/// The content of `validation.json`.
+#[derive(Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ValidationFile {
+    format: String,
+    format_version: u32,
+    /// SHA-256 of all that the result depends on.
+    key: String,
+    /// The best of each task, best first.
+    robots: Vec<Validated>,
+}
+
+/// Indices of all images that a run was trained on so far, in any of its periods.
+fn trained_on(run: &RunFile, dataset: &Dataset) -> Result<BTreeSet<usize>, Error> {
+    let mut seen: BTreeSet<usize> = run.training_images.iter().map(|image| image.index).collect();
+    let mut latest = None;
+    for period in (0..run.generations).map(|generation| run.config.period(generation)) {
+        if latest != Some(period) {
+            seen.extend(Training::indices(&run.config, dataset, period)?);
+            latest = Some(period);
+        }
+    }
+    Ok(seen)
+}
+
+/// `count` validation images, evenly divided between the classes, which take turns: so are the first of them.
+///
+/// # Errors
+/// If there are not enough images.
+pub fn images(run: &RunFile, dataset: &Dataset, count: usize) -> Result<Vec<ImageRef>, Error> {
+    let classes = run.config.classes();
+    let trained = trained_on(run, dataset)?;
+    let per_class = count.div_ceil(classes.len().max(1));
+    let mut drawn: Vec<Vec<ImageRef>> = Vec::new();
+    for &label in &classes {
+        let all = dataset.indices_of(Split::Train, label).iter().copied();
+        let free: Vec<usize> = all.filter(|index| !trained.contains(index)).collect();
+        if free.len() < per_class {
+            let text = format!(
+                "--validation {count}: expected {per_class} images of class {label} that the run was not \
+                trained on, found {}",
+                free.len()
+            );
+            return Err(Error::input(text).hint(format!("ask for at most {}", free.len() * classes.len())));
+        }
+        let picked =
+            stream(run.config.seed, Purpose::Validation, 0, u64::from(label)).sample(free.len(), per_class);
+        drawn.push(picked.into_iter().map(|i| ImageRef { index: free[i], label }).collect());
+    }
+    let turns =
+        (0..per_class).flat_map(|turn| drawn.iter().filter_map(move |class| class.get(turn).copied()));
+    Ok(turns.take(count).collect())
+}
+
+/// The `count` best of each task among some robots, best first, with how they did; `None` if stopped.
+///
+/// # Errors
+/// If there are not enough images, or the result cannot be kept.
+pub(super) fn best<'a>(
+    run: &RunFile,
+    dataset: &Dataset,
+    grouping: &Grouping,
+    (robots, count): (Vec<&'a Robot>, usize),
+    options: &Options,
+    walker: &Walker,
+) -> Result<Option<Vec<(&'a Robot, Validated)>>, Error> {
+    let images = images(run, dataset, options.validation)?;
+    let key = key(run, &robots, count, &images, options);
+    let path = options.archive.with_file_name(VALIDATION_JSON);
+    let known = std::fs::read_to_string(&path)
+        .ok()
+        .and_then(|text| serde_json::from_str::<ValidationFile>(&text).ok());
+    let by_id = |validated: &Validated| {
+        let robot = robots.iter().find(|robot| robot.id == validated.id && robot.task == validated.task)?;
+        Some((*robot, validated.clone()))
+    };
+    if let Some(file) = known.filter(|file| file.key == key) {
+        return Ok(Some(file.robots.iter().filter_map(by_id).collect()));
+    }
+    let Some(chosen) = screened(run, dataset, grouping, (&robots, count), &images, options, walker)? else {
+        return Ok(None);
+    };
+    let file = ValidationFile { format: FORMAT.0.to_string(), format_version: FORMAT.1, key, robots: chosen };
+    let text = serde_json::to_string(&file).map_err(|error| Error::other(error.to_string()))? + "\n";
+    write_atomically(&path, text.as_bytes()).map_err(|error| Error::writing(&path, &error))?;
+    Ok(Some(file.robots.iter().filter_map(by_id).collect()))
+}
+
+/// Of all that the result depends on.
+fn key(run: &RunFile, robots: &[&Robot], count: usize, images: &[ImageRef], options: &Options) -> String {
+    let ids: Vec<&str> = robots.iter().map(|robot| robot.id.as_str()).collect();
+    let images: Vec<usize> = images.iter().map(|image| image.index).collect();
+    let Options { threshold, cycles, .. } = options;
+    sha256_hex(format!("{} {ids:?} {count} {images:?} {threshold} {cycles}", fingerprint(run)).as_bytes())
+}
+
+/// Robots and images of each round, for some robots of a task of which `count` are wanted.
+fn rounds(robots: usize, count: usize, images: usize) -> [(usize, usize); 3] {
+    ROUNDS.map(|(of_images, of_robots)| {
+        let kept = ((robots as f64 * of_robots).ceil() as usize).max(count).min(robots);
+        (kept, ((images as f64 * of_images).ceil() as usize).min(images))
+    })
+}
+
+fn screened(
+    run: &RunFile,
+    dataset: &Dataset,
+    grouping: &Grouping,
+    (robots, count): (&[&Robot], usize),
+    images: &[ImageRef],
+    options: &Options,
+    walker: &Walker,
+) -> Result<Option<Vec<Validated>>, Error> {
+    let config: &Config = &run.config;
+    let stimuli: Result<Vec<_>, Error> =
+        images.iter().map(|image| see(config, dataset, Split::Train, image.index)).collect();
+    let stimuli = stimuli?;
+    let split_of = |robot: &Robot| -> Option<&grouping::Split> {
+        grouping.tasks().iter().find(|split| split.name() == robot.task)
+    };
+    let mut tasks = BTreeMap::<&str, Vec<&Robot>>::new();
+    robots.iter().for_each(|robot| tasks.entry(&robot.task).or_default().push(robot));
+    let showings = tasks.values().flat_map(|all| rounds(all.len(), count, images.len())).map(|(n, k)| n * k);
+    walker.validating(robots.len(), images.len(), showings.sum::<usize>() as u64);
+    let mut chosen = Vec::new();
+    for (_, all) in tasks {
+        let mut left = all.clone();
+        let mut scores = Vec::new();
+        for (keep, shown) in rounds(all.len(), count, images.len()) {
+            left.truncate(keep);
+            scores = Vec::with_capacity(left.len());
+            for robot in &left {
+                let Some(split) = split_of(robot) else { continue };
+                let Some((displacements, simulated)) = walker.lives(robot, &stimuli[..shown]) else {
+                    return Ok(None);
+                };
+                let trial =
+                    Trial { run, robot, split, images: &images[..shown], threshold: options.threshold };
+                scores.push((*robot, RobotReport::new(&trial, displacements, simulated)));
+            }
+            // Stable: equals stay in the order of the round before, at first of their fitness.
+            scores.sort_by(|(_, a), (_, b)| b.balanced_accuracy.total_cmp(&a.balanced_accuracy));
+            left = scores.iter().map(|(robot, _)| *robot).collect();
+        }
+        chosen.extend(scores.into_iter().take(count).map(|(robot, report)| Validated {
+            id: robot.id.clone(),
+            task: robot.task.clone(),
+            images: report.images,
+            right: report.right,
+            balanced_accuracy: report.balanced_accuracy,
+        }));
+    }
+    Ok(Some(chosen))
+}

@@ -1,0 +1,77 @@
+//! Selection on validation images: from the training split, never trained on; the same every time; kept beside the run.
+
+mod common;
+
+use common::program::{Sandbox, TINY};
+use morphcog::run::report::EvalFile;
+use morphcog::run::training::{Training, load_dataset};
+use morphcog::run::validation::images;
+use morphcog::task::dataset::Split;
+
+/// A run with redrawn images, so that it was trained on more than it ends with.
+fn sandbox() -> Sandbox {
+    let sandbox = Sandbox::new();
+    let stages = "\n[[stage]]\ngenerations = 4\n[[stage]]\nimages_per_class = 3\nredraw = 2\n";
+    sandbox.write("run.toml", format!("{TINY}{stages}"));
+    sandbox.run("evolve -q -c run.toml -o run").ended(0, &[]);
+    sandbox
+}
+
+fn eval(sandbox: &Sandbox, options: &str) -> EvalFile {
+    sandbox.run(&format!("eval -q --archive run/run.json --images 20 --cycles 1 {options}")).ended(0, &[]);
+    serde_json::from_str(&sandbox.read("run/eval.json")).unwrap()
+}
+
+#[test]
+fn validation_images_are_of_the_training_split_and_were_never_trained_on() {
+    let sandbox = sandbox();
+    let run = sandbox.run_file("run");
+    let dataset = load_dataset(&run.config, None, &[Split::Train]).unwrap();
+    // All that there are: whatever was trained on, in whichever generation, is left out.
+    let trained: std::collections::BTreeSet<usize> = (0..run.generations)
+        .flat_map(|g| Training::indices(&run.config, &dataset, run.config.period(g)).unwrap())
+        .collect();
+    assert!(trained.len() > run.training_images.len());
+    let of_class =
+        |class| dataset.indices_of(Split::Train, class).iter().filter(|i| !trained.contains(i)).count();
+    let most = 2 * of_class(0).min(of_class(1));
+    let drawn = images(&run, &dataset, most).unwrap();
+    assert_eq!(drawn.len(), most);
+    assert!(drawn.iter().all(|image| !trained.contains(&image.index)));
+    assert!(drawn.iter().all(|image| dataset.label(Split::Train, image.index).unwrap() == image.label));
+    // Classes take turns: a round on the first of them is fair, too.
+    assert_eq!(drawn[..20].iter().filter(|image| image.label == 0).count(), 10);
+    assert!(images(&run, &dataset, 10 * most).is_err());
+}
+
+#[test]
+fn the_best_on_validation_images_are_found_the_same_every_time_and_kept() {
+    let sandbox = sandbox();
+    let first = eval(&sandbox, "--robots best-validation:3 --validation 60 --threads 1");
+    assert_eq!(first.robots.len(), 3);
+    assert!(first.selected.contains("validation"), "{}", first.selected);
+    let accuracies: Vec<f64> =
+        first.robots.iter().map(|robot| robot.validation.as_ref().unwrap().balanced_accuracy).collect();
+    assert!(accuracies.is_sorted_by(|a, b| a >= b), "{accuracies:?}");
+    assert!(first.robots.iter().all(|robot| robot.validation.as_ref().unwrap().images == 60));
+    let kept = sandbox.read("run/validation.json");
+    assert_eq!(eval(&sandbox, "--robots best-validation:3 --validation 60 --threads 3"), first);
+    // A broken or another run's file is not believed.
+    sandbox.write("run/validation.json", "{");
+    assert_eq!(eval(&sandbox, "--robots best-validation:3 --validation 60"), first);
+    assert_eq!(sandbox.read("run/validation.json"), kept);
+    sandbox.write("run/validation.json", kept.replace("\"key\":\"", "\"key\":\"0"));
+    assert_eq!(eval(&sandbox, "--robots best-validation:3 --validation 60"), first);
+    // Selected otherwise, a robot has no such figure.
+    assert!(eval(&sandbox, "--robots top:2").robots.iter().all(|robot| robot.validation.is_none()));
+}
+
+#[test]
+fn too_few_or_too_many_validation_images_are_refused() {
+    let sandbox = sandbox();
+    let with = |options: &str| {
+        sandbox.run(&format!("eval --archive run/run.json --robots best-validation {options}"))
+    };
+    with("--validation 10").ended(2, &["--validation 10", "40"]);
+    with("--validation 1000000").ended(3, &["--validation 1000000", "ask for at most"]);
+}
