@@ -26,6 +26,7 @@ use std::path::Path;
 /// # Errors
 /// What went wrong; its kind has the exit code.
 pub fn run(cli: Cli, console: &Console) -> Result<(), Error> {
+    InstructionSet::asked().map_err(|text| Error::usage(text).hint("or leave it unset".to_string()))?;
     match cli.command {
         Command::Evolve(args) => run_evolve(args, console),
         Command::Eval(args) => run_eval(args, console),

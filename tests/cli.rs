@@ -838,3 +838,14 @@ fn where_nothing_can_be_written_it_says_where() {
     }
     assert_eq!(sandbox.read("file"), "in the way");
 }
+
+#[test]
+fn an_instruction_set_that_is_not_there_is_an_error_that_names_those_that_are() {
+    let sandbox = Sandbox::new();
+    for (set, code) in [("avx1024", 2), ("", 0), ("baseline", 0)] {
+        let mut command = sandbox.command(["gallery"]);
+        command.env("MORPHCOG_ISA", set);
+        let words: &[&str] = if code == 2 { &["MORPHCOG_ISA=avx1024", "baseline"] } else { &[] };
+        said(command).ended(code, words);
+    }
+}

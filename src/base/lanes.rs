@@ -62,17 +62,27 @@ impl InstructionSet {
         }
     }
 
-    /// The one in use: the widest this machine has, or the one named by the environment variable `MORPHCOG_ISA`
-    /// if the machine has that.
+    /// The one that the environment variable `MORPHCOG_ISA` asks for; none if it is not set.
+    ///
+    /// # Errors
+    /// What was asked for, if this machine has no such instruction set, and what it has.
+    pub fn asked() -> Result<Option<Self>, String> {
+        let Some(asked) = std::env::var_os("MORPHCOG_ISA").filter(|asked| !asked.is_empty()) else {
+            return Ok(None);
+        };
+        let available = || InstructionSet::ALL.into_iter().filter(|set| set.is_available());
+        let found = available().find(|set| asked == set.name());
+        let names: Vec<&str> = available().map(InstructionSet::name).collect();
+        let text = || format!("MORPHCOG_ISA={}: expected one of {}", asked.display(), names.join(", "));
+        found.map(Some).ok_or_else(text)
+    }
+
+    /// The one in use: the widest this machine has, or the one [asked](InstructionSet::asked) for.
     pub fn in_use() -> Self {
         static IN_USE: OnceLock<InstructionSet> = OnceLock::new();
         *IN_USE.get_or_init(|| {
-            let asked = std::env::var("MORPHCOG_ISA").unwrap_or_default();
-            let available = || InstructionSet::ALL.into_iter().filter(|set| set.is_available());
-            available()
-                .find(|set| set.name() == asked)
-                .or_else(|| available().next_back())
-                .unwrap_or(InstructionSet::Baseline)
+            let widest = InstructionSet::ALL.into_iter().rfind(|set| set.is_available());
+            InstructionSet::asked().ok().flatten().or(widest).unwrap_or(InstructionSet::Baseline)
         })
     }
 }
