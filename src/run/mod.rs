@@ -4,6 +4,7 @@ pub mod archive;
 pub mod audit;
 pub mod audit_file;
 pub mod bench;
+pub mod capacity_file;
 pub mod checkpoint;
 pub mod config;
 pub mod curriculum;
