@@ -2,13 +2,15 @@
 
 mod args;
 mod audit;
+mod capacity;
 
 use crate::base::lanes::InstructionSet;
 use crate::run::data::catalogue::Catalogue;
 use crate::run::data::fetch::{FetchOptions, fetch};
 use crate::run::folder::IfExists;
+use crate::run::report::EVAL_JSON;
 use crate::run::{
-    Config, Error, bench, config, data, eval, evolve, folder, gallery, replay, signals, simulate,
+    Config, Error, bench, config, data, eval, evolve, folder, gallery, replay, signals, simulate, validation,
 };
 use crate::task::dataset::{Dataset, Split};
 use crate::task::files::places;
@@ -31,6 +33,7 @@ pub fn run(cli: Cli, console: &Console) -> Result<(), Error> {
         Command::Evolve(args) => run_evolve(args, console),
         Command::Eval(args) => run_eval(args, console),
         Command::Audit(args) => audit::run(args, console),
+        Command::Capacity(args) => capacity::run(args, console),
         Command::Replay(args) => run_replay(args, console),
         Command::Simulate(args) => run_simulate(&args, console),
         Command::Data { command } => run_data(command, console),
@@ -97,6 +100,19 @@ fn run_evolve(args: EvolveArgs, console: &Console) -> Result<(), Error> {
         let text = format!("stopped after generation {}; the run is saved", finished.run.generations);
         return Err(Error::stopped(text).hint("the same command with --resume goes on".to_string()));
     }
+    if finished.run.config.validation.best > 0 {
+        let archive = out.join(folder::RUN_JSON);
+        let options = validation::Options { archive, data: args.data.clone(), threads };
+        match validation::validate(&options, &stop, &reporters::Evaluation::new(console))? {
+            Some(best) => summary::validation(console, &best),
+            None => {
+                let hint = "the same command with --resume goes on".to_string();
+                return Err(
+                    Error::stopped("stopped while validating; the run is saved".to_string()).hint(hint)
+                );
+            }
+        }
+    }
     if args.replay {
         let archive = Some(out.join(folder::RUN_JSON));
         let robot = "best".to_string();
@@ -109,19 +125,19 @@ fn run_evolve(args: EvolveArgs, console: &Console) -> Result<(), Error> {
 }
 
 fn run_eval(args: EvalArgs, console: &Console) -> Result<(), Error> {
-    let archive = args.archive.map_or_else(folder::newest_run, Ok)?;
-    let out = args.out.unwrap_or_else(|| archive.with_file_name("eval.json"));
+    let archives = if args.archive.is_empty() { vec![folder::newest_run()?] } else { args.archive };
+    let out = args.out.unwrap_or_else(|| folder::above(&archives).join(EVAL_JSON));
     let options = eval::Options {
-        robots: args.robots.physical(args.physical_only, &archive),
+        robots: args.robots.physical(args.physical_only),
         images: args.images as usize,
-        validation: args.validation as usize,
+        validation: args.validation.map(|images| images as usize),
         seed: args.seed,
         threshold: args.threshold,
         cycles: args.cycles,
         data: args.data,
         threads: args.threads.map(usize::from),
         out,
-        archive,
+        archives,
     };
     let stop = signals::stop_flag()?;
     let report = eval::eval(&options, &stop, &reporters::Evaluation::new(console))?;

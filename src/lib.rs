@@ -15,6 +15,7 @@
 //! | 2 | [`sim`] | the physics, and nothing else | [`sim::World`] |
 //! | 2 | [`genome`] | CPPNs and their mutations | [`genome::Genome`] |
 //! | 2 | [`qd`] | archives and MAP-Elites over any type of solution | [`qd::MapElites`] |
+//! | 2 | [`baseline`] | networks that robots are compared with | [`baseline::train`] |
 //! | 3 | [`task`] | images, stimuli, protocols, rollouts, scores, baselines | [`task::evaluation`] |
 //! | 4 | [`run`] | what the commands do, one file per command | [`run::evolve`] |
 //! | 5 | [`view`] | pictures and the terminal | [`view::pictures`] |
@@ -42,6 +43,7 @@
 //! ```
 
 pub mod base;
+pub mod baseline;
 pub mod body;
 pub mod cli;
 pub mod genome;

@@ -29,6 +29,10 @@ pub enum Purpose {
     Validation = 21,
     /// Resamples of a bootstrap.
     Bootstrap = 22,
+    /// Networks: how they start, and the order of their images.
+    Networks = 23,
+    /// Images that a network's training waits on.
+    Waiting = 24,
 }
 
 /// One stream of random numbers.

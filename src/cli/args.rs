@@ -1,6 +1,8 @@
 //! The words of the command line: clap's types, help and examples.
 
 use super::audit::{self, AuditArgs};
+use super::capacity::{self, CapacityArgs};
+use crate::run::eval;
 use crate::run::replay::Shown;
 use crate::run::robots::Selection;
 use crate::task::dataset::BUILTIN;
@@ -55,11 +57,15 @@ Ctrl-C (or SIGTERM, SIGUSR1) finishes the generation, saves and exits with 75; a
 Examples:
   morphcog eval --archive runs/zero_one-seed1/run.json --images 1000
   morphcog eval --archive runs/zero_one-seed1/run.json --robots top:10
-  morphcog eval --archive runs/zero_one-seed1/run.json --robots 3fa,b02 -o two.json")]
+  morphcog eval --archive runs/zero_one-seed1/run.json --robots 3fa,b02 -o two.json
+  morphcog eval --archive runs/zero_one-seed*/run.json --robots random:10 --physical-only    the paper's test")]
     Eval(EvalArgs),
     /// Tell robots that walk from robots that live off the simulator.
     #[command(after_help = audit::EXAMPLES)]
     Audit(AuditArgs),
+    /// Find the networks that robots are worth.
+    #[command(after_help = capacity::EXAMPLES)]
+    Capacity(CapacityArgs),
     /// Watch a robot: an animated GIF and a page for the browser.
     #[command(after_help = "\
 Examples:
@@ -166,19 +172,19 @@ pub(super) struct EvolveArgs {
 
 #[derive(Debug, Args)]
 pub(super) struct EvalArgs {
-    /// The run.json (default: the newest under runs/).
-    #[arg(short, long, value_name = "FILE")]
-    pub(super) archive: Option<PathBuf>,
+    /// The run.json, or those of several runs of the same task (default: the newest under runs/).
+    #[arg(short, long, value_name = "FILE", num_args = 1..)]
+    pub(super) archive: Vec<PathBuf>,
     /// Test images in all, evenly divided between the classes.
     #[arg(short = 'n', long, default_value_t = 1000, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pub(super) images: u32,
-    /// all, top:N, random:N, best-validation:N (the best of each task on validation images, drawn from the training
-    /// split), or ids (or beginnings of ids) separated by commas.
+    /// all, top:N or random:N (of each task), best-validation:N (the best of each run and task on validation images,
+    /// drawn from the training split), or ids (or beginnings of ids) separated by commas.
     #[arg(short, long, visible_alias = "select", default_value = "top:10")]
     pub(super) robots: Selection,
-    /// Validation images in all, for best-validation.
-    #[arg(long, default_value_t = 400, value_name = "IMAGES", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
-    pub(super) validation: u32,
+    /// Validation images in all, for best-validation (default: those of the config, or 400).
+    #[arg(long, value_name = "IMAGES", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    pub(super) validation: Option<u32>,
     /// Only robots that morphcog audit found physical.
     #[arg(long)]
     pub(super) physical_only: bool,
@@ -186,15 +192,15 @@ pub(super) struct EvalArgs {
     #[arg(long, default_value_t = 1)]
     pub(super) seed: u64,
     /// Displacements up to this many voxel lengths are wrong.
-    #[arg(long, default_value_t = 3.0)]
+    #[arg(long, default_value_t = eval::THRESHOLD)]
     pub(super) threshold: f64,
     /// Actuation cycles per image.
-    #[arg(long, default_value_t = 10, value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    #[arg(long, default_value_t = eval::CYCLES, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     pub(super) cycles: u32,
     /// Folder with the images.
     #[arg(long, value_name = "DIR")]
     pub(super) data: Option<PathBuf>,
-    /// Result file; a CSV goes beside it (default: eval.json beside run.json).
+    /// Result file; a CSV goes beside it (default: eval.json beside run.json, or above several).
     #[arg(short, long, value_name = "FILE")]
     pub(super) out: Option<PathBuf>,
     /// Threads (default: one per core).

@@ -3,7 +3,7 @@
 use super::archive::{Robot, RunFile};
 use super::audit_file::{AuditFile, RobotAudit, fingerprint};
 use super::eval::check_out;
-use super::robots::Selection;
+use super::robots::{self, Selection};
 use super::training::{Training, load_dataset, see};
 use super::verdict::{Behaviour, Criteria, PerturbedLife};
 use super::{Config, Error, gallery};
@@ -160,9 +160,10 @@ fn open(options: &Options) -> Result<Opened, Error> {
             Ok((config, Fitness::Min, training, subjects, order, file))
         }
         Source::Archive(path) => {
-            let run = RunFile::read(path)?;
+            let source = robots::Source::read(path)?;
+            let run = &source.run;
             check_out(&options.out, path)?;
-            let training = training_of(&run, options)?;
+            let training = training_of(run, options)?;
             let subject = |robot: &Robot| Subject {
                 id: robot.id.clone(),
                 task: robot.task.clone(),
@@ -170,13 +171,13 @@ fn open(options: &Options) -> Result<Opened, Error> {
                 known: Some(robot.displacements.clone()),
             };
             let mut subjects: Vec<Subject> = Vec::new();
-            for robot in options.robots.of(&run, options.seed)? {
-                if subjects.iter().all(|other| other.id != robot.id) {
-                    subjects.push(subject(robot));
+            for chosen in options.robots.of(std::slice::from_ref(&source), options.seed)? {
+                if subjects.iter().all(|other| other.id != chosen.robot.id) {
+                    subjects.push(subject(chosen.robot));
                 }
             }
             let order: Vec<String> = run.elites.iter().map(|robot| robot.id.clone()).collect();
-            let file = AuditFile::new(&run.name, fingerprint(&run), order.len(), &options.criteria);
+            let file = AuditFile::new(&run.name, fingerprint(run), order.len(), &options.criteria);
             Ok((run.config.clone(), run.fitness(), training, subjects, order, file))
         }
     }

@@ -103,19 +103,7 @@ impl AuditFile {
     /// What is wrong with the file, with its line and key.
     pub fn read(path: &Path) -> Result<Self, Error> {
         let text = std::fs::read_to_string(path).map_err(|error| Error::reading(path, &error))?;
-        let name = path.display().to_string();
-        #[derive(Deserialize)]
-        struct Head {
-            format: Option<String>,
-            format_version: Option<u32>,
-        }
-        let head: Head = toml_text::read_json(&text, &name)?;
-        if head.format.as_deref() != Some(FORMAT) || head.format_version.is_none_or(|v| v > FORMAT_VERSION) {
-            let text =
-                format!("{name}: expected \"format\": \"{FORMAT}\", \"format_version\": {FORMAT_VERSION}");
-            return Err(Error::input(text));
-        }
-        toml_text::read_json(&text, &name)
+        toml_text::read_versioned(&text, &path.display().to_string(), FORMAT, FORMAT_VERSION)
     }
 
     /// The verdicts on a run, from its file.
@@ -141,6 +129,30 @@ impl AuditFile {
             return Err(Error::input(text).hint(format!("{make} audits the run as it is now")));
         }
         Ok(file)
+    }
+
+    /// The verdicts on a run with this fingerprint, from an audit in a folder or in a folder in it.
+    ///
+    /// # Errors
+    /// If there is none, or it is broken.
+    pub fn near(folder: &Path, run_sha256: &str) -> Result<Self, Error> {
+        let here = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
+        let mut folders: Vec<PathBuf> =
+            std::fs::read_dir(here).into_iter().flatten().flatten().map(|entry| entry.path()).collect();
+        folders.sort();
+        folders.insert(0, folder.to_path_buf());
+        for path in folders.into_iter().map(|folder| folder.join(AUDIT_JSON)).filter(|path| path.exists()) {
+            let file = AuditFile::read(&path)?;
+            if file.run_sha256 == run_sha256 {
+                return Ok(file);
+            }
+        }
+        let short = run_sha256.get(..10).unwrap_or_default();
+        let text = format!(
+            "{}: expected an {AUDIT_JSON} there, or in a folder there, about the run with SHA-256 {short}…",
+            here.display()
+        );
+        Err(Error::input(text).hint("morphcog audit --archive … makes one beside the run".to_string()))
     }
 
     /// What was found of a robot.

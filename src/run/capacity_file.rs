@@ -86,24 +86,43 @@ impl CapacityFile {
     /// What is wrong with the file, with its line and key.
     pub fn read(path: &Path) -> Result<Self, Error> {
         let text = std::fs::read_to_string(path).map_err(|error| Error::reading(path, &error))?;
-        let name = path.display().to_string();
-        #[derive(Deserialize)]
-        struct Head {
-            format: Option<String>,
-            format_version: Option<u32>,
+        toml_text::read_versioned(&text, &path.display().to_string(), FORMAT, FORMAT_VERSION)
+    }
+
+    /// `capacity.csv`: a line per task, network and size.
+    ///
+    /// # Errors
+    /// If it cannot be written to memory.
+    pub fn to_csv(&self) -> Result<Vec<u8>, csv::Error> {
+        let mut writer = csv::Writer::from_writer(Vec::new());
+        let columns =
+            ["task", "network", "size", "parameters", "mean", "standard_deviation", "fit", "robots"];
+        writer.write_record(columns)?;
+        for task in &self.tasks {
+            for curve in &task.curves {
+                for point in &curve.points {
+                    let fit = curve.value(point.size as f64).map_or(String::new(), |value| value.to_string());
+                    let mut row = vec![task.task.clone(), curve.network.clone()];
+                    row.extend([point.size, point.parameters].map(|count| count.to_string()));
+                    row.extend([point.mean, point.standard_deviation].map(|value| value.to_string()));
+                    row.extend([fit, task.accuracy.to_string()]);
+                    writer.write_record(&row)?;
+                }
+            }
         }
-        let head: Head = toml_text::read_json(&text, &name)?;
-        if head.format.as_deref() != Some(FORMAT) || head.format_version.is_none_or(|v| v > FORMAT_VERSION) {
-            let text =
-                format!("{name}: expected \"format\": \"{FORMAT}\", \"format_version\": {FORMAT_VERSION}");
-            return Err(Error::input(text).hint("morphcog capacity makes such a file".to_string()));
-        }
-        toml_text::read_json(&text, &name)
+        writer.into_inner().map_err(|error| csv::Error::from(error.into_error()))
     }
 
     /// Its text.
     pub fn to_json(&self) -> String {
         // Numbers are finite, keys are text: JSON has all of it.
         serde_json::to_string_pretty(self).unwrap_or_default() + "\n"
+    }
+}
+
+impl Curve {
+    /// The fit at a size.
+    pub fn value(&self, size: f64) -> Option<f64> {
+        self.fit.map(|[c0, c1, c2]| c0 + size * (c1 + size * c2))
     }
 }

@@ -4,6 +4,7 @@ use super::Error;
 use super::curriculum::StageConfig;
 use super::robust::EvaluationConfig;
 use super::toml_text::{self, Format};
+use super::validation::{self, ValidationConfig};
 use crate::body::MAX_SIDE;
 use crate::genome::{BodySpec, MutationParams};
 use crate::qd::EmitterParams;
@@ -77,6 +78,9 @@ pub struct Config {
     /// How robots are evaluated. Left out of files where it is the default.
     #[serde(default, skip_serializing_if = "EvaluationConfig::is_default")]
     pub evaluation: EvaluationConfig,
+    /// How robots are chosen on images that they were not trained on. Left out of files where it is the default.
+    #[serde(default, skip_serializing_if = "ValidationConfig::is_default")]
+    pub validation: ValidationConfig,
     /// Constants of the simulator.
     #[serde(default)]
     pub physics: Physics,
@@ -120,6 +124,34 @@ pub struct TaskConfig {
     pub splits: Option<Vec<u8>>,
     /// With `splits`: one more bin for robots that walk the same way for all classes, as in the published code.
     pub same_way_bin: bool,
+}
+
+impl TaskConfig {
+    /// The tasks.
+    ///
+    /// # Errors
+    /// If the section `[task]` makes none.
+    pub fn grouping(&self) -> Result<Grouping, Error> {
+        let TaskConfig { groups, splits, same_way_bin } = self;
+        let grouping = match (groups, splits) {
+            (Some([a, b]), None) if !same_way_bin => Grouping::two_groups(a, b),
+            (None, Some(classes)) => Grouping::all_splits(classes, *same_way_bin),
+            (Some(_), None) => {
+                return Err(Error::input("task.same_way_bin: expected only with task.splits".to_string()));
+            }
+            _ => {
+                let text = "task: expected either groups, as in groups = [[0], [1]], or splits, as in splits = [0, 1, 2, 3]";
+                return Err(Error::input(text.to_string()));
+            }
+        };
+        grouping.map_err(|error| Error::input(format!("task: {error}")))
+    }
+
+    /// All classes of the task, in its order.
+    pub fn classes(&self) -> Vec<u8> {
+        let TaskConfig { groups, splits, .. } = self;
+        groups.iter().flatten().chain(splits).flatten().copied().collect()
+    }
 }
 
 /// Which images: section `[data]`.
@@ -233,25 +265,12 @@ impl Config {
     /// # Errors
     /// If the section `[task]` makes none.
     pub fn grouping(&self) -> Result<Grouping, Error> {
-        let TaskConfig { groups, splits, same_way_bin } = &self.task;
-        let grouping = match (groups, splits) {
-            (Some([a, b]), None) if !same_way_bin => Grouping::two_groups(a, b),
-            (None, Some(classes)) => Grouping::all_splits(classes, *same_way_bin),
-            (Some(_), None) => {
-                return Err(Error::input("task.same_way_bin: expected only with task.splits".to_string()));
-            }
-            _ => {
-                let text = "task: expected either groups, as in groups = [[0], [1]], or splits, as in splits = [0, 1, 2, 3]";
-                return Err(Error::input(text.to_string()));
-            }
-        };
-        grouping.map_err(|error| Error::input(format!("task: {error}")))
+        self.task.grouping()
     }
 
     /// All classes of the task, in its order.
     pub fn classes(&self) -> Vec<u8> {
-        let TaskConfig { groups, splits, .. } = &self.task;
-        groups.iter().flatten().chain(splits).flatten().copied().collect()
+        self.task.classes()
     }
 
     /// Checks what a type cannot.
@@ -275,6 +294,10 @@ impl Config {
                 self.body.min_muscles.to_string(),
                 "no more than there are voxels",
             );
+        }
+        if self.validation.images < validation::LEAST {
+            let expected = format!("{} or more", validation::LEAST);
+            return refuse("validation.images", self.validation.images.to_string(), &expected);
         }
         if self.seed > MAX_SEED {
             return refuse("seed", self.seed.to_string(), &format!("0 to {MAX_SEED}"));

@@ -1,10 +1,11 @@
 //! `morphcog eval`: how well robots do on held-out images (paper, "Generalization test").
 
-use super::archive::{Robot, RunFile};
+use super::archive::Robot;
 use super::report::{Baselines, EvalFile, RobotReport, Trial};
-use super::robots::Selection;
+use super::robots::{Chosen, Selection, Source};
 use super::training::{ImageRef, load_dataset, see};
-use super::{Config, Error, folder::RunFolder, validation};
+use super::validation::{self, Validated};
+use super::{Config, Error, folder::RunFolder};
 use crate::base::Grid;
 use crate::base::files::{check_writable, write_atomically};
 use crate::sim::Lattice;
@@ -21,17 +22,22 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 /// Training images per class on which the single-pixel baseline is chosen.
 const PIXEL_IMAGES_PER_CLASS: usize = 500;
 
+/// Displacements up to this count as wrong in the paper's test \[voxel lengths\].
+pub const THRESHOLD: f64 = 3.0;
+/// Actuation cycles per image in the paper's test.
+pub const CYCLES: u32 = 10;
+
 /// What to evaluate, and on what.
 #[derive(Clone, Debug)]
 pub struct Options {
-    /// The run.json.
-    pub archive: PathBuf,
+    /// The run.json, or those of several runs that differ in their seeds only.
+    pub archives: Vec<PathBuf>,
     /// Which of its robots.
     pub robots: Selection,
     /// Test images in all, evenly divided between the classes.
     pub images: usize,
-    /// Validation images in all, for a selection by them.
-    pub validation: usize,
+    /// Validation images in all, for a selection by them; `None`: as the config says.
+    pub validation: Option<usize>,
     /// Seed of what is drawn: images, and robots with `random:N`.
     pub seed: u64,
     /// Displacements up to this count as wrong \[voxel lengths\].
@@ -75,64 +81,117 @@ pub fn eval(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Re
             options.threshold
         )));
     }
-    if options.robots.validated().is_some() && options.validation < validation::LEAST {
-        let (asked, least) = (options.validation, validation::LEAST);
-        return Err(Error::usage(format!("--validation {asked}: expected {least} or more images")));
+    let sources: Result<Vec<Source>, Error> =
+        options.archives.iter().map(|path| Source::read(path)).collect();
+    let sources = sources?;
+    let Some(first) = sources.first() else {
+        return Err(Error::usage("--archive: expected a run.json".to_string()));
+    };
+    for source in &sources {
+        check_out(&options.out, &source.path)?;
+        same_setting(first, source)?;
     }
-    let run = RunFile::read(&options.archive)?;
-    check_out(&options.out, &options.archive)?;
-    let config = &run.config;
+    let config = &first.run.config;
+    let validated = options.validation.unwrap_or(config.validation.images);
+    if options.robots.validated().is_some() && validated < validation::LEAST {
+        let least = validation::LEAST;
+        return Err(Error::usage(format!("--validation {validated}: expected {least} or more images")));
+    }
     let grouping = config.grouping()?;
     let dataset = load_dataset(config, options.data.as_deref(), &Split::ALL)?;
-    if dataset.fingerprint(Split::Train).unwrap_or_default() != run.dataset.train_sha256 {
+    if dataset.fingerprint(Split::Train).unwrap_or_default() != first.run.dataset.train_sha256 {
         observer.warning("the training images here are not those the run was made with (another SHA-256)");
     }
-    let robots = options.robots.of(&run, options.seed)?;
-    let (robots, unskilled): (Vec<&Robot>, Vec<&Robot>) =
-        robots.into_iter().partition(|robot| task_of(&grouping, robot).is_some());
-    for robot in &unskilled {
-        observer.warning(&format!("{}: walks the same way for every class; left out", robot.id));
+    let robots = options.robots.of(&sources, options.seed)?;
+    let (robots, unskilled): (Vec<Chosen>, Vec<Chosen>) =
+        robots.into_iter().partition(|chosen| task_of(&grouping, chosen.robot).is_some());
+    if let Some(chosen) = unskilled.first() {
+        let (count, id) = (unskilled.len(), &chosen.robot.id);
+        observer.warning(&format!("{count} robots ({id} …) walk the same way for every class; left out"));
     }
     let test = test_images(config, &dataset, options)?;
     let test_sha256 = dataset.fingerprint(Split::Test).unwrap_or_default();
-    let mut report = EvalFile::new(&run, options, control_steps(config, options), &test.images, test_sha256);
-    report.baselines = baselines(&run, &grouping, &dataset, &test, &robots, options.seed)?;
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(options.threads.unwrap_or(0)).build();
-    let pool = pool.map_err(|error| Error::other(format!("no threads: {error}")))?;
-    let walker = Walker { config, options, pool: &pool, stop, observer, done: AtomicU64::new(0) };
-    let (robots, scores) = match options.robots.validated() {
+    let steps = control_steps(config, options.cycles);
+    let mut report = EvalFile::new(&sources, options, steps, &test.images, test_sha256);
+    report.baselines = baselines(&sources, &grouping, &dataset, &test, &robots, options.seed)?;
+    let pool = pool(options.threads)?;
+    let walker =
+        || Walker { config, control_steps: steps, pool: &pool, stop, observer, done: AtomicU64::new(0) };
+    let (robots, scores): (Vec<Chosen>, Vec<Validated>) = match options.robots.validated() {
         None => (robots, Vec::new()),
         Some(count) => {
-            let best = validation::best(&run, &dataset, &grouping, (robots, count), options, &walker)?;
-            report.stopped = best.is_none();
-            best.unwrap_or_default().into_iter().unzip()
+            let wanted = validation::Wanted { count, images: validated, threshold: options.threshold };
+            let mut best = Vec::new();
+            for (number, source) in sources.iter().enumerate() {
+                let own = robots.iter().filter(|chosen| chosen.source == number).map(|chosen| chosen.robot);
+                match validation::best(source, &dataset, &grouping, own.collect(), &wanted, &walker())? {
+                    Some(of_run) => best.extend(
+                        of_run.into_iter().map(|(robot, score)| (Chosen { source: number, robot }, score)),
+                    ),
+                    None => {
+                        report.stopped = true;
+                        return Ok(report);
+                    }
+                }
+            }
+            best.into_iter().unzip()
         }
     };
     observer.started(robots.len(), test.images.len());
-    let walker = Walker { done: AtomicU64::new(0), ..walker };
+    let walker = walker();
     let mut scores = scores.into_iter();
     let mut left = robots.len();
-    report.stopped |= left > 0;
-    for robot in robots {
+    report.stopped = left > 0;
+    for Chosen { source, robot } in robots {
         let Some(split) = task_of(&grouping, robot) else { continue };
         let Some((displacements, simulated)) = walker.lives(robot, &test.stimuli) else { break };
         left -= 1;
         report.stopped = left > 0;
-        let trial = Trial { run: &run, robot, split, images: &test.images, threshold: options.threshold };
-        let validation = scores.next();
-        report.robots.push(RobotReport { validation, ..RobotReport::new(&trial, displacements, simulated) });
+        let run = &sources[source].run;
+        let trial = Trial { run, robot, split, images: &test.images, threshold: options.threshold };
+        let (validation, of_trial) = (scores.next(), RobotReport::new(&trial, displacements, simulated));
+        report.robots.push(RobotReport { run: source, validation, ..of_trial });
         report.conclude();
         write(options, &report)?;
     }
     Ok(report)
 }
 
-fn control_steps(config: &Config, options: &Options) -> u32 {
-    options.cycles.saturating_mul(config.physics.cycle_steps)
+/// So many threads; `None`: one per core.
+pub(super) fn pool(threads: Option<usize>) -> Result<rayon::ThreadPool, Error> {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.unwrap_or(0)).build();
+    pool.map_err(|error| Error::other(format!("no threads: {error}")))
+}
+
+/// Whether robots of two runs can be tested together: what they are shown, and where they live, is the same.
+fn same_setting(first: &Source, other: &Source) -> Result<(), Error> {
+    let (a, b) = (&first.run.config, &other.run.config);
+    let of_data = |config: &Config| (config.data.dataset.clone(), config.data.builtin.clone());
+    let differing = [
+        ("task", a.task != b.task),
+        ("body", a.body != b.body),
+        ("stimulus", a.stimulus != b.stimulus),
+        ("protocol", a.protocol != b.protocol),
+        ("physics", a.physics != b.physics),
+        ("data", of_data(a) != of_data(b) || first.run.dataset != other.run.dataset),
+    ];
+    match differing.into_iter().find(|(_, differs)| *differs) {
+        None => Ok(()),
+        Some((section, _)) => {
+            let (other, first) = (other.path.display(), first.path.display());
+            let text = format!("{other}: expected the same [{section}] in its config as {first}");
+            Err(Error::input(text).hint("evaluate runs of different experiments one by one".to_string()))
+        }
+    }
+}
+
+/// Control steps of so many actuation cycles.
+pub(super) fn control_steps(config: &Config, cycles: u32) -> u32 {
+    cycles.saturating_mul(config.physics.cycle_steps)
 }
 
 /// The recognition task a robot performs; none if it always walks the same way.
-fn task_of<'a>(grouping: &'a Grouping, robot: &Robot) -> Option<&'a grouping::Split> {
+pub(super) fn task_of<'a>(grouping: &'a Grouping, robot: &Robot) -> Option<&'a grouping::Split> {
     grouping.tasks().iter().find(|split| split.name() == robot.task && !split.is_same_way())
 }
 
@@ -192,13 +251,14 @@ fn test_images(config: &Config, dataset: &Dataset, options: &Options) -> Result<
 
 /// Shows images to robots.
 pub(super) struct Walker<'a> {
-    config: &'a Config,
-    options: &'a Options,
-    pool: &'a rayon::ThreadPool,
-    stop: &'a AtomicBool,
-    observer: &'a dyn Observer,
+    pub config: &'a Config,
+    /// Of one showing.
+    pub control_steps: u32,
+    pub pool: &'a rayon::ThreadPool,
+    pub stop: &'a AtomicBool,
+    pub observer: &'a dyn Observer,
     /// Showings so far.
-    done: AtomicU64,
+    pub done: AtomicU64,
 }
 
 impl Walker<'_> {
@@ -210,12 +270,9 @@ impl Walker<'_> {
     /// The displacement under each image (`None`: unstable), and the number of lives it took: images that show the sensors
     /// the same pixels are one life. `None` if stopped before the end.
     pub fn lives(&self, robot: &Robot, stimuli: &[Grid<f64>]) -> Option<(Vec<Option<f64>>, usize)> {
-        let Walker { config, options, stop, observer, done, .. } = self;
-        let protocol = Protocol {
-            life: Life::Fresh,
-            control_steps: control_steps(config, options),
-            ..config.protocol.clone()
-        };
+        let Walker { config, stop, observer, done, .. } = self;
+        let protocol =
+            Protocol { life: Life::Fresh, control_steps: self.control_steps, ..config.protocol.clone() };
         let lattice = Lattice::new(&robot.body, &config.physics);
         let views: Vec<&Grid<f64>> = stimuli.iter().collect();
         let same_as = same_to_sensors(&robot.body, &views);
@@ -242,14 +299,14 @@ fn view(list: &[(Grid<f64>, u8)]) -> Vec<Labelled<'_>> {
 
 /// The baselines of every task that the robots perform.
 fn baselines(
-    run: &RunFile,
+    sources: &[Source],
     grouping: &Grouping,
     dataset: &Dataset,
     test: &Test,
-    robots: &[&Robot],
+    robots: &[Chosen],
     seed: u64,
 ) -> Result<BTreeMap<String, Baselines>, Error> {
-    let config = &run.config;
+    let Some(config) = sources.first().map(|source| &source.run.config) else { return Ok(BTreeMap::new()) };
     let classes = config.classes();
     let labelled = |images: &[ImageRef]| -> Result<Vec<(Grid<f64>, u8)>, Error> {
         images
@@ -264,21 +321,25 @@ fn baselines(
         let drawn = drawn.map_err(|error| Error::input(error.to_string()))?;
         choice.extend(drawn.into_iter().map(|index| ImageRef { index, label: class }));
     }
-    let (choice, templates) = (labelled(&choice)?, labelled(&run.training_images)?);
+    let choice = labelled(&choice)?;
+    let templates: Result<Vec<_>, Error> =
+        sources.iter().map(|source| labelled(&source.run.training_images)).collect();
+    let templates = templates?;
     let tested = test.stimuli.iter().zip(&test.images);
     let tested: Vec<Labelled> =
         tested.map(|(stimulus, image)| Labelled { stimulus, class: image.label }).collect();
     let mut all = BTreeMap::new();
-    for split in robots.iter().filter_map(|robot| task_of(grouping, robot)) {
+    for split in robots.iter().filter_map(|chosen| task_of(grouping, chosen.robot)) {
         if all.contains_key(&split.name()) {
             continue;
         }
         let rule = best_pixel(split, &view(&choice));
+        let nearest = |of_run: &Vec<_>| nearest_training_image(split, &view(of_run), &tested);
         let baselines = Baselines {
             larger_group: larger_group(split, &tested),
             best_single_pixel: rule.map_or(0.0, |rule| rule.accuracy(split, &tested)),
             pixel: rule.map_or([0, 0], |rule| [rule.row, rule.column]),
-            nearest_training_image: nearest_training_image(split, &view(&templates), &tested),
+            nearest_training_image: templates.iter().map(nearest).sum::<f64>() / templates.len() as f64,
         };
         all.insert(split.name(), baselines);
     }

@@ -195,7 +195,7 @@ impl<'a> Run<'a> {
             }
             self.next_generation()?;
             let progress = self.progress();
-            metrics.write(self.generation - 1, &progress.stats, &progress.totals)?;
+            metrics.write((self.generation - 1, period.stage), &progress.stats, &progress.totals)?;
             observer.generation(&progress);
             if self.generation.is_multiple_of(config.checkpoint.generations) || saved.elapsed() >= every {
                 metrics.flush()?;

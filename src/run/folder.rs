@@ -86,6 +86,14 @@ impl RunFolder {
     }
 }
 
+/// The folder of a run.json; of several, the nearest that all of them lie in.
+pub fn above(archives: &[PathBuf]) -> PathBuf {
+    let folders: Vec<&Path> = archives.iter().map(|path| path.parent().unwrap_or(Path::new(""))).collect();
+    let Some(first) = folders.first() else { return PathBuf::new() };
+    let holds = |folder: &&Path| folders.iter().all(|other| other.starts_with(folder));
+    first.ancestors().find(holds).unwrap_or(Path::new("")).to_path_buf()
+}
+
 /// The run.json under `runs/` that was written last: what commands look at when they are not told.
 ///
 /// # Errors

@@ -44,7 +44,7 @@ impl Totals {
 }
 
 const HEADER: &str = "generation,num_elites,coverage,qd_score,norm_qd_score,obj_max,obj_mean,evaluations,\
-simulated,saved,saved_known_bodies,saved_early_stop,saved_shared_lives,unstable,seconds";
+simulated,saved,saved_known_bodies,saved_early_stop,saved_shared_lives,unstable,seconds,stage";
 
 /// Writes `metrics.csv`.
 pub struct Metrics {
@@ -64,18 +64,27 @@ impl Metrics {
         let number = |line: &&str| line.split(',').next().and_then(|first| first.parse::<u64>().ok());
         let whole = old.split_inclusive('\n').filter(|line| line.ends_with('\n')).map(str::trim_end);
         let kept = whole.filter(|line| number(line).is_some_and(|generation| generation < generations));
-        let mut text: String = std::iter::once(HEADER).chain(kept).collect::<Vec<_>>().join("\n");
+        // Lines of earlier versions have fewer columns.
+        let columns = |line: &str| line.matches(',').count();
+        let kept =
+            kept.map(|line| line.to_string() + &",".repeat(columns(HEADER).saturating_sub(columns(line))));
+        let mut text: String = std::iter::once(HEADER.to_string()).chain(kept).collect::<Vec<_>>().join("\n");
         text.push('\n');
         write_atomically(&path, text.as_bytes()).map_err(|error| Error::writing(&path, &error))?;
         let file = File::options().append(true).open(&path).map_err(|error| Error::writing(&path, &error))?;
         Ok(Metrics { path, file: BufWriter::new(file) })
     }
 
-    /// Adds the line of a generation (from 0).
+    /// Adds the line of a generation (from 0) in a stage (from 0; from 1 in the file).
     ///
     /// # Errors
     /// If it cannot be written.
-    pub fn write(&mut self, generation: u64, stats: &ArchiveStats, totals: &Totals) -> Result<(), Error> {
+    pub fn write(
+        &mut self,
+        (generation, stage): (u64, usize),
+        stats: &ArchiveStats,
+        totals: &Totals,
+    ) -> Result<(), Error> {
         let ArchiveStats { num_elites, coverage, qd_score, norm_qd_score, obj_max, obj_mean } = stats;
         let number = |value: &Option<f64>| value.map_or(String::new(), |value| value.to_string());
         let (obj_max, obj_mean) = (number(obj_max), number(obj_mean));
@@ -83,11 +92,12 @@ impl Metrics {
         writeln!(
             self.file,
             "{generation},{num_elites},{coverage},{qd_score},{norm_qd_score},{obj_max},{obj_mean},{evaluations},\
-             {simulated},{},{},{},{},{unstable},{seconds:.3}",
+             {simulated},{},{},{},{},{unstable},{seconds:.3},{}",
             totals.saved(),
             totals.saved_known_bodies,
             totals.saved_early_stop,
             totals.saved_shared_lives,
+            stage + 1,
         )
         .map_err(|error| Error::writing(&self.path, &error))
     }
@@ -116,7 +126,7 @@ mod tests {
         let mut metrics = Metrics::open(folder, from).unwrap();
         let stats = Archive::<()>::new().stats(90, 0.0);
         let totals = Totals { evaluations, ..Totals::default() };
-        (from..to).for_each(|generation| metrics.write(generation, &stats, &totals).unwrap());
+        (from..to).for_each(|generation| metrics.write((generation, 0), &stats, &totals).unwrap());
         metrics.flush().unwrap();
     }
 
@@ -127,7 +137,7 @@ mod tests {
         let lines = lines(folder.path());
         let columns = HEADER.split(',').count();
         assert!(lines.len() == 3 && lines.iter().all(|line| line.split(',').count() == columns), "{lines:?}");
-        assert_eq!(lines[1], "0,0,0,0,0,,,7,0,0,0,0,0,0,0.000");
+        assert_eq!(lines[1], "0,0,0,0,0,,,7,0,0,0,0,0,0,0.000,1");
     }
 
     #[test]
@@ -140,6 +150,16 @@ mod tests {
             .map(|line| line.split(',').nth(7).unwrap().to_string())
             .collect();
         assert_eq!(evaluations, ["1", "1", "1", "2", "2", "2"]);
+    }
+
+    #[test]
+    fn lines_of_earlier_versions_get_the_columns_they_have_not() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("metrics.csv");
+        std::fs::write(&path, "generation,num_elites,seconds\n0,5,0.1\n").unwrap();
+        write(folder.path(), 1, 2, 1);
+        let columns: Vec<usize> = lines(folder.path()).iter().map(|line| line.split(',').count()).collect();
+        assert_eq!(columns, [16; 3]);
     }
 
     #[test]

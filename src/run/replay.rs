@@ -1,7 +1,6 @@
 //! `morphcog replay`: record a robot's life, for the pictures.
 
-use super::archive::RunFile;
-use super::robots::Selection;
+use super::robots::{Selection, Source};
 use super::training::{ImageRef, load_dataset, see};
 use super::{Config, Error, folder, gallery};
 use crate::body::Body;
@@ -162,10 +161,11 @@ fn find(options: &Options) -> Result<Found, Error> {
         Some(path) => path.clone(),
         None => folder::newest_run()?,
     };
-    let run = RunFile::read(&archive)?;
-    let robots = Selection::Ids(vec![options.robot.clone()]).physical(options.physical_only, &archive);
-    let robots = robots.of(&run, 0).map_err(|error| error.within(&archive.display().to_string()))?;
-    let robot = robots[0];
+    let source = Source::read(&archive)?;
+    let robots = Selection::Ids(vec![options.robot.clone()]).physical(options.physical_only);
+    let robots = robots.of(std::slice::from_ref(&source), 0);
+    let robots = robots.map_err(|error| error.within(&archive.display().to_string()))?;
+    let (robot, run) = (robots[0].robot, &source.run);
     let about = vec![
         ("Robot".to_string(), robot.id.clone()),
         ("From".to_string(), format!("{}, seed {}", run.name, run.config.seed)),
@@ -180,6 +180,6 @@ fn find(options: &Options) -> Result<Found, Error> {
         training: run.training_images.clone(),
         about,
         published: false,
-        config: run.config,
+        config: run.config.clone(),
     })
 }

@@ -2,18 +2,25 @@
 
 use super::archive::{Robot, RunFile};
 use super::eval::Options;
+use super::robots::Source;
+use super::setting::{RunRef, Setting};
+use super::statistics::{bootstrap, standard_deviation, wilson};
 use super::training::ImageRef;
 use super::validation::Validated;
-use crate::base::random::{Purpose, stream};
+use super::{Error, toml_text};
 use crate::task::direction::Assignment;
 use crate::task::grouping::{Group, Split};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
+use std::path::Path;
 
 /// What `eval.json` calls itself.
 pub const FORMAT: &str = "morphcog-eval";
 /// Version of its schema.
 pub const FORMAT_VERSION: u32 = 1;
+
+/// Its name beside `run.json`.
+pub const EVAL_JSON: &str = "eval.json";
 
 /// The content of `eval.json`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -24,10 +31,16 @@ pub struct EvalFile {
     pub format_version: u32,
     /// Version of morphcog that wrote it.
     pub program_version: String,
-    /// Name and seed of the run the robots are from.
+    /// Name of the (first) run the robots are from.
     pub run: String,
     /// Seed of that run.
     pub run_seed: u64,
+    /// All runs the robots are from.
+    #[serde(default)]
+    pub runs: Vec<RunRef>,
+    /// What robots were shown.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub setting: Option<Setting>,
     /// How the robots were selected.
     pub selected: String,
     /// Name of the dataset.
@@ -87,6 +100,9 @@ pub struct Mean {
 pub struct RobotReport {
     /// Its id.
     pub id: String,
+    /// Its run, by its place in `runs`.
+    #[serde(default)]
+    pub run: usize,
     /// Its task.
     pub task: String,
     /// Its fitness on the training images, voxel lengths.
@@ -129,48 +145,6 @@ pub(super) struct Trial<'a> {
     pub threshold: f64,
 }
 
-/// 95 % Wilson score interval of a share (Wilson 1927).
-pub fn wilson(right: usize, total: usize) -> [f64; 2] {
-    const Z: f64 = 1.959_963_984_540_054;
-    if total == 0 {
-        return [0.0, 1.0];
-    }
-    let n = total as f64;
-    let share = right as f64 / n;
-    let centre = share + Z * Z / (2.0 * n);
-    let spread = Z * (share * (1.0 - share) / n + Z * Z / (4.0 * n * n)).sqrt();
-    let scale = 1.0 + Z * Z / n;
-    // With none or all right the bounds are exactly 0 and 1, which rounding would miss.
-    let low = if right == 0 { 0.0 } else { ((centre - spread) / scale).max(0.0) };
-    let high = if right == total { 1.0 } else { ((centre + spread) / scale).min(1.0) };
-    [low, high]
-}
-
-/// Of a sample; none of fewer than two values.
-fn standard_deviation(values: &[f64]) -> Option<f64> {
-    let n = values.len() as f64;
-    let mean = values.iter().sum::<f64>() / n;
-    let squares = values.iter().map(|value| (value - mean) * (value - mean)).sum::<f64>();
-    (values.len() > 1).then(|| (squares / (n - 1.0)).sqrt())
-}
-
-/// 95 % interval of the mean: percentiles of the means of resamples (Efron 1979), the same every time. None of fewer than two
-/// values.
-fn bootstrap(values: &[f64]) -> Option<[f64; 2]> {
-    const RESAMPLES: usize = 10_000;
-    if values.len() < 2 {
-        return None;
-    }
-    let mut rng = stream(0, Purpose::Bootstrap, 0, 0);
-    let mut mean = |_| {
-        let sum: f64 = (0..values.len()).map(|_| values[rng.below(values.len())]).sum();
-        sum / values.len() as f64
-    };
-    let mut means: Vec<f64> = (0..RESAMPLES).map(&mut mean).collect();
-    means.sort_by(f64::total_cmp);
-    Some([means[RESAMPLES * 25 / 1000], means[RESAMPLES * 975 / 1000 - 1]])
-}
-
 impl RobotReport {
     pub(super) fn new(trial: &Trial, displacements: Vec<Option<f64>>, simulated: usize) -> Self {
         let Trial { run, robot, split, images, threshold } = *trial;
@@ -200,6 +174,7 @@ impl RobotReport {
         let count = images.len().max(1) as f64;
         RobotReport {
             id: robot.id.clone(),
+            run: 0,
             task: robot.task.clone(),
             objective: robot.objective,
             first_group_walks: format!("{:?}", assignment.expected(Group::A)).to_lowercase(),
@@ -228,20 +203,23 @@ impl RobotReport {
 
 impl EvalFile {
     pub(super) fn new(
-        run: &RunFile,
+        sources: &[Source],
         options: &Options,
         control_steps: u32,
         images: &[ImageRef],
         test_sha256: String,
     ) -> Self {
+        let first = sources.first().map(|source| &source.run);
         EvalFile {
             format: FORMAT.to_string(),
             format_version: FORMAT_VERSION,
             program_version: env!("CARGO_PKG_VERSION").to_string(),
-            run: run.name.clone(),
-            run_seed: run.config.seed,
+            run: first.map_or(String::new(), |run| run.name.clone()),
+            run_seed: first.map_or(0, |run| run.config.seed),
+            runs: sources.iter().map(|source| RunRef::new(&source.run)).collect(),
+            setting: first.map(Setting::new),
             selected: options.robots.describe(),
-            dataset: run.dataset.name.clone(),
+            dataset: first.map_or(String::new(), |run| run.dataset.name.clone()),
             test_sha256,
             seed: options.seed,
             control_steps,
@@ -272,6 +250,15 @@ impl EvalFile {
         self.means = means.collect();
     }
 
+    /// Reads `eval.json`.
+    ///
+    /// # Errors
+    /// What is wrong with the file, with its line and key.
+    pub fn read(path: &Path) -> Result<Self, Error> {
+        let text = std::fs::read_to_string(path).map_err(|error| Error::reading(path, &error))?;
+        toml_text::read_versioned(&text, &path.display().to_string(), FORMAT, FORMAT_VERSION)
+    }
+
     /// Its text, one line.
     pub fn to_json(&self) -> String {
         // Numbers are finite, keys are text or whole numbers: JSON has all of it.
@@ -288,6 +275,7 @@ impl EvalFile {
         let mut writer = csv::Writer::from_writer(Vec::new());
         let mut header: Vec<String> = [
             "id",
+            "run_seed",
             "task",
             "objective",
             "first_group_walks",
@@ -304,7 +292,9 @@ impl EvalFile {
         header.extend(["mean_distance", "not_moved", "unstable", "simulated"].map(str::to_string));
         writer.write_record(&header)?;
         for robot in &self.robots {
-            let mut row = vec![robot.id.clone(), robot.task.clone(), robot.objective.to_string()];
+            let seed = self.runs.get(robot.run).map_or(self.run_seed, |run| run.seed);
+            let mut row = vec![robot.id.clone(), seed.to_string()];
+            row.extend([robot.task.clone(), robot.objective.to_string()]);
             row.extend([robot.first_group_walks.clone(), robot.right.to_string(), robot.images.to_string()]);
             let [low, high] = robot.interval;
             row.extend([robot.accuracy, low, high, robot.balanced_accuracy].map(|v| v.to_string()));
@@ -314,31 +304,5 @@ impl EvalFile {
             writer.write_record(&row)?;
         }
         writer.into_inner().map_err(|error| csv::Error::from(error.into_error()))
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::{bootstrap, standard_deviation, wilson};
-
-    #[test]
-    fn means_have_a_spread_and_an_interval_that_holds_them() {
-        let values = [0.5, 0.6, 0.7, 0.8, 0.9];
-        // √(0.1/4)
-        assert!((standard_deviation(&values).unwrap() - 0.158_113_883).abs() < 1e-9);
-        let [low, high] = bootstrap(&values).unwrap();
-        // The normal approximation: 0.7 ± 1.96·0.1414/√5.
-        assert!((low - 0.576).abs() < 0.02 && (high - 0.824).abs() < 0.02, "{low} {high}");
-        assert_eq!(bootstrap(&values), bootstrap(&values));
-        assert_eq!((standard_deviation(&[0.5]), bootstrap(&[0.5])), (None, None));
-    }
-
-    #[test]
-    fn the_wilson_interval_is_the_textbooks() {
-        // 8 of 10: 0.4902 to 0.9433 (Brown, Cai & DasGupta 2001 use the same formula).
-        let [low, high] = wilson(8, 10);
-        assert!((low - 0.4902).abs() < 5e-5 && (high - 0.9433).abs() < 5e-5, "{low} {high}");
-        assert!(wilson(0, 50)[0] < 1e-15 && wilson(50, 50)[1] > 1.0 - 1e-15);
-        assert_eq!(wilson(0, 0), [0.0, 1.0]);
     }
 }

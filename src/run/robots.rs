@@ -1,4 +1,4 @@
-//! Choosing robots of a run: all, the fittest, some at random, or by id.
+//! Choosing robots of one run or several: all, the fittest, some at random, or by id.
 
 use super::Error;
 use super::archive::{Robot, RunFile};
@@ -7,26 +7,49 @@ use crate::base::random::{Purpose, stream};
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-/// Which robots of a run.
+/// A run, and where it lies.
+#[derive(Clone, Debug)]
+pub struct Source {
+    /// Its run.json; what else is known of its robots lies beside it.
+    pub path: PathBuf,
+    /// Its content.
+    pub run: RunFile,
+}
+
+impl Source {
+    /// Reads a run.json.
+    ///
+    /// # Errors
+    /// As [`RunFile::read`].
+    pub fn read(path: &Path) -> Result<Self, Error> {
+        Ok(Source { path: path.to_path_buf(), run: RunFile::read(path)? })
+    }
+}
+
+/// A robot, and the run it is of, by its place among several.
+#[derive(Clone, Copy, Debug)]
+pub struct Chosen<'a> {
+    /// Which of the runs.
+    pub source: usize,
+    /// The robot.
+    pub robot: &'a Robot,
+}
+
+/// Which robots of one run, or of several together.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Selection {
     /// All of them, fittest first.
     All,
-    /// The so many fittest.
+    /// The so many fittest of each task.
     Top(usize),
-    /// So many, drawn at random.
+    /// So many of each task, drawn at random.
     Random(usize),
-    /// The so many best of each task on validation images; only `eval` shows those.
+    /// The so many best of each run and task on validation images; only `eval` shows those.
     Validated(usize),
     /// Those with these ids, or unique beginnings of ids; "best" is the fittest.
     Ids(Vec<String>),
     /// So selected, but from those robots only that an audit found physical.
-    Physical {
-        /// The selection among them.
-        of: Box<Selection>,
-        /// The audit's file.
-        audit: PathBuf,
-    },
+    Physical(Box<Selection>),
 }
 
 impl FromStr for Selection {
@@ -52,20 +75,17 @@ impl FromStr for Selection {
 }
 
 impl Selection {
-    /// The same among the robots only that the audit beside an archive found physical, if `only` says so.
+    /// The same among the robots only that the audits beside the runs found physical, if `only` says so.
     #[must_use]
-    pub fn physical(self, only: bool, archive: &Path) -> Self {
-        match only {
-            true => Selection::Physical { of: Box::new(self), audit: archive.with_file_name(AUDIT_JSON) },
-            false => self,
-        }
+    pub fn physical(self, only: bool) -> Self {
+        if only { Selection::Physical(Box::new(self)) } else { self }
     }
 
     /// How many of the selected are to be chosen by validation, if that is asked for.
     pub fn validated(&self) -> Option<usize> {
         match self {
             Selection::Validated(count) => Some(*count),
-            Selection::Physical { of, .. } => of.validated(),
+            Selection::Physical(of) => of.validated(),
             _ => None,
         }
     }
@@ -74,44 +94,60 @@ impl Selection {
     pub fn describe(&self) -> String {
         match self {
             Selection::All => "all elites".to_string(),
-            Selection::Top(count) => format!("the {count} fittest on the training images"),
-            Selection::Random(count) => format!("{count} elites drawn at random"),
-            Selection::Validated(count) => format!("the {count} best of each task on validation images"),
+            Selection::Top(count) => format!("the {count} fittest of each task on the training images"),
+            Selection::Random(count) => format!("{count} elites of each task, drawn at random"),
+            Selection::Validated(count) => {
+                format!("the {count} best of each run and task on validation images")
+            }
             Selection::Ids(ids) => format!("chosen by id: {}", ids.join(", ")),
-            Selection::Physical { of, .. } => format!("{}, of those audited as physical", of.describe()),
+            Selection::Physical(of) => format!("{}, of those audited as physical", of.describe()),
         }
     }
 
-    /// The robots, fittest first where no order is given; `seed` is for the random ones. For a validation: all that
-    /// are to be looked at.
+    /// The robots; where no order is given: task by task, the fittest first. `seed` is for the random ones. For a validation:
+    /// all that are to be looked at.
     ///
     /// # Errors
     /// If there is no robot, or no single one, of an id; if only physical ones are asked for, and they are not known.
-    pub fn of<'a>(&self, run: &'a RunFile, seed: u64) -> Result<Vec<&'a Robot>, Error> {
-        let mut fittest: Vec<&Robot> = run.elites.iter().collect();
-        // Stable: equally fit ones stay in the order of their cells.
-        fittest.sort_by(|a, b| b.objective.total_cmp(&a.objective));
+    pub fn of<'a>(&self, sources: &'a [Source], seed: u64) -> Result<Vec<Chosen<'a>>, Error> {
+        let robots = |(source, from): (usize, &'a Source)| {
+            from.run.elites.iter().map(move |robot| Chosen { source, robot })
+        };
+        let mut fittest: Vec<Chosen> = sources.iter().enumerate().flat_map(robots).collect();
+        // Stable: equally fit ones stay in the order of their runs and cells.
+        fittest.sort_by(|a, b| b.robot.objective.total_cmp(&a.robot.objective));
         if fittest.is_empty() {
-            return Err(Error::input(format!("{}: the archive is empty", run.name)));
+            let names: Vec<&str> = sources.iter().map(|source| source.run.name.as_str()).collect();
+            return Err(Error::input(format!("{}: the archive is empty", names.join(", "))));
         }
-        self.among(fittest, run, seed)
+        self.among(fittest, sources, seed)
     }
 
     fn among<'a>(
         &self,
-        fittest: Vec<&'a Robot>,
-        run: &'a RunFile,
+        fittest: Vec<Chosen<'a>>,
+        sources: &'a [Source],
         seed: u64,
-    ) -> Result<Vec<&'a Robot>, Error> {
+    ) -> Result<Vec<Chosen<'a>>, Error> {
+        let by_task = || {
+            let tasks = sources.first().map_or(&[][..], |source| &source.run.dimensions.tasks);
+            let of = |task: &String| fittest.iter().filter(|c| c.robot.task == *task).copied().collect();
+            tasks.iter().map(of).collect::<Vec<Vec<Chosen>>>()
+        };
         match self {
             Selection::All | Selection::Validated(_) => Ok(fittest),
-            Selection::Top(count) => Ok(fittest.into_iter().take(*count).collect()),
+            Selection::Top(count) => {
+                Ok(by_task().into_iter().flat_map(|of_task| of_task.into_iter().take(*count)).collect())
+            }
             Selection::Random(count) => {
-                let picked = stream(seed, Purpose::Robots, 0, 0).sample(fittest.len(), *count);
-                Ok(picked.into_iter().map(|index| fittest[index]).collect())
+                let draw = |(number, of_task): (u64, Vec<Chosen<'a>>)| {
+                    let picked = stream(seed, Purpose::Robots, 0, number).sample(of_task.len(), *count);
+                    picked.into_iter().map(|index| of_task[index]).collect::<Vec<_>>()
+                };
+                Ok((0..).zip(by_task()).flat_map(draw).collect())
             }
             Selection::Ids(ids) => ids.iter().map(|id| by_id(&fittest, id)).collect(),
-            Selection::Physical { of, audit } => of.among(physical(of, audit, fittest, run)?, run, seed),
+            Selection::Physical(of) => of.among(physical(of, fittest, sources)?, sources, seed),
         }
     }
 }
@@ -119,12 +155,15 @@ impl Selection {
 /// The physical ones, fittest first; those that are named must be among them.
 fn physical<'a>(
     selection: &Selection,
-    path: &Path,
-    fittest: Vec<&'a Robot>,
-    run: &RunFile,
-) -> Result<Vec<&'a Robot>, Error> {
-    let audit = AuditFile::of_run(run, path)?;
-    let name = path.display();
+    fittest: Vec<Chosen<'a>>,
+    sources: &'a [Source],
+) -> Result<Vec<Chosen<'a>>, Error> {
+    let path = |source: &Source| source.path.with_file_name(AUDIT_JSON);
+    let audits: Result<Vec<AuditFile>, Error> =
+        sources.iter().map(|source| AuditFile::of_run(&source.run, &path(source))).collect();
+    let audits = audits?;
+    let name = |chosen: &Chosen| path(&sources[chosen.source]).display().to_string();
+    let found = |chosen: &Chosen| audits[chosen.source].robot(&chosen.robot.id);
     let hint = "morphcog audit goes on with the robots that are missing; give it the same --archive";
     let mut named = Vec::new();
     if let Selection::Ids(ids) = selection {
@@ -134,40 +173,54 @@ fn physical<'a>(
     }
     // Who names robots needs to know of those only; of a part of an archive nothing can be drawn fairly.
     let is_named = matches!(selection, Selection::Ids(ids) if ids.len() == named.len());
-    for robot in if is_named { &named } else { &fittest } {
-        if audit.robot(&robot.id).is_none() {
-            let (known, all) = (audit.robots.len(), audit.elites);
-            let text = format!("{name}: robot {} has not been audited ({known} of {all} have)", robot.id);
+    for chosen in if is_named { &named } else { &fittest } {
+        if found(chosen).is_none() {
+            let audit = &audits[chosen.source];
+            let (name, known, all) = (name(chosen), audit.robots.len(), audit.elites);
+            let id = &chosen.robot.id;
+            let text = format!("{name}: robot {id} has not been audited ({known} of {all} have)");
             return Err(Error::input(text).hint(hint.to_string()));
         }
     }
-    if let Some(found) = named.iter().filter_map(|robot| audit.robot(&robot.id)).find(|r| !r.is_physical()) {
-        let text = format!("{name}: robot {} is not physical: {}", found.id, found.conclusion());
-        return Err(Error::input(text).hint("leave --physical-only away to take it all the same".to_string()));
+    for chosen in &named {
+        if let Some(found) = found(chosen).filter(|found| !found.is_physical()) {
+            let text =
+                format!("{}: robot {} is not physical: {}", name(chosen), found.id, found.conclusion());
+            return Err(
+                Error::input(text).hint("leave --physical-only away to take it all the same".to_string())
+            );
+        }
     }
-    let physical: Vec<&Robot> =
-        fittest.into_iter().filter(|robot| audit.robot(&robot.id).is_some_and(|r| r.is_physical())).collect();
+    let physical: Vec<Chosen> =
+        fittest.iter().filter(|chosen| found(chosen).is_some_and(|r| r.is_physical())).copied().collect();
     if physical.is_empty() {
-        return Err(Error::input(format!("{name}: none of {} robots is physical", audit.robots.len())));
+        let names: Vec<String> = sources.iter().map(|source| path(source).display().to_string()).collect();
+        return Err(Error::input(format!(
+            "{}: none of {} robots is physical",
+            names.join(", "),
+            fittest.len()
+        )));
     }
     Ok(physical)
 }
 
 /// The robot of an id, or of the unique beginning of one; "best" is the first.
-fn by_id<'a>(robots: &[&'a Robot], id: &str) -> Result<&'a Robot, Error> {
+fn by_id<'a>(robots: &[Chosen<'a>], id: &str) -> Result<Chosen<'a>, Error> {
     if id == "best" {
         return Ok(robots[0]);
     }
     let lower = id.to_ascii_lowercase();
-    let found: Vec<&&Robot> =
-        robots.iter().filter(|robot| !id.is_empty() && robot.id.starts_with(&lower)).collect();
+    let found: Vec<Chosen> = robots
+        .iter()
+        .filter(|chosen| !id.is_empty() && chosen.robot.id.starts_with(&lower))
+        .copied()
+        .collect();
     let list =
-        |robots: &[&&Robot]| robots.iter().take(5).map(|r| r.id.as_str()).collect::<Vec<_>>().join(", ");
+        |some: &[Chosen]| some.iter().take(5).map(|c| c.robot.id.as_str()).collect::<Vec<_>>().join(", ");
     match found.as_slice() {
-        [robot] => Ok(robot),
+        [chosen] => Ok(*chosen),
         [] => {
-            let some: Vec<&&Robot> = robots.iter().collect();
-            let hint = format!("there are {} robots, the fittest are {}", robots.len(), list(&some));
+            let hint = format!("there are {} robots, the fittest are {}", robots.len(), list(robots));
             Err(Error::input(format!("there is no robot {id}")).hint(hint))
         }
         several => {
@@ -182,14 +235,40 @@ mod tests {
     use super::*;
     use crate::run::samples;
 
-    fn run() -> RunFile {
-        samples::run(&[("aa10", 1.0), ("ab20", 3.0), ("b300", 2.0), ("b3ff", 3.0), ("c400", -1.0)])
+    fn source(robots: &[(&str, f64)]) -> Source {
+        Source { path: PathBuf::from("run.json"), run: samples::run(robots) }
+    }
+
+    fn of(text: &str, seed: u64, sources: &[Source]) -> Result<Vec<String>, Error> {
+        let robots = Selection::from_str(text).unwrap().of(sources, seed)?;
+        Ok(robots.into_iter().map(|chosen| chosen.robot.id.clone()).collect())
     }
 
     fn selected(text: &str, seed: u64) -> Result<Vec<String>, Error> {
-        let run = run();
-        let robots = Selection::from_str(text).unwrap().of(&run, seed)?;
-        Ok(robots.into_iter().map(|robot| robot.id.clone()).collect())
+        let run = source(&[("aa10", 1.0), ("ab20", 3.0), ("b300", 2.0), ("b3ff", 3.0), ("c400", -1.0)]);
+        of(text, seed, &[run])
+    }
+
+    #[test]
+    fn several_runs_are_one_crowd() {
+        let runs = [source(&[("aa10", 1.0), ("ab20", 3.0)]), source(&[("b300", 2.0), ("b3ff", 4.0)])];
+        assert_eq!(of("top:3", 1, &runs).unwrap(), ["b3ff", "ab20", "b300"]);
+        assert_eq!(of("ab,b30", 1, &runs).unwrap(), ["ab20", "b300"]);
+        assert_eq!(of("random:9", 1, &runs).unwrap().len(), 4);
+        let chosen = Selection::All.of(&runs, 1).unwrap();
+        assert_eq!(chosen.iter().map(|c| c.source).collect::<Vec<_>>(), [1, 0, 1, 0]);
+    }
+
+    #[test]
+    fn so_many_are_so_many_of_each_task() {
+        let mut run = source(&[("aa10", 1.0), ("ab20", 3.0), ("b300", 2.0), ("b3ff", 4.0), ("c400", 5.0)]);
+        run.run.dimensions.tasks = vec!["0|1".to_string(), "1|0".to_string()];
+        for place in [1, 3] {
+            run.run.elites[place].task = "1|0".to_string();
+        }
+        let runs = [run];
+        assert_eq!(of("top:2", 1, &runs).unwrap(), ["c400", "b300", "b3ff", "ab20"]);
+        assert_eq!(of("random:2", 1, &runs).unwrap().len(), 4);
     }
 
     #[test]
@@ -229,7 +308,7 @@ mod tests {
         for wrong in ["top:0", "top:", "top:-1", "random:x", "random:0", "worst:3", "top:1:2"] {
             assert!(Selection::from_str(wrong).is_err(), "{wrong}");
         }
-        let empty = samples::run(&[]);
+        let empty = [source(&[])];
         assert!(Selection::All.of(&empty, 1).unwrap_err().message.contains("empty"));
     }
 }

@@ -3,6 +3,7 @@
 use super::Error;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
+use std::path::Path;
 
 /// How a config is written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -38,6 +39,48 @@ pub(super) fn read_json<T: DeserializeOwned>(text: &str, name: &str) -> Result<T
     })?;
     let tail = reader.end().map_err(|error| refused(name, Some(error.line()), "", "text after the end"));
     tail.map(|()| value)
+}
+
+/// Reads a JSON file of ours of a `format`, not of a version newer than `newest`.
+pub(super) fn read_versioned<T: DeserializeOwned>(
+    text: &str,
+    name: &str,
+    format: &str,
+    newest: u32,
+) -> Result<T, Error> {
+    /// What every version has, to tell a newer or foreign file before its details are refused.
+    #[derive(serde::Deserialize)]
+    struct Head {
+        format: Option<String>,
+        format_version: Option<u32>,
+    }
+    let head: Head = read_json(text, name)?;
+    if head.format.as_deref() != Some(format) || head.format_version.is_none_or(|version| version > newest) {
+        let text = format!("{name}: expected \"format\": \"{format}\", \"format_version\": {newest}");
+        return Err(Error::input(text));
+    }
+    read_json(text, name)
+}
+
+/// Reads settings, a JSON file if its name ends in `.json`, else TOML; keys that are not in it have their defaults. Then sets
+/// `overrides` (`key=value`).
+pub(super) fn load<T: Serialize + DeserializeOwned + Default>(
+    path: Option<&Path>,
+    overrides: &[String],
+) -> Result<T, Error> {
+    let mut settings = match path {
+        None => T::default(),
+        Some(path) => {
+            let text = std::fs::read_to_string(path).map_err(|error| Error::reading(path, &error))?;
+            let is_json = path.extension().is_some_and(|ending| ending == "json");
+            let format = if is_json { Format::Json } else { Format::Toml };
+            read(&text, format, &path.display().to_string())?
+        }
+    };
+    for assignment in overrides {
+        settings = set(&settings, assignment)?;
+    }
+    Ok(settings)
 }
 
 fn refused(name: &str, line: Option<usize>, key: &str, message: &str) -> Error {

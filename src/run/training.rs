@@ -1,5 +1,6 @@
 //! [`Training`]: the images a run evolves on, as its robots see them.
 
+use super::config::{BodyConfig, DataConfig};
 use super::curriculum::Period;
 use super::{Config, Error};
 use crate::base::Grid;
@@ -7,7 +8,7 @@ use crate::task::dataset::{BUILTIN, Dataset, DatasetError, Split};
 use crate::task::files::places;
 use crate::task::grouping::Grouping;
 use crate::task::score::Answer;
-use crate::task::stimulus::stimulus;
+use crate::task::stimulus::{StimulusParams, stimulus};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -45,12 +46,20 @@ pub struct Training {
 /// # Errors
 /// What is missing or broken, where it was looked for and what to do.
 pub fn load_dataset(config: &Config, data: Option<&Path>, wanted: &[Split]) -> Result<Dataset, Error> {
+    load_data(&config.data, data, wanted)
+}
+
+/// Loads the dataset of a section `[data]`.
+///
+/// # Errors
+/// As [`load_dataset`].
+pub fn load_data(config: &DataConfig, data: Option<&Path>, wanted: &[Split]) -> Result<Dataset, Error> {
     let refuse = |error: DatasetError| Error::input(error.to_string());
-    if config.data.dataset == BUILTIN {
-        return Dataset::builtin(config.data.builtin.clone(), wanted).map_err(refuse);
+    if config.dataset == BUILTIN {
+        return Dataset::builtin(config.builtin.clone(), wanted).map_err(refuse);
     }
-    let given = places(data, std::env::var_os("MORPHCOG_DATA"), config.data.dir.as_deref());
-    Dataset::load(&config.data.dataset, &given, wanted).map_err(refuse)
+    let given = places(data, std::env::var_os("MORPHCOG_DATA"), config.dir.as_deref());
+    Dataset::load(&config.dataset, &given, wanted).map_err(refuse)
 }
 
 /// What a robot of a config sees of an image.
@@ -58,9 +67,22 @@ pub fn load_dataset(config: &Config, data: Option<&Path>, wanted: &[Split]) -> R
 /// # Errors
 /// If the image does not go with the body's size.
 pub fn see(config: &Config, dataset: &Dataset, split: Split, index: usize) -> Result<Grid<f64>, Error> {
+    seen(&config.body, &config.stimulus, dataset, split, index)
+}
+
+/// What a robot of this size sees of an image.
+///
+/// # Errors
+/// If the image does not go with the body's size.
+pub fn seen(
+    &BodyConfig { height, width, .. }: &BodyConfig,
+    params: &StimulusParams,
+    dataset: &Dataset,
+    split: Split,
+    index: usize,
+) -> Result<Grid<f64>, Error> {
     let image = dataset.image(split, index).map_err(|error| Error::input(error.to_string()))?;
-    let (height, width) = (config.body.height, config.body.width);
-    stimulus(&image, height, width, &config.stimulus)
+    stimulus(&image, height, width, params)
         .map_err(|error| Error::input(format!("stimulus.reduction: {error}")))
 }
 

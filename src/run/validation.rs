@@ -6,9 +6,10 @@
 
 use super::archive::{Robot, RunFile};
 use super::audit_file::fingerprint;
-use super::eval::{Options, Walker};
+use super::eval::{self, Observer, Walker};
 use super::report::{RobotReport, Trial};
-use super::training::{ImageRef, Training, see};
+use super::robots::{Selection, Source};
+use super::training::{ImageRef, Training, load_dataset, see};
 use super::{Config, Error};
 use crate::base::files::write_atomically;
 use crate::base::hash::sha256_hex;
@@ -17,6 +18,8 @@ use crate::task::dataset::{Dataset, Split};
 use crate::task::grouping::{self, Grouping};
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, AtomicU64};
 
 /// Its name beside `run.json`.
 pub const VALIDATION_JSON: &str = "validation.json";
@@ -29,6 +32,40 @@ const ROUNDS: [(f64, f64); 3] = [(0.1, 1.0), (0.3, 1.0 / 3.0), (1.0, 0.1)];
 
 /// Least number of validation images.
 pub const LEAST: usize = 40;
+
+/// Validation at a run's end: section `[validation]`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct ValidationConfig {
+    /// Images in all, evenly divided between the classes; none of them is trained on. Default 400.
+    pub images: usize,
+    /// Robots of each task that are chosen by them at the run's end. Default 0: nothing is done then.
+    pub best: usize,
+}
+
+impl Default for ValidationConfig {
+    fn default() -> Self {
+        ValidationConfig { images: 400, best: 0 }
+    }
+}
+
+impl ValidationConfig {
+    /// Whether a file needs not say it.
+    pub(super) fn is_default(&self) -> bool {
+        *self == ValidationConfig::default()
+    }
+}
+
+/// How robots are to be chosen.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Wanted {
+    /// So many of each task.
+    pub count: usize,
+    /// Images in all.
+    pub images: usize,
+    /// Displacements up to this count as wrong \[voxel lengths\].
+    pub threshold: f64,
+}
 
 /// How a robot did on all validation images.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -100,21 +137,59 @@ pub fn images(run: &RunFile, dataset: &Dataset, count: usize) -> Result<Vec<Imag
     Ok(turns.take(count).collect())
 }
 
-/// The `count` best of each task among some robots, best first, with how they did; `None` if stopped.
+/// What to validate at a run's end.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// The run.json.
+    pub archive: PathBuf,
+    /// Where the data are, if the command line says.
+    pub data: Option<PathBuf>,
+    /// Number of threads; `None`: one per core.
+    pub threads: Option<usize>,
+}
+
+/// Chooses the robots that a run's section `[validation]` asks for, as `eval` does it, and keeps them beside the run; `None`
+/// if stopped.
+///
+/// # Errors
+/// What is wrong with run or data, or that there are not enough images.
+pub fn validate(
+    options: &Options,
+    stop: &AtomicBool,
+    observer: &dyn Observer,
+) -> Result<Option<Vec<Validated>>, Error> {
+    let source = Source::read(&options.archive)?;
+    let config = &source.run.config;
+    let ValidationConfig { images, best: count } = config.validation;
+    let grouping = config.grouping()?;
+    let dataset = load_dataset(config, options.data.as_deref(), &[Split::Train])?;
+    let pool = eval::pool(options.threads)?;
+    let control_steps = eval::control_steps(config, eval::CYCLES);
+    let walker = Walker { config, control_steps, pool: &pool, stop, observer, done: AtomicU64::new(0) };
+    let chosen = Selection::Validated(count).of(std::slice::from_ref(&source), 0)?;
+    let skilled = |robot: &&Robot| eval::task_of(&grouping, robot).is_some();
+    let robots = chosen.iter().map(|chosen| chosen.robot).filter(skilled).collect();
+    let wanted = Wanted { count, images, threshold: eval::THRESHOLD };
+    let best = best(&source, &dataset, &grouping, robots, &wanted, &walker)?;
+    Ok(best.map(|best| best.into_iter().map(|(_, validated)| validated).collect()))
+}
+
+/// The best of each task among some robots of a run, best first, with how they did; `None` if stopped.
 ///
 /// # Errors
 /// If there are not enough images, or the result cannot be kept.
 pub(super) fn best<'a>(
-    run: &RunFile,
+    source: &'a Source,
     dataset: &Dataset,
     grouping: &Grouping,
-    (robots, count): (Vec<&'a Robot>, usize),
-    options: &Options,
+    robots: Vec<&'a Robot>,
+    wanted: &Wanted,
     walker: &Walker,
 ) -> Result<Option<Vec<(&'a Robot, Validated)>>, Error> {
-    let images = images(run, dataset, options.validation)?;
-    let key = key(run, &robots, count, &images, options);
-    let path = options.archive.with_file_name(VALIDATION_JSON);
+    let run = &source.run;
+    let images = images(run, dataset, wanted.images)?;
+    let key = key(run, &robots, wanted, &images, walker.control_steps);
+    let path = source.path.with_file_name(VALIDATION_JSON);
     let known = std::fs::read_to_string(&path)
         .ok()
         .and_then(|text| serde_json::from_str::<ValidationFile>(&text).ok());
@@ -125,7 +200,7 @@ pub(super) fn best<'a>(
     if let Some(file) = known.filter(|file| file.key == key) {
         return Ok(Some(file.robots.iter().filter_map(by_id).collect()));
     }
-    let Some(chosen) = screened(run, dataset, grouping, (&robots, count), &images, options, walker)? else {
+    let Some(chosen) = screened(run, dataset, grouping, &robots, wanted, &images, walker)? else {
         return Ok(None);
     };
     let file = ValidationFile { format: FORMAT.0.to_string(), format_version: FORMAT.1, key, robots: chosen };
@@ -135,11 +210,13 @@ pub(super) fn best<'a>(
 }
 
 /// Of all that the result depends on.
-fn key(run: &RunFile, robots: &[&Robot], count: usize, images: &[ImageRef], options: &Options) -> String {
+fn key(run: &RunFile, robots: &[&Robot], wanted: &Wanted, images: &[ImageRef], control_steps: u32) -> String {
     let ids: Vec<&str> = robots.iter().map(|robot| robot.id.as_str()).collect();
     let images: Vec<usize> = images.iter().map(|image| image.index).collect();
-    let Options { threshold, cycles, .. } = options;
-    sha256_hex(format!("{} {ids:?} {count} {images:?} {threshold} {cycles}", fingerprint(run)).as_bytes())
+    let Wanted { count, threshold, .. } = wanted;
+    sha256_hex(
+        format!("{} {ids:?} {count} {images:?} {threshold} {control_steps}", fingerprint(run)).as_bytes(),
+    )
 }
 
 /// Robots and images of each round, for some robots of a task of which `count` are wanted.
@@ -154,9 +231,9 @@ fn screened(
     run: &RunFile,
     dataset: &Dataset,
     grouping: &Grouping,
-    (robots, count): (&[&Robot], usize),
+    robots: &[&Robot],
+    &Wanted { count, threshold, .. }: &Wanted,
     images: &[ImageRef],
-    options: &Options,
     walker: &Walker,
 ) -> Result<Option<Vec<Validated>>, Error> {
     let config: &Config = &run.config;
@@ -182,8 +259,7 @@ fn screened(
                 let Some((displacements, simulated)) = walker.lives(robot, &stimuli[..shown]) else {
                     return Ok(None);
                 };
-                let trial =
-                    Trial { run, robot, split, images: &images[..shown], threshold: options.threshold };
+                let trial = Trial { run, robot, split, images: &images[..shown], threshold };
                 scores.push((*robot, RobotReport::new(&trial, displacements, simulated)));
             }
             // Stable: equals stay in the order of the round before, at first of their fitness.

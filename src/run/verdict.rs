@@ -1,7 +1,7 @@
 //! [`Verdict`]: what an audit makes of a robot's perturbed lives, and by which [`Criteria`].
 
 use super::Error;
-use super::toml_text::{self, Format};
+use super::toml_text;
 use crate::task::direction::{Assignment, Direction};
 use crate::task::fitness::Fitness;
 use crate::task::grouping::{Group, Split};
@@ -52,18 +52,7 @@ impl Criteria {
     /// # Errors
     /// What is wrong, with file, line and key.
     pub fn load(path: Option<&Path>, overrides: &[String]) -> Result<Self, Error> {
-        let mut criteria = match path {
-            None => Criteria::default(),
-            Some(path) => {
-                let text = std::fs::read_to_string(path).map_err(|error| Error::reading(path, &error))?;
-                let is_json = path.extension().is_some_and(|ending| ending == "json");
-                let format = if is_json { Format::Json } else { Format::Toml };
-                toml_text::read(&text, format, &path.display().to_string())?
-            }
-        };
-        for assignment in overrides {
-            criteria = toml_text::set(&criteria, assignment)?;
-        }
+        let criteria: Criteria = toml_text::load(path, overrides)?;
         criteria.check()?;
         Ok(criteria)
     }

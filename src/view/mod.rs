@@ -10,6 +10,7 @@ pub mod console;
 pub mod font;
 pub mod gif;
 pub mod html;
+pub mod networks;
 pub mod palette;
 pub mod panel;
 pub mod pictures;

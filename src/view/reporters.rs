@@ -6,8 +6,8 @@ use crate::run::data::catalogue::RemoteFile;
 use crate::run::data::fetch::{Attempt, FetchObserver};
 use crate::run::folder::RunFolder;
 use crate::run::training::{ImageRef, Training};
-use crate::run::{audit, eval, evolve};
-use std::sync::OnceLock;
+use crate::run::{audit, capacity, eval, evolve};
+use std::sync::{OnceLock, RwLock};
 
 /// Shows an evolution.
 pub struct Evolution<'c> {
@@ -78,31 +78,37 @@ impl evolve::Observer for Evolution<'_> {
 /// Shows an evaluation.
 pub struct Evaluation<'c> {
     console: &'c Console,
-    validation: OnceLock<Counter<'c>>,
-    counter: OnceLock<Counter<'c>>,
+    counter: RwLock<Option<Counter<'c>>>,
 }
 
 impl<'c> Evaluation<'c> {
     /// Shows it on a console.
     pub fn new(console: &'c Console) -> Self {
-        Evaluation { console, validation: OnceLock::new(), counter: OnceLock::new() }
+        Evaluation { console, counter: RwLock::new(None) }
+    }
+
+    fn begin(&self, label: &str, showings: u64) {
+        // A panic elsewhere is no reason to stop counting.
+        let mut counter = self.counter.write().unwrap_or_else(std::sync::PoisonError::into_inner);
+        // The one before ends first: there is one line on the screen.
+        *counter = None;
+        *counter = Some(self.console.counter(label, showings, "lives"));
     }
 }
 
 impl eval::Observer for Evaluation<'_> {
     fn validating(&self, robots: usize, images: usize, showings: u64) {
         let label = format!("validating {robots} robots on up to {images} images:");
-        self.validation.get_or_init(|| self.console.counter(&label, showings, "lives"));
+        self.begin(&label, showings);
     }
 
     fn started(&self, robots: usize, images: usize) {
-        let total = (robots * images) as u64;
-        let label = format!("evaluating {robots} robots on {images} images:");
-        self.counter.get_or_init(|| self.console.counter(&label, total, "lives"));
+        self.begin(&format!("evaluating {robots} robots on {images} images:"), (robots * images) as u64);
     }
 
     fn progress(&self, done: u64) {
-        if let Some(counter) = self.counter.get().or(self.validation.get()) {
+        let counter = self.counter.read().unwrap_or_else(std::sync::PoisonError::into_inner);
+        if let Some(counter) = counter.as_ref() {
             counter.update(done);
         }
     }
@@ -129,6 +135,38 @@ impl audit::Observer for Audit<'_> {
     fn started(&self, robots: usize, lives: usize) {
         let label = format!("auditing {robots} robots:");
         self.counter.get_or_init(|| self.console.counter(&label, lives as u64, "lives"));
+    }
+
+    fn progress(&self, done: u64) {
+        if let Some(counter) = self.counter.get() {
+            counter.update(done);
+        }
+    }
+
+    fn warning(&self, text: &str) {
+        self.console.warning(text);
+    }
+}
+
+/// Shows the training of networks.
+pub struct Capacity<'c> {
+    console: &'c Console,
+    counter: OnceLock<Counter<'c>>,
+}
+
+impl<'c> Capacity<'c> {
+    /// Shows it on a console.
+    pub fn new(console: &'c Console) -> Self {
+        Capacity { console, counter: OnceLock::new() }
+    }
+}
+
+impl capacity::Observer for Capacity<'_> {
+    fn started(&self, trainings: u64, known: u64) {
+        let kept = if known > 0 { format!(" ({known} known from before)") } else { String::new() };
+        let label = format!("training {trainings} networks{kept}:");
+        let counter = self.counter.get_or_init(|| self.console.counter(&label, trainings, "trainings"));
+        counter.update(known);
     }
 
     fn progress(&self, done: u64) {

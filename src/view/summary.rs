@@ -8,8 +8,10 @@ use crate::run::data::fetch::{Fetched, Outcome};
 use crate::run::evolve::Finished;
 use crate::run::folder::RUN_JSON;
 use crate::run::gallery::Published;
+use crate::run::published;
 use crate::run::report::{EvalFile, RobotReport};
 use crate::run::training::ImageRef;
+use crate::run::validation::Validated;
 use std::path::Path;
 
 /// Robots shown after an evolution.
@@ -76,6 +78,18 @@ pub fn evolution(console: &Console, finished: &Finished, out: &Path) {
     ));
 }
 
+/// After a validation: the chosen robots.
+pub fn validation(console: &Console, best: &[Validated]) {
+    if console.mode() == Mode::Json {
+        return console.event("validated", &best);
+    }
+    let rows = best.iter().map(|robot| {
+        let of = format!("{} of {}", robot.right, robot.images);
+        vec![robot.id.clone(), robot.task.clone(), of, percent(robot.balanced_accuracy)]
+    });
+    console.table(&["best on validation", "task", "right", "balanced %"], &rows.collect::<Vec<_>>());
+}
+
 /// After an evaluation: a table per robot, the means, and the baselines.
 pub fn evaluation(console: &Console, report: &EvalFile, out: &Path) {
     if report.robots.is_empty() {
@@ -126,7 +140,8 @@ pub fn evaluation(console: &Console, report: &EvalFile, out: &Path) {
             mean.standard_deviation.map_or("–".to_string(), percent),
             mean.interval
                 .map_or("–".to_string(), |[low, high]| format!("{}–{}", percent(low), percent(high))),
-            published(&report.dataset, task).map_or("–".to_string(), |accuracy| format!("{accuracy:.1}")),
+            published::row(&report.dataset, task)
+                .map_or("–".to_string(), |row| format!("{:.1}", row.accuracy)),
             percent(mean.balanced_accuracy),
             baseline(|b| b.larger_group),
             baseline(|b| b.best_single_pixel),
@@ -242,21 +257,6 @@ pub fn dataset(console: &Console, found: &Found) {
     for (split, problem) in &found.problems {
         console.warning(&format!("{split}: {problem}"));
     }
-}
-/// Mean accuracy on a task that the paper published \[%\] (section "Generalization test").
-fn published(dataset: &str, task: &str) -> Option<f64> {
-    const PAPER: [(&str, f64); 8] = [
-        ("0|1", 76.57),
-        ("0|123", 68.47),
-        ("1|023", 58.96),
-        ("2|013", 70.01),
-        ("3|012", 72.00),
-        ("01|23", 58.22),
-        ("02|13", 62.02),
-        ("03|12", 57.14),
-    ];
-    let of_task = |(name, accuracy): &(&str, f64)| (*name == task).then_some(*accuracy);
-    (dataset == "mnist").then(|| PAPER.iter().find_map(of_task))?
 }
 
 /// Displacements by class for people: one by one if they are few, else the mean of each class.

@@ -1,0 +1,69 @@
+//! `morphcog capacity`: its words, and what it calls.
+
+use crate::run::capacity::{self, Options};
+use crate::run::capacity_config::CapacityConfig;
+use crate::run::capacity_file::CAPACITY_JSON;
+use crate::run::report::EVAL_JSON;
+use crate::run::{Error, folder, signals};
+use crate::view::console::Console;
+use crate::view::{networks, reporters};
+use clap::Args;
+use std::path::PathBuf;
+
+pub(super) const EXAMPLES: &str = "\
+Examples:
+  morphcog eval --archive runs/zero_one-seed*/run.json --robots random:10 --physical-only -o runs/eval.json
+  morphcog capacity --eval runs/eval.json             networks of sizes 1 to 45, 50 trainings each
+  morphcog capacity --eval runs/eval.json --clean     early stopping waits on other images than the test's
+  morphcog capacity --eval runs/eval.json --set trainings=10 --set step=4 --set mlp.learning_rate=0.003";
+
+#[derive(Debug, Args)]
+pub(super) struct CapacityArgs {
+    /// What morphcog eval wrote (default: eval.json beside the newest run under runs/).
+    #[arg(short, long, value_name = "FILE")]
+    eval: Option<PathBuf>,
+    /// Early stopping waits on images of the training split, not, as in the paper, on the test images.
+    #[arg(long)]
+    clean: bool,
+    /// Only robots that morphcog audit found physical (audit.json is looked for beside the evaluation and one folder below).
+    #[arg(long)]
+    physical_only: bool,
+    /// Settings: a TOML file (or JSON); keys that are not in it have their defaults.
+    #[arg(short, long, value_name = "FILE")]
+    config: Option<PathBuf>,
+    /// Change a setting, as in trainings=10; may be given several times.
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<String>,
+    /// Folder with the images.
+    #[arg(long, value_name = "DIR")]
+    data: Option<PathBuf>,
+    /// Result file; a CSV and the figure go beside it (default: capacity.json beside eval.json).
+    #[arg(short, long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Threads (default: one per core).
+    #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    threads: Option<u16>,
+}
+
+pub(super) fn run(args: CapacityArgs, console: &Console) -> Result<(), Error> {
+    let newest = || folder::newest_run().map(|run| run.with_file_name(EVAL_JSON));
+    let eval = args.eval.map_or_else(newest, Ok)?;
+    let mut set = args.set;
+    set.extend(args.clean.then(|| "clean=true".to_string()));
+    let options = Options {
+        config: CapacityConfig::load(args.config.as_deref(), &set)?,
+        physical_only: args.physical_only,
+        data: args.data,
+        out: args.out.unwrap_or_else(|| eval.with_file_name(CAPACITY_JSON)),
+        threads: args.threads.map(usize::from),
+        eval,
+    };
+    let stop = signals::stop_flag()?;
+    let file = capacity::capacity(&options, &stop, &reporters::Capacity::new(console))?;
+    networks::capacity(console, &file, &options.out);
+    if file.stopped {
+        let text = "stopped; the trainings done so far are kept".to_string();
+        return Err(Error::stopped(text).hint("the same command goes on".to_string()));
+    }
+    Ok(())
+}

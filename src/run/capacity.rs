@@ -1,0 +1,197 @@
+//! `morphcog capacity`: the networks that the robots are worth (paper, "Morphological cognition capacity").
+
+use super::capacity_config::CapacityConfig;
+use super::capacity_file::{CapacityFile, Curve, FORMAT, FORMAT_VERSION, Point, TaskCapacity};
+use super::capacity_images::{Images, Task};
+use super::report::{EvalFile, RobotReport};
+use super::statistics::standard_deviation;
+use super::trainings::Trainings;
+use super::{Error, audit_file::AuditFile, eval};
+use crate::base::files::write_atomically;
+use crate::base::hash::sha256_hex;
+use crate::baseline::{Kind, Trained, curve};
+use crate::task::grouping;
+use rayon::prelude::*;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+
+/// What to compare with what.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// The eval.json.
+    pub eval: PathBuf,
+    /// What is trained.
+    pub config: CapacityConfig,
+    /// Whether only robots count that an audit found physical.
+    pub physical_only: bool,
+    /// Where the data are, if the command line says.
+    pub data: Option<PathBuf>,
+    /// Where the results go (capacity.json; others beside it).
+    pub out: PathBuf,
+    /// Number of threads; `None`: one per core.
+    pub threads: Option<usize>,
+}
+
+/// Who is told how it goes.
+pub trait Observer: Sync {
+    /// Before the first training: so many in all, so many of them known from before.
+    fn started(&self, trainings: u64, known: u64);
+    /// Trainings done, the known ones included.
+    fn progress(&self, done: u64);
+    /// Something the user should know.
+    fn warning(&self, text: &str);
+}
+
+/// Finds the capacity of evaluated robots. What was trained before is kept beside the results and not trained again.
+///
+/// # Errors
+/// What is wrong with the evaluation, the data or the settings.
+pub fn capacity(
+    options: &Options,
+    stop: &AtomicBool,
+    observer: &dyn Observer,
+) -> Result<CapacityFile, Error> {
+    let report = EvalFile::read(&options.eval)?;
+    let name = options.eval.display();
+    let Some(setting) = &report.setting else {
+        let text = format!("{name}: expected \"setting\": an earlier version wrote it");
+        return Err(Error::input(text).hint("run morphcog eval again".to_string()));
+    };
+    if report.stopped {
+        observer.warning(&format!("{name}: the evaluation was stopped before its last robot"));
+    }
+    let config = &options.config;
+    let side = setting.body.height.min(setting.body.width);
+    if config.cnn.kernel > side {
+        let kernel = config.cnn.kernel;
+        return Err(Error::input(format!(
+            "capacity: cnn.kernel = {kernel}: expected up to {side}, an image's side"
+        )));
+    }
+    eval::check_out(&options.out, &options.eval)?;
+    let robots = robots(&report, options)?;
+    let images = Images::of(&report, setting, options, observer)?;
+    let grouping = setting.task.grouping()?;
+    let splits: Vec<&grouping::Split> = grouping
+        .tasks()
+        .iter()
+        .filter(|split| robots.iter().any(|robot| robot.task == split.name()))
+        .collect();
+    let per_task = config.networks.len() * config.sizes().count() * config.trainings;
+    let mut known = Trainings::read(&options.out);
+    let jobs = splits.iter().flat_map(|split| config.networks.iter().map(move |&kind| (*split, kind)));
+    let key = |split: &grouping::Split, kind: Kind| {
+        let hyper = serde_json::to_string(config.of(kind)).unwrap_or_default();
+        sha256_hex(
+            format!("{} {} {hyper} {} {}", split.name(), kind.name(), images.key, config.seed).as_bytes(),
+        )
+    };
+    let already = jobs.flat_map(|(split, kind)| {
+        let key = key(split, kind);
+        let known = &known;
+        config.sizes().map(move |size| known.of(&key, size).len().min(config.trainings)).collect::<Vec<_>>()
+    });
+    let done = AtomicU64::new(already.sum::<usize>() as u64);
+    observer.started((splits.len() * per_task) as u64, done.load(Ordering::Relaxed));
+    let pool = eval::pool(options.threads)?;
+    let mut file = CapacityFile {
+        format: FORMAT.to_string(),
+        format_version: FORMAT_VERSION,
+        program_version: env!("CARGO_PKG_VERSION").to_string(),
+        run: report.run.clone(),
+        selected: report.selected.clone(),
+        dataset: report.dataset.clone(),
+        patience_on: if config.clean { "validation" } else { "test" }.to_string(),
+        trainings: config.trainings,
+        stopped: false,
+        tasks: Vec::new(),
+    };
+    'tasks: for split in splits {
+        let of_task: Vec<f64> =
+            robots.iter().filter(|robot| robot.task == split.name()).map(|robot| robot.accuracy).collect();
+        let accuracy = of_task.iter().sum::<f64>() / of_task.len() as f64;
+        let samples = Task::new(split, &images)?;
+        let mut curves = Vec::new();
+        for &kind in &config.networks {
+            let key = key(split, kind);
+            let mut points = Vec::new();
+            for size in config.sizes() {
+                let open = known.of(&key, size).len()..config.trainings;
+                let train = |number: usize| {
+                    let trained =
+                        (!stop.load(Ordering::Relaxed)).then(|| samples.train((kind, size), config, number));
+                    observer.progress(done.fetch_add(1, Ordering::Relaxed) + 1);
+                    trained
+                };
+                let trained: Option<Result<Vec<Trained>, Error>> =
+                    pool.install(|| open.into_par_iter().map(train).collect());
+                let Some(trained) = trained else {
+                    file.stopped = true;
+                    break 'tasks;
+                };
+                let trained = trained?;
+                if !trained.is_empty() {
+                    known.extend(&key, size, &trained);
+                    known.write()?;
+                }
+                points.push(point(size, &known.of(&key, size)[..config.trainings]));
+            }
+            curves.push(curve_of(kind, points, accuracy));
+        }
+        file.tasks.push(TaskCapacity { task: split.name(), robots: of_task.len(), accuracy, curves });
+        write(options, &file)?;
+    }
+    write(options, &file)?;
+    Ok(file)
+}
+
+fn point(size: usize, trained: &[(f64, usize)]) -> Point {
+    let accuracies: Vec<f64> = trained.iter().map(|(accuracy, _)| *accuracy).collect();
+    let mean = accuracies.iter().sum::<f64>() / accuracies.len().max(1) as f64;
+    let parameters = trained.first().map_or(0, |(_, parameters)| *parameters);
+    Point { size, mean, standard_deviation: standard_deviation(&accuracies).unwrap_or(0.0), parameters }
+}
+
+fn curve_of(kind: Kind, points: Vec<Point>, accuracy: f64) -> Curve {
+    let means: Vec<(f64, f64)> = points.iter().map(|point| (point.size as f64, point.mean)).collect();
+    let fit = curve::parabola(&means);
+    let within = means.first().zip(means.last()).map(|(first, last)| (first.0, last.0));
+    let capacity = fit.zip(within).and_then(|(fit, within)| curve::first_crossing(fit, accuracy, within));
+    Curve { network: kind.name().to_string(), points, fit, capacity }
+}
+
+fn write(options: &Options, file: &CapacityFile) -> Result<(), Error> {
+    let csv = file.to_csv().map_err(|error| Error::other(error.to_string()))?;
+    for (path, content) in
+        [(&options.out, file.to_json().into_bytes()), (&options.out.with_extension("csv"), csv)]
+    {
+        write_atomically(path, &content).map_err(|error| Error::writing(path, &error))?;
+    }
+    Ok(())
+}
+
+/// The robots that count.
+fn robots<'a>(report: &'a EvalFile, options: &Options) -> Result<Vec<&'a RobotReport>, Error> {
+    let name = options.eval.display();
+    if report.robots.is_empty() {
+        return Err(Error::input(format!("{name}: there is no robot in it")));
+    }
+    if !options.physical_only {
+        return Ok(report.robots.iter().collect());
+    }
+    let folder = options.eval.parent().unwrap_or(Path::new(""));
+    let audits: Result<Vec<_>, Error> =
+        report.runs.iter().map(|run| AuditFile::near(folder, &run.sha256)).collect();
+    let audits = audits?;
+    let physical = |robot: &&RobotReport| {
+        audits
+            .get(robot.run)
+            .and_then(|audit| audit.robot(&robot.id))
+            .is_some_and(|found| found.is_physical())
+    };
+    let physical: Vec<&RobotReport> = report.robots.iter().filter(physical).collect();
+    if physical.is_empty() {
+        return Err(Error::input(format!("{name}: none of {} robots is physical", report.robots.len())));
+    }
+    Ok(physical)
+}

@@ -1,0 +1,62 @@
+//! What evaluations say of the runs they are of: enough to show others the same images.
+
+use super::archive::RunFile;
+use super::audit_file::fingerprint;
+use super::config::{BodyConfig, DataConfig, TaskConfig};
+use super::training::ImageRef;
+use crate::task::stimulus::StimulusParams;
+use serde::{Deserialize, Serialize};
+
+/// A run that robots are from.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RunRef {
+    /// Its name.
+    pub name: String,
+    /// Its seed.
+    pub seed: u64,
+    /// Generations it had done.
+    pub generations: u64,
+    /// The images it was trained on last.
+    pub training_images: Vec<ImageRef>,
+    /// SHA-256 of its content.
+    pub sha256: String,
+}
+
+/// What networks need to know to be given the same images as the robots.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Setting {
+    /// Rows and columns of a stimulus.
+    pub body: BodyConfig,
+    /// The classes and their groups.
+    pub task: TaskConfig,
+    /// The data.
+    pub data: DataConfig,
+    /// From image to stimulus.
+    pub stimulus: StimulusParams,
+    /// SHA-256 of the training split.
+    pub train_sha256: String,
+}
+
+impl RunRef {
+    pub(super) fn new(run: &RunFile) -> Self {
+        RunRef {
+            name: run.name.clone(),
+            seed: run.config.seed,
+            generations: run.generations,
+            training_images: run.training_images.clone(),
+            sha256: fingerprint(run),
+        }
+    }
+}
+
+impl Setting {
+    pub(super) fn new(run: &RunFile) -> Self {
+        Setting {
+            body: run.config.body,
+            task: run.config.task.clone(),
+            data: run.config.data.clone(),
+            stimulus: run.config.stimulus,
+            train_sha256: run.dataset.train_sha256.clone(),
+        }
+    }
+}

@@ -1,0 +1,71 @@
+//! Spreads and intervals.
+
+use crate::base::random::{Purpose, stream};
+
+/// 95 % Wilson score interval of a share (Wilson 1927).
+pub fn wilson(right: usize, total: usize) -> [f64; 2] {
+    const Z: f64 = 1.959_963_984_540_054;
+    if total == 0 {
+        return [0.0, 1.0];
+    }
+    let n = total as f64;
+    let share = right as f64 / n;
+    let centre = share + Z * Z / (2.0 * n);
+    let spread = Z * (share * (1.0 - share) / n + Z * Z / (4.0 * n * n)).sqrt();
+    let scale = 1.0 + Z * Z / n;
+    // With none or all right the bounds are exactly 0 and 1, which rounding would miss.
+    let low = if right == 0 { 0.0 } else { ((centre - spread) / scale).max(0.0) };
+    let high = if right == total { 1.0 } else { ((centre + spread) / scale).min(1.0) };
+    [low, high]
+}
+
+/// Of a sample; none of fewer than two values.
+pub fn standard_deviation(values: &[f64]) -> Option<f64> {
+    let n = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / n;
+    let squares = values.iter().map(|value| (value - mean) * (value - mean)).sum::<f64>();
+    (values.len() > 1).then(|| (squares / (n - 1.0)).sqrt())
+}
+
+/// 95 % interval of the mean: percentiles of the means of resamples (Efron 1979), the same every time. None of fewer than two
+/// values.
+pub fn bootstrap(values: &[f64]) -> Option<[f64; 2]> {
+    const RESAMPLES: usize = 10_000;
+    if values.len() < 2 {
+        return None;
+    }
+    let mut rng = stream(0, Purpose::Bootstrap, 0, 0);
+    let mut mean = |_| {
+        let sum: f64 = (0..values.len()).map(|_| values[rng.below(values.len())]).sum();
+        sum / values.len() as f64
+    };
+    let mut means: Vec<f64> = (0..RESAMPLES).map(&mut mean).collect();
+    means.sort_by(f64::total_cmp);
+    Some([means[RESAMPLES * 25 / 1000], means[RESAMPLES * 975 / 1000 - 1]])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{bootstrap, standard_deviation, wilson};
+
+    #[test]
+    fn means_have_a_spread_and_an_interval_that_holds_them() {
+        let values = [0.5, 0.6, 0.7, 0.8, 0.9];
+        // √(0.1/4)
+        assert!((standard_deviation(&values).unwrap() - 0.158_113_883).abs() < 1e-9);
+        let [low, high] = bootstrap(&values).unwrap();
+        // The normal approximation: 0.7 ± 1.96·0.1414/√5.
+        assert!((low - 0.576).abs() < 0.02 && (high - 0.824).abs() < 0.02, "{low} {high}");
+        assert_eq!(bootstrap(&values), bootstrap(&values));
+        assert_eq!((standard_deviation(&[0.5]), bootstrap(&[0.5])), (None, None));
+    }
+
+    #[test]
+    fn the_wilson_interval_is_the_textbooks() {
+        // 8 of 10: 0.4902 to 0.9433 (Brown, Cai & DasGupta 2001 use the same formula).
+        let [low, high] = wilson(8, 10);
+        assert!((low - 0.4902).abs() < 5e-5 && (high - 0.9433).abs() < 5e-5, "{low} {high}");
+        assert!(wilson(0, 50)[0] < 1e-15 && wilson(50, 50)[1] > 1.0 - 1e-15);
+        assert_eq!(wilson(0, 0), [0.0, 1.0]);
+    }
+}
