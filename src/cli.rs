@@ -3,6 +3,7 @@
 mod args;
 mod audit;
 mod capacity;
+mod reproduce;
 
 use crate::base::lanes::InstructionSet;
 use crate::run::data::catalogue::Catalogue;
@@ -34,6 +35,7 @@ pub fn run(cli: Cli, console: &Console) -> Result<(), Error> {
         Command::Eval(args) => run_eval(args, console),
         Command::Audit(args) => audit::run(args, console),
         Command::Capacity(args) => capacity::run(args, console),
+        Command::Reproduce(args) => reproduce::run(args, console),
         Command::Replay(args) => run_replay(args, console),
         Command::Simulate(args) => run_simulate(&args, console),
         Command::Data { command } => run_data(command, console),

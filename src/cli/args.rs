@@ -2,6 +2,7 @@
 
 use super::audit::{self, AuditArgs};
 use super::capacity::{self, CapacityArgs};
+use super::reproduce::{self, ReproduceArgs};
 use crate::run::eval;
 use crate::run::replay::Shown;
 use crate::run::robots::Selection;
@@ -66,6 +67,9 @@ Examples:
     /// Find the networks that robots are worth.
     #[command(after_help = capacity::EXAMPLES)]
     Capacity(CapacityArgs),
+    /// Run the whole paper, at a chosen scale.
+    #[command(after_help = reproduce::EXAMPLES)]
+    Reproduce(ReproduceArgs),
     /// Watch a robot: an animated GIF and a page for the browser.
     #[command(after_help = "\
 Examples:

@@ -2,7 +2,7 @@
 
 use super::archive::{Robot, RunFile};
 use super::eval::Options;
-use super::robots::Source;
+use super::robots::{Selection, Source};
 use super::setting::{RunRef, Setting};
 use super::statistics::{bootstrap, standard_deviation, wilson};
 use super::training::ImageRef;
@@ -248,6 +248,20 @@ impl EvalFile {
             (task.to_string(), Mean { robots, accuracy, balanced_accuracy, standard_deviation, interval })
         });
         self.means = means.collect();
+    }
+
+    /// Whether it is what these options would make of these runs, and whole.
+    pub(super) fn is_of(&self, sources: &[Source], options: &Options) -> bool {
+        let runs: Vec<RunRef> = sources.iter().map(|source| RunRef::new(&source.run)).collect();
+        let same_robots = match &options.robots {
+            Selection::Drawn { robots, .. } => {
+                robots.iter().map(|(run, id)| (*run, id)).eq(self.robots.iter().map(|r| (r.run, &r.id)))
+            }
+            _ => false,
+        };
+        let same = (self.seed, self.images.len(), self.threshold)
+            == (options.seed, options.images, options.threshold);
+        !self.stopped && self.runs == runs && same && same_robots
     }
 
     /// Reads `eval.json`.

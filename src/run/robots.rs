@@ -48,6 +48,13 @@ pub enum Selection {
     Validated(usize),
     /// Those with these ids, or unique beginnings of ids; "best" is the fittest.
     Ids(Vec<String>),
+    /// These, by the place of their run and by id, and how they were come by.
+    Drawn {
+        /// The robots.
+        robots: Vec<(usize, String)>,
+        /// For people.
+        about: String,
+    },
     /// So selected, but from those robots only that an audit found physical.
     Physical(Box<Selection>),
 }
@@ -99,6 +106,7 @@ impl Selection {
             Selection::Validated(count) => {
                 format!("the {count} best of each run and task on validation images")
             }
+            Selection::Drawn { about, .. } => about.clone(),
             Selection::Ids(ids) => format!("chosen by id: {}", ids.join(", ")),
             Selection::Physical(of) => format!("{}, of those audited as physical", of.describe()),
         }
@@ -147,6 +155,11 @@ impl Selection {
                 Ok((0..).zip(by_task()).flat_map(draw).collect())
             }
             Selection::Ids(ids) => ids.iter().map(|id| by_id(&fittest, id)).collect(),
+            Selection::Drawn { robots, .. } => {
+                let of_run = |source: usize| fittest.iter().filter(move |c| c.source == source).copied();
+                let find = |(source, id): &(usize, String)| by_id(&of_run(*source).collect::<Vec<_>>(), id);
+                robots.iter().map(find).collect()
+            }
             Selection::Physical(of) => of.among(physical(of, fittest, sources)?, sources, seed),
         }
     }

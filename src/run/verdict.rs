@@ -57,7 +57,8 @@ impl Criteria {
         Ok(criteria)
     }
 
-    fn check(&self) -> Result<(), Error> {
+    /// Checks what a type cannot.
+    pub(super) fn check(&self) -> Result<(), Error> {
         let Sizes { raised, time_step, share, pixels, least_sensors: _, seed } = &self.perturbations;
         let shares = [self.least_answered, self.least_kept, self.least_distance, self.least_robust];
         let refuse = |text: &str| Err(Error::input(format!("audit criteria: {text}")));

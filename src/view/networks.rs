@@ -3,6 +3,7 @@
 use super::console::{Console, Mode};
 use crate::run::capacity_file::{CapacityFile, TaskCapacity};
 use crate::run::published;
+use crate::run::reproduce::Finished;
 use std::path::Path;
 
 /// The table: task, accuracy and capacity, the paper's beside ours.
@@ -56,6 +57,49 @@ pub fn capacity(console: &Console, file: &CapacityFile, out: &Path) {
     };
     console.line(&format!("{}; early stopping waits on {waits}", file.selected));
     console.line(&format!("wrote {} and {}", out.display(), out.with_extension("csv").display()));
+}
+
+/// After a reproduction: the paper's table, the paper's figures beside ours.
+pub fn table(console: &Console, finished: &Finished) {
+    if console.mode() == Mode::Json {
+        return console.event("reproduced", &finished.rows);
+    }
+    let number = |value: Option<f64>| value.map_or("–".to_string(), |value| format!("{value:.1}"));
+    let size = |size: Option<f64>| size.map_or("no match".to_string(), |size| format!("{size:.1}"));
+    let rows = finished.rows.iter().map(|row| {
+        let own = |value: Option<f64>| if row.robots == 0 { "–".to_string() } else { size(value) };
+        let paper =
+            |value: Option<f64>| if row.paper_accuracy.is_none() { "–".to_string() } else { size(value) };
+        vec![
+            row.task.clone(),
+            format!("{} of {}", row.robots, row.audited),
+            number(row.accuracy),
+            row.interval.map_or("–".to_string(), |[low, high]| format!("{low:.1}–{high:.1}")),
+            number(row.paper_accuracy),
+            number(row.balanced_accuracy),
+            number(row.larger_group),
+            own(row.mlp),
+            paper(row.paper_mlp),
+            own(row.cnn),
+            paper(row.paper_cnn),
+        ]
+    });
+    let headers = [
+        "task",
+        "physical of audited",
+        "accuracy %",
+        "95 % interval",
+        "paper's %",
+        "balanced %",
+        "larger group %",
+        "MLP neurons",
+        "paper's",
+        "CNN kernels",
+        "paper's",
+    ];
+    console.table(&headers, &rows.collect::<Vec<_>>());
+    let files: Vec<String> = finished.files.iter().map(|file| file.display().to_string()).collect();
+    console.line(&format!("wrote {}", files.join(" and ")));
 }
 
 /// Of a kind of network, if it was trained: the capacity, if there is one.

@@ -6,7 +6,7 @@ use crate::run::data::catalogue::RemoteFile;
 use crate::run::data::fetch::{Attempt, FetchObserver};
 use crate::run::folder::RunFolder;
 use crate::run::training::{ImageRef, Training};
-use crate::run::{audit, capacity, eval, evolve};
+use crate::run::{audit, capacity, eval, evolve, reproduce};
 use std::sync::{OnceLock, RwLock};
 
 /// Shows an evolution.
@@ -177,6 +177,40 @@ impl capacity::Observer for Capacity<'_> {
 
     fn warning(&self, text: &str) {
         self.console.warning(text);
+    }
+}
+
+/// Shows a reproduction.
+pub struct Reproduction<'c> {
+    console: &'c Console,
+}
+
+impl<'c> Reproduction<'c> {
+    /// Shows it on a console.
+    pub fn new(console: &'c Console) -> Self {
+        Reproduction { console }
+    }
+}
+
+impl reproduce::Observer for Reproduction<'_> {
+    fn step(&self, text: &str) {
+        self.console.info(text);
+    }
+
+    fn evolution(&self) -> Box<dyn evolve::Observer + Send + '_> {
+        Box::new(Evolution::new(self.console))
+    }
+
+    fn audit(&self) -> Box<dyn audit::Observer + '_> {
+        Box::new(Audit::new(self.console))
+    }
+
+    fn evaluation(&self) -> Box<dyn eval::Observer + '_> {
+        Box::new(Evaluation::new(self.console))
+    }
+
+    fn capacity(&self) -> Box<dyn capacity::Observer + '_> {
+        Box::new(Capacity::new(self.console))
     }
 }
 

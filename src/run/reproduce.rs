@@ -1,0 +1,350 @@
+//! `morphcog reproduce`: the whole paper at a chosen scale, from the first generation to its table.
+
+use super::audit_file::{AUDIT_JSON, AuditFile};
+use super::capacity_config::CapacityConfig;
+use super::folder::{IfExists, RUN_JSON};
+use super::report::EvalFile;
+use super::robots::{Chosen, Selection, Source};
+use super::table::{self, Row};
+use super::verdict::Criteria;
+use super::{Config, Error, audit, capacity, config, eval, evolve, toml_text};
+use crate::base::files::write_atomically;
+use crate::base::random::{Purpose, stream};
+use serde::{Deserialize, Serialize};
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// The built-in plan: the paper's.
+pub const PAPER_TOML: (&str, &str) = ("paper.toml", include_str!("../../configs/paper.toml"));
+
+/// What belongs to a reproduction.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Plan {
+    /// Seeds of the runs of each experiment.
+    pub seeds: Vec<u64>,
+    /// Robots of each task that are tested.
+    pub robots: usize,
+    /// Test images.
+    pub images: usize,
+    /// The experiments.
+    pub experiment: Vec<Experiment>,
+    /// How robots are judged.
+    #[serde(default)]
+    pub audit: Criteria,
+    /// The networks.
+    #[serde(default)]
+    pub capacity: CapacityConfig,
+}
+
+/// An experiment: a config, and what is changed in it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Experiment {
+    /// A config file, or the name of a built-in one.
+    pub config: String,
+    /// Changes, as with `--set`.
+    #[serde(default)]
+    pub set: Vec<String>,
+}
+
+/// Least number of test images and of trainings at small scales.
+const LEAST_IMAGES: usize = 100;
+const LEAST_TRAININGS: usize = 5;
+
+impl Plan {
+    /// Reads a plan: a file or, if there is none, the built-in one of that name.
+    ///
+    /// # Errors
+    /// What is wrong with it, with file, line and key.
+    pub fn load(name: &str, overrides: &[String]) -> Result<Self, Error> {
+        let (own, text) = PAPER_TOML;
+        let is_own = name == own || own.strip_suffix(".toml") == Some(name);
+        let text = match std::fs::read_to_string(name) {
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound && is_own => text.to_string(),
+            Err(error) => return Err(Error::reading(Path::new(name), &error)),
+            Ok(text) => text,
+        };
+        let is_json = name.ends_with(".json");
+        let format = if is_json { toml_text::Format::Json } else { toml_text::Format::Toml };
+        let mut plan: Plan = toml_text::read(&text, format, name)?;
+        for assignment in overrides {
+            plan = toml_text::set(&plan, assignment)?;
+        }
+        let refuse = |text: &str| Err(Error::input(format!("{name}: {text}")));
+        if plan.seeds.is_empty() || plan.experiment.is_empty() {
+            return refuse("seeds, experiment: expected one or more of each");
+        }
+        if plan.seeds.iter().collect::<BTreeSet<_>>().len() < plan.seeds.len() {
+            return refuse("seeds: expected different ones");
+        }
+        if plan.robots == 0 || plan.images == 0 {
+            return refuse("robots, images: expected 1 or more");
+        }
+        plan.audit.check().and_then(|()| plan.capacity.check()).map_err(|error| error.within(name))?;
+        Ok(plan)
+    }
+
+    /// The plan at a scale: generations are multiplied by it, test images and trainings by its square root.
+    #[must_use]
+    fn at(&self, scale: f64) -> Self {
+        let part = |count: usize, least: usize| {
+            ((count as f64 * scale.sqrt()).round() as usize).max(least).min(count.max(least))
+        };
+        let trainings = part(self.capacity.trainings, LEAST_TRAININGS.min(self.capacity.trainings));
+        Plan {
+            images: part(self.images, LEAST_IMAGES.min(self.images)),
+            capacity: CapacityConfig { trainings, ..self.capacity.clone() },
+            ..self.clone()
+        }
+    }
+}
+
+/// What to reproduce, and where to.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// The plan.
+    pub plan: Plan,
+    /// Its scale, more than 0, up to 1.
+    pub scale: f64,
+    /// The folder.
+    pub out: PathBuf,
+    /// Where the data are, if the command line says.
+    pub data: Option<PathBuf>,
+    /// Number of threads; `None`: one per core.
+    pub threads: Option<usize>,
+}
+
+/// Who is told how it goes: what to do next, and observers for it.
+pub trait Observer {
+    /// A step begins.
+    fn step(&self, text: &str);
+    /// For a run.
+    fn evolution(&self) -> Box<dyn evolve::Observer + Send + '_>;
+    /// For an audit.
+    fn audit(&self) -> Box<dyn audit::Observer + '_>;
+    /// For a test.
+    fn evaluation(&self) -> Box<dyn eval::Observer + '_>;
+    /// For networks.
+    fn capacity(&self) -> Box<dyn capacity::Observer + '_>;
+}
+
+/// How a reproduction ended.
+#[derive(Clone, Debug)]
+pub struct Finished {
+    /// The paper's table, so far.
+    pub rows: Vec<Row>,
+    /// Files written at the end.
+    pub files: Vec<PathBuf>,
+    /// Whether a signal stopped it.
+    pub stopped: bool,
+}
+
+/// Does what of a plan is not done yet; what was done by an earlier, interrupted call stays.
+///
+/// # Errors
+/// What is wrong with plan, data or folder.
+pub fn reproduce(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Result<Finished, Error> {
+    if !(options.scale > 0.0 && options.scale <= 1.0) {
+        return Err(Error::usage(format!("--scale {}: expected more than 0, up to 1", options.scale)));
+    }
+    let plan = options.plan.at(options.scale);
+    let job = Job { options, plan: &plan, stop, observer };
+    // All configs first: a slip in the last one is not to be found out after hours.
+    let mut experiments = Vec::new();
+    for experiment in &plan.experiment {
+        let name = config::name_of(&experiment.config);
+        if experiments.iter().any(|(other, _)| *other == name) {
+            return Err(Error::input(format!("experiment: {name}: expected different configs")));
+        }
+        experiments.push((name, Config::load(&experiment.config, &experiment.set)?));
+    }
+    let mut rows = Vec::new();
+    for (name, config) in &experiments {
+        let Some(found) = job.experiment(name, config)? else {
+            return Ok(Finished { rows, files: Vec::new(), stopped: true });
+        };
+        rows.extend(found);
+    }
+    let files = table::write(&options.out, options.scale, &rows)?;
+    Ok(Finished { rows, files, stopped: false })
+}
+
+/// One call.
+struct Job<'a> {
+    options: &'a Options,
+    plan: &'a Plan,
+    stop: &'a AtomicBool,
+    observer: &'a dyn Observer,
+}
+
+impl Job<'_> {
+    /// All steps of an experiment; its rows of the table, or `None` if stopped.
+    fn experiment(&self, name: &str, config: &Config) -> Result<Option<Vec<Row>>, Error> {
+        let Some(sources) = self.evolved(name, config)? else { return Ok(None) };
+        let Some((chosen, audited)) = self.chosen(&sources)? else { return Ok(None) };
+        let tasks = &sources[0].run.dimensions.tasks;
+        let grouping = config.grouping()?;
+        let tasks: Vec<&String> = tasks
+            .iter()
+            .filter(|task| grouping.tasks().iter().any(|s| s.name() == **task && !s.is_same_way()))
+            .collect();
+        let mut rows: Vec<Row> = tasks.iter().map(|task| Row::new(&config.data.dataset, task)).collect();
+        for row in &mut rows {
+            row.audited = audited.get(&row.task).copied().unwrap_or(0);
+        }
+        if chosen.is_empty() {
+            self.observer.step(&format!("{name}: no robot is physical: nothing to test"));
+            return Ok(Some(rows));
+        }
+        let path = self.options.out.join(format!("{name}-eval.json"));
+        let Some(report) = self.tested(name, &path, &sources, &chosen)? else { return Ok(None) };
+        self.observer.step(&format!("{name}: networks"));
+        let options = capacity::Options {
+            eval: path.clone(),
+            config: self.plan.capacity.clone(),
+            physical_only: false,
+            data: self.options.data.clone(),
+            out: self.options.out.join(format!("{name}-capacity.json")),
+            threads: self.options.threads,
+        };
+        let file = capacity::capacity(&options, self.stop, &*self.observer.capacity())?;
+        if file.stopped {
+            return Ok(None);
+        }
+        rows.iter_mut().for_each(|row| row.fill(&report, &file));
+        Ok(Some(rows))
+    }
+
+    /// The runs of all seeds; `None` if stopped.
+    fn evolved(&self, name: &str, config: &Config) -> Result<Option<Vec<Source>>, Error> {
+        let mut sources = Vec::new();
+        for &seed in &self.plan.seeds {
+            let generations = ((config.generations as f64 * self.options.scale).round() as u64).max(1);
+            let out = self.options.out.join(format!("{name}-seed{seed}"));
+            self.observer.step(&format!("{name}, seed {seed}: {generations} generations"));
+            let options = evolve::Options {
+                config: Config { seed, generations, ..config.clone() },
+                name: name.to_string(),
+                out: out.clone(),
+                if_exists: IfExists::Resume,
+                data: self.options.data.clone(),
+                threads: self.options.threads,
+            };
+            if evolve::evolve(&options, self.stop, &mut *self.observer.evolution())?.stopped {
+                return Ok(None);
+            }
+            sources.push(Source::read(&out.join(RUN_JSON))?);
+        }
+        Ok(Some(sources))
+    }
+
+    /// Robots of each task, drawn at random one after the other and audited, until so many are found physical as are wanted
+    /// or there are no more; and how many of each task were audited. `None` if stopped.
+    #[allow(clippy::type_complexity)]
+    fn chosen<'s>(
+        &self,
+        sources: &'s [Source],
+    ) -> Result<Option<(Vec<Chosen<'s>>, BTreeMap<String, usize>)>, Error> {
+        let all = Selection::All.of(sources, 0)?;
+        let grouping = sources[0].run.config.grouping()?;
+        let (mut chosen, mut counts) = (Vec::new(), BTreeMap::new());
+        for (number, split) in (0..).zip(grouping.tasks()).filter(|(_, split)| !split.is_same_way()) {
+            let task = split.name();
+            let of_task: Vec<Chosen> = all.iter().filter(|c| c.robot.task == task).copied().collect();
+            let order = stream(1, Purpose::Robots, 1, number).sample(of_task.len(), of_task.len());
+            let mut physical = Vec::new();
+            let mut audited = 0;
+            for turn in order.chunks(self.plan.robots) {
+                if physical.len() >= self.plan.robots {
+                    break;
+                }
+                let drawn: Vec<Chosen> = turn.iter().map(|&index| of_task[index]).collect();
+                self.observer.step(&format!("{task}: audit of {} robots", drawn.len()));
+                let Some(verdicts) = self.audited(sources, &drawn)? else { return Ok(None) };
+                for (candidate, is_physical) in drawn.into_iter().zip(verdicts) {
+                    if physical.len() < self.plan.robots {
+                        audited += 1;
+                        physical.extend(is_physical.then_some(candidate));
+                    }
+                }
+            }
+            chosen.extend(physical);
+            counts.insert(task, audited);
+        }
+        Ok(Some((chosen, counts)))
+    }
+
+    /// Which of some robots are physical; `None` if stopped.
+    fn audited(&self, sources: &[Source], robots: &[Chosen]) -> Result<Option<Vec<bool>>, Error> {
+        let mut files: BTreeMap<usize, AuditFile> = BTreeMap::new();
+        for (number, source) in sources.iter().enumerate() {
+            let own = robots.iter().filter(|chosen| chosen.source == number);
+            let ids: Vec<String> = own.map(|chosen| chosen.robot.id.clone()).collect();
+            if ids.is_empty() {
+                continue;
+            }
+            let options = audit::Options {
+                source: audit::Source::Archive(source.path.clone()),
+                robots: Selection::Ids(ids),
+                seed: 0,
+                criteria: self.plan.audit.clone(),
+                data: self.options.data.clone(),
+                out: source.path.with_file_name(AUDIT_JSON),
+                threads: self.options.threads,
+            };
+            let finished = audit::audit(&options, self.stop, &*self.observer.audit())?;
+            if finished.stopped {
+                return Ok(None);
+            }
+            files.insert(number, finished.file);
+        }
+        let is_physical = |chosen: &Chosen| {
+            let found = files.get(&chosen.source).and_then(|file| file.robot(&chosen.robot.id));
+            found.is_some_and(|found| found.is_physical())
+        };
+        Ok(Some(robots.iter().map(is_physical).collect()))
+    }
+
+    /// The test of the chosen robots; `None` if stopped.
+    fn tested(
+        &self,
+        name: &str,
+        path: &Path,
+        sources: &[Source],
+        chosen: &[Chosen],
+    ) -> Result<Option<EvalFile>, Error> {
+        let ids: Vec<(usize, String)> = chosen.iter().map(|c| (c.source, c.robot.id.clone())).collect();
+        let about = format!(
+            "{} elites of each task, drawn at random among those audited as physical",
+            self.plan.robots
+        );
+        let options = eval::Options {
+            archives: sources.iter().map(|source| source.path.clone()).collect(),
+            robots: Selection::Drawn { robots: ids, about },
+            images: self.plan.images,
+            validation: None,
+            seed: 1,
+            threshold: eval::THRESHOLD,
+            cycles: eval::CYCLES,
+            data: self.options.data.clone(),
+            out: path.to_path_buf(),
+            threads: self.options.threads,
+        };
+        if let Ok(known) = EvalFile::read(path)
+            && known.is_of(sources, &options)
+        {
+            return Ok(Some(known));
+        }
+        self.observer.step(&format!("{name}: {} robots on {} test images", chosen.len(), self.plan.images));
+        let report = eval::eval(&options, self.stop, &*self.observer.evaluation())?;
+        let is_whole = !report.stopped && !self.stop.load(Ordering::Relaxed);
+        Ok(is_whole.then_some(report))
+    }
+}
+
+/// Writes a file of the reproduction.
+pub(super) fn write_file(path: &Path, content: &[u8]) -> Result<(), Error> {
+    write_atomically(path, content).map_err(|error| Error::writing(path, &error))
+}
