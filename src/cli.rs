@@ -2,6 +2,7 @@
 
 mod args;
 mod audit;
+mod plot;
 
 use crate::base::lanes::InstructionSet;
 use crate::run::data::catalogue::Catalogue;
@@ -32,6 +33,7 @@ pub fn run(cli: Cli, console: &Console) -> Result<(), Error> {
         Command::Eval(args) => run_eval(args, console),
         Command::Audit(args) => audit::run(args, console),
         Command::Replay(args) => run_replay(args, console),
+        Command::Plot(args) => plot::run(args, console),
         Command::Simulate(args) => run_simulate(&args, console),
         Command::Data { command } => run_data(command, console),
         Command::Gallery => gallery::gallery().map(|robots| summary::gallery(console, &robots)),

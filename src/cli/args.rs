@@ -1,6 +1,7 @@
 //! The words of the command line: clap's types, help and examples.
 
 use super::audit::{self, AuditArgs};
+use super::plot::{self, PlotArgs};
 use crate::run::replay::Shown;
 use crate::run::robots::Selection;
 use crate::task::dataset::BUILTIN;
@@ -69,6 +70,9 @@ Examples:
   morphcog replay --robot best --format terminal
   morphcog replay --robot best -o walk.gif")]
     Replay(ReplayArgs),
+    /// Make a figure: SVG and PNG for papers and pages.
+    #[command(after_help = plot::EXAMPLES)]
+    Plot(PlotArgs),
     /// Simulate any body under any stimuli.
     #[command(after_help = "\
 Example:

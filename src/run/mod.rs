@@ -15,6 +15,7 @@ pub mod evolve;
 pub mod folder;
 pub mod gallery;
 pub mod metrics;
+pub mod plot;
 pub mod replay;
 pub mod report;
 mod resume;
@@ -22,6 +23,7 @@ pub mod robots;
 pub mod robust;
 #[cfg(test)]
 mod samples;
+pub mod sensitivity;
 pub mod signals;
 pub mod simulate;
 mod toml_text;
