@@ -14,6 +14,7 @@ pub mod html;
 pub mod palette;
 pub mod panel;
 pub mod pictures;
+pub mod player;
 pub mod plot;
 pub mod progress;
 pub mod raster;
