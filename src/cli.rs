@@ -3,6 +3,7 @@
 mod args;
 mod audit;
 mod capacity;
+mod plot;
 mod reproduce;
 
 use crate::base::lanes::InstructionSet;
@@ -37,6 +38,7 @@ pub fn run(cli: Cli, console: &Console) -> Result<(), Error> {
         Command::Capacity(args) => capacity::run(args, console),
         Command::Reproduce(args) => reproduce::run(args, console),
         Command::Replay(args) => run_replay(args, console),
+        Command::Plot(args) => plot::run(args, console),
         Command::Simulate(args) => run_simulate(&args, console),
         Command::Data { command } => run_data(command, console),
         Command::Gallery => gallery::gallery().map(|robots| summary::gallery(console, &robots)),
@@ -152,16 +154,15 @@ fn run_eval(args: EvalArgs, console: &Console) -> Result<(), Error> {
 }
 
 fn run_replay(args: ReplayArgs, console: &Console) -> Result<(), Error> {
-    let ReplayArgs { robot, physical_only, archive, images, dataset, data, format, out, width, every, open } =
-        args;
+    let ReplayArgs { robot, physical_only, archive, images, dataset, data, format, out, open, .. } = args;
+    let (width, every, fps, look) = (args.width, usize::from(args.every), args.fps, args.look);
     let folder = pictures::folder(archive.as_deref(), &robot)?;
     let replay = replay::replay(&replay::Options { robot, physical_only, archive, images, data, dataset })?;
     let wanted = match &out {
         Some(path) => pictures::Wanted::named(path, &format)?,
         None => pictures::Wanted::beside(&folder, &replay.name, &format),
     };
-    let made =
-        pictures::make(console, &replay, &pictures::Wanted { width, every: usize::from(every), ..wanted })?;
+    let made = pictures::make(console, &replay, &pictures::Wanted { width, every, fps, look, ..wanted })?;
     match made.last().filter(|_| open) {
         Some(path) => open::that(path).map_err(|error| Error::other(format!("cannot open it: {error}"))),
         None => Ok(()),

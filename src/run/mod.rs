@@ -18,6 +18,7 @@ pub mod evolve;
 pub mod folder;
 pub mod gallery;
 pub mod metrics;
+pub mod plot;
 pub mod published;
 pub mod replay;
 pub mod report;
@@ -27,6 +28,7 @@ pub mod robots;
 pub mod robust;
 #[cfg(test)]
 mod samples;
+pub mod sensitivity;
 pub mod setting;
 pub mod signals;
 pub mod simulate;

@@ -6,9 +6,8 @@ use super::folder::{IfExists, RUN_JSON};
 use super::report::EvalFile;
 use super::robots::{Chosen, Selection, Source};
 use super::table::{self, Row};
-use super::verdict::Criteria;
+use super::verdict::{Criteria, Verdict};
 use super::{Config, Error, audit, capacity, config, eval, evolve, toml_text};
-use crate::base::files::write_atomically;
 use crate::base::random::{Purpose, stream};
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
@@ -171,6 +170,9 @@ pub fn reproduce(options: &Options, stop: &AtomicBool, observer: &dyn Observer) 
     Ok(Finished { rows, files, stopped: false })
 }
 
+/// Chosen robots, and by task how many are physical of how many that were audited.
+type Drawn<'s> = (Vec<Chosen<'s>>, BTreeMap<String, (usize, usize)>);
+
 /// One call.
 struct Job<'a> {
     options: &'a Options,
@@ -192,10 +194,10 @@ impl Job<'_> {
             .collect();
         let mut rows: Vec<Row> = tasks.iter().map(|task| Row::new(&config.data.dataset, task)).collect();
         for row in &mut rows {
-            row.audited = audited.get(&row.task).copied().unwrap_or(0);
+            (row.physical, row.audited) = audited.get(&row.task).copied().unwrap_or((0, 0));
         }
         if chosen.is_empty() {
-            self.observer.step(&format!("{name}: no robot is physical: nothing to test"));
+            self.observer.step(&format!("{name}: every robot exploits the simulator: nothing to test"));
             return Ok(Some(rows));
         }
         let path = self.options.out.join(format!("{name}-eval.json"));
@@ -241,12 +243,9 @@ impl Job<'_> {
     }
 
     /// Robots of each task, drawn at random one after the other and audited, until so many are found physical as are wanted
-    /// or there are no more; and how many of each task were audited. `None` if stopped.
-    #[allow(clippy::type_complexity)]
-    fn chosen<'s>(
-        &self,
-        sources: &'s [Source],
-    ) -> Result<Option<(Vec<Chosen<'s>>, BTreeMap<String, usize>)>, Error> {
+    /// or there are no more. If they are too few, the first of those take part, too, that are not found to exploit the
+    /// simulator: the paper, which sorted out by eye, kept such. With them, counts by task. `None` if stopped.
+    fn chosen<'s>(&self, sources: &'s [Source]) -> Result<Option<Drawn<'s>>, Error> {
         let all = Selection::All.of(sources, 0)?;
         let grouping = sources[0].run.config.grouping()?;
         let (mut chosen, mut counts) = (Vec::new(), BTreeMap::new());
@@ -254,7 +253,7 @@ impl Job<'_> {
             let task = split.name();
             let of_task: Vec<Chosen> = all.iter().filter(|c| c.robot.task == task).copied().collect();
             let order = stream(1, Purpose::Robots, 1, number).sample(of_task.len(), of_task.len());
-            let mut physical = Vec::new();
+            let (mut physical, mut others) = (Vec::new(), Vec::new());
             let mut audited = 0;
             for turn in order.chunks(self.plan.robots) {
                 if physical.len() >= self.plan.robots {
@@ -263,21 +262,27 @@ impl Job<'_> {
                 let drawn: Vec<Chosen> = turn.iter().map(|&index| of_task[index]).collect();
                 self.observer.step(&format!("{task}: audit of {} robots", drawn.len()));
                 let Some(verdicts) = self.audited(sources, &drawn)? else { return Ok(None) };
-                for (candidate, is_physical) in drawn.into_iter().zip(verdicts) {
-                    if physical.len() < self.plan.robots {
-                        audited += 1;
-                        physical.extend(is_physical.then_some(candidate));
+                for (candidate, verdict) in drawn.into_iter().zip(verdicts) {
+                    if physical.len() >= self.plan.robots {
+                        break;
+                    }
+                    audited += 1;
+                    match verdict {
+                        Some(Verdict::Physical) => physical.push(candidate),
+                        Some(Verdict::Exploits) | None => {}
+                        Some(_) => others.push(candidate),
                     }
                 }
             }
-            chosen.extend(physical);
-            counts.insert(task, audited);
+            counts.insert(task, (physical.len(), audited));
+            let missing = self.plan.robots.saturating_sub(physical.len());
+            chosen.extend(physical.into_iter().chain(others.into_iter().take(missing)));
         }
         Ok(Some((chosen, counts)))
     }
 
-    /// Which of some robots are physical; `None` if stopped.
-    fn audited(&self, sources: &[Source], robots: &[Chosen]) -> Result<Option<Vec<bool>>, Error> {
+    /// The verdicts on some robots; `None` if stopped.
+    fn audited(&self, sources: &[Source], robots: &[Chosen]) -> Result<Option<Vec<Option<Verdict>>>, Error> {
         let mut files: BTreeMap<usize, AuditFile> = BTreeMap::new();
         for (number, source) in sources.iter().enumerate() {
             let own = robots.iter().filter(|chosen| chosen.source == number);
@@ -300,11 +305,8 @@ impl Job<'_> {
             }
             files.insert(number, finished.file);
         }
-        let is_physical = |chosen: &Chosen| {
-            let found = files.get(&chosen.source).and_then(|file| file.robot(&chosen.robot.id));
-            found.is_some_and(|found| found.is_physical())
-        };
-        Ok(Some(robots.iter().map(is_physical).collect()))
+        let verdict = |chosen: &Chosen| Some(files.get(&chosen.source)?.robot(&chosen.robot.id)?.verdict);
+        Ok(Some(robots.iter().map(verdict).collect()))
     }
 
     /// The test of the chosen robots; `None` if stopped.
@@ -317,7 +319,7 @@ impl Job<'_> {
     ) -> Result<Option<EvalFile>, Error> {
         let ids: Vec<(usize, String)> = chosen.iter().map(|c| (c.source, c.robot.id.clone())).collect();
         let about = format!(
-            "{} elites of each task, drawn at random among those audited as physical",
+            "{} elites of each task, drawn at random, physical ones first, none that exploits the simulator",
             self.plan.robots
         );
         let options = eval::Options {
@@ -342,9 +344,4 @@ impl Job<'_> {
         let is_whole = !report.stopped && !self.stop.load(Ordering::Relaxed);
         Ok(is_whole.then_some(report))
     }
-}
-
-/// Writes a file of the reproduction.
-pub(super) fn write_file(path: &Path, content: &[u8]) -> Result<(), Error> {
-    write_atomically(path, content).map_err(|error| Error::writing(path, &error))
 }

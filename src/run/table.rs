@@ -4,7 +4,7 @@ use super::Error;
 use super::capacity_file::CapacityFile;
 use super::published;
 use super::report::EvalFile;
-use super::reproduce::write_file;
+use crate::base::files::write_atomically;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
@@ -15,7 +15,9 @@ pub struct Row {
     pub task: String,
     /// Robots tested.
     pub robots: usize,
-    /// Robots that were audited to find those.
+    /// Those of them that are physical.
+    pub physical: usize,
+    /// Robots that were audited to find them.
     pub audited: usize,
     /// Their mean accuracy \[%\]; none of no robots.
     pub accuracy: Option<f64>,
@@ -46,6 +48,7 @@ impl Row {
         Row {
             task: task.to_string(),
             robots: 0,
+            physical: 0,
             audited: 0,
             accuracy: None,
             deviation: None,
@@ -95,6 +98,7 @@ pub(super) fn write(folder: &Path, scale: f64, rows: &[Row]) -> Result<Vec<PathB
     let header = [
         "task",
         "robots",
+        "physical",
         "audited",
         "accuracy",
         "deviation",
@@ -124,11 +128,16 @@ pub(super) fn write(folder: &Path, scale: f64, rows: &[Row]) -> Result<Vec<PathB
             row.paper_mlp,
             row.paper_cnn,
         ];
-        let mut cells = vec![row.task.clone(), row.robots.to_string(), row.audited.to_string()];
+        let mut cells =
+            vec![row.task.clone(), row.robots.to_string(), row.physical.to_string(), row.audited.to_string()];
         cells.extend(numbers.map(|number| number.map_or(String::new(), |number| number.to_string())));
         writer.write_record(&cells).map_err(failed)?;
     }
     let text = writer.into_inner().map_err(|error| Error::other(error.to_string()))?;
     write_file(&csv, &text)?;
     Ok(vec![json, csv])
+}
+
+fn write_file(path: &Path, content: &[u8]) -> Result<(), Error> {
+    write_atomically(path, content).map_err(|error| Error::writing(path, &error))
 }

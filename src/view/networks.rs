@@ -72,7 +72,8 @@ pub fn table(console: &Console, finished: &Finished) {
             |value: Option<f64>| if row.paper_accuracy.is_none() { "–".to_string() } else { size(value) };
         vec![
             row.task.clone(),
-            format!("{} of {}", row.robots, row.audited),
+            row.robots.to_string(),
+            format!("{} of {}", row.physical, row.audited),
             number(row.accuracy),
             row.interval.map_or("–".to_string(), |[low, high]| format!("{low:.1}–{high:.1}")),
             number(row.paper_accuracy),
@@ -86,6 +87,7 @@ pub fn table(console: &Console, finished: &Finished) {
     });
     let headers = [
         "task",
+        "robots",
         "physical of audited",
         "accuracy %",
         "95 % interval",
