@@ -4,6 +4,7 @@ mod args;
 mod audit;
 mod capacity;
 mod reproduce;
+mod plot;
 
 use crate::base::lanes::InstructionSet;
 use crate::run::data::catalogue::Catalogue;
@@ -37,6 +38,7 @@ pub fn run(cli: Cli, console: &Console) -> Result<(), Error> {
         Command::Capacity(args) => capacity::run(args, console),
         Command::Reproduce(args) => reproduce::run(args, console),
         Command::Replay(args) => run_replay(args, console),
+        Command::Plot(args) => plot::run(args, console),
         Command::Simulate(args) => run_simulate(&args, console),
         Command::Data { command } => run_data(command, console),
         Command::Gallery => gallery::gallery().map(|robots| summary::gallery(console, &robots)),

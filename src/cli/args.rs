@@ -4,6 +4,7 @@ use super::audit::{self, AuditArgs};
 use super::capacity::{self, CapacityArgs};
 use super::reproduce::{self, ReproduceArgs};
 use crate::run::eval;
+use super::plot::{self, PlotArgs};
 use crate::run::replay::Shown;
 use crate::run::robots::Selection;
 use crate::task::dataset::BUILTIN;
@@ -79,6 +80,9 @@ Examples:
   morphcog replay --robot best --format terminal
   morphcog replay --robot best -o walk.gif")]
     Replay(ReplayArgs),
+    /// Make a figure: SVG and PNG for papers and pages.
+    #[command(after_help = plot::EXAMPLES)]
+    Plot(PlotArgs),
     /// Simulate any body under any stimuli.
     #[command(after_help = "\
 Example:

@@ -19,6 +19,7 @@ pub mod folder;
 pub mod gallery;
 pub mod metrics;
 pub mod published;
+pub mod plot;
 pub mod replay;
 pub mod report;
 pub mod reproduce;
@@ -28,6 +29,7 @@ pub mod robust;
 #[cfg(test)]
 mod samples;
 pub mod setting;
+pub mod sensitivity;
 pub mod signals;
 pub mod simulate;
 pub mod statistics;

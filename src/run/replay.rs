@@ -3,6 +3,7 @@
 use super::robots::{Selection, Source};
 use super::training::{ImageRef, load_dataset, see};
 use super::{Config, Error, folder, gallery};
+use crate::base::Grid;
 use crate::body::Body;
 use crate::task::dataset::Split;
 use crate::task::protocol::Life;
@@ -66,13 +67,50 @@ pub struct Replay {
     pub name: String,
 }
 
+/// A robot and what it is shown: a life before it is lived.
+#[derive(Clone, Debug)]
+pub struct Subject {
+    /// The robot.
+    pub found: Found,
+    /// Images with their labels, as it sees them.
+    pub images: Vec<(String, Grid<f64>)>,
+}
+
 /// Records a robot's life as its config's protocol has it.
 ///
 /// # Errors
 /// What is wrong with robot, archive, images or data.
 pub fn replay(options: &Options) -> Result<Replay, Error> {
-    let found = find(options)?;
-    let mut config = found.config;
+    let subject = subject(options)?;
+    let recording = record_subject(&subject);
+    let Found { name, config, mut about, .. } = subject.found;
+    let fresh = config.protocol.life == Life::Fresh;
+    about.push((
+        "Images".to_string(),
+        format!("{}, {:?} encoding", config.data.dataset, config.stimulus.encoding).to_lowercase(),
+    ));
+    let life = if fresh { "a fresh life for every image" } else { "one continuous life" };
+    about.push((
+        "Protocol".to_string(),
+        format!("{life}, {} control steps each", config.protocol.control_steps),
+    ));
+    Ok(Replay { recording, about, name })
+}
+
+/// Records a life.
+pub fn record_subject(subject: &Subject) -> Recording {
+    let Subject { found: Found { name, body, config, .. }, images } = subject;
+    let fresh = config.protocol.life == Life::Fresh;
+    record(name, body, &config.physics, &config.protocol, fresh, images)
+}
+
+/// Finds a robot and the images it is to be shown.
+///
+/// # Errors
+/// What is wrong with robot, archive, images or data.
+pub fn subject(options: &Options) -> Result<Subject, Error> {
+    let mut found = find(options)?;
+    let config = &mut found.config;
     if let Some(dataset) = &options.dataset
         && *dataset != config.data.dataset
     {
@@ -92,14 +130,13 @@ pub fn replay(options: &Options) -> Result<Replay, Error> {
     };
     let mut shown = options.images.clone();
     if shown.is_empty() {
-        let own = if options.dataset.is_none() { found.training } else { Vec::new() };
-        shown = match own.as_slice() {
-            [] => super::training::Training::load(&config, options.data.as_deref()).map_err(offer)?.images,
+        let own = if options.dataset.is_none() { found.training.as_slice() } else { &[] };
+        let all = match own {
+            [] => super::training::Training::load(config, options.data.as_deref()).map_err(offer)?.images,
             own => own.to_vec(),
-        }
-        .into_iter()
-        .map(|image| Shown { split: Split::Train, index: image.index })
-        .collect();
+        };
+        let training = |image: &ImageRef| Shown { split: Split::Train, index: image.index };
+        shown = some(&all).iter().map(training).collect();
     }
     if shown.len() > MAX_IMAGES {
         let text =
@@ -108,39 +145,56 @@ pub fn replay(options: &Options) -> Result<Replay, Error> {
     }
     let wanted: Vec<Split> =
         Split::ALL.into_iter().filter(|split| shown.iter().any(|image| image.split == *split)).collect();
-    let dataset = load_dataset(&config, options.data.as_deref(), &wanted).map_err(offer)?;
+    let dataset = load_dataset(config, options.data.as_deref(), &wanted).map_err(offer)?;
     let mut images = Vec::new();
     for Shown { split, index } in shown {
         let label =
             dataset.label(split, index).map_err(|error| Error::usage(format!("--images: {error}")))?;
-        images.push((format!("{label} ({split} {index})"), see(&config, &dataset, split, index)?));
+        images.push((format!("{label} ({split} {index})"), see(config, &dataset, split, index)?));
     }
-    let fresh = config.protocol.life == Life::Fresh;
-    let recording = record(&found.name, &found.body, &config.physics, &config.protocol, fresh, &images);
-    let mut about = found.about;
-    about.push((
-        "Images".to_string(),
-        format!("{}, {:?} encoding", dataset.name(), config.stimulus.encoding).to_lowercase(),
-    ));
-    let life = if fresh { "a fresh life for every image" } else { "one continuous life" };
-    about.push((
-        "Protocol".to_string(),
-        format!("{life}, {} control steps each", config.protocol.control_steps),
-    ));
-    Ok(Replay { recording, about, name: found.name })
+    config.data.dataset = dataset.name().to_string();
+    Ok(Subject { found, images })
 }
 
-/// A robot and how it lived.
-struct Found {
-    name: String,
-    body: Body,
-    config: Config,
-    training: Vec<ImageRef>,
-    about: Vec<(String, String)>,
+/// Training images to show: all, or the first of each class if they are too many.
+fn some(images: &[ImageRef]) -> Vec<ImageRef> {
+    let mut some = images.to_vec();
+    if some.len() > MAX_IMAGES {
+        let mut seen = std::collections::BTreeSet::new();
+        some.retain(|image| seen.insert(image.label));
+    }
+    some
+}
+
+/// A robot and how it lives.
+#[derive(Clone, Debug)]
+pub struct Found {
+    /// Its id, or its name in the gallery.
+    pub name: String,
+    /// Its body.
+    pub body: Body,
+    /// The config it was evolved with.
+    pub config: Config,
+    /// Its training images, as far as they are known.
+    pub training: Vec<ImageRef>,
+    /// What a page says about it: words and values.
+    pub about: Vec<(String, String)>,
     published: bool,
 }
 
-fn find(options: &Options) -> Result<Found, Error> {
+impl Found {
+    /// Whose picture it is, in a line: robot, run and seed.
+    pub fn title(&self) -> String {
+        let word = |key: &str| self.about.iter().find(|(word, _)| word == key).map_or("", |(_, value)| value);
+        format!("robot {}, {}", word("Robot"), word("From"))
+    }
+}
+
+/// Finds a robot in an archive or the gallery.
+///
+/// # Errors
+/// What is wrong with robot or archive.
+pub fn find(options: &Options) -> Result<Found, Error> {
     if options.archive.is_none()
         && let Some(robot) = gallery::find(&options.robot)?
     {

@@ -22,6 +22,12 @@ impl Colour {
         Colour { rgb: self.rgb, opacity }
     }
 
+    /// Its red, green and blue as `#rrggbb`.
+    pub fn hex(self) -> String {
+        let [red, green, blue] = self.rgb;
+        format!("#{red:02x}{green:02x}{blue:02x}")
+    }
+
     /// Gray of an intensity in [0, 1].
     pub fn gray(intensity: f64) -> Self {
         let level = (255.0 * intensity.clamp(0.0, 1.0)).round() as u8;

@@ -7,6 +7,7 @@
 pub mod bar;
 pub mod colour;
 pub mod console;
+pub mod figures;
 pub mod font;
 pub mod gif;
 pub mod html;
@@ -14,6 +15,7 @@ pub mod networks;
 pub mod palette;
 pub mod panel;
 pub mod pictures;
+pub mod plot;
 pub mod progress;
 pub mod raster;
 pub mod reporters;
@@ -47,6 +49,14 @@ pub enum PictureError {
         width: u32,
         /// Pixels asked for, or that follow from the width.
         height: u32,
+    },
+    /// A figure would have no pixels or too many.
+    #[error("a figure of {width} × {height} pixels is not possible; expected 1 … 16000 on each side")]
+    Figure {
+        /// Pixels asked for.
+        width: f64,
+        /// Pixels that follow.
+        height: f64,
     },
     /// The encoder refused.
     #[error("the picture could not be encoded: {0}")]

@@ -1,0 +1,105 @@
+//! `morphcog plot`: reads what figures are made of.
+
+use super::archive::RunFile;
+use super::folder::METRICS;
+use super::report::{EvalFile, FORMAT, FORMAT_VERSION};
+use super::{Error, toml_text};
+use serde::Deserialize;
+use std::path::Path;
+
+/// A line of `metrics.csv`, as far as figures show it.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+pub struct Moment {
+    /// Offspring made so far.
+    pub evaluations: f64,
+    /// Elites per possible cell.
+    pub coverage: f64,
+    /// Sum of the objectives above the offset.
+    pub qd_score: f64,
+    /// Largest objective; none without elites.
+    pub obj_max: Option<f64>,
+}
+
+/// How a run came along.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Progress {
+    /// Name of the run.
+    pub run: String,
+    /// Its seed.
+    pub seed: u64,
+    /// A moment per generation, at least one.
+    pub moments: Vec<Moment>,
+}
+
+impl Progress {
+    /// Reads a run.json and the metrics.csv beside it.
+    ///
+    /// # Errors
+    /// What is missing or wrong, with its line.
+    pub fn read(archive: &Path) -> Result<Self, Error> {
+        let run = RunFile::read(archive)?;
+        let path = archive.with_file_name(METRICS);
+        let text = std::fs::read_to_string(&path).map_err(|error| Error::reading(&path, &error))?;
+        let moments = moments(&text).map_err(|error| error.within(&path.display().to_string()))?;
+        Ok(Progress { run: run.name, seed: run.config.seed, moments })
+    }
+}
+
+fn moments(text: &str) -> Result<Vec<Moment>, Error> {
+    let hint = || "morphcog evolve writes this file beside run.json".to_string();
+    let mut moments = Vec::new();
+    for line in csv::Reader::from_reader(text.as_bytes()).deserialize() {
+        let moment: Moment = line.map_err(|error| Error::input(error.to_string()).hint(hint()))?;
+        moments.push(moment);
+    }
+    match moments.is_empty() {
+        true => Err(Error::input("expected a line per generation, found none".to_string()).hint(hint())),
+        false => Ok(moments),
+    }
+}
+
+/// Reads `eval.json`.
+///
+/// # Errors
+/// What is wrong with the file, with its line and key; or if there is no robot in it.
+pub fn read_eval(path: &Path) -> Result<EvalFile, Error> {
+    #[derive(Deserialize)]
+    struct Head {
+        format: Option<String>,
+        format_version: Option<u32>,
+    }
+    let hint = || format!("morphcog eval --archive {} makes it", path.with_file_name("run.json").display());
+    let text = std::fs::read_to_string(path).map_err(|error| Error::reading(path, &error).hint(hint()))?;
+    let name = path.display().to_string();
+    let head: Head = toml_text::read_json(&text, &name)?;
+    if head.format.as_deref() != Some(FORMAT) || head.format_version.is_none_or(|v| v > FORMAT_VERSION) {
+        let text = format!("{name}: expected \"format\": \"{FORMAT}\", \"format_version\": {FORMAT_VERSION}");
+        return Err(Error::input(text).hint(hint()));
+    }
+    let report: EvalFile = toml_text::read_json(&text, &name)?;
+    match report.robots.is_empty() {
+        true => Err(Error::input(format!("{name}: robots: expected at least one, found none")).hint(hint())),
+        false => Ok(report),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn metrics_are_read_by_the_names_of_their_columns() {
+        let text = "generation,coverage,qd_score,obj_max,evaluations\n0,0.1,2,,20\n1,0.2,3,1.5,40\n";
+        let moments = moments(text).unwrap();
+        assert_eq!((moments[0].obj_max, moments[1].obj_max), (None, Some(1.5)));
+        assert_eq!((moments[1].evaluations, moments[1].coverage, moments[1].qd_score), (40.0, 0.2, 3.0));
+    }
+
+    #[test]
+    fn broken_metrics_are_refused_with_their_line() {
+        let broken = |text: &str| moments(text).unwrap_err().message;
+        assert!(broken("generation,coverage\n").contains("found none"));
+        assert!(broken("a,b\n1,2\n").contains("evaluations"));
+        assert!(broken("coverage,qd_score,obj_max,evaluations\n1,2,3,4\n1,x,3,4\n").contains("line: 3"));
+    }
+}

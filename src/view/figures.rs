@@ -1,0 +1,270 @@
+//! What `morphcog plot` makes: figures as SVG and PNG.
+
+use super::console::Console;
+use super::plot::{self, Background, Figure};
+use super::{PictureError, write_whole};
+use crate::run::capacity_file::{CAPACITY_JSON, CapacityFile};
+use crate::run::plot::{Progress, read_eval};
+use crate::run::replay::{self, Found, Options};
+use crate::run::{Error, archive::RunFile, folder, gallery, sensitivity};
+use std::fmt;
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+
+/// What a figure shows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// A robot's voxels.
+    Body,
+    /// Its position over time.
+    Spacetime,
+    /// Poses of its life.
+    Snapshots,
+    /// What each pixel matters to it.
+    Sensitivity,
+    /// Fitness in the archive.
+    Archive,
+    /// A run's metrics.
+    Progress,
+    /// What `eval` found.
+    Accuracy,
+    /// What `capacity` found.
+    Capacity,
+}
+
+impl Kind {
+    /// All of them with their names.
+    pub const ALL: [(Kind, &str); 8] = [
+        (Kind::Body, "body"),
+        (Kind::Spacetime, "spacetime"),
+        (Kind::Snapshots, "snapshots"),
+        (Kind::Sensitivity, "sensitivity"),
+        (Kind::Archive, "archive"),
+        (Kind::Progress, "progress"),
+        (Kind::Accuracy, "accuracy"),
+        (Kind::Capacity, "capacity"),
+    ];
+
+    /// Whether it shows one robot.
+    pub fn is_of_robot(self) -> bool {
+        matches!(self, Kind::Body | Kind::Spacetime | Kind::Snapshots | Kind::Sensitivity)
+    }
+}
+
+impl fmt::Display for Kind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        Kind::ALL.iter().filter(|(kind, _)| kind == self).try_for_each(|(_, name)| f.write_str(name))
+    }
+}
+
+impl FromStr for Kind {
+    type Err = String;
+    fn from_str(text: &str) -> Result<Self, String> {
+        let found = Kind::ALL.iter().find(|(_, name)| *name == text);
+        let names = || Kind::ALL.map(|(_, name)| name).join(", ");
+        found.map(|(kind, _)| *kind).ok_or_else(|| format!("expected one of {}", names()))
+    }
+}
+
+/// What to make, and where.
+#[derive(Clone, Debug)]
+pub struct Wanted {
+    /// What it shows.
+    pub kind: Kind,
+    /// The run.json files; none: the newest under `runs/`.
+    pub archives: Vec<PathBuf>,
+    /// The robots; none: "best".
+    pub robots: Vec<String>,
+    /// How to find robots and images; its robot and archive are not looked at.
+    pub options: Options,
+    /// Control steps between poses; 0: as suits the walk.
+    pub every: usize,
+    /// The file; `None`: SVG and PNG beside the run.json.
+    pub out: Option<PathBuf>,
+    /// Pixels of PNG per inch.
+    pub dpi: u32,
+    /// What is behind it.
+    pub background: Background,
+}
+
+/// A figure and its file without the ending.
+struct Made {
+    figure: Figure,
+    stem: PathBuf,
+}
+
+/// Makes figures, says where they are; the files made.
+///
+/// # Errors
+/// What is wrong with the command line or a file, or if a figure cannot be made or written.
+pub fn make(console: &Console, wanted: &Wanted) -> Result<Vec<PathBuf>, Error> {
+    let endings = endings(wanted.out.as_deref())?;
+    if !wanted.robots.is_empty() && !wanted.kind.is_of_robot() {
+        let of_robots = Kind::ALL.iter().filter(|(kind, _)| kind.is_of_robot()).map(|(_, name)| *name);
+        let text = format!(
+            "--robot: plot {} shows no single robot; expected with {} only",
+            wanted.kind,
+            of_robots.collect::<Vec<_>>().join(", ")
+        );
+        return Err(Error::usage(text));
+    }
+    let archives = archives(wanted)?;
+    let robots = match wanted.robots.as_slice() {
+        [] => vec!["best".to_string()],
+        robots => robots.to_vec(),
+    };
+    let count = match wanted.kind {
+        Kind::Progress => 1,
+        kind if kind.is_of_robot() => archives.len() * robots.len(),
+        _ => archives.len(),
+    };
+    if count > 1 && wanted.out.is_some() {
+        return Err(Error::usage(format!("--out: expected with one figure only, these are {count}")));
+    }
+    let mut files = Vec::new();
+    let mut write = |made: Made| -> Result<(), Error> {
+        let figure = made.figure.on(wanted.background);
+        for ending in &endings {
+            let path = wanted.out.as_ref().filter(|path| path.extension().is_some());
+            let path = path
+                .cloned()
+                .unwrap_or_else(|| with_ending(wanted.out.as_ref().unwrap_or(&made.stem), ending));
+            let bytes = match *ending {
+                "svg" => figure.svg().into_bytes(),
+                _ => figure.png(f64::from(wanted.dpi) / 72.0).map_err(failed)?,
+            };
+            write_whole(&path, &bytes).map_err(failed)?;
+            console.line(&format!("wrote {}", path.display()));
+            files.push(path);
+        }
+        Ok(())
+    };
+    if wanted.kind == Kind::Progress {
+        let paths: Vec<&Path> = archives.iter().flatten().map(PathBuf::as_path).collect();
+        let runs: Result<Vec<Progress>, Error> = paths.iter().map(|path| Progress::read(path)).collect();
+        let figure = plot::progress(&runs?);
+        write(Made { figure, stem: stem(paths.first().copied(), wanted.kind, "") })?;
+    } else if wanted.kind.is_of_robot() {
+        for archive in &archives {
+            for robot in &robots {
+                write(of_robot(console, wanted, archive.as_deref(), robot)?)?;
+            }
+        }
+    } else {
+        for path in archives.iter().flatten() {
+            write(Made { figure: of_run(wanted.kind, path)?, stem: stem(Some(path), wanted.kind, "") })?;
+        }
+    }
+    Ok(files)
+}
+
+/// The formats that a file name asks for.
+fn endings(out: Option<&Path>) -> Result<Vec<&'static str>, Error> {
+    let Some(path) = out else { return Ok(vec!["svg", "png"]) };
+    match path.extension().map(|ending| ending.to_string_lossy().to_lowercase()).as_deref() {
+        None => Ok(vec!["svg", "png"]),
+        Some("svg") => Ok(vec!["svg"]),
+        Some("png") => Ok(vec!["png"]),
+        Some(_) => {
+            let text = format!("--out: {}: expected a file name that ends in .svg or .png", path.display());
+            Err(Error::usage(text))
+        }
+    }
+}
+
+fn with_ending(stem: &Path, ending: &str) -> PathBuf {
+    let mut name = stem.as_os_str().to_owned();
+    name.push(".");
+    name.push(ending);
+    PathBuf::from(name)
+}
+
+/// The archives to look at; `None` is the gallery.
+fn archives(wanted: &Wanted) -> Result<Vec<Option<PathBuf>>, Error> {
+    if !wanted.archives.is_empty() {
+        return Ok(wanted.archives.iter().cloned().map(Some).collect());
+    }
+    let published = |robot: &String| Ok(gallery::find(robot)?.is_some());
+    let published: Result<Vec<bool>, Error> = wanted.robots.iter().map(published).collect();
+    let published = published?;
+    if !published.is_empty() && published.iter().all(|is_published| *is_published) {
+        return Ok(vec![None]);
+    }
+    Ok(vec![Some(folder::newest_run()?)])
+}
+
+/// `plot-<kind>[-robot]` beside a run.json, or here.
+fn stem(archive: Option<&Path>, kind: Kind, robot: &str) -> PathBuf {
+    let name = if robot.is_empty() { format!("plot-{kind}") } else { format!("plot-{kind}-{robot}") };
+    archive.map_or_else(|| PathBuf::from(&name), |path| path.with_file_name(&name))
+}
+
+fn of_robot(console: &Console, wanted: &Wanted, archive: Option<&Path>, robot: &str) -> Result<Made, Error> {
+    let options = Options {
+        robot: robot.to_string(),
+        archive: archive.map(Path::to_path_buf),
+        ..wanted.options.clone()
+    };
+    let made = |found: &Found, figure| Made { figure, stem: stem(archive, wanted.kind, &found.name) };
+    if wanted.kind == Kind::Body {
+        let found = replay::find(&options)?;
+        return Ok(made(&found, plot::body(&found.body, &found.title())));
+    }
+    let subject = replay::subject(&options)?;
+    let title = subject.found.title();
+    let figure = match wanted.kind {
+        Kind::Sensitivity => {
+            let counter = console.counter("flipping pixels", sensitivity::lives(&subject) as u64, "lives");
+            let images = sensitivity::sensitivity(&subject, &|done| counter.update(done));
+            plot::sensitivity(&subject.found.body, &images, &title)
+        }
+        kind => {
+            let recording = replay::record_subject(&subject);
+            match kind {
+                Kind::Snapshots => plot::snapshots(&recording, wanted.every, &title),
+                _ => plot::spacetime(&recording, &title),
+            }
+            .map_err(failed)?
+        }
+    };
+    Ok(made(&subject.found, figure))
+}
+
+fn of_run(kind: Kind, path: &Path) -> Result<Figure, Error> {
+    match kind {
+        Kind::Accuracy => read_eval(&path.with_file_name("eval.json")).map(|report| plot::accuracy(&report)),
+        Kind::Capacity => {
+            let hint = |error: Error| match error.hint {
+                None => error.hint("morphcog capacity makes it".to_string()),
+                Some(_) => error,
+            };
+            let file = CapacityFile::read(&path.with_file_name(CAPACITY_JSON)).map_err(hint)?;
+            Ok(plot::capacity(&file))
+        }
+        _ => RunFile::read(path).map(|run| plot::archive(&run)),
+    }
+}
+
+fn failed(error: PictureError) -> Error {
+    match error {
+        PictureError::Figure { .. } => Error::usage(format!("--dpi: {error}")),
+        error => Error::other(error.to_string()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn kinds_are_named_and_endings_say_the_format() {
+        for (kind, name) in Kind::ALL {
+            assert_eq!((name.parse::<Kind>(), kind.to_string()), (Ok(kind), name.to_string()));
+        }
+        assert!("pie".parse::<Kind>().unwrap_err().contains("spacetime"));
+        assert_eq!(endings(Some(Path::new("a.SVG"))).unwrap(), ["svg"]);
+        assert_eq!(endings(Some(Path::new("a"))).unwrap(), ["svg", "png"]);
+        assert_eq!(endings(Some(Path::new("a.pdf"))).unwrap_err().kind.exit_code(), 2);
+        assert_eq!(with_ending(Path::new("x/plot-a.b"), "svg"), Path::new("x/plot-a.b.svg"));
+    }
+}

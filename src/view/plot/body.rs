@@ -1,0 +1,70 @@
+//! The figure of a body: its voxels by material.
+
+use super::axes::{MARGIN, heading};
+use super::canvas::{Canvas, Pen, Words};
+use super::figure::{COLUMN, Figure};
+use super::{robot, scales};
+use crate::body::{Body, Material};
+use crate::view::colour::{self, Colour};
+use crate::view::panel::present;
+
+/// Side of the map, points.
+const MAP: f64 = 132.0;
+
+/// A body's voxels by material, with a legend that counts them. `of` says whose it is.
+pub fn body(body: &Body, of: &str) -> Figure {
+    let mut canvas = Canvas::new();
+    let top = heading(&mut canvas, "Body", of, COLUMN) + 2.0;
+    let at = [MARGIN + 1.0, top];
+    let cell = MAP / body.height().max(body.width()).max(1) as f64;
+    let size = [cell * body.width() as f64, cell * body.height() as f64];
+    canvas.frame(at, size, Pen::new(scales::GRID, 0.6));
+    let fill = |material: &Material| match material {
+        Material::Empty => Colour::gray(0.985),
+        material => robot::plain(*material),
+    };
+    let seam = (0.05 * cell).min(0.5);
+    robot::squares(&mut canvas, at, cell, seam, body.voxels().iter().map(|(place, m)| (place, fill(m))));
+    robot::body_outline(&mut canvas, at, cell, body, Pen::new(colour::INK, 0.8));
+    let count = |material: Material| body.voxels().cells().iter().filter(|m| **m == material).count();
+    let lines: Vec<(Colour, String)> =
+        present(body).map(|m| (robot::plain(m), format!("{} ({})", m.name(), count(m)))).collect();
+    let x = at[0] + MAP + 10.0;
+    let below = robot::legend(
+        &mut canvas,
+        [x, top],
+        lines.iter().map(|(fill, text)| (*fill, text.as_str())),
+        COLUMN - MARGIN - x,
+    );
+    let counts = body.counts();
+    let faint = Words::default().colour(colour::FAINT);
+    let notes = [
+        format!("{} × {} places,", body.height(), body.width()),
+        format!("{} voxels,", counts.total),
+        format!("{} muscles,", counts.muscle),
+        format!("{} sensors", counts.sensor),
+    ];
+    for (k, note) in notes.iter().enumerate() {
+        canvas.text([x, below + 11.0 + 10.0 * k as f64], note, faint);
+    }
+    let height = (top + size[1]).max(below + 45.0) + MARGIN + 1.0;
+    Figure::new(&format!("Body: {of}"), [COLUMN, height], canvas.finish())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_material_that_is_there_is_named_and_drawn() {
+        let svg = body(&"0123/4560".parse().unwrap(), "robot x").svg();
+        for material in Material::ALL.into_iter().skip(1) {
+            assert!(
+                svg.contains(material.name()) && svg.contains(&robot::plain(material).hex()),
+                "{material:?}"
+            );
+        }
+        let plain = body(&"33".parse().unwrap(), "robot y").svg();
+        assert!(plain.contains("muscle, in phase (2)") && !plain.contains("rigid"));
+    }
+}

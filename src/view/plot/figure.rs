@@ -1,0 +1,174 @@
+//! [`Figure`]: a vector picture, written as SVG, or as PNG with fonts of its own.
+
+use super::canvas::{escape, number};
+use super::fonts;
+use crate::view::{PictureError, colour};
+use resvg::tiny_skia::{Pixmap, Transform};
+use resvg::usvg::{Options, Tree};
+
+/// Width of a journal's column: 85 mm in points.
+pub const COLUMN: f64 = 241.0;
+/// Width of a journal's page: 178 mm in points.
+pub const PAGE: f64 = 504.0;
+/// Pixels per point of pictures for print: 300 per inch.
+pub const PRINT: f64 = 300.0 / 72.0;
+/// Most pixels on a side of a PNG.
+const MOST_PIXELS: f64 = 16_000.0;
+
+/// What is behind a figure.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Background {
+    /// White.
+    Paper,
+    /// Whatever the figure is laid on.
+    Transparent,
+}
+
+/// A vector picture. Its SVG has neither ids nor classes nor styles, so any number of them can stand in one page.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Figure {
+    title: String,
+    size: [f64; 2],
+    content: String,
+    background: Background,
+}
+
+impl Figure {
+    /// A figure of a width and height in points; `content` is SVG in points from the top left corner.
+    pub(super) fn new(title: &str, size: [f64; 2], content: String) -> Self {
+        Figure { title: title.to_string(), size, content, background: Background::Paper }
+    }
+
+    /// The same on another background.
+    #[must_use]
+    pub fn on(self, background: Background) -> Self {
+        Figure { background, ..self }
+    }
+
+    /// Width and height in points.
+    pub fn size(&self) -> [f64; 2] {
+        self.size
+    }
+
+    /// What it shows, in a line.
+    pub fn title(&self) -> &str {
+        &self.title
+    }
+
+    /// The figure as SVG: one element `svg`, to be written into a file or into a page.
+    pub fn svg(&self) -> String {
+        let [width, height] = self.size.map(number);
+        let title = escape(&self.title);
+        let paper = match self.background {
+            Background::Transparent => String::new(),
+            Background::Paper => {
+                format!("<rect width=\"{width}\" height=\"{height}\" fill=\"{}\"/>", colour::PAPER.hex())
+            }
+        };
+        format!(
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}pt\" height=\"{height}pt\" \
+             viewBox=\"0 0 {width} {height}\" role=\"img\" aria-label=\"{title}\" font-family=\"{}\">\n\
+             <title>{title}</title>\n{paper}{}</svg>\n",
+            fonts::FAMILIES,
+            self.content
+        )
+    }
+
+    /// The figure as PNG, `scale` pixels per point ([`PRINT`] is good for print); the file says how large it is meant to be.
+    ///
+    /// # Errors
+    /// [`PictureError::Figure`] if it would have no pixels or too many, [`PictureError::Encode`] if it cannot be made.
+    pub fn png(&self, scale: f64) -> Result<Vec<u8>, PictureError> {
+        let [width, height] = self.size.map(|points| (points * scale).ceil());
+        let possible = |pixels: f64| (1.0..=MOST_PIXELS).contains(&pixels);
+        if !possible(width) || !possible(height) {
+            return Err(PictureError::Figure { width, height });
+        }
+        let encode = |error: &dyn std::fmt::Display| PictureError::Encode(error.to_string());
+        // A point is a pixel of the tree.
+        let options = Options { dpi: 72.0, fontdb: fonts::database(), ..Options::default() };
+        let tree = Tree::from_str(&self.svg(), &options).map_err(|error| encode(&error))?;
+        let mut pixmap =
+            Pixmap::new(width as u32, height as u32).ok_or(PictureError::Figure { width, height })?;
+        let transform = Transform::from_scale(scale as f32, scale as f32);
+        resvg::render(&tree, transform, &mut pixmap.as_mut());
+        if self.background == Background::Paper {
+            // The last pixels may be cut by a fraction: paper up to the edge.
+            let mut paper =
+                Pixmap::new(width as u32, height as u32).ok_or(PictureError::Figure { width, height })?;
+            paper.fill(resvg::tiny_skia::Color::WHITE);
+            let paint = resvg::tiny_skia::PixmapPaint::default();
+            paper.draw_pixmap(0, 0, pixmap.as_ref(), &paint, Transform::identity(), None);
+            pixmap = paper;
+        }
+        encode_png(&pixmap, scale, self.background).map_err(|error| encode(&error))
+    }
+}
+
+fn encode_png(pixmap: &Pixmap, scale: f64, background: Background) -> Result<Vec<u8>, png::EncodingError> {
+    let mut bytes = Vec::new();
+    let mut encoder = png::Encoder::new(&mut bytes, pixmap.width(), pixmap.height());
+    encoder.set_depth(png::BitDepth::Eight);
+    encoder.set_compression(png::Compression::High);
+    let per_metre = (scale * 72.0 / 0.0254).round() as u32;
+    encoder.set_pixel_dims(Some(png::PixelDimensions {
+        xppu: per_metre,
+        yppu: per_metre,
+        unit: png::Unit::Meter,
+    }));
+    let pixels = pixmap.pixels().iter().map(|pixel| pixel.demultiply());
+    let data: Vec<u8> = match background {
+        Background::Paper => {
+            encoder.set_color(png::ColorType::Rgb);
+            pixels.flat_map(|p| [p.red(), p.green(), p.blue()]).collect()
+        }
+        Background::Transparent => {
+            encoder.set_color(png::ColorType::Rgba);
+            pixels.flat_map(|p| [p.red(), p.green(), p.blue(), p.alpha()]).collect()
+        }
+    };
+    let mut writer = encoder.write_header()?;
+    writer.write_image_data(&data)?;
+    writer.finish()?;
+    Ok(bytes)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::canvas::{Canvas, Words};
+    use super::*;
+
+    fn figure() -> Figure {
+        let mut canvas = Canvas::new();
+        canvas.rectangle([10.0, 10.0], [20.0, 10.0], colour::INK);
+        canvas.text([5.0, 40.0], "a < b & c", Words::default());
+        Figure::new("A \"test\" <1>", [60.0, 50.0], canvas.finish())
+    }
+
+    #[test]
+    fn an_svg_is_well_formed_and_has_nothing_that_could_clash() {
+        let svg = figure().svg();
+        let tree = resvg::usvg::roxmltree::Document::parse(&svg).unwrap();
+        for node in tree.descendants() {
+            assert!(!node.has_attribute("id") && !node.has_attribute("class"), "{node:?}");
+            assert!(node.tag_name().name() != "style");
+        }
+        assert_eq!(tree.root_element().attribute("aria-label"), Some("A \"test\" <1>"));
+    }
+
+    #[test]
+    fn a_png_has_the_asked_size_and_background() {
+        let read = |bytes: &[u8]| Pixmap::decode_png(bytes).unwrap();
+        let paper = read(&figure().png(2.0).unwrap());
+        assert_eq!((paper.width(), paper.height()), (120, 100));
+        assert_eq!(paper.pixel(1, 1).unwrap().red(), 255);
+        assert_eq!(paper.pixel(30, 30).unwrap().red(), colour::INK.rgb[0]);
+        let clear = read(&figure().on(Background::Transparent).png(2.0).unwrap());
+        assert_eq!((clear.pixel(1, 1).unwrap().alpha(), clear.pixel(30, 30).unwrap().alpha()), (0, 255));
+        // The letters are there, in the embedded font.
+        let dark = (60..90).any(|y| (8..100).any(|x| paper.pixel(x, y).unwrap().red() < 100));
+        assert!(dark);
+        assert!(figure().png(0.0).is_err() && figure().png(1e9).is_err() && figure().png(f64::NAN).is_err());
+        assert_eq!(figure().png(2.0).unwrap(), figure().png(2.0).unwrap());
+    }
+}

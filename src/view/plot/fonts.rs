@@ -1,0 +1,80 @@
+//! The fonts of figures: embedded, so that pictures are the same on every machine.
+//!
+//! An SVG names a list of families as wide as the embedded one or a little narrower: with any of them the words fit.
+
+use resvg::usvg::fontdb::Database;
+use skrifa::prelude::{LocationRef, Size};
+use skrifa::{FontRef, MetadataProvider};
+use std::sync::{Arc, LazyLock};
+
+const REGULAR: &[u8] = include_bytes!("../assets/DejaVuSansCondensed-subset.ttf");
+const BOLD: &[u8] = include_bytes!("../assets/DejaVuSansCondensed-Bold-subset.ttf");
+const FAMILY: &str = "DejaVu Sans Condensed";
+
+/// What the figures' SVG asks for.
+pub const FAMILIES: &str = "'DejaVu Sans Condensed', Arial, Helvetica, 'Liberation Sans', sans-serif";
+
+/// The embedded fonts and no others.
+pub fn database() -> Arc<Database> {
+    static DATABASE: LazyLock<Arc<Database>> = LazyLock::new(|| {
+        let mut database = Database::new();
+        database.load_font_data(REGULAR.to_vec());
+        database.load_font_data(BOLD.to_vec());
+        database.set_sans_serif_family(FAMILY);
+        Arc::new(database)
+    });
+    DATABASE.clone()
+}
+
+/// Width of a text in points at a font size.
+pub fn width(text: &str, size: f64, bold: bool) -> f64 {
+    let Ok(font) = FontRef::new(if bold { BOLD } else { REGULAR }) else { return 0.0 };
+    let metrics = font.glyph_metrics(Size::new(size as f32), LocationRef::default());
+    let charmap = font.charmap();
+    let advance =
+        |letter: char| metrics.advance_width(charmap.map(letter).unwrap_or_default()).unwrap_or(0.0);
+    text.chars().map(|letter| f64::from(advance(letter))).sum()
+}
+
+/// A text no wider than `most` points: cut, with an ellipsis, if it has to be.
+pub fn fitted(text: &str, size: f64, bold: bool, most: f64) -> String {
+    if width(text, size, bold) <= most {
+        return text.to_string();
+    }
+    let letters: Vec<char> = text.chars().collect();
+    let cut = |count: usize| letters[..count].iter().collect::<String>().trim_end().to_string() + "…";
+    let count = (0..letters.len()).rev().find(|&count| width(&cut(count), size, bold) <= most);
+    cut(count.unwrap_or(0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn widths_are_those_of_the_letters() {
+        assert_eq!(width("", 8.0, false), 0.0);
+        assert!(width("iiii", 8.0, false) < width("mmmm", 8.0, false));
+        assert!((width("10", 10.0, false) - 2.0 * width("1", 10.0, false)).abs() < 1e-6);
+        assert!(width("robot", 8.0, true) > width("robot", 8.0, false));
+    }
+
+    #[test]
+    fn texts_are_cut_to_fit() {
+        assert_eq!(fitted("short", 8.0, false, 100.0), "short");
+        let cut = fitted("a very long name of a very long run", 8.0, false, 60.0);
+        assert!(cut.ends_with('…') && width(&cut, 8.0, false) <= 60.0 && cut.len() > 8, "{cut}");
+        assert_eq!(fitted("x", 8.0, false, 0.0), "…");
+    }
+
+    #[test]
+    fn the_fonts_have_every_letter_that_figures_use() {
+        for font in [REGULAR, BOLD] {
+            let font = FontRef::new(font).unwrap();
+            for letter in "aäßéŁΔσ0–—−×·±²→←≥≤…%|'“”°µ".chars() {
+                assert!(font.charmap().map(letter).is_some(), "{letter}");
+            }
+        }
+        assert_eq!(database().len(), 2);
+    }
+}

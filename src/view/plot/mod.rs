@@ -1,0 +1,29 @@
+//! Figures for print and pages: every one a function from what it shows to a [`Figure`].
+//!
+//! `canvas` makes SVG elements, `axes` and `scales` what figures share; `robot` draws bodies. The sizes are those of a
+//! journal's column or page, the words in them at least 7 points high.
+
+mod accuracy;
+mod archive;
+mod axes;
+mod body;
+mod canvas;
+mod capacity;
+mod figure;
+mod fonts;
+mod progress;
+mod robot;
+mod scales;
+mod sensitivity;
+mod snapshots;
+mod spacetime;
+
+pub use accuracy::accuracy;
+pub use archive::archive;
+pub use body::body;
+pub use capacity::capacity;
+pub use figure::{Background, COLUMN, Figure, PAGE, PRINT};
+pub use progress::progress;
+pub use sensitivity::sensitivity;
+pub use snapshots::snapshots;
+pub use spacetime::spacetime;

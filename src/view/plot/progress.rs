@@ -1,0 +1,150 @@
+//! The figure of a run's progress: QD score, coverage and best fitness over evaluations.
+
+use super::axes::{AXIS, Axis, MARGIN, Plot, heading, left_space};
+use super::canvas::{Canvas, Pen, TEXT, Words, path};
+use super::figure::{COLUMN, Figure};
+use super::scales;
+use crate::run::plot::{Moment, Progress};
+use crate::view::colour::Colour;
+
+/// Height of a panel, points.
+const PANEL: f64 = 62.0;
+/// Points of a curve: more than a column's pixels at 150 per inch would not be seen.
+const SAMPLES: usize = 400;
+
+/// A panel: its name, what it shows of a moment, and its colour.
+type Quantity = (&'static str, fn(&Moment) -> f64, Colour);
+
+const QUANTITIES: [Quantity; 3] = [
+    ("QD score", |moment| moment.qd_score, scales::BLUE),
+    ("coverage [%]", |moment| 100.0 * moment.coverage, scales::GREEN),
+    ("best fitness [vl]", |moment| moment.obj_max.unwrap_or(f64::NAN), scales::VERMILLION),
+];
+
+/// QD score, coverage and best fitness of runs over their evaluations; of several runs the median, and the band from the
+/// least to the largest, as far as the shortest of them goes.
+pub fn progress(runs: &[Progress]) -> Figure {
+    let mut canvas = Canvas::new();
+    let of = names(runs);
+    let title = if runs.len() > 1 { "Progress: median, least and largest" } else { "Progress" };
+    let mut top = heading(&mut canvas, title, &of, COLUMN) + 4.0;
+    let end = |run: &Progress| run.moments.last().map_or(0.0, |moment| moment.evaluations);
+    let shortest = runs.iter().map(end).fold(f64::INFINITY, f64::min);
+    let shortest = if shortest.is_finite() { shortest } else { 0.0 };
+    let x = Axis::exact(0.0, shortest.max(1.0), 4);
+    let panels: Vec<(Quantity, Vec<Band>, Axis)> = QUANTITIES
+        .into_iter()
+        .map(|quantity| {
+            let bands = bands(runs, quantity.1, shortest);
+            let values = || bands.iter().flat_map(|band| [band.low, band.high]).filter(|v| v.is_finite());
+            let (low, high) = (values().fold(0.0, f64::min), values().fold(f64::NEG_INFINITY, f64::max));
+            (quantity, bands, Axis::nice(low, high, 4))
+        })
+        .collect();
+    let labels = panels.iter().map(|(_, _, y)| y.labels_width()).fold(0.0, f64::max);
+    let left = MARGIN + left_space(labels);
+    let count = panels.len();
+    for (k, ((name, _, colour), bands, y)) in panels.into_iter().enumerate() {
+        let size = [COLUMN - MARGIN - 8.0 - left, PANEL];
+        let plot = Plot { at: [left, top], size, x: x.clone(), y };
+        plot.grid(&mut canvas, true, false);
+        draw(&mut canvas, &plot, &bands, colour, runs.len() > 1);
+        plot.left_axis(&mut canvas, name);
+        plot.lower_axis(&mut canvas, (k + 1 == count).then_some("evaluations"));
+        top += PANEL + 9.0;
+    }
+    let note = Words { size: TEXT, ..Words::end() }.colour(crate::view::colour::FAINT);
+    let height = top - 9.0 + AXIS + MARGIN;
+    canvas.text([COLUMN - MARGIN, height - MARGIN - 2.0], "vl: voxel lengths", note);
+    Figure::new(&format!("Progress: {of}"), [COLUMN, height], canvas.finish())
+}
+
+/// The runs in a line: their name once, and their seeds.
+fn names(runs: &[Progress]) -> String {
+    let mut parts = Vec::<(String, Vec<String>)>::new();
+    for run in runs {
+        match parts.iter_mut().find(|(name, _)| *name == run.run) {
+            Some((_, seeds)) => seeds.push(run.seed.to_string()),
+            None => parts.push((run.run.clone(), vec![run.seed.to_string()])),
+        }
+    }
+    let part = |(name, seeds): (String, Vec<String>)| {
+        let word = if seeds.len() > 1 { "seeds" } else { "seed" };
+        format!("{name}, {word} {}", seeds.join(", "))
+    };
+    parts.into_iter().map(part).collect::<Vec<_>>().join("; ")
+}
+
+/// Least, median and largest value at a number of evaluations.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Band {
+    at: f64,
+    low: f64,
+    middle: f64,
+    high: f64,
+}
+
+/// The bands from the first moment that all runs have to the last.
+fn bands(runs: &[Progress], quantity: fn(&Moment) -> f64, end: f64) -> Vec<Band> {
+    let first = |run: &Progress| run.moments.first().map_or(0.0, |moment| moment.evaluations);
+    let start = runs.iter().map(first).fold(0.0, f64::max).min(end);
+    let at = |k: usize| start + (end - start) * k as f64 / SAMPLES as f64;
+    (0..=SAMPLES).filter_map(|k| band(runs, quantity, at(k))).collect()
+}
+
+fn band(runs: &[Progress], quantity: fn(&Moment) -> f64, at: f64) -> Option<Band> {
+    let value = |run: &Progress| {
+        let after = run.moments.partition_point(|moment| moment.evaluations <= at);
+        run.moments.get(after.saturating_sub(1)).map(quantity)
+    };
+    let mut values: Vec<f64> = runs.iter().filter_map(value).filter(|v| v.is_finite()).collect();
+    values.sort_by(f64::total_cmp);
+    let (low, high) = (*values.first()?, *values.last()?);
+    let half = values.len() / 2;
+    let middle = if values.len() % 2 == 1 { values[half] } else { (values[half - 1] + values[half]) / 2.0 };
+    Some(Band { at, low, middle, high })
+}
+
+fn draw(canvas: &mut Canvas, plot: &Plot, bands: &[Band], colour: Colour, is_band: bool) {
+    let line =
+        |of: fn(&Band) -> f64| bands.iter().map(|band| plot.place([band.at, of(band)])).collect::<Vec<_>>();
+    if is_band && !bands.is_empty() {
+        let mut edge = line(|band| band.low);
+        edge.extend(line(|band| band.high).into_iter().rev());
+        canvas.area(&path(&edge, true), colour.with_opacity(64));
+    }
+    canvas.polyline(&line(|band| band.middle), Pen::new(colour, 1.2));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn run(seed: u64, best: &[Option<f64>]) -> Progress {
+        let moment = |(k, best): (usize, &Option<f64>)| Moment {
+            evaluations: 20.0 * (k + 1) as f64,
+            coverage: 0.1,
+            qd_score: 3.0,
+            obj_max: *best,
+        };
+        Progress { run: "toy".into(), seed, moments: best.iter().enumerate().map(moment).collect() }
+    }
+
+    #[test]
+    fn a_band_holds_the_runs_and_its_middle_is_their_median() {
+        let runs =
+            [run(1, &[None, Some(1.0)]), run(2, &[Some(2.0), Some(5.0)]), run(3, &[Some(4.0), Some(9.0)])];
+        let best = QUANTITIES[2].1;
+        assert_eq!(band(&runs, best, 40.0), Some(Band { at: 40.0, low: 1.0, middle: 5.0, high: 9.0 }));
+        assert_eq!(band(&runs, best, 39.9).unwrap().middle, 3.0);
+        assert_eq!(band(&runs[..1], best, 20.0), None);
+        assert_eq!(names(&runs), "toy, seeds 1, 2, 3");
+    }
+
+    #[test]
+    fn runs_without_elites_or_of_one_generation_are_drawn() {
+        for runs in [vec![run(1, &[None])], vec![run(1, &[None, None]), run(2, &[Some(1.0)])]] {
+            assert!(progress(&runs).svg().contains("evaluations"));
+        }
+    }
+}
