@@ -31,11 +31,12 @@ fn with_run() -> Sandbox {
 
 // ---- help ----
 
-const COMMANDS: [&str; 14] = [
+const COMMANDS: [&str; 15] = [
     "",
     "evolve",
     "eval",
     "replay",
+    "plot",
     "simulate",
     "data",
     "data fetch",

@@ -186,7 +186,10 @@ impl Found {
     /// Whose picture it is, in a line: robot, run and seed.
     pub fn title(&self) -> String {
         let word = |key: &str| self.about.iter().find(|(word, _)| word == key).map_or("", |(_, value)| value);
-        format!("robot {}, {}", word("Robot"), word("From"))
+        match self.published {
+            true => format!("robot {}, published with the paper", self.name),
+            false => format!("robot {}, {}", word("Robot"), word("From")),
+        }
     }
 }
 

@@ -22,9 +22,8 @@ pub fn archive(run: &RunFile) -> Figure {
     let scale = Scale::of(run);
     let mut canvas = Canvas::new();
     let (columns, width) = if tasks == 1 { (1, COLUMN) } else { (4, PAGE) };
-    let filled = 100.0 * run.stats.coverage;
     let of = format!(
-        "{}, seed {}, {} generations; {} of {} cells filled ({filled:.0} %)",
+        "{}, seed {}, generation {}; {} of {} cells",
         run.name, run.config.seed, run.generations, run.stats.num_elites, run.dimensions.possible_cells
     );
     let top = heading(&mut canvas, "Fitness of the elites", &of, width);
@@ -67,7 +66,7 @@ pub fn archive(run: &RunFile) -> Figure {
         maps
     } else {
         legend(&mut canvas, [MARGIN + LEFT, maps + 12.0], side, &scale);
-        maps + 70.0
+        maps + 78.0
     };
     Figure::new(&format!("Archive: {of}"), [width, height + MARGIN], canvas.finish())
 }
@@ -166,13 +165,15 @@ fn legend(canvas: &mut Canvas, [x, y]: [f64; 2], width: f64, scale: &Scale) {
     colour_bar(canvas, [x, y + 4.0], width - 6.0, &scale.right, "fitness [voxel lengths]", |value| {
         scale.colour(value)
     });
-    let mut lines = vec![(colour::PAPER, "no elite yet".to_string())];
+    let mut lines = vec![(colour::PAPER, "no elite".to_string())];
     if let Some(lowest) = scale.lowest {
         lines.push((scales::below(0.5), format!("below 0 (to {})", number(lowest).replace('-', "−"))));
     }
     let lines = lines.iter().map(|(fill, text)| (*fill, text.as_str()));
     let below = robot::legend(canvas, [x, y + 26.0], lines, width);
-    canvas.fitted([x, below + 6.0], "strips: total voxels, few → many", width + 14.0, Words::default());
+    for (k, text) in ["strips in a square:", "total voxels, few to many"].into_iter().enumerate() {
+        canvas.fitted([x, below + 6.0 + 9.5 * k as f64], text, width + 10.0, Words::default());
+    }
 }
 
 #[cfg(test)]

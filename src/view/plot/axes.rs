@@ -137,6 +137,11 @@ impl Plot {
 
     /// The left axis, with its name beside it.
     pub fn left_axis(&self, canvas: &mut Canvas, name: &str) {
+        self.left_axis_beside(canvas, name, self.y.labels_width());
+    }
+
+    /// The same with room for numbers so wide: the names of several plots stand below each other.
+    pub fn left_axis_beside(&self, canvas: &mut Canvas, name: &str, labels: f64) {
         let [left, top] = self.at;
         let pen = Pen::new(colour::INK, LINE);
         canvas.line([left, top], [left, top + self.size[1]], pen);
@@ -145,14 +150,14 @@ impl Plot {
             canvas.line([left - TICK, y], [left, y], pen);
             canvas.text([left - TICK - GAP, y + 0.36 * TEXT], &self.y.label(tick), Words::end());
         }
-        let x = left - TICK - GAP - self.y.labels_width() - 4.0;
+        let x = left - TICK - GAP - labels - 4.0;
         let words = Words { upwards: true, ..Words::middle() };
         canvas.text([x, top + self.size[1] / 2.0], name, words);
     }
 }
 
 /// Space for a lower axis and its name, points.
-pub const AXIS: f64 = 24.0;
+pub const AXIS: f64 = 21.5;
 
 /// Space for a left axis and its name, points, if the numbers on it are so wide.
 pub fn left_space(labels: f64) -> f64 {

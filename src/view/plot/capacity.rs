@@ -49,7 +49,7 @@ fn accuracies(panels: &[(&TaskCapacity, &Curve)]) -> Axis {
     });
     let (low, high) =
         values.filter(|v| v.is_finite()).fold((0.5f64, 0.6f64), |(l, h), v| (l.min(v), h.max(v)));
-    Axis::nice(100.0 * low.max(0.0), 100.0 * high.min(1.0), 4)
+    Axis::nice(100.0 * low.max(0.0), 100.0 * high.min(1.0), 5)
 }
 
 fn network(curve: &Curve) -> (&str, &str) {

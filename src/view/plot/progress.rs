@@ -49,7 +49,7 @@ pub fn progress(runs: &[Progress]) -> Figure {
         let plot = Plot { at: [left, top], size, x: x.clone(), y };
         plot.grid(&mut canvas, true, false);
         draw(&mut canvas, &plot, &bands, colour, runs.len() > 1);
-        plot.left_axis(&mut canvas, name);
+        plot.left_axis_beside(&mut canvas, name, labels);
         plot.lower_axis(&mut canvas, (k + 1 == count).then_some("evaluations"));
         top += PANEL + 9.0;
     }

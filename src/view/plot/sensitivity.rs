@@ -19,7 +19,7 @@ const UNSTABLE: Colour = colour::ALARM;
 pub fn sensitivity(body: &Body, images: &[Sensitivity], of: &str) -> Figure {
     let mut canvas = Canvas::new();
     let (columns, width) = if images.len() <= 2 { (2, COLUMN) } else { (4, PAGE) };
-    let top = heading(&mut canvas, "What each pixel matters", of, width);
+    let top = heading(&mut canvas, "How much each pixel matters", of, width);
     let changes = || images.iter().flat_map(|image| image.pixels.iter().filter_map(|p| image.change(p)));
     let largest = changes().map(f64::abs).fold(0.0, f64::max);
     let largest = if largest > 0.0 { largest } else { 1.0 };
@@ -47,7 +47,7 @@ pub fn sensitivity(body: &Body, images: &[Sensitivity], of: &str) -> Figure {
     canvas.frame([x + 54.0, y - 6.0], [7.0, 7.0], Pen::new(colour::INK, 1.3));
     canvas.text([x + 64.5, y], "flip turns it round", words);
     canvas.dot([x + 142.5, y - 2.5], 1.1, colour::INK);
-    canvas.text([x + 147.0, y], "pixel was lit", words);
+    canvas.text([x + 147.0, y], "lit pixel", words);
     let is_unstable =
         images.iter().any(|image| image.pixels.iter().any(|pixel| image.change(pixel).is_none()));
     let mut height = y + 4.0;

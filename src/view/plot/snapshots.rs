@@ -12,6 +12,8 @@ use crate::view::{PictureError, Walk, colour};
 const STIMULUS: f64 = 27.0;
 /// Space between panels, points.
 const GAP: f64 = 7.0;
+/// Largest size of a voxel, points.
+const LARGEST: f64 = 7.0;
 /// Opacity of the first pose.
 const FAINTEST: f64 = 0.22;
 
@@ -26,7 +28,9 @@ pub fn snapshots(recording: &Recording, every: usize, of: &str) -> Result<Figure
     let (columns, width) = if phases <= 3 { (1, COLUMN) } else { (2, PAGE) };
     let every = if every == 0 { suitable(&walk) } else { every };
     let mut canvas = Canvas::new();
-    let title = format!("Snapshots every {every} control steps");
+    let is_rest = (0..phases).any(|phase| (walk.phase_frames(phase).len() - 1) % every != 0);
+    let rest = if is_rest { ", and the last" } else { "" };
+    let title = format!("Snapshots every {every} control steps{rest}");
     let top = heading(&mut canvas, &title, of, width);
     let wide = (width - 2.0 * MARGIN - (columns - 1) as f64 * 12.0) / columns as f64;
     // All panels have one scale; each begins where its walk does.
@@ -34,7 +38,7 @@ pub fn snapshots(recording: &Recording, every: usize, of: &str) -> Result<Figure
     let [left, right, highest] =
         reach.fold([0.0, 0.0, 1.0f64], |a, b| [a[0].min(b[0]), a[1].max(b[1]), a[2].max(b[2])]);
     let plot_width = wide - STIMULUS - 8.0;
-    let scale = (plot_width / (right - left + 2.0)).min(16.0);
+    let scale = (plot_width / (right - left + 2.0)).min(LARGEST);
     let x =
         Axis::exact((left + right - plot_width / scale) / 2.0, (left + right + plot_width / scale) / 2.0, 6);
     let high = (highest + 0.5) * scale;

@@ -17,6 +17,8 @@ const ROWS: usize = 220;
 const CELLS: usize = 150;
 /// Grays, from the smallest voxels to the largest.
 const GRAYS: usize = 6;
+const DARKEST: f64 = 0.15;
+const LIGHTEST: f64 = 0.86;
 /// Side of a stimulus, points.
 const STIMULUS: f64 = 30.0;
 /// Height of a panel per control step, points, and the least and largest height.
@@ -40,6 +42,7 @@ pub fn spacetime(recording: &Recording, of: &str) -> Result<Figure, PictureError
     let mut canvas = Canvas::new();
     let top = heading(&mut canvas, "Position over time", of, width);
     let x = positions(&walk, &lives, columns);
+    let grays = grays(&walk, &lives, &x);
     let longest = lives.iter().map(|life| life.len() - 1).max().unwrap_or(1).max(1);
     let cycle = recording.cycle.max(1) as f64;
     let y = Axis::exact(0.0, longest as f64 / cycle, 5);
@@ -54,7 +57,7 @@ pub fn spacetime(recording: &Recording, of: &str) -> Result<Figure, PictureError
         let at =
             [left + (k % columns) as f64 * (wide + gap), top + above + (k / columns) as f64 * row_height];
         let plot = Plot { at, size: [wide, height], x: x.clone(), y: y.clone() };
-        rows(&mut canvas, &walk, life, &plot);
+        rows(&mut canvas, &walk, life, &plot, grays);
         stimuli(&mut canvas, &walk, life, &plot, lives.len() == 1);
         axes(&mut canvas, &plot, k % columns == 0);
     }
@@ -73,7 +76,7 @@ fn positions(walk: &Walk, lives: &[Range<usize>], columns: usize) -> Axis {
         (low, (all.right - zero).min(centres().fold(0.0, f64::max) + size))
     };
     let (low, high) = lives.iter().map(reach).fold((0.0f64, 0.0f64), |a, b| (a.0.min(b.0), a.1.max(b.1)));
-    Axis::exact(low - 1.0, high + 1.0, if columns == 1 { 6 } else { 3 })
+    Axis::exact(low - 1.0, high + 1.0, if columns == 1 { 6 } else { 4 })
 }
 
 /// Where a moment of a life is in its panel, points from the top of the figure.
@@ -81,18 +84,23 @@ fn moment(plot: &Plot, cycles: f64) -> f64 {
     plot.at[1] + plot.y.share(cycles) * plot.size[1]
 }
 
-fn rows(canvas: &mut Canvas, walk: &Walk, life: &Range<usize>, plot: &Plot) {
+/// Every how many frames a row is drawn.
+fn every(life: &Range<usize>) -> usize {
+    life.len().div_ceil(ROWS).max(1)
+}
+
+fn rows(canvas: &mut Canvas, walk: &Walk, life: &Range<usize>, plot: &Plot, grays: [f64; 2]) {
     let cycle = walk.recording().cycle.max(1) as f64;
     let zero = walk.centre(life.start)[0];
-    let every = life.len().div_ceil(ROWS).max(1);
-    let high = moment(plot, every as f64 / cycle) - plot.at[1];
+    let high = moment(plot, every(life) as f64 / cycle) - plot.at[1];
     let mut paths = vec![String::new(); GRAYS];
     let cell = plot.size[0] / CELLS as f64;
-    for frame in life.clone().step_by(every) {
-        let shades = shades(walk, frame, zero, plot);
+    for frame in life.clone().step_by(every(life)) {
+        let row: Vec<Option<usize>> =
+            areas(walk, frame, zero, &plot.x).into_iter().map(|area| Some(gray(area?, grays))).collect();
         let y = number(moment(plot, (frame - life.start) as f64 / cycle) + high / 2.0);
         let mut from = 0;
-        for run in shades.chunk_by(|a, b| a == b) {
+        for run in row.chunk_by(|a, b| a == b) {
             if let Some(gray) = run[0] {
                 let x = plot.at[0] + cell * from as f64;
                 paths[gray] += &format!("M{} {y}h{}", number(x), number(cell * run.len() as f64));
@@ -102,7 +110,7 @@ fn rows(canvas: &mut Canvas, walk: &Walk, life: &Range<usize>, plot: &Plot) {
     }
     canvas.clipped(plot.at, plot.size, |canvas| {
         for (gray, data) in paths.iter().enumerate().filter(|(_, data)| !data.is_empty()) {
-            let level = 0.12 + 0.72 * gray as f64 / (GRAYS - 1) as f64;
+            let level = DARKEST + (LIGHTEST - DARKEST) * gray as f64 / (GRAYS - 1) as f64;
             // A little higher than a row, so that no light shines through.
             canvas.path(data, Pen::new(Colour::gray(level), high + 0.12));
         }
@@ -118,11 +126,33 @@ fn rows(canvas: &mut Canvas, walk: &Walk, life: &Range<usize>, plot: &Plot) {
     });
 }
 
-/// The gray of every cell across: the mean area of the voxels there.
-fn shades(walk: &Walk, frame: usize, zero: f64, plot: &Plot) -> Vec<Option<usize>> {
+/// Areas of the darkest and the lightest gray: all but the extreme ones of the walk lie between them.
+fn grays(walk: &Walk, lives: &[Range<usize>], x: &Axis) -> [f64; 2] {
+    let mut all = Vec::new();
+    for life in lives {
+        let zero = walk.centre(life.start)[0];
+        for frame in life.clone().step_by(4 * every(life)) {
+            all.extend(areas(walk, frame, zero, x).into_iter().flatten());
+        }
+    }
+    all.sort_by(f64::total_cmp);
+    let quantile = |share: f64| all.get((share * all.len() as f64) as usize).copied().unwrap_or(1.0);
+    let (low, high) = (quantile(0.03), quantile(0.97));
+    // A body that hardly changes is not made to look as if it did.
+    let least = (0.2 - (high - low)).max(0.0) / 2.0;
+    [low - least, high + least]
+}
+
+fn gray(area: f64, [small, large]: [f64; 2]) -> usize {
+    let share = ((area - small) / (large - small)).clamp(0.0, 1.0);
+    (share * (GRAYS - 1) as f64).round() as usize
+}
+
+/// The mean area of the voxels in every cell across.
+fn areas(walk: &Walk, frame: usize, zero: f64, axis: &Axis) -> Vec<Option<f64>> {
     let mut sums = vec![(0.0, 0u32); CELLS];
     for (_, corners) in walk.voxels(frame) {
-        let xs = corners.map(|[x, _]| plot.x.share(x - zero) * CELLS as f64);
+        let xs = corners.map(|[x, _]| axis.share(x - zero) * CELLS as f64);
         let low = xs.iter().copied().fold(f64::INFINITY, f64::min);
         let high = xs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         // Cells whose middle the voxel covers.
@@ -132,12 +162,7 @@ fn shades(walk: &Walk, frame: usize, zero: f64, plot: &Plot) -> Vec<Option<usize
             (*sum, *count) = (*sum + area(&corners), *count + 1);
         }
     }
-    let [small, large] = [0.7, 1.4];
-    let gray = |mean: f64| {
-        let share = ((mean - small) / (large - small)).clamp(0.0, 1.0);
-        (share * (GRAYS - 1) as f64).round() as usize
-    };
-    sums.into_iter().map(|(sum, count)| (count > 0).then(|| gray(sum / f64::from(count)))).collect()
+    sums.into_iter().map(|(sum, count)| (count > 0).then(|| sum / f64::from(count))).collect()
 }
 
 fn stimuli(canvas: &mut Canvas, walk: &Walk, life: &Range<usize>, plot: &Plot, beside: bool) {
@@ -219,11 +244,11 @@ mod tests {
         recording.frames[1].points.iter_mut().for_each(|p| p[1] *= 0.5);
         let walk = Walk::new(&recording).unwrap();
         let x = Axis::exact(-2.0, 2.0, 3);
-        let plot = Plot { at: [0.0; 2], size: [100.0; 2], x, y: Axis::exact(0.0, 1.0, 2) };
         let zero = walk.centre(0)[0];
-        let middle = |frame| shades(&walk, frame, zero, &plot)[CELLS / 2];
+        let middle = |frame| areas(&walk, frame, zero, &x)[CELLS / 2].unwrap();
         assert!(middle(1) < middle(0), "{:?} {:?}", middle(1), middle(0));
-        assert_eq!(shades(&walk, 0, zero, &plot)[0], None);
+        assert_eq!(areas(&walk, 0, zero, &x)[0], None);
+        assert_eq!([0.2, 1.0, 9.0].map(|area| gray(area, [0.5, 1.5])), [0, 3, GRAYS - 1]);
     }
 
     #[test]

@@ -1,0 +1,170 @@
+//! `morphcog plot`: every kind of figure is made, well-formed, the same every time, and refuses what it cannot show.
+
+mod common;
+
+use common::program::{Sandbox, files};
+use resvg::usvg::roxmltree::{Document, Node};
+use std::collections::BTreeMap;
+use std::sync::OnceLock;
+
+const CAPACITY: &str = r#"{
+  "format": "morphcog-capacity", "format_version": 1, "program_version": "0.1.0", "run": "tiny", "selected": "all elites",
+  "dataset": "builtin", "patience_on": "test", "trainings": 3, "stopped": false,
+  "tasks": [{"task": "0|1", "robots": 2, "accuracy": 0.6, "curves": [
+    {"network": "mlp", "fit": [0.5, 0.05, 0.0], "capacity": 2.0, "points": [
+      {"size": 1, "mean": 0.55, "standard_deviation": 0.02, "parameters": 52},
+      {"size": 2, "mean": 0.6, "standard_deviation": 0.03, "parameters": 103},
+      {"size": 3, "mean": 0.65, "standard_deviation": 0.01, "parameters": 154}]}]}]}"#;
+
+/// Kinds that show one robot, and kinds that do not.
+const OF_ROBOTS: [&str; 4] = ["body", "spacetime", "snapshots", "sensitivity"];
+const OF_RUNS: [&str; 4] = ["archive", "progress", "accuracy", "capacity"];
+
+/// A finished tiny run with all that figures are made of, made once.
+fn run_once() -> &'static BTreeMap<String, Vec<u8>> {
+    static RUN: OnceLock<BTreeMap<String, Vec<u8>>> = OnceLock::new();
+    RUN.get_or_init(|| {
+        let sandbox = Sandbox::tiny();
+        sandbox.run("evolve -q -c tiny.toml -o run").ended(0, &[]);
+        sandbox.run("eval -q -a run/run.json -n 10 -r top:3 --cycles 1").ended(0, &[]);
+        sandbox.write("run/capacity.json", CAPACITY);
+        files(&sandbox.path("run"))
+    })
+}
+
+/// A sandbox with a finished run in `run`.
+fn with_run() -> Sandbox {
+    let sandbox = Sandbox::tiny();
+    run_once().iter().for_each(|(name, content)| {
+        sandbox.write(&format!("run/{name}"), content);
+    });
+    sandbox
+}
+
+/// Width and height that a PNG says it has.
+fn png_size(bytes: &[u8]) -> [u32; 2] {
+    assert_eq!(&bytes[..8], b"\x89PNG\r\n\x1a\n");
+    [16, 20].map(|at| u32::from_be_bytes(bytes[at..at + 4].try_into().unwrap()))
+}
+
+#[test]
+fn every_kind_makes_a_well_formed_svg_and_a_png_beside_the_run() {
+    let sandbox = with_run();
+    let best = sandbox.run_file("run").elites.into_iter().max_by(|a, b| a.objective.total_cmp(&b.objective));
+    let best = best.unwrap().id;
+    for kind in OF_ROBOTS.into_iter().chain(OF_RUNS) {
+        let said = sandbox.run(&format!("plot {kind} -a run/run.json")).ended(0, &[]);
+        let robot = if OF_ROBOTS.contains(&kind) { format!("-{best}") } else { String::new() };
+        let stem = format!("run/plot-{kind}{robot}");
+        assert!(
+            said.out.contains(&format!("{stem}.svg")) && said.out.contains(&format!("{stem}.png")),
+            "{said:?}"
+        );
+        let svg = sandbox.read(&format!("{stem}.svg"));
+        let document = Document::parse(&svg).unwrap();
+        let root = document.root_element();
+        assert_eq!(root.tag_name().name(), "svg");
+        // Several can stand in one page.
+        let clashes = |node: &Node| node.has_attribute("id") || node.has_attribute("class");
+        assert!(!document.descendants().any(|node| clashes(&node)), "{kind}");
+        assert!(document.descendants().filter(|node| node.has_tag_name("text")).count() > 2, "{kind}");
+        if kind != "capacity" {
+            assert!(svg.contains("tiny") && svg.contains("seed 3"), "{kind}: the title says run and seed");
+        }
+        assert!(robot.is_empty() || svg.contains(&best), "{kind}: the title says the robot");
+        assert!(svg.len() < 150_000, "{kind}: {}", svg.len());
+        let png = std::fs::read(sandbox.path(&format!("{stem}.png"))).unwrap();
+        // 85 mm at 300 pixels per inch.
+        assert_eq!(png_size(&png)[0], 1005, "{kind}");
+    }
+}
+
+#[test]
+fn letters_are_at_least_seven_points_high() {
+    let sandbox = with_run();
+    for kind in OF_ROBOTS.into_iter().chain(OF_RUNS) {
+        sandbox.run(&format!("plot {kind} -a run/run.json -o figure.svg")).ended(0, &[]);
+        let svg = sandbox.read("figure.svg");
+        let document = Document::parse(&svg).unwrap();
+        let sizes =
+            document.descendants().filter_map(|node| node.attribute("font-size")?.parse::<f64>().ok());
+        assert!(sizes.fold(f64::INFINITY, f64::min) >= 7.0, "{kind}");
+    }
+}
+
+#[test]
+fn the_same_input_gives_the_same_bytes() {
+    let sandbox = with_run();
+    for kind in ["archive", "snapshots", "sensitivity"] {
+        for name in ["one", "two"] {
+            sandbox.run(&format!("plot {kind} -a run/run.json -o {name}")).ended(0, &[]);
+        }
+        for ending in ["svg", "png"] {
+            let [one, two] =
+                ["one", "two"].map(|name| std::fs::read(sandbox.path(&format!("{name}.{ending}"))).unwrap());
+            assert!(one == two, "{kind}.{ending}");
+        }
+    }
+}
+
+#[test]
+fn the_ending_says_the_format_and_the_resolution_is_a_choice() {
+    let sandbox = with_run();
+    sandbox.run("plot archive -a run/run.json -o a.png --dpi 72 --transparent").ended(0, &[]);
+    assert_eq!(png_size(&std::fs::read(sandbox.path("a.png")).unwrap())[0], 241);
+    sandbox.run("plot archive -a run/run.json -o a.svg").ended(0, &[]);
+    assert!(!sandbox.path("run/plot-archive.svg").exists());
+    assert!(sandbox.read("a.svg").contains("#ffffff"));
+}
+
+#[test]
+fn seeds_become_one_figure_and_robots_one_each() {
+    let sandbox = with_run();
+    sandbox.run("evolve -q -c tiny.toml --seed 4 -o other").ended(0, &[]);
+    sandbox.run("plot progress -a run/run.json -a other/run.json -o both.svg").ended(0, &[]);
+    assert!(sandbox.read("both.svg").contains("seeds 3, 4"));
+    let ids: Vec<String> =
+        sandbox.run_file("run").elites.iter().take(2).map(|elite| elite.id.clone()).collect();
+    sandbox.run(&format!("plot body -a run/run.json -r {},{}", ids[0], ids[1])).ended(0, &[]);
+    for id in &ids {
+        assert!(sandbox.path(&format!("run/plot-body-{id}.png")).exists());
+    }
+    // A published robot needs no archive.
+    sandbox.run("plot body --robot YJTLA").ended(0, &[]);
+    assert!(sandbox.read("plot-body-YJTLA.svg").contains("published with the paper"));
+}
+
+#[test]
+fn what_cannot_be_shown_is_refused_in_a_line() {
+    let sandbox = with_run();
+    let refused = |line: &str, code, words: &[&str]| {
+        let said = sandbox.run(&format!("plot {line}")).ended(code, words);
+        assert!(
+            code == 2 || said.err.lines().filter(|line| line.starts_with("error")).count() == 1,
+            "{said:?}"
+        );
+    };
+    refused("pie -a run/run.json", 2, &["spacetime"]);
+    refused("archive -a run/run.json -o figure.pdf", 2, &["figure.pdf", ".svg or .png"]);
+    refused(
+        "archive -a run/run.json --robot best",
+        2,
+        &["--robot", "body, spacetime, snapshots, sensitivity"],
+    );
+    refused("body -a run/run.json -r best,best -o a.svg", 2, &["--out", "2"]);
+    refused("body -a run/run.json --dpi 1", 2, &["--dpi"]);
+    refused("body -a run/run.json --robot zzz", 3, &["zzz"]);
+    refused("archive -a none/run.json", 3, &["none/run.json"]);
+    refused("archive", 3, &["runs/"]);
+    refused("snapshots -a run/run.json --images test:999999", 2, &["--images"]);
+    std::fs::remove_file(sandbox.path("run/eval.json")).unwrap();
+    refused("accuracy -a run/run.json", 3, &["eval.json", "morphcog eval"]);
+    sandbox.write("run/eval.json", "{}");
+    refused("accuracy -a run/run.json", 3, &["eval.json", "morphcog-eval"]);
+    std::fs::remove_file(sandbox.path("run/capacity.json")).unwrap();
+    refused("capacity -a run/run.json", 3, &["capacity.json", "morphcog capacity"]);
+    sandbox.write("run/metrics.csv", "generation,coverage\n0,x\n");
+    refused("progress -a run/run.json", 3, &["metrics.csv"]);
+    std::fs::remove_file(sandbox.path("run/metrics.csv")).unwrap();
+    refused("progress -a run/run.json", 3, &["metrics.csv"]);
+}
