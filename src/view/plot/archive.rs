@@ -15,6 +15,8 @@ use std::collections::{BTreeMap, BTreeSet};
 /// Space left of and below a map, points.
 const LEFT: f64 = 30.0;
 const BELOW: f64 = 24.0;
+/// What the strips are.
+const STRIPS: [&str; 2] = ["strips in a square:", "total voxels, few to many"];
 
 /// Fitness of the elites of a run, one map per task.
 pub fn archive(run: &RunFile) -> Figure {
@@ -58,14 +60,15 @@ pub fn archive(run: &RunFile) -> Figure {
     let maps = top + rows as f64 * (map_height + 4.0);
     let height = if tasks == 1 {
         // A map's upper right half is empty: more muscles and sensors than voxels.
-        legend(&mut canvas, [MARGIN + LEFT + 0.53 * side, top + 0.06 * side], 0.44 * side, &scale);
-        maps
+        legend(&mut canvas, [MARGIN + LEFT + 0.53 * side, top + 0.01 * side], 0.44 * side, &scale, true);
+        canvas.text([width / 2.0, maps + 3.0], &STRIPS.join(" "), Words::middle().colour(colour::FAINT));
+        maps + 4.0
     } else if tasks % columns != 0 {
         let free = MARGIN + LEFT + (tasks % columns) as f64 * (side + LEFT + 4.0);
-        legend(&mut canvas, [free, maps - map_height + 20.0], side, &scale);
+        legend(&mut canvas, [free, maps - map_height + 20.0], side, &scale, false);
         maps
     } else {
-        legend(&mut canvas, [MARGIN + LEFT, maps + 12.0], side, &scale);
+        legend(&mut canvas, [MARGIN + LEFT, maps + 12.0], side, &scale, false);
         maps + 78.0
     };
     Figure::new(&format!("Archive: {of}"), [width, height + MARGIN], canvas.finish())
@@ -161,7 +164,8 @@ fn axes(canvas: &mut Canvas, [x, y]: [f64; 2], side: f64, run: &RunFile, is_firs
     }
 }
 
-fn legend(canvas: &mut Canvas, [x, y]: [f64; 2], width: f64, scale: &Scale) {
+/// What colours mean; `is_above` a map that leaves little room.
+fn legend(canvas: &mut Canvas, [x, y]: [f64; 2], width: f64, scale: &Scale, is_above: bool) {
     colour_bar(canvas, [x, y + 4.0], width - 6.0, &scale.right, "fitness [voxel lengths]", |value| {
         scale.colour(value)
     });
@@ -171,8 +175,10 @@ fn legend(canvas: &mut Canvas, [x, y]: [f64; 2], width: f64, scale: &Scale) {
     }
     let lines = lines.iter().map(|(fill, text)| (*fill, text.as_str()));
     let below = robot::legend(canvas, [x, y + 26.0], lines, width);
-    for (k, text) in ["strips in a square:", "total voxels, few to many"].into_iter().enumerate() {
-        canvas.fitted([x, below + 6.0 + 9.5 * k as f64], text, width + 10.0, Words::default());
+    if !is_above {
+        for (k, text) in STRIPS.into_iter().enumerate() {
+            canvas.fitted([x, below + 6.0 + 9.5 * k as f64], text, width + 10.0, Words::default());
+        }
     }
 }
 
