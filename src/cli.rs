@@ -154,16 +154,15 @@ fn run_eval(args: EvalArgs, console: &Console) -> Result<(), Error> {
 }
 
 fn run_replay(args: ReplayArgs, console: &Console) -> Result<(), Error> {
-    let ReplayArgs { robot, physical_only, archive, images, dataset, data, format, out, width, every, open } =
-        args;
+    let ReplayArgs { robot, physical_only, archive, images, dataset, data, format, out, open, .. } = args;
+    let (width, every, fps, look) = (args.width, usize::from(args.every), args.fps, args.look);
     let folder = pictures::folder(archive.as_deref(), &robot)?;
     let replay = replay::replay(&replay::Options { robot, physical_only, archive, images, data, dataset })?;
     let wanted = match &out {
         Some(path) => pictures::Wanted::named(path, &format)?,
         None => pictures::Wanted::beside(&folder, &replay.name, &format),
     };
-    let made =
-        pictures::make(console, &replay, &pictures::Wanted { width, every: usize::from(every), ..wanted })?;
+    let made = pictures::make(console, &replay, &pictures::Wanted { width, every, fps, look, ..wanted })?;
     match made.last().filter(|_| open) {
         Some(path) => open::that(path).map_err(|error| Error::other(format!("cannot open it: {error}"))),
         None => Ok(()),

@@ -10,6 +10,7 @@ use crate::run::robots::Selection;
 use crate::task::dataset::BUILTIN;
 use crate::view::console::Mode;
 use crate::view::pictures::Format;
+use crate::view::scene::Look;
 use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
 
@@ -77,7 +78,7 @@ Examples:
   morphcog replay --robot best
   morphcog replay --robot 3fa --archive runs/zero_one-seed1/run.json --images train:1,test:17
   morphcog replay --robot XFJPI            a robot published with the paper (see morphcog gallery)
-  morphcog replay --robot best --format terminal
+  morphcog replay --robot best --format terminal           space pauses, . steps, q quits
   morphcog replay --robot best -o walk.gif")]
     Replay(ReplayArgs),
     /// Make a figure: SVG and PNG for papers and pages.
@@ -245,9 +246,15 @@ pub(super) struct ReplayArgs {
     /// Width of GIF and PNG in pixels.
     #[arg(long, default_value_t = 480)]
     pub(super) width: u32,
-    /// Control steps from one frame of the GIF to the next: 2 is the robot's own time, more is faster and a smaller file.
-    #[arg(long, default_value_t = 2, value_parser = clap::value_parser!(u16).range(1..=500))]
+    /// Control steps from one frame of the GIF to the next: 1 is the robot's own time, more is faster and a smaller file.
+    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=500))]
     pub(super) every: u16,
+    /// Frames of the GIF per second: 25 with --every 2 is the robot's own time in half the frames.
+    #[arg(long, default_value_t = 50, value_parser = clap::value_parser!(u32).range(1..=50))]
+    pub(super) fps: u32,
+    /// How GIF and PNG draw the world: plain, or as in the paper's videos.
+    #[arg(long, value_name = "plain|paper", default_value_t = Look::Plain)]
+    pub(super) look: Look,
     /// Open the result.
     #[arg(long)]
     pub(super) open: bool,

@@ -45,6 +45,10 @@ pub const FAINT: Colour = Colour::new(112, 116, 124);
 pub const GROUND: Colour = Colour::new(236, 233, 226);
 /// Lines on the ground.
 pub const GROUND_LINE: Colour = Colour::new(120, 112, 98);
+/// Lines between the columns and rows of the world, in the paper's look.
+pub const GRID: Colour = Colour::new(228, 231, 236);
+/// The ground's voxels, in the paper's look.
+pub const PEG: Colour = Colour::new(72, 74, 80);
 /// Path of the centre of mass.
 pub const TRACE: Colour = Colour::new(178, 24, 158);
 /// Lines between voxels, where they are not see-through.

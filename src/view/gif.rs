@@ -3,6 +3,7 @@
 use super::colour::{self, Colour};
 use super::palette::Palette;
 use super::panel::present;
+use super::scene::Look;
 use super::stage::Stage;
 use super::walk::Walk;
 use super::{PictureError, raster, write_whole};
@@ -19,15 +20,17 @@ pub struct GifOptions {
     /// Frames per second, at most 50 (GIFs count in hundredths of a second, and viewers slow down faster ones).
     pub fps: f64,
     /// Control steps from one frame to the next, at least 1. There are 50 control steps in a second of the robot's
-    /// time: 2 at 25 frames per second is real time.
+    /// time: 1 at 50 frames per second is real time.
     pub every: usize,
+    /// How the world is drawn.
+    pub look: Look,
     /// Seconds for which the last frame of a phase is held.
     pub hold: f64,
 }
 
 impl Default for GifOptions {
     fn default() -> Self {
-        GifOptions { width: 480, fps: 25.0, every: 2, hold: 0.6 }
+        GifOptions { width: 480, fps: 50.0, every: 1, look: Look::Plain, hold: 0.6 }
     }
 }
 
@@ -64,7 +67,7 @@ pub fn shown(walk: &Walk, every: usize) -> Vec<usize> {
 /// As [`write()`], but for the file.
 pub fn encode(recording: &Recording, options: &GifOptions) -> Result<Vec<u8>, PictureError> {
     let walk = Walk::new(recording)?;
-    let stage = Stage::new(&walk, options.width)?.crisp();
+    let stage = Stage::new(&walk, options.width)?.crisp().look(options.look);
     let frames = shown(&walk, options.every);
     let palette = palette(&walk, &stage, &frames)?;
     let unchanged = palette.colours().len() as u8;
@@ -100,6 +103,9 @@ pub fn encode(recording: &Recording, options: &GifOptions) -> Result<Vec<u8>, Pi
 fn palette(walk: &Walk, stage: &Stage, frames: &[usize]) -> Result<Palette, PictureError> {
     let mut fixed: Vec<Colour> =
         vec![colour::PAPER, colour::INK, colour::GROUND, colour::TRACE, colour::FAINT, colour::SEAM];
+    if stage.window(0).look == Look::Paper {
+        fixed.extend([colour::GRID, colour::PEG]);
+    }
     let [small, _, large] = colour::TONE_AREAS;
     for material in present(&walk.recording().body) {
         fixed.extend((0..SHADES).map(|k| {
@@ -207,7 +213,7 @@ mod tests {
         let walk = Walk::new(&recording).unwrap();
         assert_eq!(shown(&walk, 4), [0, 4, 8, 10, 11, 15, 19, 21]);
         assert_eq!(shown(&walk, 0).len(), 22);
-        let options = GifOptions { width: 320, every: 4, fps: 20.0, hold: 0.5 };
+        let options = GifOptions { width: 320, every: 4, fps: 20.0, hold: 0.5, ..GifOptions::default() };
         let (.., frames) = decode(&encode(&recording, &options).unwrap());
         let delays: Vec<u16> = frames.iter().map(|f| f.1).collect();
         assert_eq!(delays, [5, 5, 5, 50, 5, 5, 5, 50]);
@@ -218,7 +224,7 @@ mod tests {
         let mut recording = wobble::recording("1", 1, 2, false);
         recording.frames[1] = recording.frames[0].clone();
         recording.frames.truncate(2);
-        let options = GifOptions { width: 320, fps: f64::NAN, hold: f64::INFINITY, every: 1 };
+        let options = GifOptions { width: 320, fps: f64::NAN, hold: f64::INFINITY, ..GifOptions::default() };
         assert_eq!(decode(&encode(&recording, &options).unwrap()).3.len(), 2);
         recording.frames.truncate(1);
         assert_eq!(decode(&encode(&recording, &options).unwrap()).3.len(), 1);

@@ -15,6 +15,7 @@ pub mod networks;
 pub mod palette;
 pub mod panel;
 pub mod pictures;
+pub mod player;
 pub mod plot;
 pub mod progress;
 pub mod raster;

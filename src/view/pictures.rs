@@ -1,13 +1,13 @@
 //! What `morphcog replay` makes of a recording: files, or a view in the terminal.
 
 use super::console::Console;
-use super::{PictureError, Stage, Walk, gif, html, raster, terminal};
+use super::scene::Look;
+use super::{PictureError, Stage, Walk, gif, html, player, raster};
 use crate::run::replay::Replay;
 use crate::run::{Error, folder, gallery};
 use std::fmt;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
-use std::time::Duration;
 
 /// A way to show a recording.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -50,15 +50,23 @@ pub struct Wanted {
     pub width: u32,
     /// Control steps from one frame of the GIF to the next.
     pub every: usize,
+    /// Frames of the GIF per second.
+    pub fps: u32,
+    /// How GIF and PNG draw the world.
+    pub look: Look,
 }
 
-const WIDTH: u32 = 480;
+impl Default for Wanted {
+    fn default() -> Self {
+        Wanted { files: Vec::new(), width: 480, every: 1, fps: 50, look: Look::Plain }
+    }
+}
 
 impl Wanted {
     /// `replay-<name>.<format>` in a folder.
     pub fn beside(folder: &Path, name: &str, formats: &[Format]) -> Self {
         let file = |&format: &Format| (format, folder.join(format!("replay-{name}.{format}")));
-        Wanted { files: formats.iter().map(file).collect(), width: WIDTH, every: EVERY }
+        Wanted { files: formats.iter().map(file).collect(), ..Wanted::default() }
     }
 
     /// A file whose ending says the format; without an ending, one file for each of `formats`.
@@ -79,7 +87,7 @@ impl Wanted {
                 vec![(format, path.to_path_buf())]
             }
         };
-        Ok(Wanted { files, width: WIDTH, every: EVERY })
+        Ok(Wanted { files, ..Wanted::default() })
     }
 }
 
@@ -114,6 +122,8 @@ pub fn make(console: &Console, replay: &Replay, wanted: &Wanted) -> Result<Vec<P
                 let options = gif::GifOptions {
                     width: wanted.width,
                     every: wanted.every,
+                    fps: f64::from(wanted.fps),
+                    look: wanted.look,
                     ..gif::GifOptions::default()
                 };
                 gif::write(path, recording, &options).map_err(failed)?;
@@ -121,12 +131,12 @@ pub fn make(console: &Console, replay: &Replay, wanted: &Wanted) -> Result<Vec<P
             Format::Html => html::write(path, recording, &title, &replay.about).map_err(failed)?,
             Format::Png => {
                 let walk = Walk::new(recording).map_err(failed)?;
-                let stage = Stage::new(&walk, wanted.width).map_err(failed)?;
+                let stage = Stage::new(&walk, wanted.width).map_err(failed)?.look(wanted.look);
                 let picture = raster::picture(&walk, walk.len() - 1, &stage).map_err(failed)?;
                 raster::write_png(path, &picture).map_err(failed)?;
             }
             Format::Terminal => {
-                play(console, &Walk::new(recording).map_err(failed)?);
+                player::play(console, &Walk::new(recording).map_err(failed)?)?;
                 continue;
             }
         }
@@ -146,25 +156,4 @@ pub fn make(console: &Console, replay: &Replay, wanted: &Wanted) -> Result<Vec<P
     }
     made.iter().for_each(|path| console.line(&format!("wrote {}", path.display())));
     Ok(made)
-}
-
-/// Columns and rows of the view in the terminal: what fits the smallest usual one.
-const VIEW: (usize, usize) = (78, 22);
-/// Control steps between two pictures, if nobody says; at [`FRAME`] each that is the robot's own time.
-const EVERY: usize = 2;
-const FRAME: Duration = Duration::from_millis(40);
-
-/// Plays a recording in the terminal, at the robot's own speed; elsewhere only its last frame.
-fn play(console: &Console, walk: &Walk) {
-    let picture = |frame| terminal::frame(walk, frame, VIEW.0, VIEW.1, console.has_colour());
-    let Some(mut live) = console.live() else {
-        return console.line(&picture(walk.len() - 1));
-    };
-    for frame in (0..walk.len()).step_by(EVERY) {
-        if console.is_closed() {
-            return;
-        }
-        live.show(&picture(frame));
-        std::thread::sleep(FRAME);
-    }
 }

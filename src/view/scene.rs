@@ -2,6 +2,35 @@
 
 use super::colour::{self, Colour};
 use super::walk::{Walk, area};
+use std::fmt;
+use std::str::FromStr;
+
+/// How the world is drawn.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Look {
+    /// A ruler on the ground.
+    #[default]
+    Plain,
+    /// As in the paper's videos: the world's grid, and the voxels that the ground is made of.
+    Paper,
+}
+
+impl fmt::Display for Look {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Look::Plain => "plain",
+            Look::Paper => "paper",
+        })
+    }
+}
+
+impl FromStr for Look {
+    type Err = String;
+    fn from_str(text: &str) -> Result<Self, String> {
+        let found = [Look::Plain, Look::Paper].into_iter().find(|look| look.to_string() == text);
+        found.ok_or_else(|| "expected plain or paper".to_string())
+    }
+}
 
 /// Something to draw. Coordinates are the world's (voxel lengths, y up) or pixels (y down), as the maker says.
 #[derive(Clone, Debug, PartialEq)]
@@ -55,6 +84,8 @@ pub struct Window {
     pub scale: f64,
     /// Whether voxels have hard edges: fewer colours, so that animations stay small.
     pub crisp: bool,
+    /// How the world is drawn.
+    pub look: Look,
 }
 
 impl Window {
@@ -91,6 +122,9 @@ fn ground(walk: &Walk, frame: usize, window: &Window) -> Vec<Primitive> {
         Primitive::rectangle([left, 0.0], [right, bottom], colour::GROUND),
     ];
     let zero = walk.centre(walk.life(frame).start)[0];
+    if window.look == Look::Paper {
+        grid(window, &mut out);
+    }
     for (step, depth, line) in [(1.0, 3.0, 1.0), (10.0, 7.0, 1.5)] {
         // Ticks closer than four pixels would be a gray band.
         if step * scale >= 4.0 {
@@ -108,6 +142,22 @@ fn ground(walk: &Walk, frame: usize, window: &Window) -> Vec<Primitive> {
         out.extend(dashes.map(|y| Primitive::line([x, y], [x, y + dash], 1.0, Colour::gray(0.72))));
     }
     out
+}
+
+/// The world's columns and rows, and the ground's voxels, of which only the upper part is seen.
+fn grid(window: &Window, out: &mut Vec<Primitive>) {
+    let Window { left, right, top, scale, .. } = *window;
+    let line = |points| Primitive::Line { points, width: 1.0, colour: colour::GRID, smooth: false };
+    // Closer than five pixels it would be a gray veil: every second line then, every fifth …
+    let step = [1.0, 2.0, 5.0, 10.0].into_iter().find(|step| step * scale >= 5.0).unwrap_or(20.0);
+    out.extend(ruler(window, 0.0, step).map(|x| line(vec![[x, 0.0], [x, top]])));
+    let rows = (top / step).clamp(0.0, 1e3) as u32;
+    out.extend((1..=rows).map(|k| line(vec![[left, step * f64::from(k)], [right, step * f64::from(k)]])));
+    let depth = (8.0 / scale).min(1.0);
+    let gap = (0.5 / scale).max(0.05);
+    let peg = |x: f64| Primitive::rectangle([x + gap, 0.0], [x + step - gap, -depth], colour::PEG);
+    let before = std::iter::once((left / step).floor() * step);
+    out.extend(before.chain(ruler(window, 0.0, step)).map(peg));
 }
 
 fn body(walk: &Walk, frame: usize, window: &Window) -> Vec<Primitive> {
@@ -166,8 +216,15 @@ mod tests {
     use super::super::wobble;
     use super::*;
 
-    const WINDOW: Window =
-        Window { left: -10.0, right: 20.0, bottom: -2.0, top: 10.0, scale: 16.0, crisp: false };
+    const WINDOW: Window = Window {
+        left: -10.0,
+        right: 20.0,
+        bottom: -2.0,
+        top: 10.0,
+        scale: 16.0,
+        crisp: false,
+        look: Look::Plain,
+    };
 
     #[test]
     fn every_visible_voxel_is_a_quad_with_its_shade() {
@@ -190,6 +247,21 @@ mod tests {
         assert_eq!(ruler(&far, 0.0, 10.0).count(), 4);
         let broken = Window { left: f64::NAN, right: f64::INFINITY, ..WINDOW };
         assert!(ruler(&broken, 0.0, 1.0).count() <= 10_000);
+    }
+
+    #[test]
+    fn the_papers_look_has_a_peg_for_every_column_of_the_ground() {
+        let recording = wobble::recording("34/56", 1, 4, false);
+        let walk = Walk::new(&recording).unwrap();
+        let pegs = |window: &Window| {
+            let is_peg = |p: &&Primitive| matches!(p, Primitive::Quad { fill, .. } if *fill == colour::PEG);
+            ground(&walk, 2, window).iter().filter(is_peg).count()
+        };
+        let paper = Window { look: Look::Paper, ..WINDOW };
+        assert_eq!((pegs(&WINDOW), pegs(&paper)), (0, 32));
+        assert!(pegs(&Window { left: f64::NAN, right: f64::INFINITY, ..paper }) <= 10_001);
+        assert_eq!("paper".parse(), Ok(Look::Paper));
+        assert!("pretty".parse::<Look>().is_err());
     }
 
     #[test]

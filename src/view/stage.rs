@@ -1,7 +1,7 @@
 //! [`Stage`]: which part of the world a picture shows, and where on it.
 
 use super::PictureError;
-use super::scene::Window;
+use super::scene::{Look, Window};
 use super::walk::Walk;
 use std::ops::RangeInclusive;
 
@@ -32,6 +32,7 @@ pub struct Stage {
     /// Height of the panel, pixels.
     pub panel: f64,
     crisp: bool,
+    look: Look,
     scale: f64,
     surface: f64,
     left: Vec<f64>,
@@ -76,6 +77,7 @@ impl Stage {
             zoom,
             panel,
             crisp,
+            look: Look::Plain,
             scale,
             surface,
             left: middle.into_iter().map(snap).collect(),
@@ -85,6 +87,11 @@ impl Stage {
     /// The same with hard edges between voxels: fewer colours, so that animations stay small.
     pub fn crisp(self) -> Self {
         Stage { crisp: true, ..self }
+    }
+
+    /// The same in another look.
+    pub fn look(self, look: Look) -> Self {
+        Stage { look, ..self }
     }
 
     /// Where a point of the world is in the picture of a frame: pixels, y down.
@@ -102,6 +109,7 @@ impl Stage {
             top: (self.surface - self.panel) / self.scale,
             scale: self.scale,
             crisp: self.crisp,
+            look: self.look,
         }
     }
 

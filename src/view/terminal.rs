@@ -19,10 +19,56 @@ enum Pixel {
     Image(f64),
 }
 
+/// What colours a terminal has.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Depth {
+    /// None: letters stand for materials.
+    Plain,
+    /// 256 of a fixed palette.
+    Indexed,
+    /// 24 bits.
+    Full,
+}
+
+impl Depth {
+    /// From what the environment says: whether colours are wanted at all, `COLORTERM`, `TERM`.
+    pub fn of(is_wanted: bool, colorterm: &str, term: &str) -> Self {
+        let full = ["direct", "kitty", "alacritty", "foot", "ghostty", "wezterm"];
+        match () {
+            () if !is_wanted || term == "dumb" => Depth::Plain,
+            () if term.is_empty() && !cfg!(windows) => Depth::Plain,
+            () if matches!(colorterm, "truecolor" | "24bit") => Depth::Full,
+            () if full.iter().any(|name| term.contains(name)) => Depth::Full,
+            () => Depth::Indexed,
+        }
+    }
+
+    /// The sequence that sets the colours of a half block's upper and lower half.
+    fn sequence(self, [upper, lower]: [[u8; 3]; 2]) -> String {
+        if self == Depth::Indexed {
+            return format!("\x1b[38;5;{};48;5;{}m", indexed(upper), indexed(lower));
+        }
+        let [[r, g, b], [x, y, z]] = [upper, lower];
+        format!("\x1b[38;2;{r};{g};{b};48;2;{x};{y};{z}m")
+    }
+}
+
+/// The number of the nearest of the 256 colours: a cube of 6 × 6 × 6, or one of 24 grays.
+fn indexed(rgb: [u8; 3]) -> u8 {
+    const LEVELS: [u8; 6] = [0, 95, 135, 175, 215, 255];
+    let distance =
+        |a: [u8; 3]| -> u32 { a.iter().zip(rgb).map(|(a, b)| u32::from(a.abs_diff(b)).pow(2)).sum() };
+    let nearest = |v: u8| (0u8..6).min_by_key(|&k| LEVELS[usize::from(k)].abs_diff(v)).unwrap_or(0);
+    let [r, g, b] = rgb.map(nearest);
+    let cube = (distance([r, g, b].map(|k| LEVELS[usize::from(k)])), 16 + 36 * r + 6 * g + b);
+    let gray = (0u8..24).map(|k| (distance([8 + 10 * k; 3]), 232 + k)).min().unwrap_or(cube);
+    if gray.0 < cube.0 { gray.1 } else { cube.1 }
+}
+
 /// A frame as exactly `rows` lines of exactly `columns` characters, joined by newlines: a line of read-outs, then the
-/// world, followed by the camera. With `colour`, two pixels a character (half blocks, 24-bit colours); without, plain
-/// ASCII: `#` rigid, `:` soft, `/` and `\` muscles, `-` and `+` sensors.
-pub fn frame(walk: &Walk, frame: usize, columns: usize, rows: usize, colour: bool) -> String {
+/// world, followed by the camera. With colours, two pixels a character (half blocks); without, plain ASCII: `#` rigid, `:` soft, `/` and `\` muscles, `-` and `+` sensors.
+pub fn frame(walk: &Walk, frame: usize, columns: usize, rows: usize, depth: Depth) -> String {
+    let colour = depth != Depth::Plain;
     let (columns, rows) = (columns.min(1000), rows.min(1000));
     let words = readout(walk, frame);
     let status = format!("{}  {}  {}", words.label, words.time, words.displacement);
@@ -42,7 +88,7 @@ pub fn frame(walk: &Walk, frame: usize, columns: usize, rows: usize, colour: boo
             let half = |c: usize| match pair(c) {
                 // The colours stay set until they change.
                 same if c > 0 && same == pair(c - 1) => "▀".to_string(),
-                [[r, g, b], [x, y, z]] => format!("\x1b[38;2;{r};{g};{b};48;2;{x};{y};{z}m▀"),
+                pair => depth.sequence(pair) + "▀",
             };
             line(&half) + "\x1b[0m"
         } else {
@@ -161,23 +207,34 @@ mod tests {
         let walk = Walk::new(&recording).unwrap();
         for (columns, rows) in [(80, 24), (20, 8), (1, 1), (2, 2), (200, 60), (41, 3)] {
             for f in [0, 7, 8, 30, 41] {
-                for colour in [true, false] {
-                    let text = frame(&walk, f, columns, rows, colour);
+                for depth in [Depth::Plain, Depth::Indexed, Depth::Full] {
+                    let text = frame(&walk, f, columns, rows, depth);
                     assert_eq!(visible(&text), vec![columns; rows], "{columns} × {rows}");
-                    assert!(colour || text.is_ascii());
+                    assert!(depth != Depth::Plain || text.is_ascii());
                 }
             }
         }
-        assert!(frame(&walk, 0, 10, 0, true).is_empty());
+        assert!(frame(&walk, 0, 10, 0, Depth::Full).is_empty());
+    }
+
+    #[test]
+    fn colours_are_those_that_the_terminal_says_it_has() {
+        assert_eq!(Depth::of(true, "truecolor", "xterm"), Depth::Full);
+        assert_eq!(Depth::of(true, "", "xterm-kitty"), Depth::Full);
+        assert_eq!(Depth::of(true, "", "xterm-256color"), Depth::Indexed);
+        assert_eq!(Depth::of(false, "truecolor", "xterm"), Depth::Plain);
+        assert_eq!(Depth::of(true, "truecolor", "dumb"), Depth::Plain);
+        let colours = [[0, 0, 0], [255, 255, 255], [255, 0, 0], [118, 118, 118], [200, 36, 58]];
+        assert_eq!(colours.map(indexed), [16, 231, 196, 243, 161]);
     }
 
     #[test]
     fn every_material_is_seen_in_its_colour_or_letter() {
         let recording = wobble::recording("123/456", 1, 10, false);
         let walk = Walk::new(&recording).unwrap();
-        let plain = frame(&walk, 0, 80, 24, false);
+        let plain = frame(&walk, 0, 80, 24, Depth::Plain);
         assert!("#:/\\-+=|".chars().all(|c| plain.contains(c)), "{plain}");
-        let colours = frame(&walk, 4, 80, 24, true);
+        let colours = frame(&walk, 4, 80, 24, Depth::Full);
         for (material, quad) in walk.voxels(4) {
             let [r, g, b] = colour::shade(material, area(&quad)).rgb;
             assert!(colours.contains(&format!("{r};{g};{b}")), "{material:?}");

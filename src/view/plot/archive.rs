@@ -63,7 +63,7 @@ pub fn archive(run: &RunFile) -> Figure {
         legend(&mut canvas, [MARGIN + LEFT + 0.53 * side, top + 0.01 * side], 0.44 * side, &scale, true);
         canvas.text([width / 2.0, maps + 3.0], &STRIPS.join(" "), Words::middle().colour(colour::FAINT));
         maps + 4.0
-    } else if tasks % columns != 0 {
+    } else if !tasks.is_multiple_of(columns) {
         let free = MARGIN + LEFT + (tasks % columns) as f64 * (side + LEFT + 4.0);
         legend(&mut canvas, [free, maps - map_height + 20.0], side, &scale, false);
         maps

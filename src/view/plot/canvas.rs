@@ -258,7 +258,7 @@ mod tests {
 
     #[test]
     fn numbers_are_short_and_always_drawable() {
-        assert_eq!([0.0, -0.001, 1.5, 2.0, 3.14159].map(number), ["0", "0", "1.5", "2", "3.14"]);
+        assert_eq!([0.0, -0.001, 1.5, 2.0, 3.1459].map(number), ["0", "0", "1.5", "2", "3.15"]);
         assert_eq!([f64::NAN, f64::INFINITY, -1e300].map(number), ["0", "1000000", "-1000000"]);
     }
 

@@ -28,7 +28,7 @@ pub fn snapshots(recording: &Recording, every: usize, of: &str) -> Result<Figure
     let (columns, width) = if phases <= 3 { (1, COLUMN) } else { (2, PAGE) };
     let every = if every == 0 { suitable(&walk) } else { every };
     let mut canvas = Canvas::new();
-    let is_rest = (0..phases).any(|phase| (walk.phase_frames(phase).len() - 1) % every != 0);
+    let is_rest = (0..phases).any(|phase| !(walk.phase_frames(phase).len() - 1).is_multiple_of(every));
     let rest = if is_rest { ", and the last" } else { "" };
     let title = format!("Snapshots every {every} control steps{rest}");
     let top = heading(&mut canvas, &title, of, width);

@@ -240,7 +240,7 @@ mod tests {
     #[test]
     fn compressed_columns_are_darker() {
         let mut recording = wobble::recording("33", 1, 2, false);
-        recording.frames[1].points.clone_from(&recording.frames[0].points);
+        recording.frames[1] = recording.frames[0].clone();
         recording.frames[1].points.iter_mut().for_each(|p| p[1] *= 0.5);
         let walk = Walk::new(&recording).unwrap();
         let x = Axis::exact(-2.0, 2.0, 3);
