@@ -2,7 +2,8 @@
 //!
 //! A [`Walk`] is a checked [`Recording`](crate::task::recording::Recording); a [`Stage`] decides what part of the
 //! world a picture shows; `scene` and `panel` make drawing primitives of one frame; `raster` paints them. On top of
-//! these stand the animated GIF, the self-contained HTML page and the view in a terminal.
+//! these stand the animated GIF, the self-contained HTML page and the view in a terminal. Figures for print are vectors and
+//! stand apart, in [`plot`].
 
 pub mod bar;
 pub mod colour;

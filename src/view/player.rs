@@ -99,7 +99,7 @@ pub fn play(console: &Console, walk: &Walk) -> Result<(), Error> {
             let mut picture = terminal::frame(walk, player.frame(), columns, rows, depth);
             if screen.has_keys {
                 let word = if player.is_paused { "space plays on" } else { "space pauses " };
-                let line: String = format!("{word}   , . ← → step   q quits").chars().take(columns).collect();
+                let line: String = format!("{word}   , . step   q quits").chars().take(columns).collect();
                 picture += &format!("\n{line}\x1b[K");
             }
             // With keys, the terminal does not go back to the first column by itself.

@@ -15,7 +15,7 @@ const GROUND: f64 = 24.0;
 /// Sky left and right of the whole walk, voxel lengths.
 const MARGIN: f64 = 2.5;
 /// Largest and smallest size of a voxel in pixels at zoom 1; a walk that needs smaller ones is followed.
-const VOXEL: RangeInclusive<f64> = 7.5..=22.0;
+const VOXEL: RangeInclusive<f64> = 5.5..=22.0;
 /// Frames before and after over which the camera's path is averaged: a cycle, so that it does not shake with the body.
 const SMOOTHING: usize = 50;
 

@@ -4,7 +4,7 @@
 //! could have an elite is framed; where no body can be there is nothing.
 
 use super::axes::{Axis, MARGIN, colour_bar, heading};
-use super::canvas::{Canvas, Pen, TEXT, Words, number};
+use super::canvas::{Canvas, Pen, TEXT, Words, number, path};
 use super::figure::{COLUMN, Figure, PAGE};
 use super::{robot, scales};
 use crate::qd::descriptor::{COUNT_BINS, DescriptorSpace, count_bin, possible_cells};
@@ -109,7 +109,8 @@ fn map(
     let step = side / COUNT_BINS as f64;
     let gap = 0.08 * step;
     let strip = (step - gap) / COUNT_BINS as f64;
-    let (mut frames, mut paths) = (String::new(), BTreeMap::<[u8; 3], String>::new());
+    let (mut frames, mut strokes, mut paths) =
+        (String::new(), String::new(), BTreeMap::<[u8; 3], String>::new());
     for muscle in 0..COUNT_BINS {
         for sensor in 0..COUNT_BINS {
             let left = x + muscle as f64 * step + gap / 2.0;
@@ -125,6 +126,10 @@ fn map(
                 frames += &data;
                 if let Some(fitness) = elite {
                     paths.entry(scale.colour(fitness).rgb).or_default().push_str(&data);
+                    if fitness < 0.0 {
+                        let corner = [left + total as f64 * strip, top];
+                        strokes += &stroke(corner, [strip, step - gap]);
+                    }
                 }
             }
         }
@@ -134,6 +139,17 @@ fn map(
         canvas.area(&data, Colour { rgb, opacity: 255 });
     }
     canvas.path(&frames, Pen::new(scales::CELL, 0.3));
+    if !strokes.is_empty() {
+        canvas.path(&strokes, STROKE);
+    }
+}
+
+/// What marks fitness below 0: a gray alone could be taken for a colour by colour-blind eyes.
+const STROKE: Pen = Pen { colour: colour::INK, width: 0.5, dashes: None };
+
+/// The diagonal of a cell.
+fn stroke([x, y]: [f64; 2], [width, height]: [f64; 2]) -> String {
+    path(&[[x, y + height], [x + width, y]], false)
 }
 
 /// Numbers of voxels at which bins begin.
@@ -175,6 +191,9 @@ fn legend(canvas: &mut Canvas, [x, y]: [f64; 2], width: f64, scale: &Scale, is_a
     }
     let lines = lines.iter().map(|(fill, text)| (*fill, text.as_str()));
     let below = robot::legend(canvas, [x, y + 26.0], lines, width);
+    if scale.lowest.is_some() {
+        canvas.path(&stroke([x, y + 37.0], [7.0, 7.0]), STROKE);
+    }
     if !is_above {
         for (k, text) in STRIPS.into_iter().enumerate() {
             canvas.fitted([x, below + 6.0 + 9.5 * k as f64], text, width + 10.0, Words::default());
