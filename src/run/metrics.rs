@@ -44,7 +44,7 @@ impl Totals {
 }
 
 const HEADER: &str = "generation,num_elites,coverage,qd_score,norm_qd_score,obj_max,obj_mean,evaluations,\
-simulated,saved,saved_known_bodies,saved_early_stop,saved_shared_lives,unstable,seconds,stage";
+simulated,saved,saved_known_bodies,saved_early_stop,saved_shared_lives,unstable,stage,seconds";
 
 /// Writes `metrics.csv`.
 pub struct Metrics {
@@ -64,10 +64,15 @@ impl Metrics {
         let number = |line: &&str| line.split(',').next().and_then(|first| first.parse::<u64>().ok());
         let whole = old.split_inclusive('\n').filter(|line| line.ends_with('\n')).map(str::trim_end);
         let kept = whole.filter(|line| number(line).is_some_and(|generation| generation < generations));
-        // Lines of earlier versions have fewer columns.
+        // Lines of earlier versions have fewer columns, but end with the seconds, too.
         let columns = |line: &str| line.matches(',').count();
-        let kept =
-            kept.map(|line| line.to_string() + &",".repeat(columns(HEADER).saturating_sub(columns(line))));
+        let whole = |line: &str| match line.rsplit_once(',') {
+            Some((counts, seconds)) => {
+                format!("{counts}{},{seconds}", ",".repeat(columns(HEADER).saturating_sub(columns(line))))
+            }
+            None => line.to_string(),
+        };
+        let kept = kept.map(whole);
         let mut text: String = std::iter::once(HEADER.to_string()).chain(kept).collect::<Vec<_>>().join("\n");
         text.push('\n');
         write_atomically(&path, text.as_bytes()).map_err(|error| Error::writing(&path, &error))?;
@@ -92,7 +97,7 @@ impl Metrics {
         writeln!(
             self.file,
             "{generation},{num_elites},{coverage},{qd_score},{norm_qd_score},{obj_max},{obj_mean},{evaluations},\
-             {simulated},{},{},{},{},{unstable},{seconds:.3},{}",
+             {simulated},{},{},{},{},{unstable},{},{seconds:.3}",
             totals.saved(),
             totals.saved_known_bodies,
             totals.saved_early_stop,
@@ -137,7 +142,7 @@ mod tests {
         let lines = lines(folder.path());
         let columns = HEADER.split(',').count();
         assert!(lines.len() == 3 && lines.iter().all(|line| line.split(',').count() == columns), "{lines:?}");
-        assert_eq!(lines[1], "0,0,0,0,0,,,7,0,0,0,0,0,0,0.000,1");
+        assert_eq!(lines[1], "0,0,0,0,0,,,7,0,0,0,0,0,0,1,0.000");
     }
 
     #[test]

@@ -1,0 +1,79 @@
+//! The whole paper in small: every step, stopped anywhere, the same table.
+
+mod common;
+
+use common::program::{Sandbox, TINY, files};
+use std::collections::BTreeMap;
+
+const PLAN: &str = r#"
+seeds = [1, 2]
+robots = 3
+images = 20
+
+[[experiment]]
+config = "tiny.toml"
+
+[audit]
+least_walk = 0.0
+threshold = 0.0
+
+[capacity]
+trainings = 2
+sizes = [1, 3]
+"#;
+
+fn sandbox() -> Sandbox {
+    let sandbox = Sandbox::new();
+    sandbox.write("tiny.toml", TINY);
+    sandbox.write("plan.toml", PLAN);
+    sandbox
+}
+
+/// All results: what does not depend on the clock.
+fn results(sandbox: &Sandbox, out: &str) -> BTreeMap<String, Vec<u8>> {
+    let mut all = files(&sandbox.path(out));
+    for seed in [1, 2] {
+        for (name, content) in files(&sandbox.path(&format!("{out}/tiny-seed{seed}"))) {
+            if ["run.json", "elites.csv", "audit.json"].contains(&name.as_str()) {
+                all.insert(format!("{seed}/{name}"), content);
+            }
+        }
+    }
+    all
+}
+
+#[test]
+fn all_steps_are_done_and_a_second_call_has_nothing_left_to_do() {
+    let sandbox = sandbox();
+    let said = sandbox.run("reproduce plan.toml --scale 0.5 --out small --threads 1").ended(0, &["6 generations"]);
+    assert!(said.out.contains("0|1") && said.out.contains("reproduction.csv"), "{}", said.out);
+    let first = results(&sandbox, "small");
+    for file in ["reproduction.json", "reproduction.csv", "tiny-eval.json", "tiny-capacity.json", "2/audit.json"] {
+        assert!(first.contains_key(file), "{file} of {:?}", first.keys());
+    }
+    let table = String::from_utf8(first["reproduction.csv"].clone()).unwrap();
+    let cells: Vec<&str> = table.lines().nth(1).unwrap().split(',').collect();
+    assert_eq!((table.lines().count(), cells[0]), (2, "0|1"));
+    assert!(cells[1].parse::<usize>().unwrap() <= 3);
+    sandbox.run("reproduce plan.toml --scale 0.5 --out small --threads 3").ended(0, &[]);
+    assert_eq!(results(&sandbox, "small"), first);
+    // A larger scale goes on with what there is.
+    sandbox.run("reproduce plan.toml --scale 1 --out small").ended(0, &["12 generations"]);
+    sandbox.run("reproduce plan.toml --scale 1 --out whole").ended(0, &[]);
+    let (grown, whole) = (results(&sandbox, "small"), results(&sandbox, "whole"));
+    assert_eq!(grown["1/run.json"], whole["1/run.json"]);
+    assert_eq!(grown["reproduction.csv"], whole["reproduction.csv"]);
+}
+
+#[test]
+fn what_cannot_be_is_refused_before_anything_is_done() {
+    let sandbox = sandbox();
+    sandbox.run("reproduce plan.toml --scale 0").ended(2, &["--scale 0"]);
+    sandbox.run("reproduce plan.toml --scale nan").ended(2, &["--scale"]);
+    sandbox.run("reproduce plan.toml --set seeds=[1,1]").ended(3, &["seeds", "different"]);
+    sandbox.run("reproduce plan.toml --set robots=0").ended(3, &["robots"]);
+    sandbox.run("reproduce nowhere.toml").ended(3, &["nowhere.toml"]);
+    sandbox.write("bad.toml", PLAN.replace("tiny.toml", "missing.toml"));
+    sandbox.run("reproduce bad.toml").ended(3, &["missing.toml"]);
+    assert!(!sandbox.path("reproduction").exists());
+}
