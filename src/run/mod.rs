@@ -30,6 +30,7 @@ pub mod robust;
 mod samples;
 pub mod sensitivity;
 pub mod setting;
+pub mod serve;
 pub mod signals;
 pub mod simulate;
 pub mod statistics;

@@ -22,6 +22,7 @@ pub mod progress;
 pub mod raster;
 pub mod reporters;
 pub mod scene;
+pub mod serve;
 pub mod sheet;
 pub mod stage;
 pub mod summary;
