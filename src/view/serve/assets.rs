@@ -18,6 +18,7 @@ pub fn asset(path: &str) -> Option<Response> {
         "/stage.js" => (JS, include_str!("page/stage.js")),
         "/life.js" => (JS, include_str!("page/life.js")),
         "/pad.js" => (JS, include_str!("page/pad.js")),
+        "/images.js" => (JS, include_str!("page/images.js")),
         "/robots.js" => (JS, include_str!("page/robots.js")),
         "/editor.js" => (JS, include_str!("page/editor.js")),
         _ => return None,

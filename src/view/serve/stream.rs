@@ -3,6 +3,7 @@
 //! As in the page of a replay: steps of 1/200 voxel length from an origin per moment, near the centre of mass.
 
 use crate::body::Material;
+use crate::run::serve::judge::THRESHOLD;
 use crate::run::serve::life::{Event, STEPS_PER_SECOND};
 use crate::run::serve::request::{Plan, Seen};
 use crate::task::recording::{Frame, VoxelCorners};
@@ -48,6 +49,7 @@ fn begin(id: u64, plan: &Plan, voxels: &[VoxelCorners], frame: &Frame) -> Value 
         "points": frame.points.len(),
         "unit": STEPS,
         "rate": STEPS_PER_SECOND,
+        "threshold": THRESHOLD,
         "cycle": plan.who.physics.cycle_steps,
         "judge": plan.who.judge,
         "frames": positions(std::slice::from_ref(frame)),
