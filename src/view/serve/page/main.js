@@ -24,7 +24,7 @@ const say = (error) => {
   $("error").textContent = error ? error.message : "";
 };
 
-const shownTo = (subject) => (subject === editor.subject || who?.own) && editor.stimulus ? { stimulus: editor.stimulus } : picture.shown;
+const shownTo = () => (who?.own && editor.stimulus ? { stimulus: editor.stimulus } : picture.shown);
 
 const start = () => {
   clearTimeout(timer);
@@ -107,7 +107,7 @@ const editor = new Editor(materials, {
 
 const words = (answer, over) => {
   const distance = Math.abs(answer.moved).toFixed(1);
-  if (!answer.way) return { state: over ? "none" : "idle", says: over ? "undecided" : "…", moved: `moved ${distance} voxels` };
+  if (!answer.way) return { state: over ? "none" : "idle", says: over ? "undecided" : "", moved: `moved ${distance} voxels` };
   const says = answer.says.length ? answer.says.join(" or ") : answer.way === "left" ? "←" : "→";
   const label = life.phase(life.frame).label;
   const known = over && answer.says.length && typeof label === "number";
@@ -133,7 +133,7 @@ const draw = () => {
   $("world").setAttribute("aria-label", `${who.name} sees ${picture.about}; ${text.moved}`);
   if (life.over && life.told !== life.end) {
     life.told = life.end;
-    $("spoken").textContent = `${who.name} sees ${picture.about}. It says ${text.says}: ${text.moved}.`;
+    $("spoken").textContent = `${who.name} sees ${picture.about}. ${text.says ? `It says ${text.says}: ` : ""}${text.moved}.`;
   }
 };
 

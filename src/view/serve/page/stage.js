@@ -35,17 +35,17 @@ export class Stage {
   }
 
   draw(life, answer) {
-    const canvas = this.canvas, width = canvas.clientWidth || canvas.parentElement.clientWidth - 24, groundHeight = 30;
-    const phone = width < 480, height = phone ? 270 : Math.min(440, Math.round(0.52 * width));
+    const canvas = this.canvas, { clientWidth: width, clientHeight: height } = canvas.parentElement, groundHeight = 30;
+    const phone = width < 480;
     const ctx = fit(canvas, width, height), surface = height - groundHeight;
     const ready = life && life.begun && life.moments.length;
     if (ready && this.life !== life) this.prepare(life);
-    const shown = ready ? this.size + (phone ? 15 : 26) : 40;
-    const scale = Math.min(width / shown, (surface - 34) / (ready ? 1.25 * this.tall : 10), 30);
+    const shown = ready ? (phone ? 1.25 * this.size + 11 : 1.9 * this.size + 12) : 40;
+    const scale = Math.min(width / shown, (surface - 30) / (ready ? 1.22 * this.tall : 10), 36);
     const frame = ready ? life.frame : 0;
     const at = ready ? life.moments[frame].x : 0, zero = ready ? life.moments[0].x : 0;
     // The camera stands until the robot nears the edge.
-    const room = Math.max(0, width / scale / 2 - this.size / 2 - 2);
+    const room = Math.max(0, width / scale / 2 - this.size / 2 - 4);
     const from = this.camera ?? at, camera = Math.min(Math.max(from, at - room), at + room);
     this.camera = frame === 0 ? at : camera;
     const x0 = this.camera - width / 2 / scale;
