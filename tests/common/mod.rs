@@ -2,6 +2,7 @@
 #![allow(dead_code, reason = "every test program uses its own part")]
 
 pub mod program;
+pub mod server;
 
 use flate2::read::GzDecoder;
 use morphcog::base::Grid;
