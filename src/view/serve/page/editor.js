@@ -2,16 +2,16 @@
 
 import { $, css, element, fit, post } from "./api.js";
 
-const AREA = (encoding) => ({ reduction: "area", encoding, level: 0.5 });
-// A walker to begin with: muscles on both sides of a sensor, and legs.
-const FIRST = ["00000000", "03366440", "03366440", "33366444", "33000044", "33000044"];
+const AREA = (encoding) => ({ reduction: "area", encoding, level: 0.2 });
+// A small walker to begin with, evolved on digits in a minute: left under a zero, right under a one.
+const FIRST = ["4444444", "4444445", "5444465", "5544465", "5544445", "5444444", "4444444"];
 
 export class Editor {
   // `live(subject, steps)` is asked for a life, `see()` tells what the picture is now.
   constructor(materials, { live, see, say, chosen }) {
     Object.assign(this, { materials, say, see, material: 3, cursor: null, painting: null, before: [], stimulus: null, steps: 500 });
     this.cells = FIRST.map((row) => [...row].map(Number));
-    this.encoding = AREA("saturated");
+    this.encoding = AREA("threshold");
     const grid = $("grid");
     grid.addEventListener("pointerdown", (e) => this.begin(e));
     grid.addEventListener("pointermove", (e) => { if (this.painting !== null) this.paint(this.at(e), this.painting); });
@@ -171,7 +171,7 @@ export class Editor {
     if (!file) return;
     const loaded = await post("/api/scenario", await file.text());
     if (loaded.body.length > 32 || loaded.body[0].length > 32) throw new Error("scenario: body: the editor has room for 32 × 32 voxels");
-    this.encoding = AREA("saturated"); $("pixels").value = "saturated";
+    this.encoding = AREA("threshold"); $("pixels").value = "threshold";
     this.set(loaded.body);
     this.steps = loaded.control_steps;
     // What it saw is shown until there is another picture.
