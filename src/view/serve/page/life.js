@@ -5,13 +5,16 @@ import { bytes, post, stream } from "./api.js";
 export class Life {
   constructor(request, speed, changed) {
     this.moments = []; this.phases = []; this.end = null; this.begun = null;
-    this.at = 0; this.speed = speed; this.playing = true; this.changed = changed;
+    this.at = 0; this.speed = speed; this.playing = true; this.waiting = null; this.changed = changed;
     this.abort = new AbortController();
     this.running = stream("/api/lives", { ...request, speed }, this.abort.signal, (name, data) => this.hear(name, data));
   }
 
   hear(name, data) {
-    if (name === "begin") { this.begun = data; this.keep(data.frames); this.phases.push(data.seen); }
+    if (name === "begin") {
+      this.begun = data; this.keep(data.frames); this.phases.push(data.seen);
+      if (this.waiting) this.change(this.waiting).catch(() => {});
+    }
     if (name === "seen") this.phases.push(data);
     if (name === "lived") { this.keep(data.frames); this.answer = data.answer; }
     if (name === "end") { this.end = data; this.answer = data.answer; }
@@ -60,6 +63,7 @@ export class Life {
   }
 
   change(value) {
+    if (!this.begun) this.waiting = { ...this.waiting, ...value };
     if (this.end || !this.begun) return Promise.resolve();
     // A life that has just ended cannot be changed any more, and need not.
     return post("/api/lives/" + this.begun.id, value).catch((error) => { if (error.status !== 404) throw error; });
@@ -68,4 +72,6 @@ export class Life {
   play(on) { this.playing = on; return this.change({ paused: !on }); }
   pace(speed) { this.speed = speed; return this.change({ speed }); }
   stop() { this.abort.abort(); }
+  // The connection is lost: what has come is all there is.
+  lose() { if (this.begun && !this.end) this.end = { step: this.last, answer: this.answer, unstable: null }; }
 }

@@ -14,7 +14,7 @@ const AFTER_STROKE = 450, WHILE_DRAWING = 60;
 const materials = await get("/api/materials");
 let life = null, timer = 0, seen = null, previous = 0, drawn = null, looked = 0;
 // The picture: { drawing } or { image }; and the words for it.
-let picture = { shown: {}, about: "nothing: it is dark" };
+let picture = { shown: {}, about: "nothing, it is dark" };
 // Who lives: a robot of an archive, or the editor's body.
 let who = null;
 
@@ -36,7 +36,7 @@ const start = () => {
     drawn = null;
   });
   life = own;
-  own.running.catch((error) => { if (life === own) say(error); }).finally(() => { drawn = null; status(); });
+  own.running.catch((error) => { if (life === own) say(error); }).finally(() => { own.lose(); drawn = null; status(); });
   say(null);
   status();
 };
@@ -59,7 +59,11 @@ const glance = async () => {
   if (mark === looked) { seen = answer; look(); }
 };
 
-const look = () => { if (seen && who) drawStimulus($("stimulus"), seen.stimulus, who.rows(), materials); };
+const look = () => {
+  if (!seen || !who) return;
+  drawStimulus($("stimulus"), seen.stimulus, who.rows(), materials);
+  $("picture").textContent = picture.about;
+};
 
 let glancing = 0;
 const pad = new Pad($("pad"), (done) => {
@@ -74,14 +78,14 @@ const pad = new Pad($("pad"), (done) => {
 const images = new Images(({ image, about }) => show({ shown: { image }, about }, 0));
 
 const choose = (robot, from) => {
-  const { reduction, encoding, level } = from.encoding;
+  const { encoding, level } = from.encoding;
   who = {
     robot, from, name: robot.id,
     subject: () => ({ archive: from.index, robot: robot.id }),
     rows: () => rows(robot), steps: () => Math.min(from.control_steps, 5000),
   };
   const way = { saturated: "1 where there is any ink", intensity: "as dark as the ink", threshold: `1 above ${level}` }[encoding];
-  $("encoding").textContent = `${robot.body.length} × ${robot.body[0].length}: ${reduction === "stride" ? "some rows and columns kept" : "means of areas"}, ${way}.`;
+  $("encoding").textContent = `${robot.body.length} × ${robot.body[0].length} pixels, ${way}`;
   $("who").textContent = robot.id;
   const audit = robot.audit ? ` · audit: ${robot.audit.conclusion}` : "";
   $("about").textContent = `${from.name} · task ${robot.task} · fitness ${robot.fitness.toFixed(2)} · ${robot.voxels.total} voxels${audit}`;
@@ -100,7 +104,7 @@ const editor = new Editor(materials, {
     who = { own: true, name: "Your body", subject: () => editor.subject, rows: () => editor.cells.map((row) => row.join("")), steps: () => editor.steps };
     $("who").textContent = "Your body";
     $("about").textContent = "from the editor; it has no task, so its walks say nothing";
-    $("encoding").textContent = `${editor.cells.length} × ${editor.cells[0].length} pixels of the picture.`;
+    $("encoding").textContent = `${editor.cells.length} × ${editor.cells[0].length} pixels`;
     start();
   },
 });

@@ -52,7 +52,7 @@ export class Robots {
 
   card(robot) {
     const canvas = element("canvas"), about = element("div", {}, element("b", { textContent: robot.id }));
-    about.append(element("span", { textContent: `${robot.task} · fitness ${robot.fitness.toFixed(2)}` }));
+    about.append(element("span", { textContent: (this.from.tasks.length > 1 ? `${robot.task} · ` : "") + `fitness ${robot.fitness.toFixed(2)}` }));
     if (robot.audit) {
       const audit = element("span", { className: "audit", textContent: robot.audit.conclusion });
       audit.dataset.verdict = robot.audit.verdict;
