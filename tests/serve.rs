@@ -1,5 +1,8 @@
 //! `morphcog serve` over HTTP: what it answers, what it refuses, and that lives are the engine's and end when nobody listens.
 
+// They end the server by signals.
+#![cfg(unix)]
+
 mod common;
 
 use base64::Engine;
@@ -63,7 +66,7 @@ fn the_page_its_headers_and_what_there_is() {
         }
     }
     assert!(files.len() >= 11, "{files:?}");
-    let head = server.send(&format!("HEAD / HTTP/1.1\r\nHost: 127.0.0.1:{}\r\n\r\n", server.port));
+    let head = server.send(format!("HEAD / HTTP/1.1\r\nHost: 127.0.0.1:{}\r\n\r\n", server.port));
     assert_eq!((head.status, head.body.as_str()), (200, ""));
     assert_eq!(head.header("content-length"), page.header("content-length"));
 
@@ -110,22 +113,22 @@ fn what_is_wrong_is_refused_with_one_line_and_hurts_nothing() {
     refused(&server.get("/api/archives/x"), 400, "archive");
     refused(&server.get("/api/images?set=none"), 404, "none");
     refused(&server.get("/api/images?set=builtin&class=many"), 400, "class");
-    let wrong = server.send(&format!("POST / HTTP/1.1\r\n{own}Content-Length: 0\r\n\r\n"));
+    let wrong = server.send(format!("POST / HTTP/1.1\r\n{own}Content-Length: 0\r\n\r\n"));
     refused(&wrong, 405, "GET");
     assert_eq!(wrong.header("allow"), "GET, HEAD");
     refused(&server.get("/api/lives"), 405, "POST");
-    refused(&server.send(&format!("DELETE /api/status HTTP/1.1\r\n{own}\r\n")), 405, "GET");
+    refused(&server.send(format!("DELETE /api/status HTTP/1.1\r\n{own}\r\n")), 405, "GET");
 
     // Names that others let point here, and pages of others.
     let port = server.port;
     for host in ["evil.example", "127.0.0.1", "127.0.0.1:1", &format!("evil.example:{port}")] {
-        refused(&server.send(&format!("GET /api/status HTTP/1.1\r\nHost: {host}\r\n\r\n")), 403, "Host");
+        refused(&server.send(format!("GET /api/status HTTP/1.1\r\nHost: {host}\r\n\r\n")), 403, "Host");
     }
     refused(&server.send("GET / HTTP/1.1\r\n\r\n"), 400, "Host");
-    refused(&server.send(&format!("GET / HTTP/1.1\r\n{own}{own}\r\n")), 400, "Host");
+    refused(&server.send(format!("GET / HTTP/1.1\r\n{own}{own}\r\n")), 400, "Host");
     let from = |origin: &str| {
         let body = "{\"body\": [[3]]}";
-        server.send(&format!(
+        server.send(format!(
             "POST /api/body HTTP/1.1\r\n{own}Origin: {origin}\r\nContent-Length: {}\r\n\r\n{body}",
             body.len()
         ))
@@ -138,11 +141,11 @@ fn what_is_wrong_is_refused_with_one_line_and_hurts_nothing() {
 
     // What is no HTTP, or too much of it.
     refused(&server.send("\u{16}\u{3}\u{1} hello\r\n\r\n"), 400, "HTTP");
-    refused(&server.send(&format!("GET / HTTP/1.1\r\n{own}X: {}\r\n\r\n", "x".repeat(40_000))), 431, "");
-    refused(&server.send(&format!("POST /api/body HTTP/1.1\r\n{own}\r\n")), 411, "Content-Length");
+    refused(&server.send(format!("GET / HTTP/1.1\r\n{own}X: {}\r\n\r\n", "x".repeat(40_000))), 431, "");
+    refused(&server.send(format!("POST /api/body HTTP/1.1\r\n{own}\r\n")), 411, "Content-Length");
     let long =
         format!("POST /api/body HTTP/1.1\r\n{own}Content-Length: 99999999\r\n\r\n{}", "x".repeat(100_000));
-    refused(&server.send(&long), 413, "262144");
+    refused(&server.send(long), 413, "262144");
 
     let robot = json!({ "archive": 0, "robot": "QMAXD" });
     let wide = vec![vec![0u8; 200]; 2];

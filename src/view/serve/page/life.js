@@ -6,6 +6,8 @@ export class Life {
   constructor(request, speed, changed) {
     this.moments = []; this.phases = []; this.end = null; this.begun = null;
     this.at = 0; this.speed = speed; this.playing = true; this.waiting = null; this.changed = changed;
+    // Whether we look at a moment of our own choice and not at the newest.
+    this.apart = false;
     this.abort = new AbortController();
     this.running = stream("/api/lives", { ...request, speed }, this.abort.signal, (name, data) => this.hear(name, data));
   }
@@ -55,12 +57,14 @@ export class Life {
   pass(seconds) {
     if (!this.begun || !this.playing) return;
     const rate = this.begun.rate * (this.speed || 16), behind = this.last - this.at;
-    if (this.speed === 0 && !this.end) this.at = this.last;
+    if (!this.apart && (behind > 2 * rate || (this.speed === 0 && !this.end))) this.at = this.last;
     else {
-      const hurry = this.end ? 1 : behind > 0.5 * rate ? 3 : behind > 0.16 * rate ? 1.25 : 1;
+      const hurry = this.end || this.apart ? 1 : behind > 0.5 * rate ? 3 : behind > 0.16 * rate ? 1.25 : 1;
       this.at = Math.min(this.last, this.at + seconds * rate * hurry);
     }
   }
+
+  look(frame) { this.at = Math.min(frame, this.last); this.apart = this.at < this.last; }
 
   change(value) {
     if (!this.begun) this.waiting = { ...this.waiting, ...value };

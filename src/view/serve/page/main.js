@@ -5,7 +5,7 @@ import { Editor } from "./editor.js";
 import { Images } from "./images.js";
 import { Life } from "./life.js";
 import { Pad } from "./pad.js";
-import { Robots, rows } from "./robots.js";
+import { Robots, rows, signed } from "./robots.js";
 import { Stage, drawStimulus } from "./stage.js";
 
 // Strokes may follow each other that fast without a life for each.
@@ -88,7 +88,7 @@ const choose = (robot, from) => {
   $("encoding").textContent = `${robot.body.length} × ${robot.body[0].length} pixels, ${way}`;
   $("who").textContent = robot.id;
   const audit = robot.audit ? ` · audit: ${robot.audit.conclusion}` : "";
-  $("about").textContent = `${from.name} · task ${robot.task} · fitness ${robot.fitness.toFixed(2)} · ${robot.voxels.total} voxels${audit}`;
+  $("about").textContent = `${from.name} · task ${robot.task} · fitness ${signed(robot.fitness, 2)} · ${robot.voxels.total} voxels${audit}`;
   const { left, right } = robot.judge ?? { left: [], right: [] };
   images.labels = left.concat(right).length ? left.concat(right) : null;
   start();
@@ -114,7 +114,8 @@ const words = (answer, over) => {
   if (!answer.way) return { state: over ? "none" : "idle", says: over ? "undecided" : "", moved: `moved ${distance} voxels` };
   const says = answer.says.length ? answer.says.join(" or ") : answer.way === "left" ? "←" : "→";
   const label = life.phase(life.frame).label;
-  const known = over && answer.says.length && typeof label === "number";
+  const { left, right } = life.begun.judge ?? { left: [], right: [] };
+  const known = over && answer.says.length && left.concat(right).includes(label);
   return { state: known ? (answer.says.includes(label) ? "right" : "wrong") : "answer", says, moved: `moved ${distance} voxels ${answer.way}` };
 };
 
@@ -161,7 +162,7 @@ $("speed").onchange = () => life?.pace(Number($("speed").value)).catch(say);
 $("time").oninput = () => {
   if (!life?.begun) return;
   if (life.playing) life.play(false).catch(say);
-  life.at = Math.min(Number($("time").value), life.last);
+  life.look(Number($("time").value));
   drawn = null;
 };
 document.addEventListener("keydown", (e) => {

@@ -20,6 +20,7 @@ export class Pad {
     $("rubber").onclick = () => this.erase(true);
     $("undo").onclick = () => { if (this.before.length) { this.ink = this.before.pop(); this.changed(true); this.draw(); } };
     $("clear").onclick = () => { this.remember(); this.ink.fill(0); this.changed(true); this.draw(); };
+    $("fit").onclick = () => { if (!this.empty) { this.remember(); this.fit(); this.changed(true); this.draw(); } };
     new ResizeObserver(() => this.draw()).observe(canvas);
   }
 
@@ -75,6 +76,22 @@ export class Pad {
     }
     this.changed(false);
     this.draw();
+  }
+
+  // As MNIST's digits were made: the longer side of the ink scaled to 20 pixels, its centre of mass put in the middle.
+  fit() {
+    const old = this.ink, all = [...old.keys()].filter((k) => old[k] > 0);
+    const xs = all.map((k) => k % SIDE), ys = all.map((k) => Math.floor(k / SIDE));
+    const long = Math.max(Math.max(...xs) - Math.min(...xs), Math.max(...ys) - Math.min(...ys)) + 1;
+    const mass = all.reduce((sum, k) => sum + old[k], 0), mean = (of) => all.reduce((sum, k, i) => sum + old[k] * of[i], 0) / mass;
+    const [cx, cy, scale] = [mean(xs), mean(ys), 20 / long];
+    const at = (r, c) => (r < 0 || c < 0 || r >= SIDE || c >= SIDE ? 0 : old[r * SIDE + c]);
+    this.ink = old.map((_, k) => {
+      const x = (k % SIDE + 0.5 - SIDE / 2) / scale + cx, y = (Math.floor(k / SIDE) + 0.5 - SIDE / 2) / scale + cy;
+      const [c, r] = [Math.floor(x), Math.floor(y)], [u, v] = [x - c, y - r];
+      const value = (1 - v) * ((1 - u) * at(r, c) + u * at(r, c + 1)) + v * ((1 - u) * at(r + 1, c) + u * at(r + 1, c + 1));
+      return value < 0.02 ? 0 : value;
+    });
   }
 
   lift() { if (this.down) { this.down = false; this.changed(true); } }

@@ -23,8 +23,9 @@ export class Robots {
   async open(index) {
     this.index = index; this.all = false;
     $("archive").value = index;
-    this.from = { index, ...await get("/api/archives/" + index) };
+    const from = { index, ...await get("/api/archives/" + index) };
     if (this.index !== index) return;
+    this.from = from;
     const choices = (id, name, values) => {
       $(id).replaceChildren(new Option(name, ""), ...values.map((value) => new Option(value, value)));
       $(id).hidden = values.length < 2;
@@ -52,7 +53,7 @@ export class Robots {
 
   card(robot) {
     const canvas = element("canvas"), about = element("div", {}, element("b", { textContent: robot.id }));
-    about.append(element("span", { textContent: (this.from.tasks.length > 1 ? `${robot.task} · ` : "") + `fitness ${robot.fitness.toFixed(2)}` }));
+    about.append(element("span", { textContent: (this.from.tasks.length > 1 ? `${robot.task} · ` : "") + `fitness ${signed(robot.fitness, 2)}` }));
     if (robot.audit) {
       const audit = element("span", { className: "audit", textContent: robot.audit.conclusion });
       audit.dataset.verdict = robot.audit.verdict;
@@ -74,15 +75,16 @@ export class Robots {
       if (!best.has(key) || best.get(key).fitness < robot.fitness) best.set(key, robot);
     }
     const values = robots.map((robot) => robot.fitness);
-    const low = Math.min(...values), high = Math.max(...values);
+    // A robot that fails, fails: by how much would hide what the others do.
+    const high = Math.max(...values), least = Math.min(...values), low = high > 0 ? Math.max(0, least) : least;
     const panels = Array.from({ length: total }, (_, t) => {
       const cells = element("div", { className: "cells" }), wide = Math.min(sensor, t + 1);
       cells.style.gridTemplateColumns = `repeat(${wide}, auto)`;
       for (let m = Math.min(muscle, t + 1) - 1; m >= 0; m--) for (let s = 0; s < wide; s++) {
         const robot = best.get([m, s, t].join());
         if (!robot) { cells.append(element("i")); continue; }
-        const share = high > low ? 100 * (robot.fitness - low) / (high - low) : 100;
-        const text = `${robot.id}: fitness ${robot.fitness.toFixed(2)}; ${robot.voxels.muscle} muscle, ${robot.voxels.sensor} sensor of ${robot.voxels.total} voxels`;
+        const share = high > low ? 100 * Math.max(0, robot.fitness - low) / (high - low) : 100;
+        const text = `${robot.id}: fitness ${signed(robot.fitness, 2)}; ${robot.voxels.muscle} muscle, ${robot.voxels.sensor} sensor of ${robot.voxels.total} voxels`;
         const button = element("button", { type: "button", title: text });
         button.setAttribute("aria-label", text);
         button.style.background = `color-mix(in oklab, var(--map-low), var(--map-high) ${share.toFixed(0)}%)`;
@@ -92,7 +94,7 @@ export class Robots {
       }
       return element("figure", {}, cells, element("figcaption", { textContent: `size ${t + 1}` }));
     });
-    const ends = element("span", { className: "ends" }, element("span", { textContent: low.toFixed(1) }), element("span", { textContent: high.toFixed(1) }));
+    const ends = element("span", { className: "ends" }, element("span", { textContent: (least < low ? "≤ " : "") + signed(low, 1) }), element("span", { textContent: signed(high, 1) }));
     const key = element("p", { className: "key" }, "Cells of the archive: muscle voxels upwards, sensors to the right, a panel per size of the body. Fitness:", element("span", { className: "scale" }), ends);
     $("map").replaceChildren(...(robots.length ? panels : []), key);
   }
@@ -105,6 +107,9 @@ export class Robots {
     }
   }
 }
+
+// A number with a minus sign that is one.
+export const signed = (value, digits) => value.toFixed(digits).replace("-", "−");
 
 // A body's rows as text, as the drawing functions take them.
 export const rows = (robot) => robot.body.map((row) => row.join(""));
