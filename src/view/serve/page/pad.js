@@ -90,7 +90,8 @@ export class Pad {
       const x = (k % SIDE + 0.5 - SIDE / 2) / scale + cx, y = (Math.floor(k / SIDE) + 0.5 - SIDE / 2) / scale + cy;
       const [c, r] = [Math.floor(x), Math.floor(y)], [u, v] = [x - c, y - r];
       const value = (1 - v) * ((1 - u) * at(r, c) + u * at(r, c + 1)) + v * ((1 - u) * at(r + 1, c) + u * at(r + 1, c + 1));
-      return value < 0.02 ? 0 : value;
+      // Enlarged, edges would be wide; they stay a pixel's.
+      return Math.min(1, Math.max(0, 0.5 + (value - 0.5) * Math.max(1, scale)));
     });
   }
 
