@@ -31,6 +31,7 @@ mod samples;
 pub mod sensitivity;
 pub mod setting;
 pub mod serve;
+pub mod setting;
 pub mod signals;
 pub mod simulate;
 pub mod statistics;
