@@ -26,9 +26,13 @@ const say = (error) => {
 
 const shownTo = () => (who?.own && editor.stimulus ? { stimulus: editor.stimulus } : picture.shown);
 
+// What the page is at, for whoever looks at it from outside: waiting for the hand to rest, living, over.
+const mark = (state) => { document.documentElement.dataset.state = state; };
+
 const start = () => {
   clearTimeout(timer);
   if (!who) return;
+  mark("living");
   life?.stop();
   const own = new Life({ subject: who.subject(), shown: shownTo(), control_steps: who.steps() }, Number($("speed").value), (name) => {
     if (life !== own) return;
@@ -46,17 +50,19 @@ const show = (next, after) => {
   picture = next;
   editor.stimulus = null;
   clearTimeout(timer);
-  const goesOn = life?.begun && !life.end && !life.over;
-  if ($("manner").value === "on" && goesOn) timer = setTimeout(() => life.change({ shown: picture.shown }).catch(say), after ? WHILE_DRAWING : 0);
-  else timer = setTimeout(start, after);
+  if ($("manner").value === "on" && life?.begun && !life.end) timer = setTimeout(() => life.change({ shown: picture.shown }).catch(say), after ? WHILE_DRAWING : 0);
+  else {
+    mark("waiting");
+    timer = setTimeout(start, after);
+  }
 };
 
 // While a stroke is drawn, what it looks like to the sensors.
 const glance = async () => {
   if (!who) return;
-  const mark = ++looked;
+  const number = ++looked;
   const answer = await post("/api/stimulus", { subject: who.subject(), shown: shownTo() });
-  if (mark === looked) { seen = answer; look(); }
+  if (number === looked) { seen = answer; look(); }
 };
 
 const look = () => {
@@ -138,6 +144,7 @@ const draw = () => {
   $("world").setAttribute("aria-label", `${who.name} sees ${picture.about}; ${text.moved}`);
   if (life.over && life.told !== life.end) {
     life.told = life.end;
+    if (document.documentElement.dataset.state === "living") mark("over");
     $("spoken").textContent = `${who.name} sees ${picture.about}. ${text.says ? `It says ${text.says}: ` : ""}${text.moved}.`;
   }
 };
