@@ -5,6 +5,7 @@ mod audit;
 mod capacity;
 mod plot;
 mod reproduce;
+mod serve;
 
 use crate::base::lanes::InstructionSet;
 use crate::run::data::catalogue::Catalogue;
@@ -40,6 +41,7 @@ pub fn run(cli: Cli, console: &Console) -> Result<(), Error> {
         Command::Replay(args) => run_replay(args, console),
         Command::Plot(args) => plot::run(args, console),
         Command::Simulate(args) => run_simulate(&args, console),
+        Command::Serve(args) => serve::run(args, console),
         Command::Data { command } => run_data(command, console),
         Command::Gallery => gallery::gallery().map(|robots| summary::gallery(console, &robots)),
         Command::Config { name: None, .. } => {

@@ -18,7 +18,7 @@
 //! | 2 | [`baseline`] | networks that robots are compared with | [`baseline::train`] |
 //! | 3 | [`task`] | images, stimuli, protocols, rollouts, scores, baselines | [`task::evaluation`] |
 //! | 4 | [`run`] | what the commands do, one file per command | [`run::evolve`] |
-//! | 5 | [`view`] | pictures and the terminal | [`view::pictures`] |
+//! | 5 | [`view`] | pictures, the terminal, the page of `serve` | [`view::pictures`] |
 //! | 6 | [`cli`] | the command line | [`cli::Cli`] |
 //!
 //! # A life

@@ -42,6 +42,7 @@ const COMMANDS: [&str; 15] = [
     "data fetch",
     "data info",
     "data sheet",
+    "serve",
     "gallery",
     "config",
     "completions",

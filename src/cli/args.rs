@@ -4,6 +4,7 @@ use super::audit::{self, AuditArgs};
 use super::capacity::{self, CapacityArgs};
 use super::plot::{self, PlotArgs};
 use super::reproduce::{self, ReproduceArgs};
+use super::serve::{self, ServeArgs};
 use crate::run::eval;
 use crate::run::replay::Shown;
 use crate::run::robots::Selection;
@@ -97,6 +98,9 @@ scenario.json:
 
 Output: step,com_x,com_y in world units (a voxel is 0.1). Exit code 4 if the life becomes unstable.")]
     Simulate(SimulateArgs),
+    /// Draw a digit and watch robots walk, in the browser.
+    #[command(after_help = serve::EXAMPLES)]
+    Serve(ServeArgs),
     /// Find, download and look at images.
     #[command(after_help = "\
 Examples:

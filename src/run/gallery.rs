@@ -3,6 +3,7 @@
 use super::config::BUILT_IN;
 use super::{Config, Error};
 use crate::body::Body;
+use crate::task::direction::Direction;
 use serde::Deserialize;
 
 /// The config under which the published robots were evolved.
@@ -21,6 +22,8 @@ pub struct Published {
     pub name: String,
     /// Its published fitness, voxel lengths.
     pub fitness: f64,
+    /// The way it walks under a zero; under a one it walks the other.
+    pub zero_walks: Direction,
     /// Its body.
     pub body: Body,
 }
@@ -34,12 +37,14 @@ pub fn gallery() -> Result<Vec<Published>, Error> {
     struct Entry {
         name: String,
         published_fitness: f64,
+        zero_walks: String,
         body: String,
     }
     let entries: Vec<Entry> = super::toml_text::read_json(TEXT, "gallery.json")?;
-    let robot = |Entry { name, published_fitness, body }: Entry| {
+    let robot = |Entry { name, published_fitness, zero_walks, body }: Entry| {
         let body = body.parse().map_err(|error| Error::other(format!("gallery.json: {name}: {error}")))?;
-        Ok(Published { name, fitness: published_fitness, body })
+        let zero_walks = if zero_walks == "left" { Direction::Left } else { Direction::Right };
+        Ok(Published { name, fitness: published_fitness, zero_walks, body })
     };
     entries.into_iter().map(robot).collect()
 }

@@ -30,6 +30,8 @@ pub mod robust;
 mod samples;
 pub mod sensitivity;
 pub mod setting;
+pub mod serve;
+pub mod setting;
 pub mod signals;
 pub mod simulate;
 pub mod statistics;

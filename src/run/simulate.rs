@@ -64,9 +64,16 @@ impl Scenario {
     /// What is wrong with the file, with its line and key.
     pub fn read(path: &Path) -> Result<Self, Error> {
         let text = std::fs::read_to_string(path).map_err(|error| Error::reading(path, &error))?;
-        let name = path.display().to_string();
-        let scenario: Scenario = toml_text::read_json(&text, &name)?;
-        scenario.check().map_err(|error| error.within(&name))?;
+        Scenario::parse(&text, &path.display().to_string())
+    }
+
+    /// Reads its text; `name` stands in messages.
+    ///
+    /// # Errors
+    /// As [`Scenario::read`].
+    pub fn parse(text: &str, name: &str) -> Result<Self, Error> {
+        let scenario: Scenario = toml_text::read_json(text, name)?;
+        scenario.check().map_err(|error| error.within(name))?;
         Ok(scenario)
     }
 
@@ -115,8 +122,14 @@ impl Scenario {
         Ok(())
     }
 
-    fn stimuli(&self) -> &[Grid<f64>] {
+    /// What is shown, in turn; nothing if all is dark.
+    pub fn stimuli(&self) -> &[Grid<f64>] {
         self.stimuli.as_deref().unwrap_or(self.stimulus.as_slice())
+    }
+
+    /// The constants of its simulator.
+    pub fn physics(&self) -> &Physics {
+        &self.physics
     }
 
     /// Control steps of the life.

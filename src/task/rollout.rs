@@ -16,13 +16,16 @@ pub struct Rollout<'a> {
     world: World<'a>,
     physics: &'a Physics,
     protocol: &'a Protocol,
+    /// Where along x the centre of mass was when the present image was first shown \[world units\].
+    begin: f64,
 }
 
 impl<'a> Rollout<'a> {
     /// A robot at its start.
     pub fn new(lattice: &'a Lattice, physics: &'a Physics, protocol: &'a Protocol) -> Self {
         let start = Start { column: protocol.start_column, row: protocol.start_row };
-        Rollout { world: World::new(lattice, physics, start), physics, protocol }
+        let world = World::new(lattice, physics, start);
+        Rollout { begin: world.centre_of_mass()[0], world, physics, protocol }
     }
 
     /// Shows an image for the protocol's control steps and goes on living from the present state; the displacement
@@ -32,13 +35,45 @@ impl<'a> Rollout<'a> {
     /// # Errors
     /// [`Unstable`] if the life ends.
     pub fn show(&mut self, stimulus: &Grid<f64>, mut watch: impl FnMut(&World)) -> Result<f64, Unstable> {
-        self.world.set_stimulus(stimulus);
-        let start = self.world.centre_of_mass()[0];
+        self.look_at(stimulus);
         for _ in 0..self.protocol.control_steps {
-            self.world.step()?;
+            self.step()?;
             watch(&self.world);
         }
-        Ok(voxel_lengths(self.world.centre_of_mass()[0] - start, self.physics))
+        Ok(self.moved())
+    }
+
+    /// Shows an image from now on, until the next.
+    pub fn look_at(&mut self, stimulus: &Grid<f64>) {
+        self.world.set_stimulus(stimulus);
+        self.begin = self.world.centre_of_mass()[0];
+    }
+
+    /// One control step.
+    ///
+    /// # Errors
+    /// [`Unstable`] if the life ends in it.
+    pub fn step(&mut self) -> Result<(), Unstable> {
+        self.world.step()
+    }
+
+    /// Displacement of the centre of mass along x since the present image is shown, in voxel lengths, right positive.
+    pub fn moved(&self) -> f64 {
+        voxel_lengths(self.world.centre_of_mass()[0] - self.begin, self.physics)
+    }
+
+    /// The moment, for pictures.
+    pub fn frame(&self) -> Frame {
+        let ground = f64::from(self.physics.ground_row) * self.physics.cell_size;
+        let place =
+            |[x, y]: [f64; 2]| [voxel_lengths(x, self.physics), voxel_lengths(y - ground, self.physics)];
+        Frame { points: self.world.points().map(place).collect(), centre: place(self.world.centre_of_mass()) }
+    }
+
+    /// The voxels with their corners, as numbers of a [`Rollout::frame`]'s points.
+    pub fn voxels(&self) -> Vec<VoxelCorners> {
+        let corner = |((row, column), corners)| VoxelCorners { row, column, corners };
+        self.world.voxels().map(corner).collect()
     }
 
     /// Back to the initial state: a fresh life.
@@ -109,38 +144,37 @@ pub fn record(
 ) -> Recording {
     let lattice = Lattice::new(body, physics);
     let mut rollout = Rollout::new(&lattice, physics, protocol);
-    let corner = |((row, column), corners)| VoxelCorners { row, column, corners };
     let mut recording = Recording {
         robot: robot.to_string(),
         body: body.clone(),
-        voxels: rollout.world.voxels().map(corner).collect(),
+        voxels: rollout.voxels(),
         phases: Vec::new(),
         frames: Vec::new(),
         cycle: physics.cycle_steps as usize,
         unstable: false,
     };
-    let ground = f64::from(physics.ground_row) * physics.cell_size;
-    let place = |[x, y]: [f64; 2]| [voxel_lengths(x, physics), voxel_lengths(y - ground, physics)];
-    let frame = |world: &World| Frame {
-        points: world.points().map(place).collect(),
-        centre: place(world.centre_of_mass()),
-    };
     for (index, (label, stimulus)) in images.iter().enumerate() {
         if fresh || index == 0 {
             rollout.reset();
-            recording.frames.push(frame(&rollout.world));
+            recording.frames.push(rollout.frame());
         }
         let first_frame = recording.frames.len() - 1;
-        let start = rollout.world.centre_of_mass()[0];
-        let end = rollout.show(stimulus, |world| recording.frames.push(frame(world)));
-        let so_far = voxel_lengths(rollout.world.centre_of_mass()[0] - start, physics);
+        rollout.look_at(stimulus);
+        let mut unstable = false;
+        for _ in 0..protocol.control_steps {
+            unstable = rollout.step().is_err();
+            if unstable {
+                break;
+            }
+            recording.frames.push(rollout.frame());
+        }
         recording.phases.push(Phase {
             first_frame,
             stimulus: stimulus.clone(),
             label: label.clone(),
-            displacement: end.unwrap_or(so_far),
+            displacement: rollout.moved(),
         });
-        if end.is_err() {
+        if unstable {
             recording.unstable = true;
             break;
         }

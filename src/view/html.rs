@@ -15,7 +15,7 @@ use std::path::Path;
 
 const TEMPLATE: &str = include_str!("replay.html");
 /// Steps of a position per voxel length.
-const STEPS: f64 = 200.0;
+pub(super) const STEPS: f64 = 200.0;
 /// The number for a position that is not finite or more than 163 voxel lengths from the frame's origin.
 const NOWHERE: i16 = i16::MIN;
 /// Most bytes of positions in a page (a third more in base64); longer recordings show every second frame, third …
@@ -117,7 +117,7 @@ fn bytes<const N: usize>(words: impl Iterator<Item = [u8; N]>) -> Vec<u8> {
     words.flatten().collect()
 }
 
-fn quantised(point: [f64; 2], origin: [f64; 2]) -> [i16; 2] {
+pub(super) fn quantised(point: [f64; 2], origin: [f64; 2]) -> [i16; 2] {
     let steps = [0, 1].map(|k| ((point[k] - origin[k]) * STEPS).round());
     if steps.iter().all(|s| s.abs() < 32767.0) { steps.map(|s| s as i16) } else { [NOWHERE; 2] }
 }

@@ -1,7 +1,10 @@
 //! What several test programs share.
 #![allow(dead_code, reason = "every test program uses its own part")]
 
+#[cfg(unix)]
+pub mod browser;
 pub mod program;
+pub mod server;
 
 use flate2::read::GzDecoder;
 use morphcog::base::Grid;

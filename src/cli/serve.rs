@@ -1,0 +1,56 @@
+//! `morphcog serve`: its words, and what it calls.
+
+use crate::run::serve::{Options, Service};
+use crate::run::{Error, folder, signals};
+use crate::view::console::Console;
+use crate::view::serve::Server;
+use clap::Args;
+use std::path::PathBuf;
+
+pub(super) const EXAMPLES: &str = "\
+Examples:
+  morphcog serve                                    the published robots, and the newest run if there is one
+  morphcog serve --archive runs/zero_one-seed1/run.json --archive runs/four_digit-seed1/run.json
+  morphcog serve --port 8080 --no-open              then open http://127.0.0.1:8080/
+
+Only this machine can reach the page. Ctrl-C ends it.";
+
+#[derive(Debug, Args)]
+pub(super) struct ServeArgs {
+    /// A run.json to browse (default: the newest under runs/); may be given several times.
+    #[arg(short, long, value_name = "FILE")]
+    archive: Vec<PathBuf>,
+    /// Folder with the images.
+    #[arg(long, value_name = "DIR")]
+    data: Option<PathBuf>,
+    /// Port (default: one that is free).
+    #[arg(short, long, default_value_t = 0, hide_default_value = true)]
+    port: u16,
+    /// Do not open the browser.
+    #[arg(long)]
+    no_open: bool,
+}
+
+pub(super) fn run(args: ServeArgs, console: &Console) -> Result<(), Error> {
+    let archives = match args.archive {
+        // A page without a run is of use, too: the published robots are there.
+        given if given.is_empty() => folder::newest_run().into_iter().collect(),
+        given => given,
+    };
+    let stop = signals::stop_flag()?;
+    let (service, notes) = Service::open(&Options { archives, data: args.data })?;
+    let server = Server::bind(service, args.port)?;
+    for note in notes {
+        console.info(&format!("note: {note}"));
+    }
+    let url = server.url();
+    console.line(&url);
+    console.info("Ctrl-C ends it");
+    if !args.no_open
+        && let Err(error) = open::that_detached(&url)
+    {
+        console.warning(&format!("the browser cannot be opened: {error}; open {url} yourself"));
+    }
+    server.run(&stop);
+    Ok(())
+}

@@ -1,0 +1,281 @@
+//! As much of HTTP/1.1 as a page on this machine needs: one request per connection, every size and time bounded.
+
+use serde::Serialize;
+use std::io::{self, Read, Write};
+use std::net::{Shutdown, TcpStream};
+use std::time::{Duration, Instant};
+
+/// Longest request line with headers \[bytes\].
+const MAX_HEAD: usize = 16 * 1024;
+/// Most headers.
+const MAX_HEADERS: usize = 64;
+/// Longest body of a request \[bytes\]: a body and a stimulus of 64 × 64 have room.
+pub const MAX_BODY: usize = 256 * 1024;
+/// A request has to be here in this time.
+const TO_READ: Duration = Duration::from_secs(10);
+/// What is written has to be taken in this time.
+const TO_WRITE: Duration = Duration::from_secs(20);
+
+/// A request.
+#[derive(Debug, PartialEq, Eq)]
+pub struct Request {
+    /// As "GET".
+    pub method: String,
+    /// Without what follows a question mark.
+    pub path: String,
+    /// What follows it.
+    pub query: String,
+    /// Names in lower case.
+    headers: Vec<(String, String)>,
+    /// The body.
+    pub body: Vec<u8>,
+}
+
+impl Request {
+    /// A header's value; none if it is not there, or more than once.
+    pub fn header(&self, name: &str) -> Option<&str> {
+        let mut found = self.headers.iter().filter(|(own, _)| own == name);
+        let first = found.next().map(|(_, value)| value.as_str());
+        if found.next().is_some() { None } else { first }
+    }
+
+    /// A value of the query, as it stands there.
+    pub fn asked(&self, key: &str) -> Option<&str> {
+        let pairs = self.query.split('&').filter_map(|pair| pair.split_once('='));
+        pairs.into_iter().find(|(own, _)| *own == key).map(|(_, value)| value)
+    }
+}
+
+/// An answer that is sent as a whole.
+#[derive(Debug)]
+pub struct Response {
+    status: u16,
+    content_type: &'static str,
+    body: Vec<u8>,
+    /// For 405: what may be done.
+    allow: Option<&'static str>,
+}
+
+impl Response {
+    /// A file that is part of the program.
+    pub fn file(content_type: &'static str, text: &str) -> Self {
+        Response { status: 200, content_type, body: text.as_bytes().to_vec(), allow: None }
+    }
+
+    /// A value as JSON.
+    pub fn json(value: &impl Serialize) -> Self {
+        match serde_json::to_vec(value) {
+            Ok(body) => Response { status: 200, content_type: "application/json", body, allow: None },
+            Err(error) => Response::refusal(500, &error.to_string()),
+        }
+    }
+
+    /// Done, nothing to say.
+    pub fn done() -> Self {
+        Response { status: 204, content_type: "text/plain; charset=utf-8", body: Vec::new(), allow: None }
+    }
+
+    /// An error with one line.
+    pub fn refusal(status: u16, line: &str) -> Self {
+        let body = format!("{}\n", line.replace(['\n', '\r'], " ")).into_bytes();
+        Response { status, content_type: "text/plain; charset=utf-8", body, allow: None }
+    }
+
+    /// Another method was expected.
+    pub fn wrong_method(allow: &'static str) -> Self {
+        Response { allow: Some(allow), ..Response::refusal(405, &format!("expected {allow}")) }
+    }
+
+    /// Sends it; of an answer to HEAD the head only.
+    ///
+    /// # Errors
+    /// If nobody takes it.
+    pub fn send(&self, stream: &mut TcpStream, head_only: bool) -> io::Result<()> {
+        let allow = self.allow.map_or(String::new(), |methods| format!("Allow: {methods}\r\n"));
+        let length = format!("Content-Length: {}\r\n", self.body.len());
+        let length = if self.status == 204 { "" } else { &length };
+        let mut text = head(self.status, self.content_type, &format!("{length}{allow}")).into_bytes();
+        if !head_only {
+            text.extend_from_slice(&self.body);
+        }
+        stream.write_all(&text)?;
+        stream.flush()
+    }
+}
+
+/// The head of an answer. The page may load nothing but what this server has, and be shown in no other page.
+fn head(status: u16, content_type: &str, more: &str) -> String {
+    let reason = match status {
+        200 => "OK",
+        204 => "No Content",
+        400 => "Bad Request",
+        403 => "Forbidden",
+        404 => "Not Found",
+        405 => "Method Not Allowed",
+        408 => "Request Timeout",
+        411 => "Length Required",
+        413 => "Content Too Large",
+        431 => "Request Header Fields Too Large",
+        503 => "Service Unavailable",
+        _ => "Internal Server Error",
+    };
+    format!(
+        "HTTP/1.1 {status} {reason}\r\nContent-Type: {content_type}\r\n{more}Connection: close\r\nCache-Control: no-store\r\n\
+         Content-Security-Policy: default-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'; \
+         object-src 'none'\r\n\
+         X-Content-Type-Options: nosniff\r\nX-Frame-Options: DENY\r\nReferrer-Policy: no-referrer\r\n\
+         Cross-Origin-Resource-Policy: same-origin\r\nCross-Origin-Opener-Policy: same-origin\r\n\r\n"
+    )
+}
+
+/// Begins an answer that is a stream of server-sent events, which lasts until the connection is closed.
+///
+/// # Errors
+/// If nobody takes it.
+pub fn begin_events(stream: &mut TcpStream) -> io::Result<()> {
+    stream.set_nodelay(true)?;
+    stream.write_all(head(200, "text/event-stream", "").as_bytes())
+}
+
+/// Reads a request. `None`: there was none.
+///
+/// # Errors
+/// What to answer to something that is no request.
+pub fn read(stream: &mut TcpStream) -> Result<Option<Request>, Response> {
+    let broken = |error: &io::Error| Response::refusal(400, &format!("the request cannot be read: {error}"));
+    let deadline = Instant::now() + TO_READ;
+    stream.set_write_timeout(Some(TO_WRITE)).map_err(|error| broken(&error))?;
+    let mut bytes = Vec::new();
+    let (mut request, begin) = loop {
+        if let Some(found) = parse(&bytes)? {
+            break found;
+        }
+        if bytes.len() > MAX_HEAD {
+            return Err(Response::refusal(431, "the request's head is too long"));
+        }
+        match more(stream, &mut bytes, deadline) {
+            Ok(0) if bytes.is_empty() => return Ok(None),
+            Ok(0) => return Err(Response::refusal(400, "the request ends in its head")),
+            Ok(_) => {}
+            // A browser opens connections that it then does not use.
+            Err(_) if bytes.is_empty() => return Ok(None),
+            Err(_) => return Err(Response::refusal(408, "the request did not come in time")),
+        }
+    };
+    let length = length(&request)?;
+    while bytes.len() < begin + length {
+        match more(stream, &mut bytes, deadline) {
+            Ok(0) => return Err(Response::refusal(400, "the request ends in its body")),
+            Ok(_) => {}
+            Err(_) => return Err(Response::refusal(408, "the request did not come in time")),
+        }
+    }
+    request.body = bytes[begin..begin + length].to_vec();
+    Ok(Some(request))
+}
+
+fn more(stream: &mut TcpStream, bytes: &mut Vec<u8>, deadline: Instant) -> io::Result<usize> {
+    let left = deadline.saturating_duration_since(Instant::now());
+    if left.is_zero() {
+        return Err(io::ErrorKind::TimedOut.into());
+    }
+    stream.set_read_timeout(Some(left))?;
+    let mut piece = [0; 8192];
+    let count = stream.read(&mut piece)?;
+    bytes.extend_from_slice(&piece[..count]);
+    Ok(count)
+}
+
+/// A request without its body, and where that begins; `None` if the head is not whole yet.
+fn parse(bytes: &[u8]) -> Result<Option<(Request, usize)>, Response> {
+    let mut space = [httparse::EMPTY_HEADER; MAX_HEADERS];
+    let mut head = httparse::Request::new(&mut space);
+    let begin = match head.parse(bytes) {
+        Ok(httparse::Status::Complete(begin)) => begin,
+        Ok(httparse::Status::Partial) => return Ok(None),
+        Err(httparse::Error::TooManyHeaders) => {
+            return Err(Response::refusal(431, &format!("expected at most {MAX_HEADERS} headers")));
+        }
+        Err(error) => return Err(Response::refusal(400, &format!("not an HTTP request: {error}"))),
+    };
+    let target = head.path.unwrap_or_default();
+    let (path, query) = target.split_once('?').unwrap_or((target, ""));
+    let lower = |header: &httparse::Header| {
+        (header.name.to_ascii_lowercase(), String::from_utf8_lossy(header.value).trim().to_string())
+    };
+    let request = Request {
+        method: head.method.unwrap_or_default().to_string(),
+        path: path.to_string(),
+        query: query.to_string(),
+        headers: head.headers.iter().map(lower).collect(),
+        body: Vec::new(),
+    };
+    Ok(Some((request, begin)))
+}
+
+fn length(request: &Request) -> Result<usize, Response> {
+    let is_there = |name: &str| request.headers.iter().any(|(own, _)| own == name);
+    if is_there("transfer-encoding") {
+        return Err(Response::refusal(411, "expected a body with a Content-Length"));
+    }
+    if !is_there("content-length") {
+        return match request.method.as_str() {
+            "POST" => Err(Response::refusal(411, "expected a Content-Length")),
+            _ => Ok(0),
+        };
+    }
+    let digits = request.header("content-length").filter(|text| text.bytes().all(|b| b.is_ascii_digit()));
+    match digits.map(str::parse::<usize>) {
+        Some(Ok(length)) if length <= MAX_BODY => Ok(length),
+        Some(Ok(_)) => {
+            Err(Response::refusal(413, &format!("the request's body is longer than {MAX_BODY} bytes")))
+        }
+        _ => Err(Response::refusal(400, "Content-Length: expected one number")),
+    }
+}
+
+/// Ends a connection so that what was sent arrives: closing with unread bytes would throw it away.
+pub fn close(stream: &mut TcpStream) {
+    let _ = stream.shutdown(Shutdown::Write);
+    let until = Instant::now() + Duration::from_millis(500);
+    let mut rest = Vec::new();
+    while rest.len() <= 2 * MAX_BODY && matches!(more(stream, &mut rest, until), Ok(count) if count > 0) {}
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn status(text: &str) -> u16 {
+        match parse(text.as_bytes()) {
+            Ok(Some((request, _))) => length(&request).map_or_else(|refusal| refusal.status, |_| 200),
+            Ok(None) => 0,
+            Err(refusal) => refusal.status,
+        }
+    }
+
+    #[test]
+    fn heads_are_read_or_refused() {
+        let (request, begin) =
+            parse(b"GET /a?b=c&d=e HTTP/1.1\r\nHost: x\r\nCookie: 1\r\ncookie: 2\r\n\r\nrest")
+                .unwrap()
+                .unwrap();
+        assert_eq!(
+            (request.path.as_str(), request.asked("d"), request.asked("b")),
+            ("/a", Some("e"), Some("c"))
+        );
+        assert_eq!((request.header("host"), request.header("cookie"), begin), (Some("x"), None, 58));
+        assert_eq!(status("GET / HTTP/1.1\r\nHost"), 0);
+        assert_eq!(status("GET / HTTP/1.1\r\n\r\n"), 200);
+        assert_eq!(status("\u{1}\u{2}\r\n\r\n"), 400);
+        assert_eq!(status("GET /\r\n\r\n"), 400);
+        assert_eq!(status(&format!("GET / HTTP/1.1\r\n{}\r\n", "a: b\r\n".repeat(65))), 431);
+        let post = |header: &str| status(&format!("POST / HTTP/1.1\r\n{header}\r\n\r\n"));
+        assert_eq!((post("content-length: 5"), post("a: b"), post("content-length: +5")), (200, 411, 400));
+        assert_eq!(
+            (post("content-length: 1\r\ncontent-length: 2"), post("content-length: 99999999")),
+            (400, 413)
+        );
+        assert_eq!(post("transfer-encoding: chunked"), 411);
+    }
+}

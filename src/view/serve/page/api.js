@@ -1,0 +1,82 @@
+// Talking to the server. Errors carry the server's one line.
+
+const fail = async (response) => {
+  const line = (await response.text()).trim();
+  throw Object.assign(new Error(line || response.statusText), { status: response.status });
+};
+
+export const get = async (path) => {
+  const response = await fetch(path);
+  return response.ok ? response.json() : fail(response);
+};
+
+export const post = async (path, value, signal) => {
+  const body = typeof value === "string" ? value : JSON.stringify(value);
+  const response = await fetch(path, { method: "POST", headers: { "Content-Type": "application/json" }, body, signal });
+  if (!response.ok) return fail(response);
+  return response.status === 204 ? null : response.json();
+};
+
+// Server-sent events in the answer to a POST (EventSource can only GET): one request begins a life, and to drop it ends
+// that life.
+export const stream = async (path, value, signal, tell) => {
+  const response = await fetch(path, { method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify(value), signal });
+  if (!response.ok) return fail(response);
+  const reader = response.body.pipeThrough(new TextDecoderStream()).getReader();
+  let rest = "";
+  for (;;) {
+    const { done, value: piece } = await reader.read();
+    if (done) return;
+    const events = (rest + piece).split("\n\n");
+    rest = events.pop();
+    for (const event of events) {
+      const name = /^event: (.*)$/m.exec(event), data = /^data: (.*)$/m.exec(event);
+      if (name && data) tell(name[1], JSON.parse(data[1]));
+    }
+  }
+};
+
+export const $ = (id) => document.getElementById(id);
+
+export const bytes = (text) => Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
+
+// A canvas of sharp pixels; returns its context in CSS pixels.
+export const fit = (canvas, width, height) => {
+  const ratio = Math.min(window.devicePixelRatio || 1, 3);
+  const w = Math.max(1, Math.round(width * ratio)), h = Math.max(1, Math.round(height * ratio));
+  if (canvas.width !== w || canvas.height !== h) { canvas.width = w; canvas.height = h; }
+  canvas.style.height = height + "px";
+  const ctx = canvas.getContext("2d");
+  ctx.setTransform(ratio, 0, 0, ratio, 0, 0);
+  return ctx;
+};
+
+export const css = (name) => getComputedStyle(document.documentElement).getPropertyValue("--" + name).trim();
+
+export const element = (tag, properties = {}, ...children) => {
+  const made = Object.assign(document.createElement(tag), properties);
+  made.append(...children);
+  return made;
+};
+
+// Tabs as the ARIA practices have them: arrows move, only the chosen one is in the tab order.
+export const tabs = (ids, chosen) => {
+  const choose = (id) => {
+    for (const own of ids) {
+      $("tab-" + own).setAttribute("aria-selected", String(own === id));
+      $("tab-" + own).tabIndex = own === id ? 0 : -1;
+      $(own).hidden = own !== id;
+    }
+    chosen(id);
+  };
+  ids.forEach((id, k) => {
+    $("tab-" + id).onclick = () => choose(id);
+    $("tab-" + id).addEventListener("keydown", (e) => {
+      const by = { ArrowRight: 1, ArrowLeft: -1 }[e.key];
+      if (!by) return;
+      const next = ids[(k + by + ids.length) % ids.length];
+      choose(next); $("tab-" + next).focus(); e.preventDefault(); e.stopPropagation();
+    });
+  });
+  return choose;
+};

@@ -1,0 +1,88 @@
+// Test images: pages of one class.
+
+import { $, css, element, get } from "./api.js";
+
+const PAGE = 15;
+
+export class Images {
+  constructor(chosen) {
+    this.chosen = chosen; this.sets = []; this.set = null; this.class = 0; this.from = 0; this.index = null;
+    $("set").onchange = () => this.open($("set").value);
+    $("newer").onclick = () => this.turn(-PAGE);
+    $("older").onclick = () => this.turn(PAGE);
+    $("lucky").onclick = () => this.lucky();
+  }
+
+  async load() {
+    this.sets = await get("/api/images");
+    for (const { name } of this.sets) $("set").add(new Option(name === "builtin" ? "built-in digits" : name, name));
+    await this.open(this.sets[0].name);
+  }
+
+  // The set a robot was evolved on, and of it the classes of its task first.
+  async open(name) {
+    this.set = this.sets.find((set) => set.name === name) ?? this.set;
+    $("set").value = this.set.name;
+    $("classes").replaceChildren(...this.set.classes.map(([label]) => {
+      const button = element("button", { type: "button", textContent: String(label) });
+      button.onclick = () => this.show(label);
+      return button;
+    }));
+    await this.show(this.set.classes.some(([label]) => label === this.class) ? this.class : this.set.classes[0][0]);
+  }
+
+  get total() { return this.set.classes.find(([label]) => label === this.class)?.[1] ?? 0; }
+
+  async show(label) { this.class = label; this.from = 0; await this.page(); }
+
+  async turn(by) { this.from = Math.max(0, Math.min(this.from + by, Math.floor((this.total - 1) / PAGE) * PAGE)); await this.page(); }
+
+  async page() {
+    const wanted = `/api/images?set=${this.set.name}&class=${this.class}&from=${this.from}&count=${PAGE}`;
+    this.wanted = wanted;
+    const images = await get(wanted);
+    if (this.wanted !== wanted) return;
+    [...$("classes").children].forEach((b) => b.setAttribute("aria-pressed", String(b.textContent === String(this.class))));
+    $("newer").disabled = this.from === 0;
+    $("older").disabled = this.from + PAGE >= this.total;
+    this.shown = images;
+    this.draw();
+  }
+
+  draw() {
+    const ink = hex(css("ink"));
+    $("thumbs").replaceChildren(...(this.shown ?? []).map((image) => {
+      const canvas = element("canvas"), label = `A ${image.label}, image ${image.index}`;
+      paint(canvas, image.pixels, ink);
+      const button = element("button", { type: "button", title: label }, canvas);
+      button.setAttribute("aria-label", label);
+      button.setAttribute("aria-pressed", String(image.index === this.index));
+      button.onclick = () => this.choose(image);
+      return button;
+    }));
+  }
+
+  choose(image) {
+    this.index = image.index;
+    this.draw();
+    this.chosen({ image: { set: this.set.name, index: image.index }, about: `a ${image.label} (${this.set.name} test image ${image.index})` });
+  }
+
+  async lucky() {
+    const all = this.labels ?? this.set.classes.map(([label]) => label);
+    this.class = all[Math.floor(Math.random() * all.length)];
+    const at = Math.floor(Math.random() * this.total);
+    this.from = Math.floor(at / PAGE) * PAGE;
+    await this.page();
+    if (this.shown[at - this.from]) this.choose(this.shown[at - this.from]);
+  }
+}
+
+const hex = (colour) => [1, 3, 5].map((k) => parseInt(colour.slice(k, k + 2), 16));
+
+const paint = (canvas, rows, ink) => {
+  canvas.height = rows.length; canvas.width = rows[0].length;
+  const ctx = canvas.getContext("2d"), data = ctx.createImageData(canvas.width, canvas.height);
+  rows.flat().forEach((value, k) => data.data.set([...ink, value], 4 * k));
+  ctx.putImageData(data, 0, 0);
+};

@@ -1,0 +1,218 @@
+// The page: who is shown what, and what comes of it.
+
+import { $, element, get, post, tabs } from "./api.js";
+import { Editor } from "./editor.js";
+import { Images } from "./images.js";
+import { Life } from "./life.js";
+import { Pad } from "./pad.js";
+import { Robots, rows, signed } from "./robots.js";
+import { Stage, drawStimulus } from "./stage.js";
+
+// Strokes may follow each other that fast without a life for each.
+const AFTER_STROKE = 450, WHILE_DRAWING = 60;
+
+const materials = await get("/api/materials");
+let life = null, timer = 0, seen = null, previous = 0, drawn = null, looked = 0;
+// The picture: { drawing } or { image }; and the words for it.
+let picture = { shown: {}, about: "nothing, it is dark" };
+// Who lives: a robot of an archive, or the editor's body.
+let who = null;
+
+const say = (error) => {
+  if (error?.name === "AbortError") return;
+  $("error").hidden = !error;
+  $("error").textContent = error ? error.message : "";
+};
+
+const shownTo = () => (who?.own && editor.stimulus ? { stimulus: editor.stimulus } : picture.shown);
+
+// What the page is at, for whoever looks at it from outside: waiting for the hand to rest, living, over.
+const mark = (state) => { document.documentElement.dataset.state = state; };
+
+const start = () => {
+  clearTimeout(timer);
+  if (!who) return;
+  mark("living");
+  life?.stop();
+  const own = new Life({ subject: who.subject(), shown: shownTo(), control_steps: who.steps() }, Number($("speed").value), (name) => {
+    if (life !== own) return;
+    if (name === "begin" || name === "seen") { seen = own.phase(own.last); look(); }
+    drawn = null;
+  });
+  life = own;
+  own.running.catch((error) => { if (life === own) say(error); }).finally(() => { own.lose(); drawn = null; status(); });
+  say(null);
+  status();
+};
+
+// The picture has changed: the same life sees it, or a fresh one does.
+const show = (next, after) => {
+  picture = next;
+  editor.stimulus = null;
+  clearTimeout(timer);
+  if ($("manner").value === "on" && life?.begun && !life.end) timer = setTimeout(() => life.change({ shown: picture.shown }).catch(say), after ? WHILE_DRAWING : 0);
+  else {
+    mark("waiting");
+    timer = setTimeout(start, after);
+  }
+};
+
+// While a stroke is drawn, what it looks like to the sensors.
+const glance = async () => {
+  if (!who) return;
+  const number = ++looked;
+  const answer = await post("/api/stimulus", { subject: who.subject(), shown: shownTo() });
+  if (number === looked) { seen = answer; look(); }
+};
+
+const look = () => {
+  if (!seen || !who) return;
+  drawStimulus($("stimulus"), seen.stimulus, who.rows(), materials);
+  $("picture").textContent = picture.about;
+};
+
+let glancing = 0;
+const pad = new Pad($("pad"), (done) => {
+  const next = { shown: { drawing: pad.rows }, about: "your drawing" };
+  if (done) return show(next, AFTER_STROKE);
+  picture = next; editor.stimulus = null;
+  clearTimeout(timer);
+  if ($("manner").value === "on" && life?.begun && !life.end) timer = setTimeout(() => life.change({ shown: next.shown }).catch(say), WHILE_DRAWING);
+  else if (!glancing) glancing = setTimeout(() => { glancing = 0; glance().catch(say); }, WHILE_DRAWING);
+});
+
+const images = new Images(({ image, about }) => show({ shown: { image }, about }, 0));
+
+const choose = (robot, from) => {
+  const { encoding, level } = from.encoding;
+  who = {
+    robot, from, name: robot.id,
+    subject: () => ({ archive: from.index, robot: robot.id }),
+    rows: () => rows(robot), steps: () => Math.min(from.control_steps, 5000),
+  };
+  const way = { saturated: "1 where there is any ink", intensity: "as dark as the ink", threshold: `1 above ${level}` }[encoding];
+  $("encoding").textContent = `${robot.body.length} × ${robot.body[0].length} pixels, ${way}`;
+  $("who").textContent = robot.id;
+  const audit = robot.audit ? ` · audit: ${robot.audit.conclusion}` : "";
+  $("about").textContent = `${from.name} · task ${robot.task} · fitness ${signed(robot.fitness, 2)} · ${robot.voxels.total} voxels${audit}`;
+  const { left, right } = robot.judge ?? { left: [], right: [] };
+  images.labels = left.concat(right).length ? left.concat(right) : null;
+  start();
+};
+
+const robots = new Robots(materials, choose);
+
+const editor = new Editor(materials, {
+  say,
+  chosen: () => robots.robot && { robot: robots.robot, encoding: robots.from.encoding },
+  see: () => (editor.stimulus ? { stimulus: editor.stimulus } : picture.shown),
+  live: () => {
+    who = { own: true, name: "Your body", subject: () => editor.subject, rows: () => editor.cells.map((row) => row.join("")), steps: () => editor.steps };
+    $("who").textContent = "Your body";
+    $("about").textContent = "from the editor; it has no task, so its walks say nothing";
+    $("encoding").textContent = `${editor.cells.length} × ${editor.cells[0].length} pixels`;
+    start();
+  },
+});
+
+const words = (answer, over) => {
+  const distance = Math.abs(answer.moved).toFixed(1);
+  if (!answer.way) return { state: over ? "none" : "idle", says: over ? "undecided" : "", moved: `moved ${distance} voxels` };
+  const says = answer.says.length ? answer.says.join(" or ") : answer.way === "left" ? "←" : "→";
+  const label = life.phase(life.frame).label;
+  const { left, right } = life.begun.judge ?? { left: [], right: [] };
+  const known = over && answer.says.length && left.concat(right).includes(label);
+  return { state: known ? (answer.says.includes(label) ? "right" : "wrong") : "answer", says, moved: `moved ${distance} voxels ${answer.way}` };
+};
+
+const draw = () => {
+  const ready = life?.begun && life.moments.length;
+  const answer = ready ? life.answered(life.frame) : null;
+  stage.draw(life, answer);
+  if (!ready) return;
+  const unstable = life.over && life.end.unstable;
+  const text = unstable ? { state: "none", says: "unstable", moved: life.end.unstable } : words(answer, life.over);
+  $("verdict").dataset.state = text.state;
+  $("says").textContent = text.says;
+  $("moved").textContent = text.moved;
+  const play = life.over ? "Play" : life.playing ? "Pause" : "Play";
+  if ($("play").textContent !== play) $("play").textContent = play;
+  $("time").max = Math.max(life.until, 1);
+  $("time").value = life.frame;
+  $("step").textContent = `step ${life.frame} of ${life.until}`;
+  $("time").setAttribute("aria-valuetext", $("step").textContent);
+  $("world").setAttribute("aria-label", `${who.name} sees ${picture.about}; ${text.moved}`);
+  if (life.over && life.told !== life.end) {
+    life.told = life.end;
+    if (document.documentElement.dataset.state === "living") mark("over");
+    $("spoken").textContent = `${who.name} sees ${picture.about}. ${text.says ? `It says ${text.says}: ` : ""}${text.moved}.`;
+  }
+};
+
+const stage = new Stage($("world"), materials);
+const tick = (now) => {
+  life?.pass(Math.min(now - previous, 200) / 1000);
+  previous = now;
+  const state = life?.begun ? `${life.frame} ${life.last} ${life.end !== null} ${life.playing}` : "none";
+  if (state !== drawn) { drawn = state; draw(); }
+  requestAnimationFrame(tick);
+};
+
+const play = () => {
+  if (!life || life.over) return start();
+  life.play(!life.playing).catch(say);
+  drawn = null;
+};
+$("play").onclick = play;
+$("again").onclick = start;
+$("speed").onchange = () => life?.pace(Number($("speed").value)).catch(say);
+$("time").oninput = () => {
+  if (!life?.begun) return;
+  if (life.playing) life.play(false).catch(say);
+  life.look(Number($("time").value));
+  drawn = null;
+};
+document.addEventListener("keydown", (e) => {
+  if (e.ctrlKey || e.metaKey || e.altKey || e.target.matches("select, input, canvas[tabindex]")) return;
+  if (e.key === " " && !e.target.matches("button")) play();
+  else if (e.key === "r" || e.key === "R") start();
+  else return;
+  e.preventDefault();
+});
+
+const status = async () => {
+  try {
+    const { lives, max_lives: most } = await get("/api/status");
+    $("status").dataset.state = lives ? "alive" : "";
+    $("status").textContent = lives === 1 ? "1 life running" : `${lives} lives running`;
+    $("status").title = `at most ${most} at once`;
+  } catch {
+    $("status").dataset.state = "lost";
+    $("status").textContent = "morphcog has ended";
+  }
+};
+setInterval(() => { if (!document.hidden) status(); }, 2000);
+
+tabs(["draw", "test"], (id) => { if (id === "draw") pad.draw(); else images.draw(); });
+tabs(["robots", "editor"], (id) => { if (id === "editor") editor.draw(); });
+for (const material of materials.list.slice(1)) {
+  const swatch = element("div");
+  for (const tone of material.tones) { const i = element("i"); i.style.background = `rgb(${tone.join(",")})`; swatch.append(i); }
+  $("legend").append(element("li", {}, swatch, material.name));
+}
+const redraw = () => { drawn = null; look(); pad.draw(); editor.draw(); };
+window.addEventListener("resize", redraw);
+window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { redraw(); images.draw(); });
+// A tab that closes drops its connection, and with it its life.
+window.addEventListener("pagehide", () => life?.stop());
+requestAnimationFrame(tick);
+
+try {
+  await images.load();
+  // Something to see at once: a test image, unless motion is not wanted.
+  const first = images.shown[0];
+  if (first) picture = { shown: { image: { set: images.set.name, index: first.index } }, about: `a ${first.label} (${images.set.name} test image ${first.index})` };
+  await robots.load();
+  if (window.matchMedia("(prefers-reduced-motion: reduce)").matches) life?.play(false);
+} catch (error) { say(error); }
+document.documentElement.dataset.ready = "yes";

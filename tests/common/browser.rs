@@ -1,0 +1,247 @@
+//! A real browser without a window, driven over its debugging pipe: JSON messages that end with a zero byte.
+
+use super::program::Sandbox;
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD as BASE64;
+use serde_json::{Value, json};
+use std::collections::VecDeque;
+use std::io::{BufRead, BufReader, Write};
+use std::path::{Path, PathBuf};
+use std::process::{Child, ChildStdin, Command, Stdio};
+use std::sync::mpsc::{Receiver, channel};
+use std::time::{Duration, Instant};
+
+/// Nothing that is waited for may take longer.
+const LIMIT: Duration = Duration::from_secs(25);
+const NAMES: [&str; 4] = ["chromium", "chromium-browser", "google-chrome", "google-chrome-stable"];
+const FLAGS: [&str; 12] = [
+    "--headless",
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-quic",
+    "--disable-dev-shm-usage",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--disable-extensions",
+    "--hide-scrollbars",
+    "--remote-debugging-pipe",
+];
+
+/// Where a Chromium is; what `MORPHCOG_BROWSER` names, or one of the usual names on the path.
+pub fn found() -> Option<PathBuf> {
+    if let Some(named) = std::env::var_os("MORPHCOG_BROWSER").filter(|name| !name.is_empty()) {
+        return Some(named.into());
+    }
+    let path = std::env::var_os("PATH")?;
+    let places = || std::env::split_paths(&path);
+    NAMES.iter().find_map(|name| places().map(|folder| folder.join(name)).find(|file| file.is_file()))
+}
+
+/// A browser that runs; ended when this goes.
+pub struct Browser {
+    child: Child,
+    to: ChildStdin,
+    from: Receiver<Value>,
+    /// Events that came while an answer was waited for.
+    events: VecDeque<Value>,
+    number: u64,
+}
+
+impl Browser {
+    /// Starts it with a profile of its own in the sandbox.
+    pub fn start(program: &Path, sandbox: &Sandbox) -> Self {
+        // It reads its commands from file 3 and answers to file 4.
+        let mut child = Command::new("sh")
+            .args(["-c", "exec \"$0\" \"$@\" 3<&0 4>&1 </dev/null >/dev/null 2>&1"])
+            .arg(program)
+            .args(FLAGS)
+            .arg(format!("--user-data-dir={}", sandbox.path("profile").display()))
+            .arg("about:blank")
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let (to, mut out) = (child.stdin.take().unwrap(), BufReader::new(child.stdout.take().unwrap()));
+        let (send, from) = channel();
+        std::thread::spawn(move || {
+            loop {
+                let mut message = Vec::new();
+                if !matches!(out.read_until(0, &mut message), Ok(count) if count > 0) {
+                    return;
+                }
+                message.pop();
+                if send.send(serde_json::from_slice(&message).unwrap()).is_err() {
+                    return;
+                }
+            }
+        });
+        Browser { child, to, from, events: VecDeque::new(), number: 0 }
+    }
+
+    fn next(&mut self, until: Instant) -> Value {
+        let left = until.saturating_duration_since(Instant::now());
+        self.from.recv_timeout(left).expect("the browser answers in time")
+    }
+
+    #[track_caller]
+    fn call(&mut self, session: Option<&str>, method: &str, params: Value) -> Value {
+        self.number += 1;
+        let mut message = json!({ "id": self.number, "method": method, "params": params });
+        if let Some(session) = session {
+            message["sessionId"] = session.into();
+        }
+        self.to.write_all(message.to_string().as_bytes()).unwrap();
+        self.to.write_all(&[0]).unwrap();
+        let until = Instant::now() + LIMIT;
+        loop {
+            let answer = self.next(until);
+            if answer["id"] == self.number {
+                assert!(answer["error"].is_null(), "{method}: {}", answer["error"]);
+                return answer["result"].clone();
+            }
+            self.events.push_back(answer);
+        }
+    }
+
+    /// A new tab of a size.
+    pub fn tab(&mut self, width: u32, height: u32, dark: bool) -> Tab<'_> {
+        let target = self.call(None, "Target.createTarget", json!({ "url": "about:blank" }));
+        let id = target["targetId"].clone();
+        let attached = self.call(None, "Target.attachToTarget", json!({ "targetId": id, "flatten": true }));
+        let session = attached["sessionId"].as_str().unwrap().to_string();
+        let mut tab = Tab { browser: self, session, id };
+        for domain in ["Page.enable", "Runtime.enable", "Log.enable"] {
+            tab.call(domain, json!({}));
+        }
+        let size = json!({ "width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 500 });
+        tab.call("Emulation.setDeviceMetricsOverride", size);
+        let scheme = if dark { "dark" } else { "light" };
+        let features = json!({ "features": [{ "name": "prefers-color-scheme", "value": scheme }] });
+        tab.call("Emulation.setEmulatedMedia", features);
+        tab
+    }
+}
+
+impl Drop for Browser {
+    fn drop(&mut self) {
+        // It ends when its pipe does; if not, it is ended.
+        let _ = self.to.write_all(b"{\"id\":0,\"method\":\"Browser.close\"}\0");
+        let until = Instant::now() + Duration::from_secs(3);
+        while matches!(self.child.try_wait(), Ok(None)) && Instant::now() < until {
+            std::thread::sleep(Duration::from_millis(20));
+        }
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+/// A tab.
+pub struct Tab<'a> {
+    browser: &'a mut Browser,
+    session: String,
+    id: Value,
+}
+
+impl Tab<'_> {
+    #[track_caller]
+    fn call(&mut self, method: &str, params: Value) -> Value {
+        let session = self.session.clone();
+        self.browser.call(Some(&session), method, params)
+    }
+
+    pub fn open(&mut self, url: &str) {
+        self.call("Page.navigate", json!({ "url": url }));
+    }
+
+    /// What an expression comes to.
+    #[track_caller]
+    pub fn eval(&mut self, expression: &str) -> Value {
+        let params = json!({ "expression": expression, "returnByValue": true, "awaitPromise": true });
+        let result = self.call("Runtime.evaluate", params);
+        assert!(result["exceptionDetails"].is_null(), "{expression}: {}", result["exceptionDetails"]);
+        result["result"]["value"].clone()
+    }
+
+    /// Waits until an expression is true.
+    #[track_caller]
+    pub fn wait(&mut self, expression: &str) {
+        let until = Instant::now() + LIMIT;
+        while self.eval(&format!("Boolean({expression})")) != true {
+            assert!(Instant::now() < until, "never: {expression}");
+            std::thread::sleep(Duration::from_millis(30));
+        }
+    }
+
+    /// The text of an element.
+    #[track_caller]
+    pub fn text(&mut self, selector: &str) -> String {
+        let text = self.eval(&format!("document.querySelector('{selector}').textContent"));
+        text.as_str().unwrap().to_string()
+    }
+
+    fn mouse(&mut self, kind: &str, [x, y]: [f64; 2], buttons: u32) {
+        let button = if kind == "mouseMoved" { "none" } else { "left" };
+        let params =
+            json!({ "type": kind, "x": x, "y": y, "button": button, "buttons": buttons, "clickCount": 1 });
+        self.call("Input.dispatchMouseEvent", params);
+    }
+
+    /// Left, top, width, height of an element that is in sight.
+    #[track_caller]
+    pub fn place(&mut self, selector: &str) -> [f64; 4] {
+        let expression = format!(
+            "(() => {{ const e = document.querySelector('{selector}'); e.scrollIntoView({{ block: 'center' }}); \
+             const b = e.getBoundingClientRect(); return [b.left, b.top, b.width, b.height]; }})()"
+        );
+        serde_json::from_value(self.eval(&expression)).unwrap()
+    }
+
+    /// Clicks into the middle of an element.
+    #[track_caller]
+    pub fn click(&mut self, selector: &str) {
+        let [x, y, w, h] = self.place(selector);
+        self.drag(&[[x + w / 2.0, y + h / 2.0]]);
+    }
+
+    /// Draws along a line with the mouse.
+    pub fn drag(&mut self, line: &[[f64; 2]]) {
+        self.mouse("mouseMoved", line[0], 0);
+        self.mouse("mousePressed", line[0], 1);
+        line[1..].iter().for_each(|place| self.mouse("mouseMoved", *place, 1));
+        self.mouse("mouseReleased", line[line.len() - 1], 0);
+    }
+
+    /// Presses a key: its name, and the text it types if it does.
+    pub fn key(&mut self, key: &str, text: &str) {
+        for kind in ["keyDown", "keyUp"] {
+            let text = if kind == "keyDown" { text } else { "" };
+            self.call("Input.dispatchKeyEvent", json!({ "type": kind, "key": key, "text": text }));
+        }
+    }
+
+    /// A picture of what is in sight.
+    pub fn screenshot(&mut self) -> Vec<u8> {
+        let shot = self.call("Page.captureScreenshot", json!({ "format": "png" }));
+        BASE64.decode(shot["data"].as_str().unwrap()).unwrap()
+    }
+
+    /// What the console has complained of, and scripts that failed.
+    pub fn complaints(&mut self) -> Vec<String> {
+        self.eval("0");
+        let own = |event: &Value| event["sessionId"] == self.session.as_str();
+        let bad = |event: &Value| match event["method"].as_str() {
+            Some("Runtime.exceptionThrown") => true,
+            Some("Runtime.consoleAPICalled") => event["params"]["type"] == "error",
+            Some("Log.entryAdded") => event["params"]["entry"]["level"] == "error",
+            _ => false,
+        };
+        self.browser.events.iter().filter(|e| own(e) && bad(e)).map(|e| e["params"].to_string()).collect()
+    }
+
+    pub fn close(self) {
+        let id = self.id.clone();
+        self.browser.call(None, "Target.closeTarget", json!({ "targetId": id }));
+    }
+}

@@ -1,0 +1,405 @@
+//! `morphcog serve` over HTTP: what it answers, what it refuses, and that lives are the engine's and end when nobody listens.
+
+// They end the server by signals.
+#![cfg(unix)]
+
+mod common;
+
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD as BASE64;
+use common::program::Sandbox;
+use common::server::{Answer, Server};
+use morphcog::base::Grid;
+use morphcog::run::gallery;
+use morphcog::run::serve::lives::MAX_LIVES;
+use morphcog::sim::Physics;
+use morphcog::task::dataset::{BUILTIN, Dataset, Split};
+use morphcog::task::direction::Direction;
+use morphcog::task::protocol::Protocol;
+use morphcog::task::recording::Frame;
+use morphcog::task::rollout::record;
+use morphcog::task::stimulus::{Encoding, Reduction, StimulusParams, stimulus};
+use serde_json::{Value, json};
+use std::collections::BTreeMap;
+use std::time::{Duration, Instant};
+
+fn json_of(answer: &Answer) -> Value {
+    assert_eq!(answer.status, 200, "{}", answer.body);
+    serde_json::from_str(&answer.body).unwrap()
+}
+
+/// Refused, with one line that has the words.
+#[track_caller]
+fn refused(answer: &Answer, status: u16, words: &str) {
+    assert_eq!(answer.status, status, "{}", answer.body);
+    assert!(answer.body.contains(words), "expected {words:?} in: {}", answer.body);
+    assert_eq!(answer.body.matches('\n').count(), 1, "{}", answer.body);
+}
+
+fn drawing() -> Grid<u8> {
+    Grid::from_fn(28, 28, |r, c| if (4..24).contains(&r) && (12..16).contains(&c) { 200 } else { 0 })
+}
+
+#[test]
+fn the_page_its_headers_and_what_there_is() {
+    let sandbox = Sandbox::tiny();
+    sandbox.run("evolve --config tiny.toml --out runs/one --quiet").ended(0, &[]);
+    let server = Server::start(&sandbox, "");
+    let page = server.get("/");
+    assert_eq!((page.status, page.header("content-type")), (200, "text/html; charset=utf-8"));
+    assert!(page.header("content-security-policy").starts_with("default-src 'self';"));
+    assert_eq!(page.header("x-content-type-options"), "nosniff");
+    // Everything that the page and its scripts name is there, and nothing is from elsewhere.
+    let mut files = vec!["/".to_string()];
+    let mut next = 0;
+    while let Some(path) = files.get(next).cloned() {
+        next += 1;
+        let text = server.get(&path);
+        assert_eq!(text.status, 200, "{path}");
+        assert!(!text.body.contains("https://") && !text.body.contains("//cdn"), "{path}");
+        for piece in text.body.split('"').filter(|piece| piece.starts_with('/') || piece.starts_with("./")) {
+            let path = piece.trim_start_matches('.').to_string();
+            let is_file = [".js", ".css", ".svg"].iter().any(|ending| path.ends_with(ending));
+            if is_file && !files.contains(&path) {
+                files.push(path);
+            }
+        }
+    }
+    assert!(files.len() >= 11, "{files:?}");
+    let head = server.send(format!("HEAD / HTTP/1.1\r\nHost: 127.0.0.1:{}\r\n\r\n", server.port));
+    assert_eq!((head.status, head.body.as_str()), (200, ""));
+    assert_eq!(head.header("content-length"), page.header("content-length"));
+
+    // The newest run is offered without being named, after the published robots.
+    let archives = json_of(&server.get("/api/archives"));
+    assert_eq!((archives.as_array().unwrap().len(), &archives[0]["robots"]), (2, &json!(5)));
+    let run = sandbox.run_file("runs/one");
+    let listed = json_of(&server.get("/api/archives/1"));
+    assert_eq!(listed["robots"].as_array().unwrap().len(), run.elites.len());
+    let best = &listed["robots"][0];
+    let robot = run.elites.iter().find(|robot| best["id"] == robot.id.as_str()).unwrap();
+    assert_eq!(best["fitness"], json!(run.stats.obj_max.unwrap()));
+    assert_eq!(best["body"], serde_json::to_value(&robot.body).unwrap());
+    assert_eq!(best["audit"], Value::Null);
+    let sets = json_of(&server.get("/api/images"));
+    assert!(sets.as_array().unwrap().iter().any(|set| set["name"] == BUILTIN));
+    let images = json_of(&server.get("/api/images?set=builtin&class=3&from=2&count=2"));
+    let digits = Dataset::load(BUILTIN, &[], &[Split::Test]).unwrap();
+    let index = digits.indices_of(Split::Test, 3)[2];
+    assert_eq!((&images[0]["index"], &images[0]["label"]), (&json!(index), &json!(3)));
+    assert_eq!(images[0]["pixels"], serde_json::to_value(digits.image(Split::Test, index).unwrap()).unwrap());
+    assert_eq!(images.as_array().unwrap().len(), 2);
+}
+
+#[test]
+fn an_audit_beside_the_archive_is_shown() {
+    let sandbox = Sandbox::tiny();
+    sandbox.run("evolve --config tiny.toml --out runs/one --quiet").ended(0, &[]);
+    sandbox.run("audit --archive runs/one/run.json --robots top:1 --quiet").ended(0, &[]);
+    let server = Server::start(&sandbox, "--archive runs/one/run.json");
+    let robots = json_of(&server.get("/api/archives/1"))["robots"].clone();
+    assert!(robots[0]["audit"]["verdict"].is_string(), "{}", robots[0]);
+    assert_eq!(robots[1]["audit"], Value::Null);
+}
+
+#[test]
+fn what_is_wrong_is_refused_with_one_line_and_hurts_nothing() {
+    let sandbox = Sandbox::new();
+    let server = Server::start(&sandbox, "");
+    let own = format!("Host: 127.0.0.1:{}\r\n", server.port);
+    refused(&server.get("/nothing"), 404, "the page is at /");
+    refused(&server.get("/../Cargo.toml"), 404, "");
+    refused(&server.get("/api/archives/7"), 404, "archive 7");
+    refused(&server.get("/api/archives/x"), 400, "archive");
+    refused(&server.get("/api/images?set=none"), 404, "none");
+    refused(&server.get("/api/images?set=builtin&class=many"), 400, "class");
+    let wrong = server.send(format!("POST / HTTP/1.1\r\n{own}Content-Length: 0\r\n\r\n"));
+    refused(&wrong, 405, "GET");
+    assert_eq!(wrong.header("allow"), "GET, HEAD");
+    refused(&server.get("/api/lives"), 405, "POST");
+    refused(&server.send(format!("DELETE /api/status HTTP/1.1\r\n{own}\r\n")), 405, "GET");
+
+    // Names that others let point here, and pages of others.
+    let port = server.port;
+    for host in ["evil.example", "127.0.0.1", "127.0.0.1:1", &format!("evil.example:{port}")] {
+        refused(&server.send(format!("GET /api/status HTTP/1.1\r\nHost: {host}\r\n\r\n")), 403, "Host");
+    }
+    refused(&server.send("GET / HTTP/1.1\r\n\r\n"), 400, "Host");
+    refused(&server.send(format!("GET / HTTP/1.1\r\n{own}{own}\r\n")), 400, "Host");
+    let from = |origin: &str| {
+        let body = "{\"body\": [[3]]}";
+        server.send(format!(
+            "POST /api/body HTTP/1.1\r\n{own}Origin: {origin}\r\nContent-Length: {}\r\n\r\n{body}",
+            body.len()
+        ))
+    };
+    for origin in ["http://evil.example", "null", &format!("https://127.0.0.1:{port}"), "http://127.0.0.1"] {
+        refused(&from(origin), 403, "Origin");
+    }
+    assert_eq!(from(&format!("http://127.0.0.1:{port}")).status, 200);
+    assert_eq!(from(&format!("http://localhost:{port}")).status, 200);
+
+    // What is no HTTP, or too much of it.
+    refused(&server.send("\u{16}\u{3}\u{1} hello\r\n\r\n"), 400, "HTTP");
+    refused(&server.send(format!("GET / HTTP/1.1\r\n{own}X: {}\r\n\r\n", "x".repeat(40_000))), 431, "");
+    refused(&server.send(format!("POST /api/body HTTP/1.1\r\n{own}\r\n")), 411, "Content-Length");
+    let long =
+        format!("POST /api/body HTTP/1.1\r\n{own}Content-Length: 99999999\r\n\r\n{}", "x".repeat(100_000));
+    refused(&server.send(long), 413, "262144");
+
+    let robot = json!({ "archive": 0, "robot": "QMAXD" });
+    let wide = vec![vec![0u8; 200]; 2];
+    for (request, words) in [
+        (json!({}), "subject"),
+        (json!([]), ""),
+        (json!({ "subject": robot, "speed": 99 }), "speed"),
+        (json!({ "subject": robot, "speed": -1 }), "speed"),
+        (json!({ "subject": robot, "control_steps": 0 }), "control_steps"),
+        (json!({ "subject": robot, "control_steps": 1_000_000 }), "control_steps"),
+        (json!({ "subject": robot, "colour": "red" }), "colour"),
+        (json!({ "subject": { "archive": 0 } }), "subject"),
+        (json!({ "subject": { "body": [[3, 0, 3]] } }), "hanging together"),
+        (json!({ "subject": { "body": [[0]] } }), "at least one voxel"),
+        (json!({ "subject": { "body": [[9]] } }), "9"),
+        (json!({ "subject": { "body": vec![vec![3; 65]; 65] } }), "64"),
+        (json!({ "subject": robot, "shown": { "drawing": [[1, 2], [3]] } }), "drawing"),
+        (json!({ "subject": robot, "shown": { "drawing": [[300]] } }), "drawing"),
+        (json!({ "subject": robot, "shown": { "drawing": vec![vec![0; 13]; 13] } }), "do not divide"),
+        (json!({ "subject": robot, "shown": { "drawing": wide } }), "at most 128"),
+        (json!({ "subject": robot, "shown": { "stimulus": [[0.5]] } }), "14 × 14"),
+        (json!({ "subject": { "body": [[3]] }, "shown": { "stimulus": [[1.5]] } }), "0 to 1"),
+        (json!({ "subject": robot, "shown": { "stimulus": [[0.5]], "drawing": [[5]] } }), "one of"),
+    ] {
+        refused(&server.post("/api/lives", &request), 400, words);
+    }
+    refused(&server.post_text("/api/lives", "{\"subject\": "), 400, "request:1");
+    refused(&server.post_bytes("/api/lives", &[0xff, 0xfe]), 400, "UTF-8");
+    refused(
+        &server.post("/api/lives", &json!({ "subject": { "archive": 0, "robot": "x" } })),
+        404,
+        "no robot",
+    );
+    let image = json!({ "subject": robot, "shown": { "image": { "set": "builtin", "index": 99_999_999 } } });
+    refused(&server.post("/api/lives", &image), 404, "99999999");
+    refused(&server.post("/api/lives/5", &json!({ "paused": true })), 404, "no life 5");
+    refused(
+        &server.post_text("/api/scenario", "{\"body\": [[3]], \"physics\": {\"substeps\": 9}}"),
+        400,
+        "physics",
+    );
+    refused(&server.post_text("/api/scenario", "{\"body\": [[7]]}"), 400, "scenario:1: body");
+
+    // After all that it is well, and no life has begun.
+    let status = json_of(&server.get("/api/status"));
+    assert_eq!((&status["lives"], &status["begun"]), (&json!(0), &json!(0)));
+    server.ended_by("INT");
+}
+
+#[test]
+fn bodies_and_scenarios_are_checked_and_pictures_reduced_as_runs_do() {
+    let sandbox = Sandbox::new();
+    let server = Server::start(&sandbox, "");
+    let check = |body: Value| json_of(&server.post("/api/body", &json!({ "body": body })));
+    assert_eq!(check(json!([[3, 3, 6]]))["problem"], Value::Null);
+    assert!(check(json!([[3, 0], [0, 3]]))["problem"].as_str().unwrap().contains("hang together"));
+    assert!(check(json!([[0]]))["problem"].as_str().unwrap().contains("no voxel"));
+    assert!(check(json!([[6]]))["note"].as_str().unwrap().contains("muscle"));
+
+    let scenario = sandbox.write(
+        "scenario.json",
+        r#"{"body": [[3, 6], [4, 5]], "stimulus": [[0, 0.5], [1, 0]], "control_steps": 7}"#,
+    );
+    let loaded = json_of(&server.post_text("/api/scenario", &std::fs::read_to_string(&scenario).unwrap()));
+    assert_eq!(loaded["stimulus"], json!([[0.0, 0.5], [1.0, 0.0]]));
+    assert_eq!((&loaded["control_steps"], &loaded["body"]), (&json!(7), &json!([[3, 6], [4, 5]])));
+
+    // A robot sees with its run's encoding, a body of one's own with the one that is asked for.
+    let see = |subject: Value| {
+        let asked = json!({ "subject": subject, "shown": { "drawing": drawing() } });
+        let seen = json_of(&server.post("/api/stimulus", &asked))["stimulus"].clone();
+        serde_json::from_value::<Grid<f64>>(seen).unwrap()
+    };
+    let config = gallery::config().unwrap();
+    let expected = stimulus(&drawing(), 14, 14, &config.stimulus).unwrap();
+    assert_eq!(see(json!({ "archive": 0, "robot": "XFJPI" })), expected);
+    let own = StimulusParams { reduction: Reduction::Area, encoding: Encoding::Intensity, level: 0.5 };
+    let expected = stimulus(&drawing(), 2, 3, &own).unwrap();
+    assert_eq!(see(json!({ "body": [[3, 3, 6], [4, 4, 5]], "encoding": own })), expected);
+}
+
+/// Moments as the page decodes them: centre and points.
+fn moments(text: &str, points: usize) -> Vec<Frame> {
+    let bytes = BASE64.decode(text).unwrap();
+    let float = |bytes: &[u8]| f64::from_le_bytes(bytes.try_into().unwrap());
+    let step = |bytes: &[u8]| f64::from(i16::from_le_bytes(bytes.try_into().unwrap())) / 200.0;
+    let moment = |bytes: &[u8]| {
+        let centre = [float(&bytes[..8]), float(&bytes[8..16])];
+        let point = |pair: &[u8]| [step(&pair[..2]) + centre[0], step(&pair[2..]) + centre[1]];
+        Frame { points: bytes[16..].chunks(4).map(point).collect(), centre }
+    };
+    bytes.chunks(16 + 4 * points).map(moment).collect()
+}
+
+#[test]
+fn a_life_is_what_the_engine_computes() {
+    let sandbox = Sandbox::new();
+    let server = Server::start(&sandbox, "");
+    let request = json!({
+        "subject": { "archive": 0, "robot": "QMAXD" }, "shown": { "drawing": drawing() },
+        "control_steps": 120, "speed": 0,
+    });
+    let events: Vec<(String, Value)> = server.events("/api/lives", &request).collect();
+    let names: Vec<&str> = events.iter().map(|(name, _)| name.as_str()).collect();
+    assert_eq!((names[0], names[names.len() - 1]), ("begin", "end"));
+    assert!(names[1..names.len() - 1].iter().all(|name| *name == "lived"));
+
+    let config = gallery::config().unwrap();
+    let robot = gallery::find("QMAXD").unwrap().unwrap();
+    let seen = stimulus(&drawing(), 14, 14, &config.stimulus).unwrap();
+    let protocol = Protocol { control_steps: 120, ..config.protocol.clone() };
+    let images = [("drawing".to_string(), seen.clone())];
+    let expected = record("QMAXD", &robot.body, &config.physics, &protocol, true, &images);
+
+    let begin = &events[0].1;
+    assert_eq!(begin["seen"]["stimulus"], serde_json::to_value(&seen).unwrap());
+    assert_eq!(begin["judge"], json!({ "left": [1], "right": [0] }));
+    let points = begin["points"].as_u64().unwrap() as usize;
+    assert_eq!(points, expected.frames[0].points.len());
+    for (voxel, expected) in begin["voxels"].as_array().unwrap().iter().zip(&expected.voxels) {
+        assert_eq!(voxel[1], json!(expected.corners));
+        assert_eq!((&voxel[2], &voxel[3]), (&json!(expected.row), &json!(expected.column)));
+    }
+    let told = events.iter().filter_map(|(_, data)| data["frames"].as_str());
+    let told: Vec<Frame> = told.flat_map(|text| moments(text, points)).collect();
+    assert_eq!(told.len(), expected.frames.len());
+    let near = |a: [f64; 2], b: [f64; 2]| (a[0] - b[0]).abs() <= 0.00501 && (a[1] - b[1]).abs() <= 0.00501;
+    for (told, expected) in told.iter().zip(&expected.frames) {
+        assert!(near(told.centre, expected.centre));
+        assert!(told.points.iter().zip(&expected.points).all(|(a, b)| near(*a, *b)));
+    }
+    let end = &events[events.len() - 1].1;
+    assert_eq!((&end["step"], &end["unstable"]), (&json!(120), &Value::Null));
+    let moved = expected.phases[0].displacement;
+    assert_eq!(end["answer"]["moved"].as_f64(), Some(moved));
+    let way = Direction::of(moved, 3.0).map(|way| if way == Direction::Left { "left" } else { "right" });
+    assert_eq!(end["answer"]["way"], json!(way));
+    let says = way.map_or(json!([]), |way| begin["judge"][way].clone());
+    assert_eq!(end["answer"]["says"], says);
+}
+
+#[test]
+fn a_body_of_ones_own_lives_as_simulate_has_it() {
+    let sandbox = Sandbox::new();
+    let server = Server::start(&sandbox, "");
+    let stimulus = json!([[0, 0.5, 1], [0, 0, 1]]);
+    let body = json!([[3, 3, 6], [4, 0, 5]]);
+    let request = json!({ "subject": { "body": body }, "shown": { "stimulus": stimulus }, "control_steps": 60, "speed": 0 });
+    let (_, end) = server.events("/api/lives", &request).last().unwrap();
+    let scenario = json!({ "body": body, "stimulus": stimulus, "control_steps": 60 });
+    sandbox.write("scenario.json", scenario.to_string());
+    let said = sandbox.run("simulate scenario.json").ended(0, &[]);
+    let places: Vec<f64> =
+        said.out.lines().skip(1).map(|line| line.split(',').nth(1).unwrap().parse().unwrap()).collect();
+    let moved = (places[60] - places[0]) / Physics::default().cell_size;
+    assert!((end["answer"]["moved"].as_f64().unwrap() - moved).abs() < 1e-9);
+    assert_eq!(end["answer"]["says"], json!([]));
+}
+
+#[test]
+fn a_life_keeps_its_pace_and_is_told_to_change() {
+    let sandbox = Sandbox::new();
+    let server = Server::start(&sandbox, "");
+    let request = json!({ "subject": { "body": [[3, 6, 4]] }, "control_steps": 50, "speed": 1 });
+    let begun = Instant::now();
+    let mut events = server.events("/api/lives", &request);
+    let (_, begin) = events.next().unwrap();
+    let path = format!("/api/lives/{}", begin["id"]);
+    assert_eq!(server.post(&path, &json!({ "paused": true })).status, 204);
+    std::thread::sleep(Duration::from_millis(600));
+    refused(&server.post(&path, &json!({ "speed": 1000 })), 400, "speed");
+    let bright = json!({ "shown": { "stimulus": [[1, 1, 1]] }, "paused": false });
+    assert_eq!(server.post(&path, &bright).status, 204);
+    let rest: Vec<(String, Value)> = events.collect();
+    // Fifty control steps are a second, and it stood still for more than half of one.
+    assert!(begun.elapsed() > Duration::from_millis(1400), "{:?}", begun.elapsed());
+    let seen = rest.iter().find(|(name, _)| name == "seen").map(|(_, data)| data.clone()).unwrap();
+    assert_eq!(seen["stimulus"], json!([[1.0, 1.0, 1.0]]));
+    let changed = seen["step"].as_u64().unwrap();
+    assert!(changed < 40, "{changed}");
+    // The new picture is shown for as long as the first would have been.
+    assert_eq!(rest.last().unwrap().1["step"], json!(changed + 50));
+}
+
+#[test]
+fn lives_end_when_nobody_listens_and_only_so_many_run() {
+    let sandbox = Sandbox::new();
+    let server = Server::start(&sandbox, "");
+    let lives = || json_of(&server.get("/api/status"))["lives"].as_u64().unwrap() as usize;
+    let wait_for = |count: usize| {
+        let until = Instant::now() + Duration::from_secs(5);
+        while lives() != count {
+            assert!(Instant::now() < until, "{} lives, expected {count}", lives());
+            std::thread::sleep(Duration::from_millis(20));
+        }
+    };
+    let request = json!({ "subject": { "body": [[3, 6, 4]] }, "control_steps": 5000, "speed": 1 });
+    let begin = || {
+        let mut events = server.events("/api/lives", &request);
+        let (_, begin) = events.next().unwrap();
+        (begin["id"].as_u64().unwrap(), events)
+    };
+    let mut open: Vec<_> = (0..MAX_LIVES).map(|_| begin()).collect();
+    wait_for(MAX_LIVES);
+    refused(&server.post("/api/lives", &request), 503, "lives are running");
+    // One stands still when its tab closes.
+    let (paused, events) = open.remove(0);
+    server.post(&format!("/api/lives/{paused}"), &json!({ "paused": true }));
+    drop(events);
+    wait_for(MAX_LIVES - 1);
+    open.push(begin());
+    wait_for(MAX_LIVES);
+    open.clear();
+    wait_for(0);
+
+    // A life that runs does not keep the server from ending; it is told.
+    let (_, events) = begin();
+    server.ended_by("TERM");
+    assert_eq!(events.last().map(|(name, _)| name), Some("end".to_string()));
+}
+
+#[test]
+fn many_requests_at_once_are_all_answered() {
+    let sandbox = Sandbox::new();
+    let server = Server::start(&sandbox, "");
+    // Connections that say nothing, as browsers open them, are in nobody's way.
+    let _idle: Vec<_> = (0..10).map(|_| server.connect()).collect();
+    std::thread::scope(|scope| {
+        for _ in 0..16 {
+            scope.spawn(|| (0..10).for_each(|_| assert_eq!(server.get("/api/archives/0").status, 200)));
+        }
+    });
+}
+
+#[test]
+fn a_port_that_is_taken_and_a_broken_archive_are_clear_errors() {
+    let sandbox = Sandbox::new();
+    let server = Server::start(&sandbox, "");
+    let again = format!("serve --no-open --port {}", server.port);
+    sandbox.run(&again).ended(5, &["is taken", "--port"]);
+    sandbox.write("run.json", "{}");
+    sandbox.run("serve --no-open --archive run.json").ended(3, &["run.json"]);
+    sandbox.run("serve --no-open --archive none.json").ended(3, &["none.json"]);
+}
+
+#[test]
+fn the_gallery_walks_as_it_was_trained() {
+    #[derive(serde::Deserialize)]
+    struct Reference {
+        evogym_displacements: Vec<Vec<f64>>,
+    }
+    let references: BTreeMap<String, Reference> = common::golden("published_robots");
+    for robot in gallery::gallery().unwrap() {
+        let under_zero = references[&robot.name].evogym_displacements[0][0];
+        assert_eq!(Direction::of(under_zero, 3.0), Some(robot.zero_walks), "{}", robot.name);
+    }
+}
