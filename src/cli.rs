@@ -4,14 +4,15 @@ mod args;
 mod audit;
 mod capacity;
 mod plot;
+mod report;
 mod reproduce;
 mod serve;
 
 use crate::base::lanes::InstructionSet;
 use crate::run::data::catalogue::Catalogue;
 use crate::run::data::fetch::{FetchOptions, fetch};
+use crate::run::eval_file::EVAL_JSON;
 use crate::run::folder::IfExists;
-use crate::run::report::EVAL_JSON;
 use crate::run::{
     Config, Error, bench, config, data, eval, evolve, folder, gallery, replay, signals, simulate, validation,
 };
@@ -37,6 +38,7 @@ pub fn run(cli: Cli, console: &Console) -> Result<(), Error> {
         Command::Eval(args) => run_eval(args, console),
         Command::Audit(args) => audit::run(args, console),
         Command::Capacity(args) => capacity::run(args, console),
+        Command::Report(args) => report::run(args, console),
         Command::Reproduce(args) => reproduce::run(args, console),
         Command::Replay(args) => run_replay(args, console),
         Command::Plot(args) => plot::run(args, console),

@@ -4,7 +4,7 @@ mod common;
 
 use common::program::{Sandbox, TINY};
 use morphcog::run::capacity_file::CapacityFile;
-use morphcog::run::report::EvalFile;
+use morphcog::run::eval_file::EvalFile;
 
 const FEW: &str = "--set trainings=3 --set sizes=[1,4]";
 

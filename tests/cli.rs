@@ -5,7 +5,7 @@ mod common;
 use common::program::{Sandbox, TINY, files, said};
 use common::{Reference, golden};
 use morphcog::run::config::{BUILT_IN, Config};
-use morphcog::run::report::EvalFile;
+use morphcog::run::eval_file::EvalFile;
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::OnceLock;

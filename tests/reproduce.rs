@@ -45,10 +45,13 @@ fn results(sandbox: &Sandbox, out: &str) -> BTreeMap<String, Vec<u8>> {
 #[test]
 fn all_steps_are_done_and_a_second_call_has_nothing_left_to_do() {
     let sandbox = sandbox();
-    let said = sandbox.run("reproduce plan.toml --scale 0.5 --out small --threads 1").ended(0, &["6 generations"]);
+    let said =
+        sandbox.run("reproduce plan.toml --scale 0.5 --out small --threads 1").ended(0, &["6 generations"]);
     assert!(said.out.contains("0|1") && said.out.contains("reproduction.csv"), "{}", said.out);
     let first = results(&sandbox, "small");
-    for file in ["reproduction.json", "reproduction.csv", "tiny-eval.json", "tiny-capacity.json", "2/audit.json"] {
+    for file in
+        ["reproduction.json", "reproduction.csv", "tiny-eval.json", "tiny-capacity.json", "2/audit.json"]
+    {
         assert!(first.contains_key(file), "{file} of {:?}", first.keys());
     }
     let table = String::from_utf8(first["reproduction.csv"].clone()).unwrap();

@@ -3,7 +3,7 @@
 mod common;
 
 use common::program::{Sandbox, TINY};
-use morphcog::run::report::EvalFile;
+use morphcog::run::eval_file::EvalFile;
 use morphcog::run::training::{Training, load_dataset};
 use morphcog::run::validation::images;
 use morphcog::task::dataset::Split;

@@ -3,6 +3,7 @@
 use super::audit::{self, AuditArgs};
 use super::capacity::{self, CapacityArgs};
 use super::plot::{self, PlotArgs};
+use super::report::{self, ReportArgs};
 use super::reproduce::{self, ReproduceArgs};
 use super::serve::{self, ServeArgs};
 use crate::run::eval;
@@ -70,6 +71,9 @@ Examples:
     /// Find the networks that robots are worth.
     #[command(after_help = capacity::EXAMPLES)]
     Capacity(CapacityArgs),
+    /// Make a page about runs: archive, robots to watch, tests, methods.
+    #[command(after_help = report::EXAMPLES)]
+    Report(ReportArgs),
     /// Run the whole paper, at a chosen scale.
     #[command(after_help = reproduce::EXAMPLES)]
     Reproduce(ReproduceArgs),

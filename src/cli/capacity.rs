@@ -3,7 +3,7 @@
 use crate::run::capacity::{self, Options};
 use crate::run::capacity_config::CapacityConfig;
 use crate::run::capacity_file::CAPACITY_JSON;
-use crate::run::report::EVAL_JSON;
+use crate::run::eval_file::EVAL_JSON;
 use crate::run::{Error, folder, signals};
 use crate::view::console::Console;
 use crate::view::{networks, reporters};

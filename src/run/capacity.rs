@@ -3,7 +3,7 @@
 use super::capacity_config::CapacityConfig;
 use super::capacity_file::{CapacityFile, Curve, FORMAT, FORMAT_VERSION, Point, TaskCapacity};
 use super::capacity_images::{Images, Task};
-use super::report::{EvalFile, RobotReport};
+use super::eval_file::{EvalFile, RobotReport};
 use super::statistics::standard_deviation;
 use super::trainings::Trainings;
 use super::{Error, audit_file::AuditFile, eval};

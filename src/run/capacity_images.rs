@@ -3,7 +3,7 @@
 use super::Error;
 use super::capacity::{Observer, Options};
 use super::capacity_config::CapacityConfig;
-use super::report::EvalFile;
+use super::eval_file::EvalFile;
 use super::setting::{RunRef, Setting};
 use super::training::{ImageRef, load_data, seen};
 use crate::base::Grid;

@@ -1,7 +1,7 @@
 //! `morphcog eval`: how well robots do on held-out images (paper, "Generalization test").
 
 use super::archive::Robot;
-use super::report::{Baselines, EvalFile, RobotReport, Trial};
+use super::eval_file::{Baselines, EvalFile, RobotReport, Trial};
 use super::robots::{Chosen, Selection, Source};
 use super::training::{ImageRef, load_dataset, see};
 use super::validation::{self, Validated};

@@ -14,6 +14,7 @@ pub mod curriculum;
 pub mod data;
 mod error;
 pub mod eval;
+pub mod eval_file;
 pub mod evolve;
 pub mod folder;
 pub mod gallery;
@@ -29,7 +30,6 @@ pub mod robust;
 #[cfg(test)]
 mod samples;
 pub mod sensitivity;
-pub mod setting;
 pub mod serve;
 pub mod setting;
 pub mod signals;

@@ -1,8 +1,8 @@
 //! `morphcog plot`: reads what figures are made of.
 
 use super::archive::RunFile;
+use super::eval_file::{EvalFile, FORMAT, FORMAT_VERSION};
 use super::folder::METRICS;
-use super::report::{EvalFile, FORMAT, FORMAT_VERSION};
 use super::{Error, toml_text};
 use serde::Deserialize;
 use std::path::Path;
@@ -18,6 +18,9 @@ pub struct Moment {
     pub qd_score: f64,
     /// Largest objective; none without elites.
     pub obj_max: Option<f64>,
+    /// Wall-clock time so far \[s\].
+    #[serde(default)]
+    pub seconds: f64,
 }
 
 /// How a run came along.

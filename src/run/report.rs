@@ -1,322 +1,190 @@
-//! `eval.json` and `eval.csv`: what an evaluation found.
+//! `morphcog report`: gathers what is known of runs, for a page.
 
 use super::archive::{Robot, RunFile};
-use super::eval::Options;
-use super::robots::{Selection, Source};
-use super::setting::{RunRef, Setting};
-use super::statistics::{bootstrap, standard_deviation, wilson};
-use super::training::ImageRef;
-use super::validation::Validated;
-use super::{Error, toml_text};
-use crate::task::direction::Assignment;
-use crate::task::grouping::{Group, Split};
-use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
-use std::path::Path;
+use super::audit_file::{AUDIT_JSON, AuditFile};
+use super::capacity_file::{CAPACITY_JSON, CapacityFile};
+use super::eval_file::{EVAL_JSON, EvalFile};
+use super::plot::Progress;
+use super::training::{ImageRef, load_dataset, see};
+use super::{Error, folder};
+use crate::base::Grid;
+use crate::task::dataset::Split;
+use crate::task::protocol::Life;
+use crate::task::recording::Recording;
+use crate::task::rollout::record;
+use std::path::{Path, PathBuf};
 
-/// What `eval.json` calls itself.
-pub const FORMAT: &str = "morphcog-eval";
-/// Version of its schema.
-pub const FORMAT_VERSION: u32 = 1;
+/// Most images in the lives of a page: one of each class, if there are more.
+const MOST_IMAGES: usize = 4;
 
-/// Its name beside `run.json`.
-pub const EVAL_JSON: &str = "eval.json";
-
-/// The content of `eval.json`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct EvalFile {
-    /// [`FORMAT`].
-    pub format: String,
-    /// [`FORMAT_VERSION`].
-    pub format_version: u32,
-    /// Version of morphcog that wrote it.
-    pub program_version: String,
-    /// Name of the (first) run the robots are from.
-    pub run: String,
-    /// Seed of that run.
-    pub run_seed: u64,
-    /// All runs the robots are from.
-    #[serde(default)]
-    pub runs: Vec<RunRef>,
-    /// What robots were shown.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub setting: Option<Setting>,
-    /// How the robots were selected.
-    pub selected: String,
-    /// Name of the dataset.
-    pub dataset: String,
-    /// SHA-256 of its test split.
-    pub test_sha256: String,
-    /// Seed of what was drawn.
-    pub seed: u64,
-    /// Control steps per image, each a fresh life.
-    pub control_steps: u32,
-    /// Displacements up to this counted as wrong \[voxel lengths\].
-    pub threshold: f64,
-    /// Whether it ended before the last robot, by a signal or otherwise.
-    pub stopped: bool,
-    /// The test images.
-    pub images: Vec<ImageRef>,
-    /// By task: what takes no body at all.
-    pub baselines: BTreeMap<String, Baselines>,
-    /// By task: averages over its robots.
-    pub means: BTreeMap<String, Mean>,
-    /// The robots, in the order of their selection.
-    pub robots: Vec<RobotReport>,
+/// All that is known of a run.
+#[derive(Clone, Debug)]
+pub struct Dossier {
+    /// Its run.json.
+    pub path: PathBuf,
+    /// The run.
+    pub run: RunFile,
+    /// How it came along; none without a metrics.csv.
+    pub progress: Option<Progress>,
+    /// What was found of it, and of nothing else.
+    pub findings: Findings,
+    /// What its robots are shown on the page: labels and stimuli.
+    pub images: Vec<(String, Grid<f64>)>,
 }
 
-/// Accuracies on the same images that take no body.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Baselines {
-    /// Always answering the larger group.
-    pub larger_group: f64,
-    /// One pixel and a threshold, chosen on training images.
-    pub best_single_pixel: f64,
-    /// That pixel: row, column.
-    pub pixel: [usize; 2],
-    /// The group of the nearest of the run's training images.
-    pub nearest_training_image: f64,
+/// What tests found; none of what was not done.
+#[derive(Clone, Debug, Default)]
+pub struct Findings {
+    /// From `eval`.
+    pub eval: Option<EvalFile>,
+    /// From `audit`.
+    pub audit: Option<AuditFile>,
+    /// From `capacity`.
+    pub capacity: Option<CapacityFile>,
 }
 
-/// Averages over the robots of a task.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Mean {
-    /// Robots.
-    pub robots: usize,
-    /// Mean accuracy.
-    pub accuracy: f64,
-    /// Mean balanced accuracy.
-    pub balanced_accuracy: f64,
-    /// Standard deviation of the accuracy over the robots; none of a single one.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub standard_deviation: Option<f64>,
-    /// 95 % bootstrap interval of the mean accuracy (percentiles of 10,000 resamples of the robots).
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub interval: Option<[f64; 2]>,
-}
-
-/// What one robot did.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct RobotReport {
-    /// Its id.
-    pub id: String,
-    /// Its run, by its place in `runs`.
-    #[serde(default)]
-    pub run: usize,
-    /// Its task.
-    pub task: String,
-    /// Its fitness on the training images, voxel lengths.
-    pub objective: f64,
-    /// Which way the classes before the task's bar are to walk: "left" or "right", as on the training images.
-    pub first_group_walks: String,
-    /// Images answered right.
-    pub right: usize,
-    /// Images in all.
-    pub images: usize,
-    /// Share answered right.
-    pub accuracy: f64,
-    /// Its 95 % Wilson interval.
-    pub interval: [f64; 2],
-    /// Mean over the two groups of the share answered right.
-    pub balanced_accuracy: f64,
-    /// Share answered right, by class.
-    pub per_class: BTreeMap<u8, f64>,
-    /// Mean |displacement|, voxel lengths, of the stable lives.
-    pub mean_distance: f64,
-    /// Share of images under which it moved no farther than the threshold.
-    pub not_moved: f64,
-    /// Images under which its life became unstable (counted as wrong).
-    pub unstable: usize,
-    /// Lives simulated.
-    pub simulated: usize,
-    /// How it did on the validation images, if it was selected on them.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub validation: Option<Validated>,
-    /// Displacement under each image, voxel lengths; none if unstable.
-    pub displacements: Vec<Option<f64>>,
-}
-
-/// One robot's test.
-pub(super) struct Trial<'a> {
-    pub run: &'a RunFile,
-    pub robot: &'a Robot,
-    pub split: &'a Split,
-    pub images: &'a [ImageRef],
-    pub threshold: f64,
-}
-
-impl RobotReport {
-    pub(super) fn new(trial: &Trial, displacements: Vec<Option<f64>>, simulated: usize) -> Self {
-        let Trial { run, robot, split, images, threshold } = *trial;
-        let training = run.training_images.iter().zip(&robot.displacements);
-        let answer = |(image, &displacement): (&ImageRef, &f64)| crate::task::score::Answer {
-            class: image.label,
-            displacement,
-        };
-        let assignment =
-            Assignment::from_training(split, run.fitness(), &training.map(answer).collect::<Vec<_>>());
-        let is_right = |(image, displacement): (&ImageRef, &Option<f64>)| {
-            let (group, displacement) = (split.group(image.label), *displacement);
-            group.zip(displacement).is_some_and(|(g, d)| assignment.is_right(g, d, threshold))
-        };
-        let verdicts: Vec<(u8, bool)> =
-            images.iter().zip(&displacements).map(|pair| (pair.0.label, is_right(pair))).collect();
-        let share = |of: &dyn Fn(u8) -> bool| {
-            let chosen = verdicts.iter().filter(|(class, _)| of(*class));
-            let (right, all) =
-                chosen.fold((0usize, 0usize), |(r, n), (_, right)| (r + usize::from(*right), n + 1));
-            (right as f64 / all.max(1) as f64, right)
-        };
-        let (accuracy, right) = share(&|_| true);
-        let group = |g: Group| share(&|class| split.group(class) == Some(g)).0;
-        let classes: std::collections::BTreeSet<u8> = images.iter().map(|image| image.label).collect();
-        let moved: Vec<f64> = displacements.iter().flatten().map(|d| d.abs()).collect();
-        let count = images.len().max(1) as f64;
-        RobotReport {
-            id: robot.id.clone(),
-            run: 0,
-            task: robot.task.clone(),
-            objective: robot.objective,
-            first_group_walks: format!("{:?}", assignment.expected(Group::A)).to_lowercase(),
-            right,
-            images: images.len(),
-            accuracy,
-            interval: wilson(right, images.len()),
-            balanced_accuracy: (group(Group::A) + group(Group::B)) / 2.0,
-            per_class: classes.into_iter().map(|class| (class, share(&|c| c == class).0)).collect(),
-            mean_distance: moved.iter().sum::<f64>() / moved.len().max(1) as f64,
-            not_moved: moved.iter().filter(|&&d| d <= threshold).count() as f64 / count,
-            unstable: displacements.len() - moved.len(),
-            simulated,
-            validation: None,
-            displacements,
+impl Findings {
+    /// Those in a folder; verdicts only if they are on a run as it is.
+    fn read(folder: &Path, run: Option<&RunFile>, warn: &dyn Fn(&str)) -> Self {
+        let existing = |name: &str| Some(folder.join(name)).filter(|path| path.exists());
+        // A report of what can be read is better than none.
+        let told = |error: Error| warn(&format!("{error}; left out"));
+        let audit = existing(AUDIT_JSON)
+            .zip(run)
+            .and_then(|(path, run)| AuditFile::of_run(run, &path).map_err(told).ok());
+        Findings {
+            eval: existing(EVAL_JSON).and_then(|path| EvalFile::read(&path).map_err(told).ok()),
+            audit,
+            capacity: existing(CAPACITY_JSON).and_then(|path| CapacityFile::read(&path).map_err(told).ok()),
         }
     }
 }
 
-impl RobotReport {
-    /// The report in short: its figures.
-    pub fn without_displacements(&self) -> Self {
-        RobotReport { displacements: Vec::new(), ..self.clone() }
-    }
+/// Everything for a page.
+#[derive(Clone, Debug)]
+pub struct Gathered {
+    /// The runs.
+    pub runs: Vec<Dossier>,
+    /// What was found of several runs together, above their folders.
+    pub together: Findings,
 }
 
-impl EvalFile {
-    pub(super) fn new(
-        sources: &[Source],
-        options: &Options,
-        control_steps: u32,
-        images: &[ImageRef],
-        test_sha256: String,
-    ) -> Self {
-        let first = sources.first().map(|source| &source.run);
-        EvalFile {
-            format: FORMAT.to_string(),
-            format_version: FORMAT_VERSION,
-            program_version: env!("CARGO_PKG_VERSION").to_string(),
-            run: first.map_or(String::new(), |run| run.name.clone()),
-            run_seed: first.map_or(0, |run| run.config.seed),
-            runs: sources.iter().map(|source| RunRef::new(&source.run)).collect(),
-            setting: first.map(Setting::new),
-            selected: options.robots.describe(),
-            dataset: first.map_or(String::new(), |run| run.dataset.name.clone()),
-            test_sha256,
-            seed: options.seed,
-            control_steps,
-            threshold: options.threshold,
-            stopped: false,
-            images: images.to_vec(),
-            baselines: BTreeMap::new(),
-            means: BTreeMap::new(),
-            robots: Vec::new(),
-        }
-    }
-
-    /// Averages over the robots so far.
-    pub(super) fn conclude(&mut self) {
-        let mut by_task = BTreeMap::<&str, Vec<&RobotReport>>::new();
-        self.robots.iter().for_each(|robot| by_task.entry(&robot.task).or_default().push(robot));
-        let mean = |robots: &[&RobotReport], of: fn(&RobotReport) -> f64| {
-            robots.iter().map(|robot| of(robot)).sum::<f64>() / robots.len() as f64
+/// Reads runs and what lies beside them; `warn` is told what cannot be read. Without `with_lives` no images are needed.
+///
+/// # Errors
+/// What is wrong with a run, or with its images.
+pub fn gather(
+    archives: &[PathBuf],
+    data: Option<&Path>,
+    with_lives: bool,
+    warn: &dyn Fn(&str),
+) -> Result<Gathered, Error> {
+    let mut runs = Vec::new();
+    for path in archives {
+        let run = RunFile::read(path)?;
+        let folder = path.parent().unwrap_or(Path::new(""));
+        let progress = match path.with_file_name(folder::METRICS).exists() {
+            true => Progress::read(path).map_err(|error| warn(&format!("{error}; left out"))).ok(),
+            false => None,
         };
-        let means = by_task.into_iter().map(|(task, robots)| {
-            let (accuracy, balanced_accuracy) =
-                (mean(&robots, |r| r.accuracy), mean(&robots, |r| r.balanced_accuracy));
-            let accuracies: Vec<f64> = robots.iter().map(|robot| robot.accuracy).collect();
-            let (standard_deviation, interval) = (standard_deviation(&accuracies), bootstrap(&accuracies));
-            let robots = robots.len();
-            (task.to_string(), Mean { robots, accuracy, balanced_accuracy, standard_deviation, interval })
+        let images = if with_lives { images(&run, data)? } else { Vec::new() };
+        let findings = Findings::read(folder, Some(&run), warn);
+        runs.push(Dossier { path: path.clone(), run, progress, findings, images });
+    }
+    let together = match archives.len() {
+        0 | 1 => Findings::default(),
+        _ => Findings::read(&folder::above(archives), None, warn),
+    };
+    Ok(Gathered { runs, together })
+}
+
+/// The training images, or one of each class if they are many.
+fn images(run: &RunFile, data: Option<&Path>) -> Result<Vec<(String, Grid<f64>)>, Error> {
+    let hint = |error: Error| match &error.hint {
+        None => error.hint("or --lives 0 for a report without moving pictures".to_string()),
+        Some(_) => error,
+    };
+    let dataset = load_dataset(&run.config, data, &[Split::Train]).map_err(hint)?;
+    let mut shown: Vec<ImageRef> = run.training_images.clone();
+    if shown.len() > MOST_IMAGES {
+        let mut classes = Vec::new();
+        shown.retain(|image| {
+            let is_first = !classes.contains(&image.label);
+            classes.push(image.label);
+            is_first
         });
-        self.means = means.collect();
+    }
+    let one = |image: &ImageRef| {
+        let label = format!("{} (train {})", image.label, image.index);
+        Ok((label, see(&run.config, &dataset, Split::Train, image.index)?))
+    };
+    shown.iter().map(one).collect()
+}
+
+impl Dossier {
+    /// The life of a robot under the images.
+    pub fn record(&self, robot: &Robot) -> Recording {
+        let config = &self.run.config;
+        let fresh = config.protocol.life == Life::Fresh;
+        record(&robot.id, &robot.body, &config.physics, &config.protocol, fresh, &self.images)
     }
 
-    /// Whether it is what these options would make of these runs, and whole.
-    pub(super) fn is_of(&self, sources: &[Source], options: &Options) -> bool {
-        let runs: Vec<RunRef> = sources.iter().map(|source| RunRef::new(&source.run)).collect();
-        let same_robots = match &options.robots {
-            Selection::Drawn { robots, .. } => {
-                robots.iter().map(|(run, id)| (*run, id)).eq(self.robots.iter().map(|r| (r.run, &r.id)))
+    /// Seconds that the run took, and offspring it made; none without a metrics.csv.
+    pub fn effort(&self) -> Option<(f64, f64)> {
+        let last = self.progress.as_ref()?.moments.last()?;
+        Some((last.seconds, last.evaluations))
+    }
+
+    /// Robots that differ most from each other: the fittest, then in turn the one whose body is farthest from all before
+    /// (in voxels that differ), among those that answer all training images right.
+    pub fn most_different(&self, count: usize) -> Vec<&Robot> {
+        let able = || self.run.elites.iter().filter(|robot| robot.objective > 0.0);
+        let mut chosen: Vec<&Robot> =
+            able().max_by(|a, b| a.objective.total_cmp(&b.objective)).into_iter().collect();
+        while !chosen.is_empty() && chosen.len() < count {
+            let nearest =
+                |robot: &Robot| chosen.iter().map(|other| distance(robot, other)).min().unwrap_or(0);
+            match able().max_by_key(|robot| nearest(robot)).filter(|robot| nearest(robot) > 0) {
+                Some(robot) => chosen.push(robot),
+                None => break,
             }
-            _ => false,
-        };
-        let same = (self.seed, self.images.len(), self.threshold)
-            == (options.seed, options.images, options.threshold);
-        !self.stopped && self.runs == runs && same && same_robots
-    }
-
-    /// Reads `eval.json`.
-    ///
-    /// # Errors
-    /// What is wrong with the file, with its line and key.
-    pub fn read(path: &Path) -> Result<Self, Error> {
-        let text = std::fs::read_to_string(path).map_err(|error| Error::reading(path, &error))?;
-        toml_text::read_versioned(&text, &path.display().to_string(), FORMAT, FORMAT_VERSION)
-    }
-
-    /// Its text, one line.
-    pub fn to_json(&self) -> String {
-        // Numbers are finite, keys are text or whole numbers: JSON has all of it.
-        serde_json::to_string(self).unwrap_or_default() + "\n"
-    }
-
-    /// `eval.csv`: a line per robot.
-    ///
-    /// # Errors
-    /// If it cannot be written to memory.
-    pub fn to_csv(&self) -> Result<Vec<u8>, csv::Error> {
-        let classes: Vec<u8> =
-            self.robots.first().map_or(Vec::new(), |robot| robot.per_class.keys().copied().collect());
-        let mut writer = csv::Writer::from_writer(Vec::new());
-        let mut header: Vec<String> = [
-            "id",
-            "run_seed",
-            "task",
-            "objective",
-            "first_group_walks",
-            "right",
-            "images",
-            "accuracy",
-            "accuracy_low",
-            "accuracy_high",
-            "balanced_accuracy",
-        ]
-        .map(str::to_string)
-        .to_vec();
-        header.extend(classes.iter().map(|class| format!("accuracy_{class}")));
-        header.extend(["mean_distance", "not_moved", "unstable", "simulated"].map(str::to_string));
-        writer.write_record(&header)?;
-        for robot in &self.robots {
-            let seed = self.runs.get(robot.run).map_or(self.run_seed, |run| run.seed);
-            let mut row = vec![robot.id.clone(), seed.to_string()];
-            row.extend([robot.task.clone(), robot.objective.to_string()]);
-            row.extend([robot.first_group_walks.clone(), robot.right.to_string(), robot.images.to_string()]);
-            let [low, high] = robot.interval;
-            row.extend([robot.accuracy, low, high, robot.balanced_accuracy].map(|v| v.to_string()));
-            row.extend(robot.per_class.values().map(f64::to_string));
-            row.extend([robot.mean_distance, robot.not_moved].map(|v| v.to_string()));
-            row.extend([robot.unstable, robot.simulated].map(|v| v.to_string()));
-            writer.write_record(&row)?;
         }
-        writer.into_inner().map_err(|error| csv::Error::from(error.into_error()))
+        chosen
+    }
+}
+
+/// Voxels in which two bodies of a size differ.
+fn distance(a: &Robot, b: &Robot) -> usize {
+    a.body.voxels().cells().iter().zip(b.body.voxels().cells()).filter(|(a, b)| a != b).count()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::run::samples;
+
+    fn dossier(robots: &[(&str, f64)]) -> Dossier {
+        let (path, run) = (PathBuf::from("run.json"), samples::run(robots));
+        Dossier { path, run, progress: None, findings: Findings::default(), images: Vec::new() }
+    }
+
+    #[test]
+    fn the_most_different_begin_with_the_fittest_and_leave_out_who_fails() {
+        let dossier = dossier(&[("a", 1.0), ("b", 9.0), ("c", -1.0), ("d", 2.0)]);
+        let chosen: Vec<&str> = dossier.most_different(9).iter().map(|robot| robot.id.as_str()).collect();
+        assert_eq!(chosen[0], "b");
+        assert!(!chosen.contains(&"c") && chosen.len() <= 3, "{chosen:?}");
+        let [a, d] = [0, 3].map(|place| distance(&dossier.run.elites[place], &dossier.run.elites[1]));
+        assert_eq!(chosen.get(1), Some(&if d >= a { "d" } else { "a" }));
+    }
+
+    #[test]
+    fn a_report_of_what_there_is_leaves_out_what_cannot_be_read() {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join(EVAL_JSON), "{").unwrap();
+        let told = std::cell::RefCell::new(Vec::new());
+        let findings = Findings::read(folder.path(), None, &|text| told.borrow_mut().push(text.to_string()));
+        assert!(findings.eval.is_none() && findings.audit.is_none() && findings.capacity.is_none());
+        assert!(told.borrow().len() == 1 && told.borrow()[0].contains("eval.json"), "{told:?}");
     }
 }

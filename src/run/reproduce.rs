@@ -2,8 +2,8 @@
 
 use super::audit_file::{AUDIT_JSON, AuditFile};
 use super::capacity_config::CapacityConfig;
+use super::eval_file::EvalFile;
 use super::folder::{IfExists, RUN_JSON};
-use super::report::EvalFile;
 use super::robots::{Chosen, Selection, Source};
 use super::table::{self, Row};
 use super::verdict::{Criteria, Verdict};

@@ -2,8 +2,8 @@
 
 use super::Error;
 use super::capacity_file::CapacityFile;
+use super::eval_file::EvalFile;
 use super::published;
-use super::report::EvalFile;
 use crate::base::files::write_atomically;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};

@@ -7,7 +7,7 @@
 use super::archive::{Robot, RunFile};
 use super::audit_file::fingerprint;
 use super::eval::{self, Observer, Walker};
-use super::report::{RobotReport, Trial};
+use super::eval_file::{RobotReport, Trial};
 use super::robots::{Selection, Source};
 use super::training::{ImageRef, Training, load_dataset, see};
 use super::{Config, Error};

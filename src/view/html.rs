@@ -11,6 +11,7 @@ use crate::task::recording::Recording;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD as BASE64;
 use serde_json::json;
+use std::io::Write;
 use std::path::Path;
 
 const TEMPLATE: &str = include_str!("replay.html");
@@ -52,7 +53,7 @@ pub fn page(
     } else {
         ""
     };
-    let life = life(&walk).to_string();
+    let life = life(&walk, MOST_BYTES).to_string();
     Ok(fill(
         TEMPLATE,
         &[
@@ -67,11 +68,38 @@ pub fn page(
     ))
 }
 
-/// The recording as the page's script reads it.
-fn life(walk: &Walk) -> serde_json::Value {
+/// A page in which `life` stands where its recording belongs.
+pub(super) fn player(life: &str) -> String {
+    fill(
+        TEMPLATE,
+        &[
+            ("title", ""),
+            ("style", concat!(include_str!("replay.css"), include_str!("report/player.css"))),
+            ("script", include_str!("replay.js")),
+            ("metadata", ""),
+            ("warning", ""),
+            ("life", life),
+        ],
+    )
+}
+
+/// A recording for [`player`], packed: gzip in base64. `most`: about so many bytes.
+///
+/// # Errors
+/// [`PictureError::Encode`] if it cannot be packed.
+pub(super) fn packed(walk: &Walk, most: usize) -> Result<String, PictureError> {
+    let failed = |error: std::io::Error| PictureError::Encode(error.to_string());
+    // The same bytes every time: the header has no time in it.
+    let mut packer = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::best());
+    packer.write_all(life(walk, most).to_string().as_bytes()).map_err(failed)?;
+    Ok(BASE64.encode(packer.finish().map_err(failed)?))
+}
+
+/// The recording as the page's script reads it; `most`: bytes of positions, of which there are fewer for longer lives.
+fn life(walk: &Walk, most: usize) -> serde_json::Value {
     let recording = walk.recording();
     let points = recording.frames.iter().map(|f| f.points.len()).min().unwrap_or(0);
-    let every = (walk.len() * points * 4).div_ceil(MOST_BYTES).max(1);
+    let every = (walk.len() * points * 4).div_ceil(most.max(1)).max(1);
     let shown = gif::shown(walk, every);
     let origins: Vec<[f64; 2]> =
         shown.iter().map(|f| walk.centre(*f).map(|v| (v * STEPS).round() / STEPS)).collect();
@@ -128,7 +156,7 @@ fn number(value: f64) -> Option<f64> {
 }
 
 /// Text as it stands in HTML, in elements and in quoted attributes.
-fn escape(text: &str) -> String {
+pub(super) fn escape(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for letter in text.chars() {
         match letter {
@@ -144,7 +172,7 @@ fn escape(text: &str) -> String {
 }
 
 /// The template with its `{{name}}`s replaced, in one pass: what is put in is not looked at again.
-fn fill(template: &str, values: &[(&str, &str)]) -> String {
+pub(super) fn fill(template: &str, values: &[(&str, &str)]) -> String {
     let mut out = String::new();
     let mut rest = template;
     while let Some((before, (name, after))) =

@@ -21,6 +21,7 @@ pub mod player;
 pub mod plot;
 pub mod progress;
 pub mod raster;
+pub mod report;
 pub mod reporters;
 pub mod scene;
 pub mod serve;

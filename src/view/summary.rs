@@ -5,11 +5,11 @@ use super::progress::duration;
 use crate::run::bench::Speed;
 use crate::run::data::Found;
 use crate::run::data::fetch::{Fetched, Outcome};
+use crate::run::eval_file::{EvalFile, RobotReport};
 use crate::run::evolve::Finished;
 use crate::run::folder::RUN_JSON;
 use crate::run::gallery::Published;
 use crate::run::published;
-use crate::run::report::{EvalFile, RobotReport};
 use crate::run::training::ImageRef;
 use crate::run::validation::Validated;
 use std::path::Path;
@@ -130,7 +130,7 @@ pub fn evaluation(console: &Console, report: &EvalFile, out: &Path) {
     console.line("");
     let rows = report.means.iter().map(|(task, mean)| {
         let baselines = report.baselines.get(task);
-        let baseline = |of: fn(&crate::run::report::Baselines) -> f64| {
+        let baseline = |of: fn(&crate::run::eval_file::Baselines) -> f64| {
             baselines.map_or(String::new(), |b| percent(of(b)))
         };
         vec![

@@ -4,7 +4,7 @@ use super::axes::{AXIS, Axis, MARGIN, Plot, heading};
 use super::canvas::{Canvas, Pen, TEXT, Words};
 use super::figure::{COLUMN, Figure};
 use super::{fonts, scales};
-use crate::run::report::{EvalFile, RobotReport};
+use crate::run::eval_file::{EvalFile, RobotReport};
 use crate::view::colour;
 
 /// Robots that have a line of their own with their name; of more, lines are thin and nameless.

@@ -24,6 +24,7 @@ pub use body::body;
 pub use capacity::capacity;
 pub use figure::{Background, COLUMN, Figure, PAGE, PRINT};
 pub use progress::progress;
+pub use scales::{below, sequential};
 pub use sensitivity::sensitivity;
 pub use snapshots::snapshots;
 pub use spacetime::spacetime;

@@ -126,6 +126,7 @@ mod tests {
             coverage: 0.1,
             qd_score: 3.0,
             obj_max: *best,
+            seconds: 0.0,
         };
         Progress { run: "toy".into(), seed, moments: best.iter().enumerate().map(moment).collect() }
     }

@@ -1,0 +1,60 @@
+//! `morphcog report`: its words, and what it calls.
+
+use crate::run::report;
+use crate::run::{Error, folder};
+use crate::view::console::Console;
+use crate::view::report::Content;
+use crate::view::write_whole;
+use clap::Args;
+use std::path::PathBuf;
+
+pub(super) const EXAMPLES: &str = "\
+Examples:
+  morphcog report runs/zero_one-seed1
+  morphcog report runs/zero_one-seed* -o seeds.html
+  morphcog report runs/zero_one-seed1 --lives 20 --open
+
+What lies beside a run.json is part of its report: metrics.csv, eval.json, audit.json, capacity.json. Of several runs, those of
+them together are looked for above their folders.";
+
+#[derive(Debug, Args)]
+pub(super) struct ReportArgs {
+    /// Run folders, or files run.json (default: the newest under runs/).
+    runs: Vec<PathBuf>,
+    /// Robots of each run that can be watched, the fittest; all of them together take up to 20 MB.
+    #[arg(long, default_value_t = 100)]
+    lives: usize,
+    /// Folder with the images.
+    #[arg(long, value_name = "DIR")]
+    data: Option<PathBuf>,
+    /// The page (default: report.html beside run.json, or above several).
+    #[arg(short, long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Open it.
+    #[arg(long)]
+    open: bool,
+}
+
+pub(super) fn run(args: ReportArgs, console: &Console) -> Result<(), Error> {
+    let named = |path: PathBuf| if path.is_dir() { path.join(folder::RUN_JSON) } else { path };
+    let archives: Vec<PathBuf> = match args.runs.is_empty() {
+        true => vec![folder::newest_run()?],
+        false => args.runs.into_iter().map(named).collect(),
+    };
+    let out = args.out.unwrap_or_else(|| folder::above(&archives).join("report.html"));
+    let gathered =
+        report::gather(&archives, args.data.as_deref(), args.lives > 0, &|text| console.warning(text))?;
+    let content = Content { gathered: &gathered, lives: args.lives };
+    let page = {
+        let counter = console.counter("living lives for the page:", content.count() as u64, "lives");
+        content.page(&|lived| counter.update(lived))
+    };
+    let failed = |error: crate::view::PictureError| Error::other(error.to_string());
+    let page = page.map_err(failed)?;
+    write_whole(&out, page.as_bytes()).map_err(failed)?;
+    console.line(&format!("wrote {} ({:.1} MB)", out.display(), page.len() as f64 / 1e6));
+    match args.open {
+        true => open::that(&out).map_err(|error| Error::other(format!("cannot open it: {error}"))),
+        false => Ok(()),
+    }
+}

@@ -1,0 +1,92 @@
+//! Robots as buttons: a click plays them.
+
+use super::maps::Lives;
+use crate::body::{Body, Material};
+use crate::run::archive::Robot;
+use crate::run::report::Dossier;
+use crate::view::colour::tones;
+use crate::view::html::escape;
+use std::collections::BTreeSet;
+use std::fmt::Write;
+
+/// Robots shown of each kind.
+const SHOWN: usize = 5;
+
+/// A button that plays a robot. `look`: its style, what stands before the robot's figures for those who cannot see it, and
+/// whether it is played at first.
+pub(super) fn button(
+    run: usize,
+    dossier: &Dossier,
+    lives: &Lives,
+    robot: &Robot,
+    (style, name, first): (&str, &str, bool),
+    content: &str,
+) -> String {
+    let about = about(dossier, robot);
+    let life = lives.id(run, &robot.id).unwrap_or_default();
+    let command = format!("morphcog replay --robot {} --archive {}", robot.id, dossier.path.display());
+    format!(
+        "<button type=\"button\" style=\"{style}\" data-robot=\"{}\" data-life=\"{}\" data-about=\"{}\" data-command=\"{}\" \
+         aria-pressed=\"false\" aria-label=\"{}\" title=\"{}\"{}>{content}</button>",
+        escape(&robot.id),
+        escape(&life),
+        escape(&about),
+        escape(&command),
+        escape(&format!("{name}{}{about}", if name.is_empty() { "" } else { ": " })),
+        escape(&about),
+        if first { " data-first" } else { "" }
+    )
+}
+
+/// A robot in a line.
+fn about(dossier: &Dossier, robot: &Robot) -> String {
+    let counts = robot.voxels;
+    let verdict = dossier.findings.audit.as_ref().and_then(|audit| audit.robot(&robot.id));
+    let verdict = verdict.map_or(String::new(), |found| format!("; {}", found.conclusion()));
+    format!(
+        "{} ({}), fitness {:.2}: {} muscle, {} sensor, {} voxels in all, born in generation {}{verdict}.",
+        robot.id, robot.task, robot.objective, counts.muscle, counts.sensor, counts.total, robot.generation
+    )
+}
+
+/// The fittest robots, and the most different ones.
+pub(super) fn bodies(run: usize, dossier: &Dossier, lives: &Lives) -> String {
+    let mut fittest: Vec<&Robot> = dossier.run.elites.iter().collect();
+    fittest.sort_by(|a, b| b.objective.total_cmp(&a.objective));
+    let mut seen = BTreeSet::new();
+    let chosen = fittest.into_iter().take(SHOWN).chain(dossier.most_different(SHOWN + 1));
+    let buttons: String = chosen
+        .filter(|robot| seen.insert(robot.id.clone()))
+        .map(|robot| {
+            let id = escape(&robot.id);
+            let walks: Vec<String> = robot.displacements.iter().take(4).map(|d| format!("{d:+.1}")).collect();
+            let content = format!(
+                "{}<span>{id}</span><small>{}: {}</small>",
+                picture(&robot.body),
+                escape(&robot.task),
+                walks.join(" ")
+            );
+            button(run, dossier, lives, robot, ("", "", false), &content)
+        })
+        .collect();
+    format!("<div class=\"bodies\">{buttons}</div>\n")
+}
+
+/// A body's voxels by material.
+fn picture(body: &Body) -> String {
+    let (height, width) = (body.voxels().height(), body.voxels().width());
+    let mut out =
+        format!("<svg viewBox=\"0 0 {width} {height}\" aria-hidden=\"true\" shape-rendering=\"crispEdges\">");
+    for material in Material::ALL.into_iter().filter(|material| *material != Material::Empty) {
+        let mut path = String::new();
+        for ((row, column), _) in body.voxels().iter().filter(|(_, found)| **found == material) {
+            // Text is written to memory, which takes it all.
+            let _ = write!(path, "M{column} {row}h1v1h-1z");
+        }
+        if !path.is_empty() {
+            let [_, [red, green, blue], _] = tones(material);
+            let _ = write!(out, "<path fill=\"#{red:02x}{green:02x}{blue:02x}\" d=\"{path}\"/>");
+        }
+    }
+    out + "</svg>"
+}

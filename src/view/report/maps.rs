@@ -1,0 +1,154 @@
+//! The archive as buttons, and the lives they play.
+
+use super::bodies::button;
+use crate::qd::descriptor::{COUNT_BINS, DescriptorSpace, possible_cells};
+use crate::run::archive::Robot;
+use crate::run::report::{Dossier, Gathered};
+use crate::view::html::{escape, packed};
+use crate::view::plot::{below, sequential};
+use crate::view::{PictureError, Walk};
+use rayon::prelude::*;
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// Bytes of all lives of a page together, before they are packed: packed, as text, they are about as many.
+const MOST_BYTES: usize = 13_000_000;
+/// Most bytes of a single one.
+const MOST_OF_ONE: usize = 1_500_000;
+
+/// Lives, packed, by run and robot.
+pub(super) struct Lives(BTreeMap<(usize, String), String>);
+
+/// The robots of a run that can be played: the fittest.
+pub(super) fn played(dossier: &Dossier, most: usize) -> Vec<&Robot> {
+    if dossier.images.is_empty() {
+        return Vec::new();
+    }
+    let mut robots: Vec<&Robot> = dossier.run.elites.iter().collect();
+    robots.sort_by(|a, b| b.objective.total_cmp(&a.objective));
+    robots.truncate(most);
+    robots
+}
+
+impl Lives {
+    /// Lives them.
+    pub fn live(
+        gathered: &Gathered,
+        most: usize,
+        lived: &(dyn Fn(u64) + Sync),
+    ) -> Result<Self, PictureError> {
+        let jobs: Vec<(usize, &Dossier, &Robot)> = gathered
+            .runs
+            .iter()
+            .enumerate()
+            .flat_map(|(number, dossier)| {
+                played(dossier, most).into_iter().map(move |robot| (number, dossier, robot))
+            })
+            .collect();
+        let each = (MOST_BYTES / jobs.len().max(1)).min(MOST_OF_ONE);
+        let done = AtomicU64::new(0);
+        let one = |&(number, dossier, robot): &(usize, &Dossier, &Robot)| {
+            let recording = dossier.record(robot);
+            let life = packed(&Walk::new(&recording)?, each)?;
+            lived(done.fetch_add(1, Ordering::Relaxed) + 1);
+            Ok(((number, robot.id.clone()), life))
+        };
+        jobs.par_iter().map(one).collect::<Result<BTreeMap<_, _>, _>>().map(Lives)
+    }
+
+    /// Id of the element with a robot's life.
+    pub fn id(&self, run: usize, robot: &str) -> Option<String> {
+        self.0.contains_key(&(run, robot.to_string())).then(|| format!("life-{run}-{robot}"))
+    }
+
+    /// The elements that hold them.
+    pub fn elements(&self) -> String {
+        let element = |((run, robot), life): (&(usize, String), &String)| {
+            format!("<script type=\"text/plain\" id=\"life-{run}-{}\">{life}</script>\n", escape(robot))
+        };
+        self.0.iter().map(element).collect()
+    }
+}
+
+/// Counts in a bin, in words.
+fn range(bin: usize, area: usize) -> String {
+    let width = (area / COUNT_BINS).max(1);
+    let last = if bin + 1 == COUNT_BINS { area } else { ((bin + 1) * width - 1).min(area) };
+    format!("{}–{last}", bin * width)
+}
+
+/// The map with its player.
+pub(super) fn archive(number: usize, dossier: &Dossier, lives: &Lives) -> String {
+    let run = &dossier.run;
+    let tasks = &run.dimensions.tasks;
+    let area = run.config.body.height * run.config.body.width;
+    let space = DescriptorSpace::voxel_counts(tasks.len());
+    let possible: BTreeSet<Vec<usize>> = possible_cells(area, run.config.body.min_muscles, tasks.len())
+        .into_iter()
+        .filter_map(|index| space.coordinates(index))
+        .collect();
+    let elites: BTreeMap<&[usize], &Robot> =
+        run.elites.iter().map(|robot| (robot.cell.as_slice(), robot)).collect();
+    let highest = run.elites.iter().map(|robot| robot.objective).fold(0.0, f64::max);
+    let colour = |objective: f64| match objective < 0.0 {
+        true => below(0.7).hex(),
+        false => sequential(if highest > 0.0 { objective / highest } else { 0.0 }).hex(),
+    };
+    let mut out = "<p>A square is a cell of the archive: how many muscle voxels (right) and sensor voxels (up) a body has, one map for each \
+        range of voxels in all. Press one to watch its robot; hatched cells are empty.</p>\n"
+        .to_string();
+    if tasks.len() > 1 {
+        let options: String = tasks
+            .iter()
+            .enumerate()
+            .map(|(place, task)| format!("<option value=\"{place}\">{}</option>", escape(task)))
+            .collect();
+        out += &format!("<p><label>Task <select class=\"task\">{options}</select></label></p>\n");
+    }
+    let stops: Vec<String> = (0..=8).map(|k| sequential(f64::from(k) / 8.0).hex()).collect();
+    out += &format!(
+        "<div class=\"scale\">fitness 0 <i style=\"background:linear-gradient(90deg,{})\"></i> {highest:.1} voxel lengths; gray: below 0</div>\n",
+        stops.join(",")
+    );
+    out += "<div class=\"archive\">\n<div>\n";
+    let best = played(dossier, 1).first().map(|robot| robot.id.clone());
+    for (place, task) in tasks.iter().enumerate() {
+        out += &format!(
+            "<div class=\"map\" data-task=\"{place}\" role=\"group\" aria-label=\"Cells of {}\">\n",
+            escape(task)
+        );
+        for total in 0..COUNT_BINS {
+            let mut cells = String::new();
+            for sensor in (0..COUNT_BINS).rev() {
+                for muscle in 0..COUNT_BINS {
+                    let mut cell = vec![muscle, sensor, total];
+                    cell.extend((tasks.len() > 1).then_some(place));
+                    let name = format!(
+                        "muscle {}, sensor {}, voxels {}",
+                        range(muscle, area),
+                        range(sensor, area),
+                        range(total, area)
+                    );
+                    cells += &match elites.get(cell.as_slice()) {
+                        Some(robot) => {
+                            let style = format!("background:{}", colour(robot.objective));
+                            let first = best.as_ref() == Some(&robot.id);
+                            button(number, dossier, lives, robot, (&style, &name, first), "")
+                        }
+                        None if possible.contains(&cell) => {
+                            format!("<span class=\"empty\" role=\"img\" aria-label=\"{name}: empty\"></span>")
+                        }
+                        None => "<span></span>".to_string(),
+                    };
+                }
+            }
+            out += &format!(
+                "<figure><div class=\"cells\">{cells}</div><figcaption>{} voxels</figcaption></figure>\n",
+                range(total, area)
+            );
+        }
+        out += "</div>\n";
+    }
+    out += "</div>\n<div>\n<p class=\"about\" aria-live=\"polite\"></p>\n<iframe title=\"The chosen robot\"></iframe>\n</div>\n</div>\n";
+    out
+}

@@ -1,0 +1,121 @@
+//! One self-contained page about runs: what was run, how it came along, an archive whose robots can be played, and what tests
+//! found of them. No network, works from `file://`.
+
+mod bodies;
+mod maps;
+mod tables;
+mod words;
+
+use super::html::{escape, fill};
+use super::plot::{self, Figure};
+use super::{PictureError, html};
+use crate::run::report::{Dossier, Findings, Gathered};
+use maps::Lives;
+
+/// What goes into a page.
+#[derive(Clone, Copy, Debug)]
+pub struct Content<'a> {
+    /// What is known.
+    pub gathered: &'a Gathered,
+    /// Most robots of each run that can be played; the fittest of them.
+    pub lives: usize,
+}
+
+impl Content<'_> {
+    /// Lives that have to be lived for it.
+    pub fn count(&self) -> usize {
+        self.gathered.runs.iter().map(|dossier| maps::played(dossier, self.lives).len()).sum()
+    }
+
+    /// The page as text; `lived` is told the number of lives lived so far.
+    ///
+    /// # Errors
+    /// If a life cannot be drawn.
+    pub fn page(&self, lived: &(dyn Fn(u64) + Sync)) -> Result<String, PictureError> {
+        let Gathered { runs, together } = self.gathered;
+        let lives = Lives::live(self.gathered, self.lives, lived)?;
+        let mut content = words::contents(runs);
+        if runs.len() > 1 {
+            content += &overview(runs, together);
+        }
+        for (number, dossier) in runs.iter().enumerate() {
+            content += &run(number, dossier, &lives, runs.len() > 1);
+        }
+        content += &lives.elements();
+        let style = [include_str!("../replay.css"), include_str!("report.css")].concat();
+        let player = serde_json::Value::from(html::player("%LIFE%")).to_string().replace('<', "\\u003c");
+        Ok(fill(
+            include_str!("report.html"),
+            &[
+                ("title", &escape(&words::title(runs))),
+                ("style", &style),
+                ("content", &content),
+                ("player", &player),
+                ("script", include_str!("report.js")),
+            ],
+        ))
+    }
+}
+
+/// A figure in the page, in a column's or a page's width.
+fn figure(figure: &Figure, class: &str) -> String {
+    format!("<figure class=\"figure {class}\">{}</figure>\n", figure.svg())
+}
+
+/// What several runs have in common.
+fn overview(runs: &[Dossier], together: &Findings) -> String {
+    let mut out = "<section id=\"together\">\n<h2>All runs together</h2>\n".to_string();
+    out += &tables::runs(runs);
+    let progress: Option<Vec<_>> = runs.iter().map(|dossier| dossier.progress.clone()).collect();
+    if let Some(progress) = progress {
+        out += &format!("<div class=\"figures\">{}</div>\n", figure(&plot::progress(&progress), "column"));
+    }
+    out += &findings(together);
+    out + "</section>\n"
+}
+
+/// A run.
+fn run(number: usize, dossier: &Dossier, lives: &Lives, is_one_of_several: bool) -> String {
+    let name = if is_one_of_several { format!("{}: ", words::name(dossier)) } else { String::new() };
+    let heading = |what: &str| format!("<h2>{}{what}</h2>\n", escape(&name));
+    let mut out = format!("<section id=\"run{number}\" data-run=\"{number}\">\n{}", heading("What was run"));
+    out += &tables::about(dossier);
+    out += &heading("Archive");
+    out += &maps::archive(number, dossier, lives);
+    out += &heading("The fittest, and the most different");
+    out += "<p>The fittest robots, then those whose bodies differ most from each other. Press one to watch it above.</p>\n";
+    out += &bodies::bodies(number, dossier, lives);
+    let mut figures = String::new();
+    if let Some(progress) = &dossier.progress {
+        figures += &figure(&plot::progress(std::slice::from_ref(progress)), "column");
+    }
+    let tasks = dossier.run.dimensions.tasks.len();
+    figures += &figure(&plot::archive(&dossier.run), if tasks > 1 { "page" } else { "column" });
+    out += &format!("{}<div class=\"figures\">\n{figures}</div>\n", heading("Progress"));
+    out += &findings(&dossier.findings);
+    out += &heading("Methods");
+    out += &words::methods(dossier);
+    out += &heading("Commands");
+    out += &words::commands(dossier);
+    out + "</section>\n"
+}
+
+/// What tests found.
+fn findings(found: &Findings) -> String {
+    let mut out = String::new();
+    if let Some(report) = found.eval.as_ref().filter(|report| !report.robots.is_empty()) {
+        out += "<h2>Test on held-out images</h2>\n";
+        out += &tables::eval(report);
+        out += &format!("<div class=\"figures\">{}</div>\n", figure(&plot::accuracy(report), "column"));
+    }
+    if let Some(audit) = &found.audit {
+        out += "<h2>Audit</h2>\n";
+        out += &tables::audit(audit);
+    }
+    if let Some(file) = found.capacity.as_ref().filter(|file| !file.tasks.is_empty()) {
+        out += "<h2>Capacity</h2>\n";
+        out += &tables::capacity(file);
+        out += &format!("<div class=\"figures\">{}</div>\n", figure(&plot::capacity(file), "page"));
+    }
+    out
+}

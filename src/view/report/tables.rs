@@ -1,0 +1,247 @@
+//! The tables of a report.
+
+use super::words;
+use crate::base::lanes::InstructionSet;
+use crate::run::audit_file::AuditFile;
+use crate::run::capacity_file::CapacityFile;
+use crate::run::eval_file::EvalFile;
+use crate::run::published;
+use crate::run::report::Dossier;
+use crate::run::verdict::Verdict;
+use crate::view::html::escape;
+use crate::view::progress::duration;
+
+/// Robots of a test or an audit that are listed one by one.
+const LISTED: usize = 50;
+
+/// A table; the first column is words, all others are numbers.
+fn table(headers: &[&str], rows: impl IntoIterator<Item = Vec<String>>) -> String {
+    let class = |place: usize| if place == 0 { "" } else { " class=\"number\"" };
+    let head: String = headers
+        .iter()
+        .enumerate()
+        .map(|(place, header)| format!("<th scope=\"col\"{}>{}</th>", class(place), escape(header)))
+        .collect();
+    let row = |cells: Vec<String>| {
+        let cells: String = cells
+            .iter()
+            .enumerate()
+            .map(|(place, cell)| format!("<td{}>{}</td>", class(place), escape(cell)))
+            .collect();
+        format!("<tr>{cells}</tr>\n")
+    };
+    let rows: String = rows.into_iter().map(row).collect();
+    format!(
+        "<div class=\"card scroll\"><table><thead><tr>{head}</tr></thead><tbody>\n{rows}</tbody></table></div>\n"
+    )
+}
+
+fn percent(share: f64) -> String {
+    format!("{:.1}", 100.0 * share)
+}
+
+fn or_none<T>(value: Option<T>, text: impl Fn(T) -> String) -> String {
+    value.map_or("–".to_string(), text)
+}
+
+/// A line per run.
+pub(super) fn runs(runs: &[Dossier]) -> String {
+    let row = |dossier: &Dossier| {
+        let stats = dossier.run.stats;
+        vec![
+            words::name(dossier),
+            dossier.run.generations.to_string(),
+            format!("{} of {}", stats.num_elites, dossier.run.dimensions.possible_cells),
+            format!("{:.1}", stats.qd_score),
+            or_none(stats.obj_max, |best| format!("{best:.2}")),
+            or_none(dossier.effort(), |(seconds, _)| duration(seconds)),
+        ]
+    };
+    let headers = ["run", "generations", "cells filled", "QD score", "best fitness", "time"];
+    table(&headers, runs.iter().map(row))
+}
+
+/// What was run: words and values.
+pub(super) fn about(dossier: &Dossier) -> String {
+    let run = &dossier.run;
+    let stats = run.stats;
+    let images: Vec<String> = run
+        .training_images
+        .iter()
+        .take(12)
+        .map(|image| format!("{} (train {})", image.label, image.index))
+        .collect();
+    let more = run.training_images.len().saturating_sub(images.len());
+    let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    let machine = format!(
+        "{} {}, {cores} cores, {}",
+        std::env::consts::OS,
+        std::env::consts::ARCH,
+        InstructionSet::in_use().name()
+    );
+    let effort = or_none(dossier.effort(), |(seconds, evaluations)| {
+        format!("{evaluations:.0} evaluations in {}", duration(seconds))
+    });
+    let rows = [
+        ("Run", words::name(dossier)),
+        ("Tasks", run.dimensions.tasks.join(", ")),
+        ("Data", format!("{}, training split SHA-256 {}", run.dataset.name, run.dataset.train_sha256)),
+        ("Training images", format!("{}{more}", images.join(", "))),
+        ("Generations", format!("{} of {}", run.generations, run.config.generations)),
+        ("Effort", effort),
+        (
+            "Archive",
+            format!(
+                "{} of {} cells (coverage {} %), QD score {:.1}, best fitness {}",
+                stats.num_elites,
+                run.dimensions.possible_cells,
+                percent(stats.coverage),
+                stats.qd_score,
+                or_none(stats.obj_max, |best| format!("{best:.2} voxel lengths"))
+            ),
+        ),
+        ("Made with", format!("morphcog {}", run.program_version)),
+        ("Report made on", machine),
+    ];
+    let rows: String = rows
+        .into_iter()
+        .map(|(key, value)| format!("<tr><th scope=\"row\">{key}</th><td>{}</td></tr>\n", escape(&value)))
+        .collect();
+    format!(
+        "<div class=\"card\"><table><tbody>\n{rows}</tbody></table></div>\n<details><summary>Config</summary><pre>{}</pre></details>\n",
+        escape(&run.config.to_toml())
+    )
+}
+
+/// Accuracies by task and by robot.
+pub(super) fn eval(report: &EvalFile) -> String {
+    let mut out = format!(
+        "<p>{} {} test images; {}; a displacement up to {} voxel lengths counts as wrong.</p>\n",
+        report.images.len(),
+        escape(&report.dataset),
+        escape(&report.selected),
+        report.threshold
+    );
+    let row = |(task, mean): (&String, &crate::run::eval_file::Mean)| {
+        let known = report.baselines.get(task);
+        vec![
+            task.clone(),
+            mean.robots.to_string(),
+            percent(mean.accuracy),
+            or_none(mean.standard_deviation, percent),
+            or_none(mean.interval, |[low, high]| format!("{}–{}", percent(low), percent(high))),
+            or_none(published::row(&report.dataset, task), |row| format!("{:.1}", row.accuracy)),
+            percent(mean.balanced_accuracy),
+            or_none(known, |known| percent(known.larger_group)),
+            or_none(known, |known| percent(known.best_single_pixel)),
+            or_none(known, |known| percent(known.nearest_training_image)),
+        ]
+    };
+    let headers = [
+        "task",
+        "robots",
+        "accuracy %",
+        "deviation",
+        "95 % interval",
+        "paper's %",
+        "balanced %",
+        "larger group %",
+        "best pixel %",
+        "nearest image %",
+    ];
+    out += &table(&headers, report.means.iter().map(row));
+    let row = |robot: &crate::run::eval_file::RobotReport| {
+        let [low, high] = robot.interval.map(percent);
+        vec![
+            robot.id.clone(),
+            robot.task.clone(),
+            format!("{:.2}", robot.objective),
+            percent(robot.accuracy),
+            format!("{low}–{high}"),
+            percent(robot.balanced_accuracy),
+            percent(robot.not_moved),
+            or_none(robot.validation.as_ref(), |found| percent(found.balanced_accuracy)),
+        ]
+    };
+    let headers = [
+        "robot",
+        "task",
+        "fitness",
+        "accuracy %",
+        "95 % interval",
+        "balanced %",
+        "not moved %",
+        "on validation %",
+    ];
+    out += "<h3>Robots</h3>\n";
+    out += &table(&headers, report.robots.iter().take(LISTED).map(row));
+    out
+}
+
+/// Verdicts.
+pub(super) fn audit(audit: &AuditFile) -> String {
+    let verdicts = [Verdict::Physical, Verdict::Exploits, Verdict::Fragile, Verdict::NotAWalker];
+    let counts: Vec<String> = verdicts
+        .map(|verdict| {
+            let count = audit.robots.iter().filter(|robot| robot.verdict == verdict).count();
+            format!("{count} {}", verdict.name())
+        })
+        .to_vec();
+    let mut out = format!(
+        "<p>Of {} robots, {} were audited: {}.</p>\n",
+        audit.elites,
+        audit.robots.len(),
+        counts.join(", ")
+    );
+    let mut walkers: Vec<_> =
+        audit.robots.iter().filter(|robot| robot.verdict != Verdict::NotAWalker).collect();
+    walkers.sort_by(|a, b| b.persisting.total_cmp(&a.persisting));
+    let row = |robot: &&crate::run::audit_file::RobotAudit| {
+        vec![
+            robot.id.clone(),
+            robot.task.clone(),
+            robot.conclusion(),
+            percent(robot.persisting),
+            format!("{:.2}", robot.spread),
+        ]
+    };
+    let rows: Vec<Vec<String>> = walkers.iter().take(LISTED).map(row).collect();
+    let headers = ["robot", "task", "verdict", "persists in % of changed lives", "spread"];
+    let listed = table(&headers, rows);
+    out += &format!("<details><summary>Verdicts on the walkers</summary>\n{listed}</details>\n");
+    out
+}
+
+/// Capacities.
+pub(super) fn capacity(file: &CapacityFile) -> String {
+    let size = |size: Option<f64>| size.map_or("no match".to_string(), |size| format!("{size:.1}"));
+    let rows = file.tasks.iter().map(|task| {
+        let own = |network: &str| {
+            or_none(task.curves.iter().find(|curve| curve.network == network), |curve| size(curve.capacity))
+        };
+        let paper = published::row(&file.dataset, &task.task);
+        vec![
+            task.task.clone(),
+            task.robots.to_string(),
+            percent(task.accuracy),
+            or_none(paper, |row| format!("{:.1}", row.accuracy)),
+            own("mlp"),
+            or_none(paper, |row| size(row.mlp)),
+            own("cnn"),
+            or_none(paper, |row| size(row.cnn)),
+        ]
+    });
+    let headers =
+        ["task", "robots", "accuracy %", "paper's %", "MLP neurons", "paper's", "CNN kernels", "paper's"];
+    let waits = if file.patience_on == "test" {
+        "the test images, as in the paper"
+    } else {
+        "images of the training split"
+    };
+    format!(
+        "<p>Networks trained on the robots' images, {} times per size; early stopping waits on {waits}.</p>\n{}",
+        file.trainings,
+        table(&headers, rows)
+    )
+}

@@ -1,0 +1,138 @@
+//! The words of a report: its title, a methods paragraph, and the commands that make it again.
+
+use crate::run::eval_file::Mean;
+use crate::run::report::Dossier;
+use crate::task::fitness::Fitness;
+use crate::task::protocol::Life;
+use crate::task::stimulus::Encoding;
+use crate::view::html::escape;
+
+/// A run in short.
+pub(super) fn name(dossier: &Dossier) -> String {
+    format!("{}, seed {}", dossier.run.name, dossier.run.config.seed)
+}
+
+/// The page's title.
+pub(super) fn title(runs: &[Dossier]) -> String {
+    match runs {
+        [one] => format!("{} – morphcog", name(one)),
+        several => format!("{} runs – morphcog", several.len()),
+    }
+}
+
+/// Links to the runs, if there are several.
+pub(super) fn contents(runs: &[Dossier]) -> String {
+    if runs.len() < 2 {
+        return String::new();
+    }
+    let link = |(number, dossier): (usize, &Dossier)| {
+        format!("<a href=\"#run{number}\">{}</a>\n", escape(&name(dossier)))
+    };
+    format!("<nav aria-label=\"Runs\">\n{}</nav>\n", runs.iter().enumerate().map(link).collect::<String>())
+}
+
+/// A paragraph that could go into a paper.
+pub(super) fn methods(dossier: &Dossier) -> String {
+    let run = &dossier.run;
+    let config = &run.config;
+    let (height, width) = (config.body.height, config.body.width);
+    let evaluations =
+        dossier.effort().map_or(String::new(), |(_, count)| format!(" ({count:.0} evaluations)"));
+    let encoding = match config.stimulus.encoding {
+        Encoding::Intensity => "proportional to the pixel's intensity".to_string(),
+        Encoding::Saturated => "1 for any pixel above 0".to_string(),
+        Encoding::Threshold => format!("1 for any pixel above {} of full intensity", config.stimulus.level),
+    };
+    let steps = config.protocol.control_steps;
+    let cycles = f64::from(steps) / f64::from(config.physics.cycle_steps);
+    let life = match config.protocol.life {
+        Life::Fresh => "a life of its own from the initial state",
+        Life::Sequential => "one continuous life for all images",
+    };
+    let fitness = match run.fitness() {
+        Fitness::Min => {
+            "the smallest distance walked towards the right side, or minus the largest one towards the wrong side"
+        }
+        Fitness::MeanClipped => {
+            "the mean distance walked towards the right side, clipped at ten voxel lengths"
+        }
+        Fitness::RightThenMargin => "the number of images answered right, ties broken by how far it walked",
+    };
+    let stages = match config.stage.len() {
+        0 => String::new(),
+        count => format!(
+            " Training went through {count} stages; the archive was evaluated anew at the beginning of each."
+        ),
+    };
+    let counts = |label: u8| run.training_images.iter().filter(|image| image.label == label).count();
+    let images: Vec<String> =
+        config.classes().into_iter().map(|class| format!("{} of class {class}", counts(class))).collect();
+    let mut text = format!(
+        "Bodies of at most {height} × {width} voxels (rigid, soft, two phases of muscle, shrinking and expanding sensors) were encoded by compositional \
+         pattern-producing networks and evolved with MAP-Elites for {} generations{evaluations}, seed {}, using morphcog {}. \
+         The archive's dimensions are the numbers of muscle, sensor and all voxels in seven bins each{}; {} of its {} cells can be filled. \
+         Each generation mutated up to {} elites; an offspring replaced an elite only if it was strictly fitter. \
+         Robots were trained on {} images of {} ({}); each image was shown for {steps} control steps ({cycles:.0} actuation cycles) in {life}, \
+         a sensor's stimulus being {encoding}. Fitness is {fitness}.{stages}",
+        run.generations,
+        config.seed,
+        run.program_version,
+        if run.dimensions.tasks.len() > 1 { ", and the task performed" } else { "" },
+        run.stats.num_elites,
+        run.dimensions.possible_cells,
+        config.map_elites.parents,
+        run.training_images.len(),
+        run.dataset.name,
+        images.join(", "),
+    );
+    if let Some(report) = dossier.findings.eval.as_ref().filter(|report| !report.means.is_empty()) {
+        let mean = |(task, mean): (&String, &Mean)| {
+            let interval = mean.interval.map_or(String::new(), |[low, high]| {
+                format!(" (95 % bootstrap interval {:.1}–{:.1} %)", 100.0 * low, 100.0 * high)
+            });
+            format!("{:.1} %{interval} on {task}", 100.0 * mean.accuracy)
+        };
+        let means: Vec<String> = report.means.iter().map(mean).collect();
+        text += &format!(
+            " On {} held-out test images, with displacements up to {} voxel lengths counted as wrong, {} robots ({}) reached a mean accuracy of {}.",
+            report.images.len(),
+            report.threshold,
+            report.robots.len(),
+            report.selected,
+            means.join(", ")
+        );
+    }
+    if let Some(audit) = &dossier.findings.audit {
+        let physical = audit.robots.iter().filter(|robot| robot.is_physical()).count();
+        text += &format!(
+            " Of {} robots audited under changes of start, time step, material and stimulus, {physical} kept their behaviour.",
+            audit.robots.len()
+        );
+    }
+    format!("<p>{}</p>\n", escape(&text))
+}
+
+/// The commands that make a run and its tests again.
+pub(super) fn commands(dossier: &Dossier) -> String {
+    let path = dossier.path.display().to_string();
+    let config = dossier.path.with_file_name(crate::run::folder::CONFIG).display().to_string();
+    let mut lines = vec![format!("morphcog evolve --config {config} --out again")];
+    let found = &dossier.findings;
+    if found.audit.is_some() {
+        lines.push(format!("morphcog audit --archive {path}"));
+    }
+    if let Some(report) = &found.eval {
+        let ids: Vec<&str> = report.robots.iter().map(|robot| robot.id.as_str()).collect();
+        let (images, seed) = (report.images.len(), report.seed);
+        lines.push(format!(
+            "morphcog eval --archive {path} --images {images} --seed {seed} --robots {}",
+            ids.join(",")
+        ));
+    }
+    if found.capacity.is_some() {
+        lines
+            .push(format!("morphcog capacity --eval {}", dossier.path.with_file_name("eval.json").display()));
+    }
+    lines.push(format!("morphcog report {path}"));
+    format!("<pre>{}</pre>\n", escape(&lines.join("\n")))
+}
