@@ -31,10 +31,14 @@ fn with_run() -> Sandbox {
 
 // ---- help ----
 
-const COMMANDS: [&str; 15] = [
+const COMMANDS: [&str; 21] = [
     "",
     "evolve",
     "eval",
+    "audit",
+    "capacity",
+    "reproduce",
+    "report",
     "replay",
     "plot",
     "simulate",
@@ -43,6 +47,7 @@ const COMMANDS: [&str; 15] = [
     "data info",
     "data sheet",
     "serve",
+    "bench",
     "gallery",
     "config",
     "completions",

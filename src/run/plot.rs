@@ -1,9 +1,8 @@
 //! `morphcog plot`: reads what figures are made of.
 
+use super::Error;
 use super::archive::RunFile;
-use super::eval_file::{EvalFile, FORMAT, FORMAT_VERSION};
 use super::folder::METRICS;
-use super::{Error, toml_text};
 use serde::Deserialize;
 use std::path::Path;
 
@@ -58,31 +57,6 @@ fn moments(text: &str) -> Result<Vec<Moment>, Error> {
     match moments.is_empty() {
         true => Err(Error::input("expected a line per generation, found none".to_string()).hint(hint())),
         false => Ok(moments),
-    }
-}
-
-/// Reads `eval.json`.
-///
-/// # Errors
-/// What is wrong with the file, with its line and key; or if there is no robot in it.
-pub fn read_eval(path: &Path) -> Result<EvalFile, Error> {
-    #[derive(Deserialize)]
-    struct Head {
-        format: Option<String>,
-        format_version: Option<u32>,
-    }
-    let hint = || format!("morphcog eval --archive {} makes it", path.with_file_name("run.json").display());
-    let text = std::fs::read_to_string(path).map_err(|error| Error::reading(path, &error).hint(hint()))?;
-    let name = path.display().to_string();
-    let head: Head = toml_text::read_json(&text, &name)?;
-    if head.format.as_deref() != Some(FORMAT) || head.format_version.is_none_or(|v| v > FORMAT_VERSION) {
-        let text = format!("{name}: expected \"format\": \"{FORMAT}\", \"format_version\": {FORMAT_VERSION}");
-        return Err(Error::input(text).hint(hint()));
-    }
-    let report: EvalFile = toml_text::read_json(&text, &name)?;
-    match report.robots.is_empty() {
-        true => Err(Error::input(format!("{name}: robots: expected at least one, found none")).hint(hint())),
-        false => Ok(report),
     }
 }
 

@@ -4,7 +4,8 @@ use super::console::Console;
 use super::plot::{self, Background, Figure};
 use super::{PictureError, write_whole};
 use crate::run::capacity_file::{CAPACITY_JSON, CapacityFile};
-use crate::run::plot::{Progress, read_eval};
+use crate::run::eval_file::{EVAL_JSON, EvalFile};
+use crate::run::plot::Progress;
 use crate::run::replay::{self, Found, Options};
 use crate::run::{Error, archive::RunFile, folder, gallery, sensitivity};
 use std::fmt;
@@ -152,7 +153,10 @@ pub fn make(console: &Console, wanted: &Wanted) -> Result<Vec<PathBuf>, Error> {
         }
     } else {
         for path in archives.iter().flatten() {
-            write(Made { figure: of_run(wanted.kind, path)?, stem: stem(Some(path), wanted.kind, "") })?;
+            write(Made {
+                figure: of_run(wanted.kind, path)?,
+                stem: stem(Some(path), wanted.kind, &result_name(wanted.kind, path)),
+            })?;
         }
     }
     Ok(files)
@@ -231,18 +235,44 @@ fn of_robot(console: &Console, wanted: &Wanted, archive: Option<&Path>, robot: &
 }
 
 fn of_run(kind: Kind, path: &Path) -> Result<Figure, Error> {
+    let hint = |error: Error| match error.hint {
+        None => error
+            .hint(format!("morphcog {} makes it", if kind == Kind::Accuracy { "eval" } else { "capacity" })),
+        Some(_) => error,
+    };
     match kind {
-        Kind::Accuracy => read_eval(&path.with_file_name("eval.json")).map(|report| plot::accuracy(&report)),
+        Kind::Accuracy => {
+            let path = result(path, EVAL_JSON);
+            let report = EvalFile::read(&path).map_err(hint)?;
+            if report.robots.is_empty() {
+                let text = format!("{}: robots: expected at least one, found none", path.display());
+                return Err(hint(Error::input(text)));
+            }
+            Ok(plot::accuracy(&report))
+        }
         Kind::Capacity => {
-            let hint = |error: Error| match error.hint {
-                None => error.hint("morphcog capacity makes it".to_string()),
-                Some(_) => error,
-            };
-            let file = CapacityFile::read(&path.with_file_name(CAPACITY_JSON)).map_err(hint)?;
+            let file = CapacityFile::read(&result(path, CAPACITY_JSON)).map_err(hint)?;
             Ok(plot::capacity(&file))
         }
         _ => RunFile::read(path).map(|run| plot::archive(&run)),
     }
+}
+
+/// A result file: the one beside a run.json, or the file itself that was named instead.
+fn result(path: &Path, name: &str) -> PathBuf {
+    match path.file_name().is_some_and(|given| given == folder::RUN_JSON) {
+        true => path.with_file_name(name),
+        false => path.to_path_buf(),
+    }
+}
+
+/// What distinguishes the figure of a result file that was named itself.
+fn result_name(kind: Kind, path: &Path) -> String {
+    let is_result = matches!(kind, Kind::Accuracy | Kind::Capacity);
+    let stem = path
+        .file_stem()
+        .filter(|_| is_result && path.file_name().is_some_and(|name| name != folder::RUN_JSON));
+    stem.map_or(String::new(), |stem| stem.to_string_lossy().into_owned())
 }
 
 fn failed(error: PictureError) -> Error {

@@ -14,7 +14,7 @@ const NAMED: usize = 40;
 /// body.
 pub fn accuracy(report: &EvalFile) -> Figure {
     let mut canvas = Canvas::new();
-    let of = format!("{}, seed {}; {}", report.run, report.run_seed, report.selected);
+    let of = format!("{}; {}", runs(report), report.selected);
     let top = heading(&mut canvas, "Accuracy on test images", &of, COLUMN);
     let named = report.robots.len() <= NAMED;
     let line = if named { 10.5 } else { 3.0 };
@@ -22,7 +22,7 @@ pub fn accuracy(report: &EvalFile) -> Figure {
     tasks.sort_unstable();
     tasks.dedup();
     let block_head = if tasks.len() > 1 { 12.0 } else { 0.0 };
-    let name_width = |robot: &RobotReport| fonts::width(&robot.id, TEXT, false);
+    let name_width = |robot: &RobotReport| fonts::width(&name(report, robot), TEXT, false);
     let names = report.robots.iter().map(name_width).fold(0.0, f64::max).min(80.0);
     let left = MARGIN + if named { names + 5.0 } else { 8.0 };
     let lowest = report.robots.iter().map(|robot| robot.interval[0]).fold(0.5, f64::min);
@@ -44,7 +44,7 @@ pub fn accuracy(report: &EvalFile) -> Figure {
             dot(&mut canvas, &plot, robot, y + line / 2.0, named);
             if named {
                 let at = [left - 4.0, y + line / 2.0 + 0.36 * TEXT];
-                canvas.fitted(at, &robot.id, 80.0, Words::end());
+                canvas.fitted(at, &name(report, robot), 80.0, Words::end());
             }
             y += line;
         }
@@ -56,6 +56,25 @@ pub fn accuracy(report: &EvalFile) -> Figure {
     let below = top + all + AXIS + 4.0;
     let height = legend(&mut canvas, report, below) + MARGIN;
     Figure::new(&format!("Accuracy: {of}"), [COLUMN, height], canvas.finish())
+}
+
+/// The runs in words: name and seeds.
+fn runs(report: &EvalFile) -> String {
+    match report.runs.as_slice() {
+        [] | [_] => format!("{}, seed {}", report.run, report.run_seed),
+        runs => {
+            let seeds: Vec<String> = runs.iter().map(|run| run.seed.to_string()).collect();
+            format!("{}, seeds {}", report.run, seeds.join(", "))
+        }
+    }
+}
+
+/// What a robot is called: its id, and of several runs the seed of its own.
+fn name(report: &EvalFile, robot: &RobotReport) -> String {
+    match report.runs.get(robot.run).filter(|_| report.runs.len() > 1) {
+        Some(run) => format!("{} ({})", robot.id, run.seed),
+        None => robot.id.clone(),
+    }
 }
 
 fn percent(share: f64) -> f64 {
