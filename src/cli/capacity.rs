@@ -61,6 +61,11 @@ pub(super) fn run(args: CapacityArgs, console: &Console) -> Result<(), Error> {
     let stop = signals::stop_flag()?;
     let file = capacity::capacity(&options, &stop, &reporters::Capacity::new(console))?;
     networks::capacity(console, &file, &options.out);
+    if !file.tasks.is_empty() {
+        let made = networks::figure(&file, &options.out);
+        let [svg, png] = made.map_err(|error| Error::other(error.to_string()))?;
+        console.line(&format!("wrote {} and {}", svg.display(), png.display()));
+    }
     if file.stopped {
         let text = "stopped; the trainings done so far are kept".to_string();
         return Err(Error::stopped(text).hint("the same command goes on".to_string()));

@@ -53,5 +53,9 @@ pub(super) fn run(args: ReproduceArgs, console: &Console) -> Result<(), Error> {
         return Err(Error::stopped(text).hint("the same command goes on".to_string()));
     }
     networks::table(console, &finished);
+    for (path, file) in &finished.capacities {
+        let made = networks::figure(file, path).map_err(|error| Error::other(error.to_string()))?;
+        console.line(&format!("wrote {}", made[1].display()));
+    }
     Ok(())
 }

@@ -2,6 +2,7 @@
 
 use super::audit_file::{AUDIT_JSON, AuditFile};
 use super::capacity_config::CapacityConfig;
+use super::capacity_file::CapacityFile;
 use super::eval_file::EvalFile;
 use super::folder::{IfExists, RUN_JSON};
 use super::robots::{Chosen, Selection, Source};
@@ -48,9 +49,8 @@ pub struct Experiment {
     pub set: Vec<String>,
 }
 
-/// Least number of test images and of trainings at small scales.
-const LEAST_IMAGES: usize = 100;
-const LEAST_TRAININGS: usize = 5;
+/// Least numbers of test images and trainings at small scales.
+const LEAST: [usize; 2] = [100, 5];
 
 impl Plan {
     /// Reads a plan: a file or, if there is none, the built-in one of that name.
@@ -91,9 +91,9 @@ impl Plan {
         let part = |count: usize, least: usize| {
             ((count as f64 * scale.sqrt()).round() as usize).max(least).min(count.max(least))
         };
-        let trainings = part(self.capacity.trainings, LEAST_TRAININGS.min(self.capacity.trainings));
+        let trainings = part(self.capacity.trainings, LEAST[1].min(self.capacity.trainings));
         Plan {
-            images: part(self.images, LEAST_IMAGES.min(self.images)),
+            images: part(self.images, LEAST[0].min(self.images)),
             capacity: CapacityConfig { trainings, ..self.capacity.clone() },
             ..self.clone()
         }
@@ -136,6 +136,8 @@ pub struct Finished {
     pub rows: Vec<Row>,
     /// Files written at the end.
     pub files: Vec<PathBuf>,
+    /// Every experiment's networks, with their file.
+    pub capacities: Vec<(PathBuf, CapacityFile)>,
     /// Whether a signal stopped it.
     pub stopped: bool,
 }
@@ -143,36 +145,39 @@ pub struct Finished {
 /// Does what of a plan is not done yet; what was done by an earlier, interrupted call stays.
 ///
 /// # Errors
-/// What is wrong with plan, data or folder.
+/// Of what is wrong.
 pub fn reproduce(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Result<Finished, Error> {
     if !(options.scale > 0.0 && options.scale <= 1.0) {
         return Err(Error::usage(format!("--scale {}: expected more than 0, up to 1", options.scale)));
     }
     let plan = options.plan.at(options.scale);
     let job = Job { options, plan: &plan, stop, observer };
-    // All configs first: a slip in the last one is not to be found out after hours.
+    // All configs first: a slip in the last one would be found out after hours.
     let mut experiments = Vec::new();
     for experiment in &plan.experiment {
         let name = config::name_of(&experiment.config);
         if experiments.iter().any(|(other, _)| *other == name) {
-            return Err(Error::input(format!("experiment: {name}: expected different configs")));
+            return Err(Error::input(format!("experiment: {name}: expected once")));
         }
         experiments.push((name, Config::load(&experiment.config, &experiment.set)?));
     }
-    let mut rows = Vec::new();
+    let (mut rows, mut capacities) = (Vec::new(), Vec::new());
     for (name, config) in &experiments {
-        let Some(found) = job.experiment(name, config)? else {
-            return Ok(Finished { rows, files: Vec::new(), stopped: true });
+        let Some((found, networks)) = job.experiment(name, config)? else {
+            return Ok(Finished { rows, files: Vec::new(), capacities, stopped: true });
         };
         rows.extend(found);
+        capacities.extend(networks);
     }
     let files = table::write(&options.out, options.scale, &rows)?;
-    Ok(Finished { rows, files, stopped: false })
+    Ok(Finished { rows, files, capacities, stopped: false })
 }
 
 /// Chosen robots, and by task how many are physical of how many that were audited.
 type Drawn<'s> = (Vec<Chosen<'s>>, BTreeMap<String, (usize, usize)>);
 
+/// Rows of the table, and networks with their file.
+type Experienced = (Vec<Row>, Option<(PathBuf, CapacityFile)>);
 /// One call.
 struct Job<'a> {
     options: &'a Options,
@@ -182,12 +187,11 @@ struct Job<'a> {
 }
 
 impl Job<'_> {
-    /// All steps of an experiment; its rows of the table, or `None` if stopped.
-    fn experiment(&self, name: &str, config: &Config) -> Result<Option<Vec<Row>>, Error> {
+    /// All steps of an experiment; its rows of the table and its networks, or `None` if stopped.
+    fn experiment(&self, name: &str, config: &Config) -> Result<Option<Experienced>, Error> {
         let Some(sources) = self.evolved(name, config)? else { return Ok(None) };
         let Some((chosen, audited)) = self.chosen(&sources)? else { return Ok(None) };
-        let tasks = &sources[0].run.dimensions.tasks;
-        let grouping = config.grouping()?;
+        let (tasks, grouping) = (&sources[0].run.dimensions.tasks, config.grouping()?);
         let tasks: Vec<&String> = tasks
             .iter()
             .filter(|task| grouping.tasks().iter().any(|s| s.name() == **task && !s.is_same_way()))
@@ -198,7 +202,7 @@ impl Job<'_> {
         }
         if chosen.is_empty() {
             self.observer.step(&format!("{name}: every robot exploits the simulator: nothing to test"));
-            return Ok(Some(rows));
+            return Ok(Some((rows, None)));
         }
         let path = self.options.out.join(format!("{name}-eval.json"));
         let Some(report) = self.tested(name, &path, &sources, &chosen)? else { return Ok(None) };
@@ -216,7 +220,7 @@ impl Job<'_> {
             return Ok(None);
         }
         rows.iter_mut().for_each(|row| row.fill(&report, &file));
-        Ok(Some(rows))
+        Ok(Some((rows, Some((options.out, file)))))
     }
 
     /// The runs of all seeds; `None` if stopped.
@@ -253,8 +257,7 @@ impl Job<'_> {
             let task = split.name();
             let of_task: Vec<Chosen> = all.iter().filter(|c| c.robot.task == task).copied().collect();
             let order = stream(1, Purpose::Robots, 1, number).sample(of_task.len(), of_task.len());
-            let (mut physical, mut others) = (Vec::new(), Vec::new());
-            let mut audited = 0;
+            let (mut physical, mut others, mut audited) = (Vec::new(), Vec::new(), 0);
             for turn in order.chunks(self.plan.robots) {
                 if physical.len() >= self.plan.robots {
                     break;

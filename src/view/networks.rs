@@ -1,10 +1,11 @@
 //! What `morphcog capacity` says at its end: the paper's table.
 
 use super::console::{Console, Mode};
+use super::{PictureError, plot, write_whole};
 use crate::run::capacity_file::{CapacityFile, TaskCapacity};
 use crate::run::published;
 use crate::run::reproduce::Finished;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// The table: task, accuracy and capacity, the paper's beside ours.
 pub fn capacity(console: &Console, file: &CapacityFile, out: &Path) {
@@ -57,6 +58,18 @@ pub fn capacity(console: &Console, file: &CapacityFile, out: &Path) {
     };
     console.line(&format!("{}; early stopping waits on {waits}", file.selected));
     console.line(&format!("wrote {} and {}", out.display(), out.with_extension("csv").display()));
+}
+
+/// The figure beside a `capacity.json`, as SVG and as PNG; the files.
+///
+/// # Errors
+/// If it cannot be made or written.
+pub fn figure(file: &CapacityFile, out: &Path) -> Result<[PathBuf; 2], PictureError> {
+    let figure = plot::capacity(file);
+    let files = ["svg", "png"].map(|ending| out.with_extension(ending));
+    write_whole(&files[0], figure.svg().as_bytes())?;
+    write_whole(&files[1], &figure.png(plot::PRINT)?)?;
+    Ok(files)
 }
 
 /// After a reproduction: the paper's table, the paper's figures beside ours.

@@ -119,7 +119,10 @@ pub(super) fn archive(number: usize, dossier: &Dossier, lives: &Lives) -> String
         );
         for total in 0..COUNT_BINS {
             let mut cells = String::new();
-            for sensor in (0..COUNT_BINS).rev() {
+            // Rows in which no body can be are left out.
+            let highest = possible.iter().filter(|cell| cell[2] == total).map(|cell| cell[1]).max();
+            let Some(highest) = highest else { continue };
+            for sensor in (0..=highest).rev() {
                 for muscle in 0..COUNT_BINS {
                     let mut cell = vec![muscle, sensor, total];
                     cell.extend((tasks.len() > 1).then_some(place));
@@ -143,7 +146,7 @@ pub(super) fn archive(number: usize, dossier: &Dossier, lives: &Lives) -> String
                 }
             }
             out += &format!(
-                "<figure><div class=\"cells\">{cells}</div><figcaption>{} voxels</figcaption></figure>\n",
+                "<figure><div class=\"cells\">{cells}</div><figcaption>{} voxels; sensor ↑ muscle →</figcaption></figure>\n",
                 range(total, area)
             );
         }

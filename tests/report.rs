@@ -1,0 +1,78 @@
+//! The page about runs: whole in itself, with what there is, and the same every time.
+
+mod common;
+
+use common::program::{Sandbox, TINY};
+
+fn sandbox() -> Sandbox {
+    let sandbox = Sandbox::new();
+    sandbox.write("tiny.toml", TINY);
+    for seed in [3, 4] {
+        sandbox.run(&format!("evolve -q -c tiny.toml --seed {seed} -o runs/{seed}")).ended(0, &[]);
+    }
+    sandbox
+}
+
+/// Text between two marks, all of them.
+fn between<'a>(text: &'a str, begin: &str, end: &str) -> Vec<&'a str> {
+    text.split(begin).skip(1).filter_map(|rest| rest.split_once(end)).map(|(inner, _)| inner).collect()
+}
+
+#[test]
+fn every_elite_can_be_played_and_nothing_is_loaded() {
+    let sandbox = sandbox();
+    let said = sandbox.run("report runs/3").ended(0, &[]);
+    assert!(said.out.contains("report.html"), "{}", said.out);
+    let page = sandbox.read("runs/3/report.html");
+    for forbidden in ["http://", "https://", "src=", "@import", "url(", "<link"] {
+        let found = page.replace("http://www.w3.org/2000/svg", "").contains(forbidden);
+        assert!(!found, "{forbidden}");
+    }
+    let run = sandbox.run_file("runs/3");
+    let lives = between(&page, "data-life=\"", "\"");
+    for elite in &run.elites {
+        let id = format!("life-0-{}", elite.id);
+        assert!(lives.contains(&id.as_str()) && page.contains(&format!("id=\"{id}\"")), "{id}");
+    }
+    // What is packed is a life of that robot.
+    let id = &run.elites[0].id;
+    let packed = between(&page, &format!("id=\"life-0-{id}\">"), "</script>")[0];
+    let bytes = base64::Engine::decode(&base64::engine::general_purpose::STANDARD, packed).unwrap();
+    let life: serde_json::Value = serde_json::from_reader(flate2::read::GzDecoder::new(&bytes[..])).unwrap();
+    assert_eq!(life["robot"], id.as_str());
+    assert_eq!(life["phases"].as_array().unwrap().len(), 2);
+    let walked = life["phases"][0]["displacement"].as_f64().unwrap();
+    assert!((walked - run.elites[0].displacements[0]).abs() < 1e-9);
+    sandbox.run("report runs/3/run.json -o again.html").ended(0, &[]);
+    let same = |page: &str| page.replace("runs/3/run.json", "").replace("runs/3", "");
+    assert_eq!(same(&sandbox.read("again.html")), same(&page));
+}
+
+#[test]
+fn what_lies_beside_the_run_is_in_it_and_several_runs_go_together() {
+    let sandbox = sandbox();
+    sandbox.run("eval -q --archive runs/3/run.json --images 20 --cycles 1 --robots top:3").ended(0, &[]);
+    sandbox.run("audit -q --archive runs/3/run.json").ended(0, &[]);
+    sandbox.run("capacity -q --eval runs/3/eval.json --set trainings=2 --set sizes=[1,4]").ended(0, &[]);
+    sandbox.run("report runs/3 runs/4").ended(0, &[]);
+    let page = sandbox.read("runs/report.html");
+    for part in
+        ["All runs together", "<h2>Audit</h2>", "Test on held-out images", "Capacity", "run1", "Methods"]
+    {
+        assert!(page.contains(part), "{part}");
+    }
+    assert!(page.contains("id=\"run0\"") && page.contains("id=\"run1\""));
+    // A broken file is left out, and said to be.
+    sandbox.write("runs/3/eval.json", "{");
+    sandbox.run("report runs/3 --lives 0").ended(0, &["eval.json", "left out"]);
+    let page = sandbox.read("runs/3/report.html");
+    assert!(!page.contains("Test on held-out images") && !page.contains("id=\"life-"));
+}
+
+#[test]
+fn what_is_no_run_is_refused() {
+    let sandbox = sandbox();
+    sandbox.run("report nowhere").ended(3, &["nowhere"]);
+    sandbox.run("report tiny.toml").ended(3, &["tiny.toml"]);
+    sandbox.run("report runs/3 -o runs").ended(1, &["runs"]);
+}
