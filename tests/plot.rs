@@ -168,3 +168,24 @@ fn what_cannot_be_shown_is_refused_in_a_line() {
     std::fs::remove_file(sandbox.path("run/metrics.csv")).unwrap();
     refused("progress -a run/run.json", 3, &["metrics.csv"]);
 }
+
+#[test]
+fn moving_pictures_have_a_look_and_a_speed() {
+    let sandbox = with_run();
+    let gif = |line: &str| {
+        sandbox.run(&format!("replay -a run/run.json -o a.gif --width 320 {line}")).ended(0, &[]);
+        std::fs::read(sandbox.path("a.gif")).unwrap()
+    };
+    // Hundredths of a second from frame to frame stand in the blocks that begin so.
+    let delays = |bytes: &[u8]| -> Vec<u8> {
+        let blocks = bytes.windows(8).filter(|b| b[..3] == [0x21, 0xf9, 0x04] && b[7] == 0);
+        blocks.map(|block| block[4]).collect()
+    };
+    let own = gif("");
+    assert_eq!((delays(&own)[0], delays(&own).len()), (2, 2 * 21));
+    let half = gif("--fps 25 --every 2");
+    assert_eq!((delays(&half)[0], delays(&half).len()), (4, 2 * 11));
+    assert_ne!(gif("--look paper"), own);
+    sandbox.run("replay -a run/run.json --look pretty").ended(2, &["plain or paper"]);
+    sandbox.run("replay -a run/run.json --fps 60").ended(2, &["--fps"]);
+}

@@ -79,6 +79,8 @@ struct Scale {
     right: Axis,
     /// Lowest fitness, if some elite is below nothing.
     lowest: Option<f64>,
+    /// Whether a cell is without an elite.
+    is_open: bool,
 }
 
 impl Scale {
@@ -87,7 +89,11 @@ impl Scale {
         let highest = objectives().fold(0.0, f64::max);
         let lowest = objectives().fold(0.0, f64::min);
         let highest = if highest > 0.0 { highest } else { 1.0 };
-        Scale { right: Axis::nice(0.0, highest, 4), lowest: (lowest < 0.0).then_some(lowest) }
+        Scale {
+            right: Axis::nice(0.0, highest, 4),
+            lowest: (lowest < 0.0).then_some(lowest),
+            is_open: run.elites.len() < run.dimensions.possible_cells,
+        }
     }
 
     fn colour(&self, fitness: f64) -> Colour {
@@ -185,14 +191,17 @@ fn legend(canvas: &mut Canvas, [x, y]: [f64; 2], width: f64, scale: &Scale, is_a
     colour_bar(canvas, [x, y + 4.0], width - 6.0, &scale.right, "fitness [voxel lengths]", |value| {
         scale.colour(value)
     });
-    let mut lines = vec![(colour::PAPER, "no elite".to_string())];
+    let mut lines = Vec::new();
     if let Some(lowest) = scale.lowest {
         lines.push((scales::below(0.5), format!("below 0 (to {})", number(lowest).replace('-', "−"))));
+    }
+    if scale.is_open {
+        lines.push((colour::PAPER, "no elite".to_string()));
     }
     let lines = lines.iter().map(|(fill, text)| (*fill, text.as_str()));
     let below = robot::legend(canvas, [x, y + 26.0], lines, width);
     if scale.lowest.is_some() {
-        canvas.path(&stroke([x, y + 37.0], [7.0, 7.0]), STROKE);
+        canvas.path(&stroke([x, y + 26.0], [7.0, 7.0]), STROKE);
     }
     if !is_above {
         for (k, text) in STRIPS.into_iter().enumerate() {
@@ -213,7 +222,7 @@ mod tests {
 
     #[test]
     fn what_is_wrong_is_gray_and_what_is_right_is_not() {
-        let scale = Scale { right: Axis::nice(0.0, 20.0, 4), lowest: Some(-10.0) };
+        let scale = Scale { right: Axis::nice(0.0, 20.0, 4), lowest: Some(-10.0), is_open: true };
         assert_eq!(scale.colour(20.0), scales::sequential(1.0));
         assert_eq!(scale.colour(-10.0), scales::below(0.0));
         assert_ne!(scale.colour(-0.1), scale.colour(0.1));
