@@ -13,6 +13,7 @@ use crate::run::data::catalogue::Catalogue;
 use crate::run::data::fetch::{FetchOptions, fetch};
 use crate::run::eval_file::EVAL_JSON;
 use crate::run::folder::IfExists;
+use crate::run::plan::{PAPER_TOML, Plan};
 use crate::run::{
     Config, Error, bench, config, data, eval, evolve, folder, gallery, replay, signals, simulate, validation,
 };
@@ -47,7 +48,11 @@ pub fn run(cli: Cli, console: &Console) -> Result<(), Error> {
         Command::Data { command } => run_data(command, console),
         Command::Gallery => gallery::gallery().map(|robots| summary::gallery(console, &robots)),
         Command::Config { name: None, .. } => {
-            summary::configs(console, &config::BUILT_IN);
+            summary::configs(console, &[&config::BUILT_IN[..], &[PAPER_TOML]].concat());
+            Ok(())
+        }
+        Command::Config { name: Some(name), set } if Plan::is_built_in(&name) => {
+            console.text(&Plan::load(&name, &set)?.to_toml());
             Ok(())
         }
         Command::Config { name: Some(name), set } => {

@@ -6,6 +6,7 @@ use common::program::{Sandbox, TINY, files, said};
 use common::{Reference, golden};
 use morphcog::run::config::{BUILT_IN, Config};
 use morphcog::run::eval_file::EvalFile;
+use morphcog::run::plan::PAPER_TOML;
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::OnceLock;
@@ -143,8 +144,11 @@ fn the_man_page_renders() {
 fn every_shipped_config_is_valid_and_its_built_in_copy_is_the_same() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs");
     let shipped = files(&folder);
-    let built_in: BTreeMap<String, Vec<u8>> =
-        BUILT_IN.iter().map(|(name, text)| (name.to_string(), text.as_bytes().to_vec())).collect();
+    let built_in: BTreeMap<String, Vec<u8>> = BUILT_IN
+        .iter()
+        .chain([&PAPER_TOML])
+        .map(|(name, text)| (name.to_string(), text.as_bytes().to_vec()))
+        .collect();
     assert_eq!(shipped, built_in);
     let sandbox = Sandbox::new();
     let list = sandbox.run("config").ended(0, &[]).out;
@@ -152,6 +156,10 @@ fn every_shipped_config_is_valid_and_its_built_in_copy_is_the_same() {
         Config::parse(text, name, &[]).unwrap();
         assert!(list.contains(name), "{list}");
     }
+    let plan = sandbox.run("config paper.toml --set seeds=[7]").ended(0, &[]).out;
+    sandbox.write("mine.toml", &plan);
+    assert!(list.contains("paper.toml") && plan.contains("seeds = [7]"), "{plan}");
+    sandbox.run("reproduce mine.toml --scale 2").ended(2, &["--scale 2"]);
 }
 
 #[test]

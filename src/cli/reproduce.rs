@@ -1,6 +1,7 @@
 //! `morphcog reproduce`: its words, and what it calls.
 
-use crate::run::reproduce::{self, Options, Plan};
+use crate::run::plan::{PAPER_TOML, Plan};
+use crate::run::reproduce::{self, Options};
 use crate::run::{Error, signals};
 use crate::view::console::Console;
 use crate::view::{networks, reporters};
@@ -19,7 +20,7 @@ the networks they are worth, and prints the paper's table. Ctrl-C stops it anywh
 #[derive(Debug, Args)]
 pub(super) struct ReproduceArgs {
     /// What belongs to it (TOML or JSON), or paper.toml, which is built in.
-    #[arg(default_value = reproduce::PAPER_TOML.0)]
+    #[arg(default_value = PAPER_TOML.0)]
     plan: String,
     /// More than 0, up to 1: generations are multiplied by it, test images and trainings by its square root.
     #[arg(long, default_value_t = 1.0)]

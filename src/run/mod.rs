@@ -19,6 +19,7 @@ pub mod evolve;
 pub mod folder;
 pub mod gallery;
 pub mod metrics;
+pub mod plan;
 pub mod plot;
 pub mod published;
 pub mod replay;

@@ -1,104 +1,18 @@
 //! `morphcog reproduce`: the whole paper at a chosen scale, from the first generation to its table.
 
 use super::audit_file::{AUDIT_JSON, AuditFile};
-use super::capacity_config::CapacityConfig;
 use super::capacity_file::CapacityFile;
 use super::eval_file::EvalFile;
 use super::folder::{IfExists, RUN_JSON};
+use super::plan::Plan;
 use super::robots::{Chosen, Selection, Source};
 use super::table::{self, Row};
-use super::verdict::{Criteria, Verdict};
-use super::{Config, Error, audit, capacity, config, eval, evolve, toml_text};
+use super::verdict::Verdict;
+use super::{Config, Error, audit, capacity, config, eval, evolve};
 use crate::base::random::{Purpose, stream};
-use serde::{Deserialize, Serialize};
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
-
-/// The built-in plan: the paper's.
-pub const PAPER_TOML: (&str, &str) = ("paper.toml", include_str!("../../configs/paper.toml"));
-
-/// What belongs to a reproduction.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Plan {
-    /// Seeds of the runs of each experiment.
-    pub seeds: Vec<u64>,
-    /// Robots of each task that are tested.
-    pub robots: usize,
-    /// Test images.
-    pub images: usize,
-    /// The experiments.
-    pub experiment: Vec<Experiment>,
-    /// How robots are judged.
-    #[serde(default)]
-    pub audit: Criteria,
-    /// The networks.
-    #[serde(default)]
-    pub capacity: CapacityConfig,
-}
-
-/// An experiment: a config, and what is changed in it.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Experiment {
-    /// A config file, or the name of a built-in one.
-    pub config: String,
-    /// Changes, as with `--set`.
-    #[serde(default)]
-    pub set: Vec<String>,
-}
-
-/// Least numbers of test images and trainings at small scales.
-const LEAST: [usize; 2] = [100, 5];
-
-impl Plan {
-    /// Reads a plan: a file or, if there is none, the built-in one of that name.
-    ///
-    /// # Errors
-    /// What is wrong with it, with file, line and key.
-    pub fn load(name: &str, overrides: &[String]) -> Result<Self, Error> {
-        let (own, text) = PAPER_TOML;
-        let is_own = name == own || own.strip_suffix(".toml") == Some(name);
-        let text = match std::fs::read_to_string(name) {
-            Err(error) if error.kind() == std::io::ErrorKind::NotFound && is_own => text.to_string(),
-            Err(error) => return Err(Error::reading(Path::new(name), &error)),
-            Ok(text) => text,
-        };
-        let is_json = name.ends_with(".json");
-        let format = if is_json { toml_text::Format::Json } else { toml_text::Format::Toml };
-        let mut plan: Plan = toml_text::read(&text, format, name)?;
-        for assignment in overrides {
-            plan = toml_text::set(&plan, assignment)?;
-        }
-        let refuse = |text: &str| Err(Error::input(format!("{name}: {text}")));
-        if plan.seeds.is_empty() || plan.experiment.is_empty() {
-            return refuse("seeds, experiment: expected one or more of each");
-        }
-        if plan.seeds.iter().collect::<BTreeSet<_>>().len() < plan.seeds.len() {
-            return refuse("seeds: expected different ones");
-        }
-        if plan.robots == 0 || plan.images == 0 {
-            return refuse("robots, images: expected 1 or more");
-        }
-        plan.audit.check().and_then(|()| plan.capacity.check()).map_err(|error| error.within(name))?;
-        Ok(plan)
-    }
-
-    /// The plan at a scale: generations are multiplied by it, test images and trainings by its square root.
-    #[must_use]
-    fn at(&self, scale: f64) -> Self {
-        let part = |count: usize, least: usize| {
-            ((count as f64 * scale.sqrt()).round() as usize).max(least).min(count.max(least))
-        };
-        let trainings = part(self.capacity.trainings, LEAST[1].min(self.capacity.trainings));
-        Plan {
-            images: part(self.images, LEAST[0].min(self.images)),
-            capacity: CapacityConfig { trainings, ..self.capacity.clone() },
-            ..self.clone()
-        }
-    }
-}
 
 /// What to reproduce, and where to.
 #[derive(Clone, Debug)]

@@ -1,0 +1,117 @@
+//! [`Plan`]: what belongs to a reproduction of the paper.
+
+use super::capacity_config::CapacityConfig;
+use super::verdict::Criteria;
+use super::{Error, toml_text};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeSet;
+use std::path::Path;
+
+/// The built-in plan: the paper's.
+pub const PAPER_TOML: (&str, &str) = ("paper.toml", include_str!("../../configs/paper.toml"));
+
+/// What belongs to a reproduction.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Plan {
+    /// Seeds of the runs of each experiment.
+    pub seeds: Vec<u64>,
+    /// Robots of each task that are tested.
+    pub robots: usize,
+    /// Test images.
+    pub images: usize,
+    /// The experiments.
+    pub experiment: Vec<Experiment>,
+    /// How robots are judged.
+    #[serde(default)]
+    pub audit: Criteria,
+    /// The networks.
+    #[serde(default)]
+    pub capacity: CapacityConfig,
+}
+
+/// An experiment: a config, and what is changed in it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Experiment {
+    /// A config file, or the name of a built-in one.
+    pub config: String,
+    /// Changes, as with `--set`.
+    #[serde(default)]
+    pub set: Vec<String>,
+}
+
+/// Least numbers of test images and trainings at small scales.
+const LEAST: [usize; 2] = [100, 5];
+
+impl Plan {
+    /// Whether a name is that of the built-in plan, and of no file.
+    pub fn is_built_in(name: &str) -> bool {
+        let own = PAPER_TOML.0;
+        (name == own || own.strip_suffix(".toml") == Some(name)) && !Path::new(name).exists()
+    }
+
+    /// The plan as TOML, every key with its value.
+    pub fn to_toml(&self) -> String {
+        // Every field is a number, text, list or table, which TOML has.
+        toml::to_string_pretty(self).unwrap_or_default()
+    }
+
+    /// Reads a plan: a file or, if there is none, the built-in one of that name.
+    ///
+    /// # Errors
+    /// What is wrong with it, with file, line and key.
+    pub fn load(name: &str, overrides: &[String]) -> Result<Self, Error> {
+        let text = match std::fs::read_to_string(name) {
+            Err(_) if Plan::is_built_in(name) => PAPER_TOML.1.to_string(),
+            Err(error) => return Err(Error::reading(Path::new(name), &error)),
+            Ok(text) => text,
+        };
+        let is_json = name.ends_with(".json");
+        let format = if is_json { toml_text::Format::Json } else { toml_text::Format::Toml };
+        let mut plan: Plan = toml_text::read(&text, format, name)?;
+        for assignment in overrides {
+            plan = toml_text::set(&plan, assignment)?;
+        }
+        let refuse = |text: &str| Err(Error::input(format!("{name}: {text}")));
+        if plan.seeds.is_empty() || plan.experiment.is_empty() {
+            return refuse("seeds, experiment: expected one or more of each");
+        }
+        if plan.seeds.iter().collect::<BTreeSet<_>>().len() < plan.seeds.len() {
+            return refuse("seeds: expected different ones");
+        }
+        if plan.robots == 0 || plan.images == 0 {
+            return refuse("robots, images: expected 1 or more");
+        }
+        plan.audit.check().and_then(|()| plan.capacity.check()).map_err(|error| error.within(name))?;
+        Ok(plan)
+    }
+
+    /// The plan at a scale: generations are multiplied by it, test images and trainings by its square root.
+    #[must_use]
+    pub(super) fn at(&self, scale: f64) -> Self {
+        let part = |count: usize, least: usize| {
+            ((count as f64 * scale.sqrt()).round() as usize).max(least).min(count.max(least))
+        };
+        let trainings = part(self.capacity.trainings, LEAST[1].min(self.capacity.trainings));
+        Plan {
+            images: part(self.images, LEAST[0].min(self.images)),
+            capacity: CapacityConfig { trainings, ..self.capacity.clone() },
+            ..self.clone()
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_small_scale_has_fewer_images_and_trainings_but_never_too_few() {
+        let plan = Plan::load(PAPER_TOML.0, &[]).unwrap();
+        let sizes = |scale: f64| (plan.at(scale).images, plan.at(scale).capacity.trainings);
+        assert_eq!([1.0, 0.25, 0.01, 1e-6].map(sizes), [(1000, 50), (500, 25), (100, 5), (100, 5)]);
+        let few = Plan { images: 30, ..plan };
+        assert_eq!(few.at(0.01).images, 30);
+    }
+}
