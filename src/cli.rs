@@ -14,6 +14,7 @@ use crate::run::data::fetch::{FetchOptions, fetch};
 use crate::run::eval_file::EVAL_JSON;
 use crate::run::folder::IfExists;
 use crate::run::plan::{PAPER_TOML, Plan};
+use crate::run::robots::Selection;
 use crate::run::{
     Config, Error, bench, config, data, eval, evolve, folder, gallery, replay, signals, simulate, validation,
 };
@@ -138,10 +139,27 @@ fn run_evolve(args: EvolveArgs, console: &Console) -> Result<(), Error> {
 }
 
 fn run_eval(args: EvalArgs, console: &Console) -> Result<(), Error> {
-    let archives = if args.archive.is_empty() { vec![folder::newest_run()?] } else { args.archive };
-    let out = args.out.unwrap_or_else(|| folder::above(&archives).join(EVAL_JSON));
+    let of_gallery = args.archive.is_empty() && gallery::is_meant(&args.robots)?;
+    if of_gallery && args.physical_only {
+        let text = "--physical-only: expected robots of an archive, not published ones";
+        return Err(Error::usage(text.to_string()).hint("morphcog audit --robots gallery".to_string()));
+    }
+    let archives = match args.archive.is_empty() {
+        true if of_gallery => Vec::new(),
+        true => vec![folder::newest_run()?],
+        false => args.archive,
+    };
+    let beside = || match of_gallery {
+        true => Path::new("gallery-eval.json").to_path_buf(),
+        false => folder::above(&archives).join(EVAL_JSON),
+    };
+    let out = args.out.unwrap_or_else(beside);
+    let robots = match &args.robots {
+        Selection::Ids(ids) if of_gallery && ids.iter().any(|id| id == gallery::ALL) => Selection::All,
+        robots => robots.clone(),
+    };
     let options = eval::Options {
-        robots: args.robots.physical(args.physical_only),
+        robots: robots.physical(args.physical_only),
         images: args.images as usize,
         validation: args.validation.map(|images| images as usize),
         seed: args.seed,

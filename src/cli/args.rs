@@ -63,7 +63,8 @@ Examples:
   morphcog eval --archive runs/zero_one-seed1/run.json --images 1000
   morphcog eval --archive runs/zero_one-seed1/run.json --robots top:10
   morphcog eval --archive runs/zero_one-seed1/run.json --robots 3fa,b02 -o two.json
-  morphcog eval --archive runs/zero_one-seed*/run.json --robots random:10 --physical-only    the paper's test")]
+  morphcog eval --archive runs/zero_one-seed*/run.json --robots random:10 --physical-only    the paper's test
+  morphcog eval --robots gallery                       the robots published with the paper")]
     Eval(EvalArgs),
     /// Tell robots that walk from robots that live off the simulator.
     #[command(after_help = audit::EXAMPLES)]
@@ -196,7 +197,8 @@ pub(super) struct EvalArgs {
     #[arg(short = 'n', long, default_value_t = 1000, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pub(super) images: u32,
     /// all, top:N or random:N (of each task), best-validation:N (the best of each run and task on validation images,
-    /// drawn from the training split), or ids (or beginnings of ids) separated by commas.
+    /// drawn from the training split), or ids (or beginnings of ids) separated by commas; without --archive also gallery,
+    /// or names of published robots.
     #[arg(short, long, visible_alias = "select", default_value = "top:10")]
     pub(super) robots: Selection,
     /// Validation images in all, for best-validation (default: those of the config, or 400).

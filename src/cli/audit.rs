@@ -85,15 +85,8 @@ fn sources(args: &AuditArgs) -> Result<Vec<Source>, Error> {
     if !args.archive.is_empty() {
         return Ok(args.archive.iter().cloned().map(Source::Archive).collect());
     }
-    if let Selection::Ids(ids) = &args.robots {
-        if matches!(ids.as_slice(), [word] if word == gallery::ALL) {
-            return Ok(vec![Source::Gallery]);
-        }
-        let published: Result<Vec<bool>, Error> =
-            ids.iter().map(|id| Ok(gallery::find(id)?.is_some())).collect();
-        if published?.iter().all(|is_published| *is_published) {
-            return Ok(vec![Source::Gallery]);
-        }
+    if gallery::is_meant(&args.robots)? {
+        return Ok(vec![Source::Gallery]);
     }
     Ok(vec![Source::Archive(folder::newest_run()?)])
 }

@@ -5,7 +5,7 @@ use super::eval_file::{Baselines, EvalFile, RobotReport, Trial};
 use super::robots::{Chosen, Selection, Source};
 use super::training::{ImageRef, load_dataset, see};
 use super::validation::{self, Validated};
-use super::{Config, Error, folder::RunFolder};
+use super::{Config, Error, folder::RunFolder, gallery};
 use crate::base::Grid;
 use crate::base::files::{check_writable, write_atomically};
 use crate::sim::Lattice;
@@ -30,7 +30,7 @@ pub const CYCLES: u32 = 10;
 /// What to evaluate, and on what.
 #[derive(Clone, Debug)]
 pub struct Options {
-    /// The run.json, or those of several runs that differ in their seeds only.
+    /// The run.json, or those of several runs that differ in their seeds only; none: the published robots.
     pub archives: Vec<PathBuf>,
     /// Which of its robots.
     pub robots: Selection,
@@ -81,12 +81,11 @@ pub fn eval(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Re
             options.threshold
         )));
     }
-    let sources: Result<Vec<Source>, Error> =
-        options.archives.iter().map(|path| Source::read(path)).collect();
-    let sources = sources?;
-    let Some(first) = sources.first() else {
-        return Err(Error::usage("--archive: expected a run.json".to_string()));
+    let sources: Vec<Source> = match options.archives.as_slice() {
+        [] => vec![gallery::source(options.data.as_deref())?],
+        archives => archives.iter().map(|path| Source::read(path)).collect::<Result<_, _>>()?,
     };
+    let first = &sources[0];
     for source in &sources {
         check_out(&options.out, &source.path)?;
         same_setting(first, source)?;

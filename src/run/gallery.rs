@@ -1,10 +1,16 @@
 //! `morphcog gallery`: the zero-one robots that the paper's authors published.
 
+use super::archive::{Dimensions, FORMAT, FORMAT_VERSION, Robot, RunFile};
 use super::config::BUILT_IN;
+use super::robots::{Selection, Source};
+use super::training::Training;
 use super::{Config, Error};
 use crate::body::Body;
+use crate::genome::Genome;
+use crate::qd::Archive;
 use crate::task::direction::Direction;
 use serde::Deserialize;
+use std::path::{Path, PathBuf};
 
 /// The config under which the published robots were evolved.
 const CONFIG: &str = "zero_one_published.toml";
@@ -64,6 +70,64 @@ pub fn find(name: &str) -> Result<Option<Published>, Error> {
 pub fn config() -> Result<Config, Error> {
     let text = BUILT_IN.iter().find(|(name, _)| *name == CONFIG).map_or("", |(_, text)| text);
     Config::parse(text, CONFIG, &[])
+}
+
+/// Whether a selection, of no archive in particular, means published robots: the word for all of them, or their names.
+///
+/// # Errors
+/// As [`gallery`].
+pub fn is_meant(selection: &Selection) -> Result<bool, Error> {
+    let Selection::Ids(ids) = selection else { return Ok(false) };
+    if matches!(ids.as_slice(), [word] if word == ALL) {
+        return Ok(true);
+    }
+    let published: Result<Vec<bool>, Error> = ids.iter().map(|id| Ok(find(id)?.is_some())).collect();
+    Ok(published?.into_iter().all(|is_published| is_published))
+}
+
+/// The published robots as a run, for a test. Their genomes were not published: each has the empty one, and none of their
+/// displacements but the fitness.
+///
+/// # Errors
+/// If the data are missing or broken, which say what the robots were trained on.
+pub fn source(data: Option<&Path>) -> Result<Source, Error> {
+    let config = config()?;
+    let hint = |error: Error| error.hint("morphcog data fetch mnist".to_string());
+    let training = Training::load(&config, data).map_err(hint)?;
+    let robot = |(number, robot): (usize, Published)| {
+        let (left, right) = (-robot.fitness, robot.fitness);
+        let displacements = match robot.zero_walks {
+            Direction::Left => vec![left, right],
+            Direction::Right => vec![right, left],
+        };
+        Robot {
+            id: robot.name,
+            cell: vec![number],
+            task: "0|1".to_string(),
+            objective: robot.fitness,
+            displacements,
+            voxels: robot.body.counts(),
+            generation: 0,
+            parent: None,
+            body: robot.body,
+            genome: Genome::initial(),
+        }
+    };
+    let elites: Vec<Robot> = gallery()?.into_iter().enumerate().map(robot).collect();
+    let run = RunFile {
+        format: FORMAT.to_string(),
+        format_version: FORMAT_VERSION,
+        program_version: env!("CARGO_PKG_VERSION").to_string(),
+        name: ALL.to_string(),
+        dataset: training.dataset,
+        training_images: training.images,
+        dimensions: Dimensions::of(&config)?,
+        generations: config.generations,
+        stats: Archive::<Robot>::new().stats(1, 0.0),
+        elites,
+        config,
+    };
+    Ok(Source { path: PathBuf::from(ALL), run })
 }
 
 #[cfg(test)]

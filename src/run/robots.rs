@@ -225,7 +225,7 @@ fn by_id<'a>(robots: &[Chosen<'a>], id: &str) -> Result<Chosen<'a>, Error> {
     let lower = id.to_ascii_lowercase();
     let found: Vec<Chosen> = robots
         .iter()
-        .filter(|chosen| !id.is_empty() && chosen.robot.id.starts_with(&lower))
+        .filter(|chosen| !id.is_empty() && chosen.robot.id.to_ascii_lowercase().starts_with(&lower))
         .copied()
         .collect();
     let list =

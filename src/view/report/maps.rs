@@ -146,7 +146,7 @@ pub(super) fn archive(number: usize, dossier: &Dossier, lives: &Lives) -> String
                 }
             }
             out += &format!(
-                "<figure><div class=\"cells\">{cells}</div><figcaption>{} voxels; sensor ↑ muscle →</figcaption></figure>\n",
+                "<figure><div class=\"cells\">{cells}</div><figcaption>{} voxels</figcaption></figure>\n",
                 range(total, area)
             );
         }
