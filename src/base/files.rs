@@ -1,12 +1,28 @@
-//! Writing files so that nothing is ever half-written.
+//! Writing files so that nothing is ever half-written, and reading texts that end.
 
 use std::ffi::{OsStr, OsString};
 use std::fs::File;
-use std::io::{self, Write};
+use std::io::{self, Read, Write};
 use std::path::Path;
 
 /// Beginning and end of the names of temporary files, around the name of the file to be written.
 const TEMPORARY: [&str; 2] = [".", ".tmp"];
+
+/// Most bytes of a text: many times what any file of ours has.
+const MOST_TEXT: u64 = 256 << 20;
+
+/// Reads a text. What does not end, as a device, is refused before it fills the memory.
+///
+/// # Errors
+/// What the system says; if it is no UTF-8; if it has more than 256 megabytes.
+pub fn read_text(path: &Path) -> io::Result<String> {
+    let mut text = String::new();
+    let read = File::open(path)?.take(MOST_TEXT + 1).read_to_string(&mut text)?;
+    match read as u64 > MOST_TEXT {
+        true => Err(io::Error::new(io::ErrorKind::FileTooLarge, "expected at most 256 MB of text")),
+        false => Ok(text),
+    }
+}
 
 /// Writes a file as a whole or not at all: to a temporary name in the same folder, synced, then renamed. Of a
 /// symbolic link, the file it leads to; what is no ordinary file (`/dev/stdout`, a pipe) is written to as it is.

@@ -166,7 +166,7 @@ pub(super) struct EvolveArgs {
     #[arg(long)]
     pub(super) seed: Option<u64>,
     /// Number of generations.
-    #[arg(short, long)]
+    #[arg(short, long, value_parser = clap::value_parser!(u64).range(1..))]
     pub(super) generations: Option<u64>,
     /// Threads (default: one per core); the result does not depend on it.
     #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]

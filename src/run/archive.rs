@@ -2,6 +2,7 @@
 
 use super::training::{DatasetRef, ImageRef};
 use super::{Config, Error};
+use crate::base::files::read_text;
 use crate::body::{Body, VoxelCounts};
 use crate::genome::Genome;
 use crate::qd::descriptor::possible_cells;
@@ -106,7 +107,7 @@ impl RunFile {
     /// # Errors
     /// What is wrong with the file, with its line and key.
     pub fn read(path: &Path) -> Result<Self, Error> {
-        let text = std::fs::read_to_string(path).map_err(|error| Error::reading(path, &error))?;
+        let text = read_text(path).map_err(|error| Error::reading(path, &error))?;
         RunFile::parse(&text, &path.display().to_string())
     }
 

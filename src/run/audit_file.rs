@@ -3,7 +3,7 @@
 use super::archive::RunFile;
 use super::verdict::{Criteria, PerturbedLife, Verdict};
 use super::{Error, toml_text};
-use crate::base::files::write_atomically;
+use crate::base::files::{read_text, write_atomically};
 use crate::base::hash::sha256_hex;
 use crate::sim::Energy;
 use serde::{Deserialize, Serialize};
@@ -102,7 +102,7 @@ impl AuditFile {
     /// # Errors
     /// What is wrong with the file, with its line and key.
     pub fn read(path: &Path) -> Result<Self, Error> {
-        let text = std::fs::read_to_string(path).map_err(|error| Error::reading(path, &error))?;
+        let text = read_text(path).map_err(|error| Error::reading(path, &error))?;
         toml_text::read_versioned(&text, &path.display().to_string(), FORMAT, FORMAT_VERSION)
     }
 

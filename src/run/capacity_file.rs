@@ -1,6 +1,7 @@
 //! `capacity.json`: what networks the robots are worth (paper, "Morphological cognition capacity").
 
 use super::{Error, toml_text};
+use crate::base::files::read_text;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -85,7 +86,7 @@ impl CapacityFile {
     /// # Errors
     /// What is wrong with the file, with its line and key.
     pub fn read(path: &Path) -> Result<Self, Error> {
-        let text = std::fs::read_to_string(path).map_err(|error| Error::reading(path, &error))?;
+        let text = read_text(path).map_err(|error| Error::reading(path, &error))?;
         toml_text::read_versioned(&text, &path.display().to_string(), FORMAT, FORMAT_VERSION)
     }
 

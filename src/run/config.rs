@@ -5,6 +5,7 @@ use super::curriculum::StageConfig;
 use super::robust::EvaluationConfig;
 use super::toml_text::{self, Format};
 use super::validation::{self, ValidationConfig};
+use crate::base::files::read_text;
 use crate::body::MAX_SIDE;
 use crate::genome::{BodySpec, MutationParams};
 use crate::qd::EmitterParams;
@@ -217,7 +218,7 @@ impl Config {
         let path = Path::new(name);
         let built_in =
             || BUILT_IN.iter().find(|(own, _)| *own == name || own.strip_suffix(".toml") == Some(name));
-        let text = match std::fs::read_to_string(path) {
+        let text = match read_text(path) {
             Ok(text) => text,
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => match built_in() {
                 Some((_, text)) => (*text).to_string(),

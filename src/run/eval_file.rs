@@ -8,6 +8,7 @@ use super::statistics::{bootstrap, standard_deviation, wilson};
 use super::training::ImageRef;
 use super::validation::Validated;
 use super::{Error, toml_text};
+use crate::base::files::read_text;
 use crate::task::direction::Assignment;
 use crate::task::grouping::{Group, Split};
 use serde::{Deserialize, Serialize};
@@ -269,7 +270,7 @@ impl EvalFile {
     /// # Errors
     /// What is wrong with the file, with its line and key.
     pub fn read(path: &Path) -> Result<Self, Error> {
-        let text = std::fs::read_to_string(path).map_err(|error| Error::reading(path, &error))?;
+        let text = read_text(path).map_err(|error| Error::reading(path, &error))?;
         toml_text::read_versioned(&text, &path.display().to_string(), FORMAT, FORMAT_VERSION)
     }
 

@@ -85,11 +85,12 @@ pub fn evolve(
 ) -> Result<Finished, Error> {
     let config = &options.config;
     let dataset = load_dataset(config, options.data.as_deref(), &[Split::Train])?;
-    // Whether there are images for every stage is to be known before anything is written.
+    // Whether there are images and bodies for it is to be known before anything is written.
     let first = Training::of(config, &dataset, config.period(0))?;
     for stage in (0..config.stage.len()).map(|stage| Period { stage, draw: 0 }) {
         Training::of(config, &dataset, stage)?;
     }
+    Mutations { seed: config.seed, spec: config.body_spec(), params: &config.genome }.check()?;
     let folder = RunFolder::open(&options.out, options.if_exists)?;
     let saved = match options.if_exists {
         IfExists::Resume => resume::saved(&folder, config, &dataset, |text| observer.warning(&text))?,
@@ -241,8 +242,7 @@ impl<'a> Run<'a> {
         let robots = robots.map_err(|error| Error::input(format!("body: {error}")))?;
         self.totals.evaluations += robots.len() as u64;
 
-        let images = self.training.stimuli.len() as u64;
-        let mut fresh = Vec::new();
+        let (images, mut fresh) = (self.training.stimuli.len() as u64, Vec::new());
         for (proposal, robot) in proposals.iter().zip(robots) {
             let is_new = self.known.insert(robot.body.key());
             if is_new || !config.savings.known_bodies {

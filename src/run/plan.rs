@@ -3,6 +3,7 @@
 use super::capacity_config::CapacityConfig;
 use super::verdict::Criteria;
 use super::{Error, toml_text};
+use crate::base::files::read_text;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -62,7 +63,7 @@ impl Plan {
     /// # Errors
     /// What is wrong with it, with file, line and key.
     pub fn load(name: &str, overrides: &[String]) -> Result<Self, Error> {
-        let text = match std::fs::read_to_string(name) {
+        let text = match read_text(Path::new(name)) {
             Err(_) if Plan::is_built_in(name) => PAPER_TOML.1.to_string(),
             Err(error) => return Err(Error::reading(Path::new(name), &error)),
             Ok(text) => text,

@@ -3,6 +3,7 @@
 use super::Error;
 use super::archive::RunFile;
 use super::folder::METRICS;
+use crate::base::files::read_text;
 use serde::Deserialize;
 use std::path::Path;
 
@@ -41,7 +42,7 @@ impl Progress {
     pub fn read(archive: &Path) -> Result<Self, Error> {
         let run = RunFile::read(archive)?;
         let path = archive.with_file_name(METRICS);
-        let text = std::fs::read_to_string(&path).map_err(|error| Error::reading(&path, &error))?;
+        let text = read_text(&path).map_err(|error| Error::reading(&path, &error))?;
         let moments = moments(&text).map_err(|error| error.within(&path.display().to_string()))?;
         Ok(Progress { run: run.name, seed: run.config.seed, moments })
     }

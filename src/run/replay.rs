@@ -221,7 +221,17 @@ pub fn find(options: &Options) -> Result<Found, Error> {
     let source = Source::read(&archive)?;
     let robots = Selection::Ids(vec![options.robot.clone()]).physical(options.physical_only);
     let robots = robots.of(std::slice::from_ref(&source), 0);
-    let robots = robots.map_err(|error| error.within(&archive.display().to_string()))?;
+    let robots = robots.map_err(|error| {
+        let hint = error.hint.clone().unwrap_or_default();
+        let error = error.within(&archive.display().to_string());
+        // Without an archive, the robot may have been meant for a published one.
+        match options.archive {
+            None if !options.physical_only => {
+                error.hint(format!("{hint}; published robots: morphcog gallery"))
+            }
+            _ => error,
+        }
+    })?;
     let (robot, run) = (robots[0].robot, &source.run);
     let about = vec![
         ("Robot".to_string(), robot.id.clone()),

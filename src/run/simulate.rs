@@ -2,7 +2,7 @@
 
 use super::{Error, toml_text};
 use crate::base::Grid;
-use crate::base::files::write_atomically;
+use crate::base::files::{read_text, write_atomically};
 use crate::body::Body;
 use crate::sim::{Lattice, Physics, Start, World};
 use crate::task::protocol::MAX_COLUMN;
@@ -63,7 +63,7 @@ impl Scenario {
     /// # Errors
     /// What is wrong with the file, with its line and key.
     pub fn read(path: &Path) -> Result<Self, Error> {
-        let text = std::fs::read_to_string(path).map_err(|error| Error::reading(path, &error))?;
+        let text = read_text(path).map_err(|error| Error::reading(path, &error))?;
         Scenario::parse(&text, &path.display().to_string())
     }
 

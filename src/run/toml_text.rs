@@ -1,6 +1,7 @@
 //! Reading configs: errors with file, line and key; `key=value` overrides.
 
 use super::Error;
+use crate::base::files::read_text;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::path::Path;
@@ -71,7 +72,7 @@ pub(super) fn load<T: Serialize + DeserializeOwned + Default>(
     let mut settings = match path {
         None => T::default(),
         Some(path) => {
-            let text = std::fs::read_to_string(path).map_err(|error| Error::reading(path, &error))?;
+            let text = read_text(path).map_err(|error| Error::reading(path, &error))?;
             let is_json = path.extension().is_some_and(|ending| ending == "json");
             let format = if is_json { Format::Json } else { Format::Toml };
             read(&text, format, &path.display().to_string())?

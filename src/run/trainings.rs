@@ -1,7 +1,7 @@
 //! Trainings of networks, kept beside the results so that none is done twice.
 
 use super::Error;
-use crate::base::files::write_atomically;
+use crate::base::files::{read_text, write_atomically};
 use crate::baseline::Trained;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -31,7 +31,7 @@ impl Trainings {
     /// be read: then all is trained again.
     pub fn read(results: &Path) -> Self {
         let path = results.with_extension("trainings.json");
-        let text = std::fs::read_to_string(&path).unwrap_or_default();
+        let text = read_text(&path).unwrap_or_default();
         let content: Content = serde_json::from_str(&text).unwrap_or_default();
         let ours = (content.format.as_str(), content.format_version) == FORMAT;
         let trainings = if ours { content.trainings } else { BTreeMap::new() };

@@ -11,7 +11,7 @@ use super::eval_file::{RobotReport, Trial};
 use super::robots::{Selection, Source};
 use super::training::{ImageRef, Training, load_dataset, see};
 use super::{Config, Error};
-use crate::base::files::write_atomically;
+use crate::base::files::{read_text, write_atomically};
 use crate::base::hash::sha256_hex;
 use crate::base::random::{Purpose, stream};
 use crate::task::dataset::{Dataset, Split};
@@ -190,9 +190,7 @@ pub(super) fn best<'a>(
     let images = images(run, dataset, wanted.images)?;
     let key = key(run, &robots, wanted, &images, walker.control_steps);
     let path = source.path.with_file_name(VALIDATION_JSON);
-    let known = std::fs::read_to_string(&path)
-        .ok()
-        .and_then(|text| serde_json::from_str::<ValidationFile>(&text).ok());
+    let known = read_text(&path).ok().and_then(|text| serde_json::from_str::<ValidationFile>(&text).ok());
     let by_id = |validated: &Validated| {
         let robot = robots.iter().find(|robot| robot.id == validated.id && robot.task == validated.task)?;
         Some((*robot, validated.clone()))

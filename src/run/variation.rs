@@ -1,5 +1,6 @@
 //! How robots vary: newcomers and mutated offspring, each from a random stream of its own.
 
+use super::Error;
 use super::archive::Robot;
 use crate::base::random::{Purpose, stream};
 use crate::body::Body;
@@ -26,6 +27,13 @@ fn newborn((genome, body): (Genome, Body), generation: u64, parent: Option<&Robo
         parent: parent.map(|parent| parent.id.clone()),
         body,
         genome,
+    }
+}
+
+impl Mutations<'_> {
+    /// Whether there can be robots at all: to be known before an earlier run is deleted.
+    pub fn check(&self) -> Result<(), Error> {
+        self.newcomer(0, 0).map(drop).map_err(|error| Error::input(format!("body: {error}")))
     }
 }
 
