@@ -21,7 +21,7 @@ them together are looked for above their folders.";
 pub(super) struct ReportArgs {
     /// Run folders, or files run.json (default: the newest under runs/).
     runs: Vec<PathBuf>,
-    /// Robots of each run that can be watched, the fittest; all of them together take up to 20 MB.
+    /// Robots that can be watched, the fittest of each run; the more, the fewer frames each has (the page stays below 20 MB).
     #[arg(long, default_value_t = 100)]
     lives: usize,
     /// Folder with the images.
@@ -44,7 +44,8 @@ pub(super) fn run(args: ReportArgs, console: &Console) -> Result<(), Error> {
     let out = args.out.unwrap_or_else(|| folder::above(&archives).join("report.html"));
     let gathered =
         report::gather(&archives, args.data.as_deref(), args.lives > 0, &|text| console.warning(text))?;
-    let content = Content { gathered: &gathered, lives: args.lives };
+    let lives = args.lives.div_ceil(archives.len());
+    let content = Content { gathered: &gathered, lives };
     let page = {
         let counter = console.counter("living lives for the page:", content.count() as u64, "lives");
         content.page(&|lived| counter.update(lived))
