@@ -5,6 +5,7 @@ mod common;
 use common::golden;
 use morphcog::base::Grid;
 use morphcog::body::Body;
+use morphcog::run::eval_file::EvalFile;
 use morphcog::run::gallery;
 use morphcog::sim::{Lattice, Physics};
 use morphcog::task::dataset::{Dataset, Split};
@@ -124,4 +125,26 @@ fn the_built_in_gallery_holds_these_very_robots() {
     assert_eq!((config.protocol.start_row, config.protocol.start_column), (2, 493));
     assert_eq!(config.data.train_images.as_deref(), Some(&IMAGES[..2]));
     assert_eq!(config.physics, Physics::default());
+}
+
+#[test]
+fn the_published_robots_answer_test_images() {
+    if skipped() {
+        return;
+    }
+    let sandbox = common::program::Sandbox::new();
+    let data = std::env::var("MORPHCOG_DATA").unwrap();
+    let data = std::fs::canonicalize(data).unwrap();
+    let args = ["eval", "-q", "--robots", "qmaxd,YJTLA", "--images", "40", "--data"];
+    let mut command = sandbox.command(args);
+    command.arg(data);
+    common::program::said(command).ended(0, &[]);
+    let report = EvalFile::read(&sandbox.path("gallery-eval.json")).unwrap();
+    let names: Vec<&str> = report.robots.iter().map(|robot| robot.id.as_str()).collect();
+    assert_eq!(names, ["QMAXD", "YJTLA"]);
+    // 97.2 and 88.7 % of 1000 images.
+    assert!(report.robots.iter().all(|robot| robot.right >= 30), "{:?}", report.means);
+    // Which way a zero is to be answered is known of them.
+    let walks = report.robots.iter().map(|robot| robot.first_group_walks.as_str());
+    assert_eq!(walks.collect::<Vec<_>>(), ["right", "left"]);
 }

@@ -67,6 +67,26 @@ fn the_best_on_validation_images_are_found_the_same_every_time_and_kept() {
 }
 
 #[test]
+fn a_run_that_asks_for_it_chooses_robots_at_its_end() {
+    let sandbox = Sandbox::new();
+    let validation = "\n[validation]\nimages = 60\nbest = 2\n";
+    sandbox.write("run.toml", format!("{TINY}{validation}"));
+    let said = sandbox.run("evolve -c run.toml -o run").ended(0, &["validating"]);
+    assert!(said.out.contains("best on validation"), "{}", said.out);
+    // What it found is what eval finds, and is not looked for again: eval asks for as many images as the config says.
+    let kept = sandbox.read("run/validation.json");
+    let archive = "--archive run/run.json --robots best-validation:2 --images 20";
+    let said = sandbox.run(&format!("eval {archive}")).ended(0, &[]);
+    assert!(!said.err.contains("validating"), "{}", said.err);
+    assert_eq!(sandbox.read("run/validation.json"), kept);
+    let report = EvalFile::read(&sandbox.path("run/eval.json")).unwrap();
+    assert!(report.robots.iter().all(|robot| robot.validation.as_ref().unwrap().images == 60));
+    // A run that is resumed at its end, with nothing left to do, says it again.
+    sandbox.run("evolve -c run.toml -o run --resume").ended(0, &[]);
+    assert_eq!(sandbox.read("run/validation.json"), kept);
+}
+
+#[test]
 fn too_few_or_too_many_validation_images_are_refused() {
     let sandbox = sandbox();
     let with = |options: &str| {
