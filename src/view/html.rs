@@ -15,6 +15,8 @@ use std::io::Write;
 use std::path::Path;
 
 const TEMPLATE: &str = include_str!("replay.html");
+/// And its script.
+const SCRIPT: &str = concat!(include_str!("drawing.js"), include_str!("replay.js"));
 /// Steps of a position per voxel length.
 pub(super) const STEPS: f64 = 200.0;
 /// The number for a position that is not finite or more than 163 voxel lengths from the frame's origin.
@@ -59,7 +61,7 @@ pub fn page(
         &[
             ("title", &escape(title)),
             ("style", include_str!("replay.css")),
-            ("script", include_str!("replay.js")),
+            ("script", SCRIPT),
             ("metadata", &rows.collect::<String>()),
             ("warning", warning),
             // In a script element only "<" could end it or open another.
@@ -75,7 +77,7 @@ pub(super) fn player(life: &str) -> String {
         &[
             ("title", ""),
             ("style", concat!(include_str!("replay.css"), include_str!("report/player.css"))),
-            ("script", include_str!("replay.js")),
+            ("script", SCRIPT),
             ("metadata", ""),
             ("warning", ""),
             ("life", life),

@@ -1,5 +1,5 @@
-"use strict";
 (() => {
+  const { css, fit } = Drawing;
   const $ = (id) => document.getElementById(id);
   const life = JSON.parse($("life").textContent);
   const view = (text) => {
@@ -15,7 +15,7 @@
     const at = 4 * (f * P + i), x = positions.getInt16(at, true);
     return x === NOWHERE ? null : [x / UNIT + origin(f, 0), positions.getInt16(at + 2, true) / UNIT + origin(f, 1)];
   };
-  const rows = life.body.split("\n"), H = rows.length, W = rows[0].length;
+  const rows = life.body.split("\n");
 
   // Phases and lives (a life goes from one reset to the next).
   const phases = life.phases;
@@ -61,33 +61,8 @@
     f = Math.max(b, f + 1);
   }
 
-  // Colours.
-  const style = getComputedStyle(document.documentElement);
-  const css = (name) => style.getPropertyValue("--" + name).trim();
-  const shade = (material, area) => {
-    const [a, b, c] = life.areas, [dark, rest, light] = life.materials[material].tones;
-    const [from, to, t] = area < b ? [dark, rest, (area - a) / (b - a)] : [rest, light, (area - b) / (c - b)];
-    const u = Math.min(Math.max(t, 0), 1);
-    return "rgb(" + from.map((v, k) => Math.round(v + u * (to[k] - v))).join(",") + ")";
-  };
-
-  // A canvas of sharp pixels; returns its context in CSS pixels.
-  const fit = (canvas, width, height) => {
-    const ratio = Math.min(window.devicePixelRatio || 1, 3);
-    const w = Math.max(1, Math.round(width * ratio)), h = Math.max(1, Math.round(height * ratio));
-    if (canvas.width !== w || canvas.height !== h) { canvas.width = w; canvas.height = h; }
-    canvas.style.height = height + "px";
-    const ctx = canvas.getContext("2d");
-    ctx.setTransform(ratio, 0, 0, ratio, 0, 0);
-    return ctx;
-  };
-
   let frame = 0;
-  const sides = new Map();
-  for (const [, c] of life.voxels) for (let k = 0; k < 4; k++) {
-    const a = Math.min(c[k], c[(k + 1) % 4]), b = Math.max(c[k], c[(k + 1) % 4]), key = a * P + b;
-    sides.set(key, (sides.get(key) || 0) + 1);
-  }
+  const body = { voxels: life.voxels, sides: Drawing.sidesOf(life.voxels, P), areas: life.areas, materials: life.materials };
 
   const drawWorld = () => {
     const canvas = $("world"), width = canvas.parentElement.clientWidth - 24, groundHeight = 30;
@@ -108,77 +83,16 @@
     ctx.strokeStyle = css("mark"); ctx.lineWidth = 1; ctx.setLineDash([5, 5]);
     for (const x of begin === zero ? [zero] : [zero, begin]) { ctx.beginPath(); ctx.moveTo(X(x), 0); ctx.lineTo(X(x), surface); ctx.stroke(); }
     ctx.setLineDash([]);
-    ctx.strokeStyle = css("ground-line"); ctx.fillStyle = css("faint");
-    ctx.font = "11px system-ui, sans-serif"; ctx.textAlign = "center"; ctx.textBaseline = "top";
-    const by = scale * 10 > 45 ? 10 : 50;
-    for (let m = Math.ceil(x0 - zero); m <= x0 - zero + width / scale; m++) {
-      const ten = m % 10 === 0;
-      if (!ten && scale < 4) continue;
-      ctx.lineWidth = ten ? 1.5 : 1;
-      ctx.beginPath(); ctx.moveTo(X(zero + m), surface); ctx.lineTo(X(zero + m), surface + (ten ? 9 : 4)); ctx.stroke();
-      if (m % by === 0) ctx.fillText(m === 0 ? "0" : (m < 0 ? "−" : "+") + Math.abs(m), X(zero + m), surface + 13);
-    }
-    ctx.lineWidth = 1.5; ctx.beginPath(); ctx.moveTo(0, surface); ctx.lineTo(width, surface); ctx.stroke();
-
-    const points = Array.from({ length: P }, (_, i) => point(frame, i));
-    ctx.lineJoin = ctx.lineCap = "round";
-    for (const [material, corners] of life.voxels) {
-      const [a, b, c, d] = corners.map((i) => points[i]);
-      if (!(a && b && c && d)) continue;
-      const area = ((c[0] - a[0]) * (b[1] - d[1]) - (b[0] - d[0]) * (c[1] - a[1])) / 2;
-      ctx.fillStyle = ctx.strokeStyle = shade(material, area);
-      ctx.lineWidth = 0.6;
-      ctx.beginPath();
-      for (const q of [a, b, c, d]) ctx.lineTo(X(q[0]), Y(q[1]));
-      ctx.closePath(); ctx.fill(); ctx.stroke();
-    }
-    for (const outer of [false, true]) {
-      if (!outer && scale < 5) continue;
-      ctx.strokeStyle = css(outer ? "rim" : "seam"); ctx.lineWidth = outer ? 1.4 : 1;
-      ctx.beginPath();
-      for (const [key, count] of sides) if ((count === 1) === outer) {
-        const a = points[Math.floor(key / P)], b = points[key % P];
-        if (a && b) { ctx.moveTo(X(a[0]), Y(a[1])); ctx.lineTo(X(b[0]), Y(b[1])); }
-      }
-      ctx.stroke();
-    }
-    for (const [colour, line] of [["halo", 4], ["accent", 1.8]]) {
-      ctx.strokeStyle = css(colour); ctx.lineWidth = line; ctx.beginPath();
-      for (let f = first; f <= frame; f++) ctx.lineTo(X(origin(f, 0)), Y(origin(f, 1)));
-      ctx.stroke();
-    }
-    ctx.fillStyle = css("accent"); ctx.strokeStyle = css("sky"); ctx.lineWidth = 1.5;
-    ctx.beginPath(); ctx.arc(X(origin(frame, 0)), Y(origin(frame, 1)), 4.5, 0, 7); ctx.fill(); ctx.stroke();
+    Drawing.ruler(ctx, { x0, zero, X, scale, width, surface });
+    Drawing.robot(ctx, { ...body, points: Array.from({ length: P }, (_, i) => point(frame, i)) }, { X, Y, scale });
+    Drawing.path(ctx, Array.from({ length: frame - first + 1 }, (_, i) => [origin(first + i, 0), origin(first + i, 1)]), { X, Y });
   };
 
   const images = phases.map((p) => view(p.stimulus));
   const drawStimulus = () => {
-    const canvas = $("stimulus"), p = phaseOf(frame), { height, width } = phases[p], data = images[p];
-    const room = canvas.parentElement.clientWidth, cell = room / Math.max(height, width);
-    const ctx = fit(canvas, room, cell * height);
-    ctx.clearRect(0, 0, room, cell * height);
-    const material = (r, c) => (r < 0 || c < 0 || r >= H || c >= W ? 0 : Number(rows[r][c]));
-    for (let r = 0; r < height; r++) for (let c = 0; c < width; c++) {
-      const v = data.getUint8(r * width + c);
-      ctx.fillStyle = `rgb(${v},${v},${v})`;
-      const x = Math.round(c * cell), y = Math.round(r * cell);
-      ctx.fillRect(x, y, Math.round((c + 1) * cell) - x, Math.round((r + 1) * cell) - y);
-    }
-    ctx.lineWidth = Math.max(1, Math.min(2.5, cell / 4));
-    const h = ctx.lineWidth / 2;
-    for (let r = 0; r < height; r++) for (let c = 0; c < width; c++) {
-      const m = material(r, c);
-      if (!life.materials[m].sensor) continue;
-      ctx.strokeStyle = m === 5 ? "#f03e52" : "#26ba78";
-      const [l, t] = [Math.round(c * cell) + h, Math.round(r * cell) + h];
-      const [R, b] = [Math.round((c + 1) * cell) - h, Math.round((r + 1) * cell) - h];
-      ctx.beginPath();
-      if (material(r - 1, c) !== m) { ctx.moveTo(l - h, t); ctx.lineTo(R + h, t); }
-      if (material(r + 1, c) !== m) { ctx.moveTo(l - h, b); ctx.lineTo(R + h, b); }
-      if (material(r, c - 1) !== m) { ctx.moveTo(l, t - h); ctx.lineTo(l, b + h); }
-      if (material(r, c + 1) !== m) { ctx.moveTo(R, t - h); ctx.lineTo(R, b + h); }
-      ctx.stroke();
-    }
+    const canvas = $("stimulus"), p = phaseOf(frame), { height, width } = phases[p];
+    const grey = (r, c) => images[p].getUint8(r * width + c);
+    Drawing.stimulus(canvas, canvas.parentElement.clientWidth, { height, width, grey }, rows, life.materials);
   };
 
   const gutter = 52;

@@ -13,6 +13,7 @@ pub fn asset(path: &str) -> Option<Response> {
         // The looks of the page that `replay` writes, and what is new here.
         "/replay.css" => (CSS, include_str!("../replay.css")),
         "/page.css" => (CSS, include_str!("page/page.css")),
+        "/drawing.js" => (JS, include_str!("../drawing.js")),
         "/main.js" => (JS, include_str!("page/main.js")),
         "/api.js" => (JS, include_str!("page/api.js")),
         "/stage.js" => (JS, include_str!("page/stage.js")),

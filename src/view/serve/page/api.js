@@ -40,19 +40,6 @@ export const $ = (id) => document.getElementById(id);
 
 export const bytes = (text) => Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
 
-// A canvas of sharp pixels; returns its context in CSS pixels.
-export const fit = (canvas, width, height) => {
-  const ratio = Math.min(window.devicePixelRatio || 1, 3);
-  const w = Math.max(1, Math.round(width * ratio)), h = Math.max(1, Math.round(height * ratio));
-  if (canvas.width !== w || canvas.height !== h) { canvas.width = w; canvas.height = h; }
-  canvas.style.height = height + "px";
-  const ctx = canvas.getContext("2d");
-  ctx.setTransform(ratio, 0, 0, ratio, 0, 0);
-  return ctx;
-};
-
-export const css = (name) => getComputedStyle(document.documentElement).getPropertyValue("--" + name).trim();
-
 export const element = (tag, properties = {}, ...children) => {
   const made = Object.assign(document.createElement(tag), properties);
   made.append(...children);

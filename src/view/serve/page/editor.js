@@ -1,7 +1,8 @@
 // The body editor: a grid of voxels, checked by the server, kept in files that `morphcog simulate` reads.
 
-import { $, css, element, fit, post } from "./api.js";
+import { $, element, post } from "./api.js";
 
+const { css, fit } = Drawing;
 const AREA = (encoding) => ({ reduction: "area", encoding, level: 0.2 });
 // A small walker to begin with, evolved on digits in a minute: left under a zero, right under a one.
 const FIRST = ["4444444", "4444445", "5444465", "5544465", "5544445", "5444444", "4444444"];

@@ -1,7 +1,8 @@
 // Test images: pages of one class.
 
-import { $, css, element, get } from "./api.js";
+import { $, element, get } from "./api.js";
 
+const { css } = Drawing;
 const PAGE = 15;
 
 export class Images {

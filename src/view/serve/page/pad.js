@@ -1,7 +1,8 @@
 // The drawing: 28 × 28 pixels, strokes as soft-edged as MNIST's.
 
-import { $, css } from "./api.js";
+import { $ } from "./api.js";
 
+const { css } = Drawing;
 const SIDE = 28, RADIUS = 1.15;
 
 export class Pad {

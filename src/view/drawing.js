@@ -1,0 +1,115 @@
+"use strict";
+// What the replay's page and that of `serve` draw alike: canvases, the ground, the robot, what it sees.
+// `X` and `Y` take voxel lengths to pixels, `scale` is pixels per voxel length.
+const Drawing = (() => {
+  const css = (name) => getComputedStyle(document.documentElement).getPropertyValue("--" + name).trim();
+
+  // A canvas of sharp pixels; returns its context in CSS pixels.
+  const fit = (canvas, width, height) => {
+    const ratio = Math.min(window.devicePixelRatio || 1, 3);
+    const w = Math.max(1, Math.round(width * ratio)), h = Math.max(1, Math.round(height * ratio));
+    if (canvas.width !== w || canvas.height !== h) { canvas.width = w; canvas.height = h; }
+    canvas.style.height = height + "px";
+    const ctx = canvas.getContext("2d");
+    ctx.setTransform(ratio, 0, 0, ratio, 0, 0);
+    return ctx;
+  };
+
+  // A material's colour at an area [voxels]: dark when shrunk, light when swollen.
+  const shade = ([a, b, c], [dark, rest, light], area) => {
+    const [from, to, t] = area < b ? [dark, rest, (area - a) / (b - a)] : [rest, light, (area - b) / (c - b)];
+    const u = Math.min(Math.max(t, 0), 1);
+    return "rgb(" + from.map((v, k) => Math.round(v + u * (to[k] - v))).join(",") + ")";
+  };
+
+  // How many voxels each side belongs to; a side's key is made of its two points, of `count` in all.
+  const sidesOf = (voxels, count) => {
+    const sides = new Map();
+    for (const [, c] of voxels) for (let k = 0; k < 4; k++) {
+      const a = Math.min(c[k], c[(k + 1) % 4]), b = Math.max(c[k], c[(k + 1) % 4]), key = a * count + b;
+      sides.set(key, (sides.get(key) || 0) + 1);
+    }
+    return sides;
+  };
+
+  // The ground's surface with a mark per voxel length, counted from `zero`; `x0` is at the left edge.
+  const ruler = (ctx, { x0, zero, X, scale, width, surface }) => {
+    ctx.strokeStyle = css("ground-line"); ctx.fillStyle = css("faint");
+    ctx.font = "11px system-ui, sans-serif"; ctx.textAlign = "center"; ctx.textBaseline = "top";
+    const by = scale * 10 > 45 ? 10 : 50;
+    for (let m = Math.ceil(x0 - zero); m <= x0 - zero + width / scale; m++) {
+      const ten = m % 10 === 0;
+      if (!ten && scale < 4) continue;
+      ctx.lineWidth = ten ? 1.5 : 1;
+      ctx.beginPath(); ctx.moveTo(X(zero + m), surface); ctx.lineTo(X(zero + m), surface + (ten ? 9 : 4)); ctx.stroke();
+      if (m % by === 0) ctx.fillText(m === 0 ? "0" : (m < 0 ? "−" : "+") + Math.abs(m), X(zero + m), surface + 13);
+    }
+    ctx.lineWidth = 1.5; ctx.beginPath(); ctx.moveTo(0, surface); ctx.lineTo(width, surface); ctx.stroke();
+  };
+
+  // A body: voxels [material, corners, …], its points (null where the simulation had lost one), and its sides.
+  const robot = (ctx, { voxels, points, sides, areas, materials }, { X, Y, scale }) => {
+    ctx.lineJoin = ctx.lineCap = "round";
+    for (const [material, corners] of voxels) {
+      const [a, b, c, d] = corners.map((i) => points[i]);
+      if (!(a && b && c && d)) continue;
+      const area = ((c[0] - a[0]) * (b[1] - d[1]) - (b[0] - d[0]) * (c[1] - a[1])) / 2;
+      ctx.fillStyle = ctx.strokeStyle = shade(areas, materials[material].tones, area);
+      ctx.lineWidth = 0.6;
+      ctx.beginPath();
+      for (const q of [a, b, c, d]) ctx.lineTo(X(q[0]), Y(q[1]));
+      ctx.closePath(); ctx.fill(); ctx.stroke();
+    }
+    for (const outer of [false, true]) {
+      if (!outer && scale < 5) continue;
+      ctx.strokeStyle = css(outer ? "rim" : "seam"); ctx.lineWidth = outer ? 1.4 : 1;
+      ctx.beginPath();
+      for (const [key, count] of sides) if ((count === 1) === outer) {
+        const a = points[Math.floor(key / points.length)], b = points[key % points.length];
+        if (a && b) { ctx.moveTo(X(a[0]), Y(a[1])); ctx.lineTo(X(b[0]), Y(b[1])); }
+      }
+      ctx.stroke();
+    }
+  };
+
+  // The way of the centre of mass, and where it is now.
+  const path = (ctx, places, { X, Y }) => {
+    for (const [colour, line] of [["halo", 4], ["accent", 1.8]]) {
+      ctx.strokeStyle = css(colour); ctx.lineWidth = line; ctx.beginPath();
+      for (const [x, y] of places) ctx.lineTo(X(x), Y(y));
+      ctx.stroke();
+    }
+    const [x, y] = places[places.length - 1];
+    ctx.fillStyle = css("accent"); ctx.strokeStyle = css("sky"); ctx.lineWidth = 1.5;
+    ctx.beginPath(); ctx.arc(X(x), Y(y), 4.5, 0, 7); ctx.fill(); ctx.stroke();
+  };
+
+  // A stimulus `room` pixels wide, grey levels 0 to 255 by row and column, with the sensors of the body (rows of text) outlined.
+  const stimulus = (canvas, room, { height, width, grey }, rows, materials) => {
+    const cell = room / Math.max(height, width), ctx = fit(canvas, room, cell * height);
+    ctx.clearRect(0, 0, room, cell * height);
+    const edge = (k) => Math.round(k * cell);
+    const material = (r, c) => (rows[r] && rows[r][c] ? Number(rows[r][c]) : 0);
+    for (let r = 0; r < height; r++) for (let c = 0; c < width; c++) {
+      const v = grey(r, c);
+      ctx.fillStyle = `rgb(${v},${v},${v})`;
+      ctx.fillRect(edge(c), edge(r), edge(c + 1) - edge(c), edge(r + 1) - edge(r));
+    }
+    ctx.lineWidth = Math.max(1, Math.min(2.5, cell / 4));
+    const h = ctx.lineWidth / 2;
+    for (let r = 0; r < height; r++) for (let c = 0; c < width; c++) {
+      const m = material(r, c);
+      if (!materials[m].sensor) continue;
+      ctx.strokeStyle = m === 5 ? "#f03e52" : "#26ba78";
+      const [l, t, R, b] = [edge(c) + h, edge(r) + h, edge(c + 1) - h, edge(r + 1) - h];
+      ctx.beginPath();
+      if (material(r - 1, c) !== m) { ctx.moveTo(l - h, t); ctx.lineTo(R + h, t); }
+      if (material(r + 1, c) !== m) { ctx.moveTo(l - h, b); ctx.lineTo(R + h, b); }
+      if (material(r, c - 1) !== m) { ctx.moveTo(l, t - h); ctx.lineTo(l, b + h); }
+      if (material(r, c + 1) !== m) { ctx.moveTo(R, t - h); ctx.lineTo(R, b + h); }
+      ctx.stroke();
+    }
+  };
+
+  return { css, fit, sidesOf, ruler, robot, path, stimulus };
+})();
