@@ -9,6 +9,7 @@ mod reproduce;
 mod serve;
 
 use crate::base::lanes::InstructionSet;
+use crate::run::capacity_file::CapacityFile;
 use crate::run::data::catalogue::Catalogue;
 use crate::run::data::fetch::{FetchOptions, fetch};
 use crate::run::eval_file::EVAL_JSON;
@@ -172,7 +173,8 @@ fn run_eval(args: EvalArgs, console: &Console) -> Result<(), Error> {
     };
     let stop = signals::stop_flag()?;
     let report = eval::eval(&options, &stop, &reporters::Evaluation::new(console))?;
-    summary::evaluation(console, &report, &options.out);
+    let capacity = CapacityFile::of(&report, &options.out);
+    summary::evaluation(console, &report, capacity.as_ref(), &options.out);
     if report.stopped {
         let text = format!("stopped after {} robots; those are saved", report.robots.len());
         return Err(Error::stopped(text));

@@ -78,6 +78,21 @@ fn networks_are_trained_once_and_the_same_on_any_number_of_threads() {
 }
 
 #[test]
+fn an_evaluation_shows_the_capacity_of_its_robots_and_of_no_others() {
+    let sandbox = sandbox();
+    let known = capacity(&sandbox, "").tasks[0].worth("mlp").unwrap();
+    let eval = |robots: &str| {
+        let archives = "--archive runs/3/run.json runs/4/run.json";
+        sandbox.run(&format!("eval {archives} --images 40 --cycles 1 --robots {robots}")).ended(0, &[]).out
+    };
+    let same = eval("top:4");
+    let row = same.lines().skip_while(|line| !line.contains("MLP neurons")).nth(2).unwrap();
+    let known = known.map_or("no match".to_string(), |size| format!("{size:.1}"));
+    assert!(row.starts_with("0|1") && row.contains(&known), "{row} ({known})");
+    assert!(!eval("top:3").contains("MLP neurons"));
+}
+
+#[test]
 fn clean_training_never_waits_on_the_test_images() {
     let sandbox = sandbox();
     let published = capacity(&sandbox, "");

@@ -1,5 +1,6 @@
 //! `capacity.json`: what networks the robots are worth (paper, "Morphological cognition capacity").
 
+use super::eval_file::EvalFile;
 use super::{Error, toml_text};
 use crate::base::files::read_text;
 use serde::{Deserialize, Serialize};
@@ -90,6 +91,18 @@ impl CapacityFile {
         toml_text::read_versioned(&text, &path.display().to_string(), FORMAT, FORMAT_VERSION)
     }
 
+    /// The analysis beside an `eval.json`, if there is one of just the robots and images that the evaluation is of.
+    pub fn of(report: &EvalFile, eval: &Path) -> Option<Self> {
+        let found = Self::read(&eval.with_file_name(CAPACITY_JSON)).ok()?;
+        let same = |task: &TaskCapacity| {
+            report.means.get(&task.task).is_some_and(|mean| {
+                mean.robots == task.robots && (mean.accuracy - task.accuracy).abs() < 1e-9
+            })
+        };
+        let is_of_it = found.dataset == report.dataset && found.selected == report.selected;
+        (is_of_it && found.tasks.iter().all(same)).then_some(found)
+    }
+
     /// `capacity.csv`: a line per task, network and size.
     ///
     /// # Errors
@@ -118,6 +131,13 @@ impl CapacityFile {
     pub fn to_json(&self) -> String {
         // Numbers are finite, keys are text: JSON has all of it.
         serde_json::to_string_pretty(self).unwrap_or_default() + "\n"
+    }
+}
+
+impl TaskCapacity {
+    /// The capacity as one kind of network tells it, if that was trained; none within: no match.
+    pub fn worth(&self, network: &str) -> Option<Option<f64>> {
+        self.curves.iter().find(|curve| curve.network == network).map(|curve| curve.capacity)
     }
 }
 

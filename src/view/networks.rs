@@ -13,27 +13,8 @@ pub fn capacity(console: &Console, file: &CapacityFile, out: &Path) {
         let done = serde_json::json!({ "file": out.display().to_string(), "stopped": file.stopped, "tasks": file.tasks });
         return console.event("capacity", &done);
     }
-    let size = |size: Option<f64>| size.map_or("no match".to_string(), |size| format!("{size:.1}"));
-    let rows = file.tasks.iter().map(|task| {
-        let paper = published::row(&file.dataset, &task.task);
-        let own = |network: &str| own(task, network).map_or("–".to_string(), size);
-        let theirs = |of: fn(&published::PaperRow) -> Option<f64>| {
-            paper.map_or("–".to_string(), |row| size(of(row)))
-        };
-        vec![
-            task.task.clone(),
-            task.robots.to_string(),
-            format!("{:.1}", 100.0 * task.accuracy),
-            paper.map_or("–".to_string(), |row| format!("{:.1}", row.accuracy)),
-            own("mlp"),
-            theirs(|row| row.mlp),
-            own("cnn"),
-            theirs(|row| row.cnn),
-        ]
-    });
-    let headers =
-        ["task", "robots", "accuracy %", "paper's %", "MLP neurons", "paper's", "CNN kernels", "paper's"];
-    console.table(&headers, &rows.collect::<Vec<_>>());
+    let rows = file.tasks.iter().map(|task| (task.task.as_str(), task.robots, task.accuracy, Some(task)));
+    papers_table(console, &file.dataset, rows);
     console.line("");
     for task in &file.tasks {
         for curve in &task.curves {
@@ -58,6 +39,36 @@ pub fn capacity(console: &Console, file: &CapacityFile, out: &Path) {
     };
     console.line(&format!("{}; early stopping waits on {waits}", file.selected));
     console.line(&format!("wrote {} and {}", out.display(), out.with_extension("csv").display()));
+}
+
+/// The paper's table: each task with its robots, their accuracy (0 to 1) and their capacity as far as it is known, the paper's figures
+/// beside.
+pub(super) fn papers_table<'a>(
+    console: &Console,
+    dataset: &str,
+    tasks: impl Iterator<Item = (&'a str, usize, f64, Option<&'a TaskCapacity>)>,
+) {
+    let size = |size: Option<f64>| size.map_or("no match".to_string(), |size| format!("{size:.1}"));
+    let unknown = || "–".to_string();
+    let rows = tasks.map(|(task, robots, accuracy, capacity)| {
+        let paper = published::row(dataset, task);
+        let own = |network: &str| capacity.and_then(|known| known.worth(network)).map_or_else(unknown, size);
+        let theirs =
+            |of: fn(&published::PaperRow) -> Option<f64>| paper.map_or_else(unknown, |row| size(of(row)));
+        vec![
+            task.to_string(),
+            robots.to_string(),
+            format!("{:.1}", 100.0 * accuracy),
+            paper.map_or_else(unknown, |row| format!("{:.1}", row.accuracy)),
+            own("mlp"),
+            theirs(|row| row.mlp),
+            own("cnn"),
+            theirs(|row| row.cnn),
+        ]
+    });
+    let headers =
+        ["task", "robots", "accuracy %", "paper's %", "MLP neurons", "paper's", "CNN kernels", "paper's"];
+    console.table(&headers, &rows.collect::<Vec<_>>());
 }
 
 /// The figure beside a `capacity.json`, as SVG and as PNG; the files.
@@ -115,9 +126,4 @@ pub fn table(console: &Console, finished: &Finished) {
     console.table(&headers, &rows.collect::<Vec<_>>());
     let files: Vec<String> = finished.files.iter().map(|file| file.display().to_string()).collect();
     console.line(&format!("wrote {}", files.join(" and ")));
-}
-
-/// Of a kind of network, if it was trained: the capacity, if there is one.
-fn own(task: &TaskCapacity, network: &str) -> Option<Option<f64>> {
-    task.curves.iter().find(|curve| curve.network == network).map(|curve| curve.capacity)
 }

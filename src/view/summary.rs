@@ -1,8 +1,10 @@
 //! What a command says at its end.
 
 use super::console::{Console, Mode};
+use super::networks;
 use super::progress::duration;
 use crate::run::bench::Speed;
+use crate::run::capacity_file::CapacityFile;
 use crate::run::data::Found;
 use crate::run::data::fetch::{Fetched, Outcome};
 use crate::run::eval_file::{EvalFile, RobotReport};
@@ -90,8 +92,9 @@ pub fn validation(console: &Console, best: &[Validated]) {
     console.table(&["best on validation", "task", "right", "balanced %"], &rows.collect::<Vec<_>>());
 }
 
-/// After an evaluation: a table per robot, the means, and the baselines.
-pub fn evaluation(console: &Console, report: &EvalFile, out: &Path) {
+/// After an evaluation: a table per robot, the means and the baselines, and the paper's table; `capacity` is what is known
+/// from an analysis of these robots.
+pub fn evaluation(console: &Console, report: &EvalFile, capacity: Option<&CapacityFile>, out: &Path) {
     if report.robots.is_empty() {
         return console.warning("no robot was evaluated");
     }
@@ -140,8 +143,6 @@ pub fn evaluation(console: &Console, report: &EvalFile, out: &Path) {
             mean.standard_deviation.map_or("–".to_string(), percent),
             mean.interval
                 .map_or("–".to_string(), |[low, high]| format!("{}–{}", percent(low), percent(high))),
-            published::row(&report.dataset, task)
-                .map_or("–".to_string(), |row| format!("{:.1}", row.accuracy)),
             percent(mean.balanced_accuracy),
             baseline(|b| b.larger_group),
             baseline(|b| b.best_single_pixel),
@@ -154,7 +155,6 @@ pub fn evaluation(console: &Console, report: &EvalFile, out: &Path) {
         "mean accuracy %",
         "deviation",
         "95 % interval",
-        "paper's %",
         "mean balanced %",
         "larger group %",
         "best pixel %",
@@ -162,6 +162,14 @@ pub fn evaluation(console: &Console, report: &EvalFile, out: &Path) {
     ];
     console.table(&headers, &rows.collect::<Vec<_>>());
     console.line("");
+    if capacity.is_some() || report.means.keys().any(|task| published::row(&report.dataset, task).is_some()) {
+        let tasks = report.means.iter().map(|(task, mean)| {
+            let known = capacity.and_then(|file| file.tasks.iter().find(|known| known.task == *task));
+            (task.as_str(), mean.robots, mean.accuracy, known)
+        });
+        networks::papers_table(console, &report.dataset, tasks);
+        console.line("");
+    }
     console.line(&format!(
         "{} {} test images; {}; |d| up to {} voxel lengths is wrong",
         report.images.len(),
@@ -170,6 +178,9 @@ pub fn evaluation(console: &Console, report: &EvalFile, out: &Path) {
         report.threshold
     ));
     console.line(&format!("wrote {} and {}", out.display(), out.with_extension("csv").display()));
+    if capacity.is_none() {
+        console.info(&format!("what network are they worth? morphcog capacity --eval {}", out.display()));
+    }
 }
 
 /// How fast this machine simulates.
