@@ -1,9 +1,10 @@
 //! Springs that end in an extra point, where two voxels touch only at a corner: few, and anywhere.
 
-use super::forces::{Pulls, Springs, Watch, carefully};
+use super::forces::{Pulls, Springs, Watch};
 use super::lattice::{FAMILIES, Lattice};
 use super::limits::Limits;
 use super::params::Physics;
+use super::series::LONG;
 use super::state::{Pair, X, Y, pair};
 use crate::base::lanes::{BLOCK, Buffer, Lanes, each};
 
@@ -97,7 +98,7 @@ impl Extra {
             let pull = each!(i in [0, 1, 2, 3] => {
                 let square = square[i] * L::load(&self.inverse_rest_square, at + i * BLOCK);
                 let t = limits.excess(square).or_else(limits.beyond(square, all), L::splat(0.0));
-                share * carefully(t)
+                share * LONG.carefully(t)
             });
             self.put(at, vector, pull);
         }

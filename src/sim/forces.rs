@@ -10,35 +10,12 @@
 //!
 //!   k(1 − ρ/d₀) + k(ρ/d₀)·(1 − 1/√(1 + t)) = `initial` + `change`·(1 − 1/√(1 + t)).
 //!
-//! Within a substep t is small, and a short series does: neither root nor division.
+//! Within a substep t is small, and a short series does ([`Series`](super::series::Series)): neither root nor division.
 
 use super::lattice::FAMILIES;
+use super::series::{LONG, SHORT};
 use super::state::{X, Y};
 use crate::base::lanes::{BLOCK, Lanes, each};
-
-/// Greatest |t| for the series. Springs beyond it (well below one in 1000) are computed with root and division.
-pub(super) const SERIES_RANGE: f64 = 1.0 / 64.0;
-
-/// (1 − 1/√(1 + t))/t up to t⁴: the binomial series to t⁶ with its last two terms spread over the others as
-/// Chebyshev's polynomials prescribe. 1 − 1/√(1 + t) is then off by no more than 2e-13 anywhere in the range.
-pub(super) const SERIES: [f64; 5] = {
-    const SQUARE: f64 = SERIES_RANGE * SERIES_RANGE;
-    const SIXTH: f64 = -231.0 / 1024.0;
-    [
-        1.0 / 2.0,
-        -3.0 / 8.0 - SIXTH * SQUARE * SQUARE * 9.0 / 16.0,
-        5.0 / 16.0,
-        -35.0 / 128.0 + SIXTH * SQUARE * 3.0 / 2.0,
-        63.0 / 256.0,
-    ]
-};
-
-/// (1 − 1/√(1 + t))/t for |t| in the series' range.
-#[inline(always)]
-fn series<L: Lanes>(t: L) -> L {
-    let [c0, c1, c2, c3, c4] = each!(i in [0, 1, 2, 3, 4] => L::splat(SERIES[i]));
-    c4.mul_add(t, c3).mul_add(t, c2).mul_add(t, c1).mul_add(t, c0)
-}
 
 /// What a sweep looks out for while it takes everything for regular. A branch in every block would cost more than the
 /// rare second sweep that treats each irregular spring and point as it must be.
@@ -67,30 +44,12 @@ impl<L: Lanes> Watch<L> {
         self.depth = (L::splat(0.0) - y).max(self.depth);
     }
 
-    /// Whether all was as it was taken to be.
+    /// Whether all was as it was taken to be, for a series of some range.
     #[inline(always)]
-    pub fn regular(self) -> bool {
-        let beyond = self.stretch.above(L::splat(SERIES_RANGE)) | self.depth.above(L::splat(0.0));
+    pub fn regular(self, range: f64) -> bool {
+        let beyond = self.stretch.above(L::splat(range)) | self.depth.above(L::splat(0.0));
         !L::any(beyond)
     }
-}
-
-/// 1 − 1/√(1 + t) by the series.
-#[inline(always)]
-pub(super) fn briefly<L: Lanes>(t: L) -> L {
-    t * series(t)
-}
-
-/// 1 − 1/√(1 + t) by the series or, beyond its range, with root and division.
-#[inline(always)]
-pub(super) fn carefully<L: Lanes>(t: L) -> L {
-    let brief = briefly(t);
-    let beyond = t.abs().above(L::splat(SERIES_RANGE));
-    if !L::any(beyond) {
-        return brief;
-    }
-    let one = L::splat(1.0);
-    (one - one / (one + t).sqrt()).or_else(beyond, brief)
 }
 
 /// A number for each slot of a block.
@@ -139,7 +98,7 @@ impl Pulls {
             watch.springs(&t);
         }
         each!(i in [0, 1, 2, 3] => {
-            let shrunk = if CAREFUL { carefully(t[i]) } else { briefly(t[i]) };
+            let shrunk = if CAREFUL { SHORT.carefully(t[i]) } else { SHORT.briefly(t[i]) };
             L::load(&self.change[i], lane).mul_add(shrunk, L::load(&self.initial[i], lane))
         })
     }
@@ -182,7 +141,7 @@ impl Springs {
                 square[i].mul_add(before[i] * before[i], L::splat(-1.0))
             });
             watch.springs(&t);
-            each!(i in [0, 1, 2, 3] => before[i].mul_sub_from(briefly(t[i]), before[i]))
+            each!(i in [0, 1, 2, 3] => before[i].mul_sub_from(LONG.briefly(t[i]), before[i]))
         };
         each!(i in [0, 1, 2, 3] => {
             // rest/d₀ = 1 − gain·(1 − goal/d₀)
@@ -251,6 +210,19 @@ impl<'a, L: Lanes> Gather<'a, L> {
             let sum = (own - above) + beside.after(self.beside[axis]);
             self.beside[axis] = beside;
             self.below[axis] = falling;
+            sum
+        })
+    }
+
+    /// As [`Gather::next`] where no spring pulls.
+    #[inline(always)]
+    pub fn next_nothing(&mut self, slot: usize) -> [L; 2] {
+        let zero = L::splat(0.0);
+        each!(axis in [X, Y] => {
+            zero.after(self.below[axis]).store(self.passing[axis], slot + self.pitch);
+            let above = L::load(self.passing[axis], slot);
+            let sum = zero.after(self.beside[axis]) - above;
+            (self.beside[axis], self.below[axis]) = (zero, zero);
             sum
         })
     }

@@ -10,6 +10,7 @@ use super::forces::{Gather, Watch, squares, vectors};
 use super::lattice::Lattice;
 use super::limits::limit_all;
 use super::params::Physics;
+use super::series::{LONG, SHORT};
 use super::state::{Scratch, State, Work, X, Y, slices, slices_mut};
 use crate::base::lanes::{BLOCK, Lanes, each};
 
@@ -25,7 +26,9 @@ pub(super) fn integrate<L: Lanes>(
         let goals = &scratch.goals[lattice.len..];
         extra.first_stage::<L>(lattice, goals, physics.servo_gain, &state.position);
     }
-    if !first_stage::<L, false>(lattice, physics, state, scratch) {
+    // The first substep of a control step knows no lengths yet.
+    let anew = std::mem::take(&mut scratch.anew);
+    if anew || !first_stage::<L, false>(lattice, physics, state, scratch) {
         first_stage::<L, true>(lattice, physics, state, scratch);
     }
     if !later_stages::<L, false>(lattice, physics, state, scratch) {
@@ -132,7 +135,7 @@ fn first_stage<L: Lanes, const CAREFUL: bool>(
             each!(axis in [X, Y] => first[axis].store(&mut work.first[axis], lane));
         }
     }
-    CAREFUL || watch.regular()
+    CAREFUL || watch.regular(LONG.range)
 }
 
 /// The second stage; leaves the positions of the third and of the fourth.
@@ -257,7 +260,7 @@ fn fourth_stage<L: Lanes, const CAREFUL: bool>(
             });
         }
     }
-    CAREFUL || watch.regular()
+    CAREFUL || watch.regular(SHORT.range)
 }
 
 /// Lanes in memory. Their alignment matters beyond them: a compiler that need not align the stack for anything else

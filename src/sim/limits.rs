@@ -3,9 +3,10 @@
 //! A spring beyond a limit l is corrected by (1 − l/d) of its vector; with t = d²/l² − 1, which is small, that is
 //! 1 − 1/√(1 + t) again: mostly neither root nor division.
 
-use super::forces::{Gather, SERIES, SERIES_RANGE, briefly, carefully, squares, vectors};
+use super::forces::{Gather, squares, vectors};
 use super::lattice::{FAMILIES, Lattice};
 use super::params::Physics;
+use super::series::{LONG, SHORT};
 use super::state::{Pair, X, Y, slices, slices_mut};
 use crate::base::lanes::{BLOCK, Lanes, each};
 
@@ -114,8 +115,8 @@ fn limit_horizontal<L: Lanes>(lattice: &Lattice, physics: &Physics, from: &Pair,
             });
             others = others | ((other[0] | other[1]) | other[2]);
             let t = limits[0].excess(squares[0]).or_else(beyond, zero);
-            far = far | t.abs().above(L::splat(SERIES_RANGE));
-            let sums = gather.next_horizontal(share * briefly(t), &vectors);
+            far = far | t.abs().above(L::splat(LONG.range));
+            let sums = gather.next_horizontal(share * LONG.briefly(t), &vectors);
             (L::load(from[X], slot) + sums[X]).store(to[X], slot);
             (L::load(from[Y], slot) + sums[Y]).store(to[Y], slot);
         }
@@ -147,11 +148,18 @@ fn limit_any<L: Lanes, const FAR: bool>(
             let beyond = each!(i in [0, 1, 2, 3] => {
                 limits[i].beyond(squares[i], L::load(exists, i * BLOCK + lane))
             });
-            others = others | ((beyond[1] | beyond[2]) | beyond[3]);
+            let other = (beyond[1] | beyond[2]) | beyond[3];
+            if !L::any(other | beyond[0]) {
+                let sums = gather.next_nothing(slot);
+                (L::load(from[X], slot) + sums[X]).store(to[X], slot);
+                (L::load(from[Y], slot) + sums[Y]).store(to[Y], slot);
+                continue;
+            }
+            others = others | other;
             let t = each!(i in [0, 1, 2, 3] => limits[i].excess(squares[i]).or_else(beyond[i], zero));
             let greatest = t[0].max_abs(t[1]).max_abs(t[2].max_abs(t[3]));
-            far = far | greatest.above(L::splat(SERIES_RANGE));
-            let pull = each!(i in [0, 1, 2, 3] => share * if FAR { carefully(t[i]) } else { briefly(t[i]) });
+            far = far | greatest.above(L::splat(LONG.range));
+            let pull = each!(i in [0, 1, 2, 3] => share * if FAR { LONG.carefully(t[i]) } else { LONG.briefly(t[i]) });
             let sums = gather.next(pull, &vectors, slot);
             (L::load(from[X], slot) + sums[X]).store(to[X], slot);
             (L::load(from[Y], slot) + sums[Y]).store(to[Y], slot);
@@ -198,10 +206,10 @@ pub(super) fn limit_rigid(lattice: &Lattice, physics: &Physics, [x, y]: &mut Pai
 /// 1 − 1/√(1 + t), in the order with the shortest chain.
 #[inline(always)]
 fn shrink_scalar(t: f64) -> f64 {
-    if t.abs() > SERIES_RANGE {
+    if t.abs() > SHORT.range {
         return 1.0 - 1.0 / (1.0 + t).sqrt();
     }
-    let [c0, c1, c2, c3, c4] = SERIES;
+    let [c0, c1, c2, c3, c4] = SHORT.terms;
     let square = t * t;
     ((c0 + c1 * t) + square * ((c2 + c3 * t) + square * c4)) * t
 }

@@ -18,6 +18,7 @@ mod limits;
 mod neighbours;
 pub mod params;
 mod refinement;
+mod series;
 mod state;
 mod world;
 

@@ -5,11 +5,12 @@
 //! lists were made, no other pair can have met. So the lists change nothing but the time it takes. Motion along x
 //! counts relative to one of the points: the ground is the same everywhere, and a walk wears no list out.
 
+use super::forces::vectors;
 use super::geometry::{Bounds, Vector};
-use super::lattice::{Lattice, SurfaceVoxel};
+use super::lattice::{FAMILIES, Lattice, SurfaceVoxel};
 use super::params::Physics;
-use super::state::{Pair, State, X, Y};
-use crate::base::lanes::{Lanes, each};
+use super::state::{Pair, State, X, Y, slices};
+use crate::base::lanes::{BLOCK, Buffer, Lanes, each};
 
 /// How far a point may move before the lists are made anew \[voxel lengths\].
 const BUDGET: f64 = 0.2;
@@ -35,6 +36,8 @@ pub(super) struct Neighbours {
     /// Pairs of surface voxels, not neighbours in the body, whose boxes may overlap.
     pub distant: Vec<[usize; 2]>,
     bounds: Vec<Bounds>,
+    /// The same for wide lanes, in whole blocks: low x, low y, high x, high y. Behind the last box there is no number.
+    sides: [Buffer; 4],
 }
 
 /// A voxel is larger than the physics allows, or a coordinate is not a number.
@@ -51,6 +54,41 @@ pub(super) fn place(point: usize, state: &State) -> Vector {
 #[inline]
 pub(super) fn quad(voxel: &SurfaceVoxel, state: &State) -> [Vector; 4] {
     voxel.corners.map(|point| place(point, state))
+}
+
+/// Whether no voxel is larger than the physics allows, and all coordinates are numbers.
+#[cold]
+fn sane(lattice: &Lattice, physics: &Physics, state: &State) -> bool {
+    lattice.voxels.iter().all(|(_, corners)| {
+        let bounds = Bounds::of(&corners.map(|point| place(point, state)));
+        let extent = bounds.high - bounds.low;
+        let small = extent.x <= physics.blow_up_extent && extent.y <= physics.blow_up_extent;
+        small && corners.iter().all(|&point| place(point, state).iter().all(|v| v.is_finite()))
+    })
+}
+
+/// Whether all sides of all voxels are numbers and so short that every voxel is [`sane`]: the way from any of its corners
+/// to any other is two sides long.
+#[inline(always)]
+fn short_sides<L: Lanes>(lattice: &Lattice, physics: &Physics, state: &State) -> bool {
+    if !lattice.extra_springs.is_empty() {
+        return false;
+    }
+    let half = L::splat(physics.blow_up_extent / 2.0);
+    let (exists, _) = lattice.exists.as_chunks::<{ FAMILIES * BLOCK }>();
+    let mut short = half.above(L::splat(0.0));
+    for slot in lattice.runs.iter().flat_map(|run| run.clone().step_by(L::WIDTH)) {
+        let vectors = vectors::<L>(slices(&state.position, lattice.len), slot, lattice.pitch);
+        let (exists, lane) = (&exists[slot / BLOCK], slot % BLOCK);
+        for along in vectors {
+            for family in [0, 1] {
+                let side = along[family].bits_and(L::load(exists, family * BLOCK + lane));
+                // What is no number is not short either.
+                short = short & half.above(side);
+            }
+        }
+    }
+    L::all(short)
 }
 
 impl Neighbours {
@@ -78,11 +116,11 @@ impl Neighbours {
                 return Ok(());
             }
         }
-        self.make(lattice, physics, state)
+        self.make::<L>(lattice, physics, state)
     }
 
-    #[cold]
-    fn make(&mut self, lattice: &Lattice, physics: &Physics, state: &State) -> Result<(), BlownUp> {
+    #[inline(always)]
+    fn make<L: Lanes>(&mut self, lattice: &Lattice, physics: &Physics, state: &State) -> Result<(), BlownUp> {
         let slack = 2.0 * BUDGET * physics.cell_size;
         if self.made[X].len() == lattice.len {
             // `clone_from` would ask for new memory.
@@ -96,42 +134,67 @@ impl Neighbours {
             self.low.reserve(surface);
             self.candidates.reserve(16 * surface);
             self.distant.reserve(4 * surface);
+            let blocks = surface.next_multiple_of(BLOCK);
+            self.sides = each!(_side in [0, 1, 2, 3] => Buffer::filled(blocks, f64::NAN));
         }
-        for (_, corners) in &lattice.voxels {
-            let bounds = Bounds::of(&corners.map(|point| place(point, state)));
-            let extent = bounds.high - bounds.low;
-            let sane = extent.x <= physics.blow_up_extent && extent.y <= physics.blow_up_extent;
-            if !sane || !corners.iter().all(|&p| place(p, state).iter().all(|v| v.is_finite())) {
-                return Err(BlownUp);
-            }
+        if !short_sides::<L>(lattice, physics, state) && !sane(lattice, physics, state) {
+            return Err(BlownUp);
         }
         self.bounds.clear();
         self.bounds.extend(lattice.surface.iter().map(|voxel| Bounds::of(&quad(voxel, state))));
+        for (i, Bounds { low, high }) in self.bounds.iter().enumerate() {
+            let ends = [low.x, low.y, high.x, high.y];
+            self.sides.iter_mut().zip(ends).for_each(|(side, end)| side[i] = end);
+        }
         let ground_top = f64::from(physics.ground_row) * physics.cell_size;
         self.low.clear();
         self.candidates.clear();
         self.distant.clear();
-        for (mover, voxel) in lattice.surface.iter().enumerate() {
+        for mover in 0..lattice.surface.len() {
             if self.bounds[mover].low.y <= ground_top + slack {
                 self.low.push(mover);
             }
-            for (host, other) in lattice.surface.iter().enumerate() {
-                if host == mover || !self.bounds[mover].near(&self.bounds[host], slack) {
+            let bounds = self.bounds[mover];
+            for block in (0..lattice.surface.len()).step_by(L::WIDTH) {
+                // Most are far away as a whole.
+                if !self.any_near::<L>(&bounds, block, slack) {
                     continue;
                 }
-                let apart = voxel.row.abs_diff(other.row).max(voxel.column.abs_diff(other.column));
-                if apart > 1 && mover < host {
-                    self.distant.push([mover, host]);
-                }
-                for (corner, point) in voxel.corners.iter().enumerate() {
-                    let place = place(*point, state);
-                    if !other.corners.contains(point) && self.bounds[host].holds(place, slack) {
-                        self.candidates.push(Candidate { mover, corner, host });
+                for host in block..lattice.surface.len().min(block + L::WIDTH) {
+                    if host != mover && bounds.near(&self.bounds[host], slack) {
+                        self.add(lattice, state, [mover, host], slack);
                     }
                 }
             }
         }
         Ok(())
+    }
+
+    /// Whether any of the next few surface voxels may be near a box.
+    #[inline(always)]
+    fn any_near<L: Lanes>(&self, bounds: &Bounds, block: usize, slack: f64) -> bool {
+        let [low_x, low_y, high_x, high_y] = each!(i in [0, 1, 2, 3] => L::load(&self.sides[i], block));
+        // A little more, since these comparisons are strict: whoever touches is looked at.
+        let reach = 1.001 * slack;
+        let (left, right) = (L::splat(bounds.low.x - reach), L::splat(bounds.high.x + reach));
+        let (bottom, top) = (L::splat(bounds.low.y - reach), L::splat(bounds.high.y + reach));
+        let across = high_x.above(left) & right.above(low_x);
+        L::any(across & high_y.above(bottom) & top.above(low_y))
+    }
+
+    /// Adds a surface voxel near another to the lists.
+    fn add(&mut self, lattice: &Lattice, state: &State, [mover, host]: [usize; 2], slack: f64) {
+        let (voxel, other) = (&lattice.surface[mover], &lattice.surface[host]);
+        let apart = voxel.row.abs_diff(other.row).max(voxel.column.abs_diff(other.column));
+        if apart > 1 && mover < host {
+            self.distant.push([mover, host]);
+        }
+        for (corner, point) in voxel.corners.iter().enumerate() {
+            let place = place(*point, state);
+            if !other.corners.contains(point) && self.bounds[host].holds(place, slack) {
+                self.candidates.push(Candidate { mover, corner, host });
+            }
+        }
     }
 
     /// Whether so many distant surface voxels overlap that the life is unstable (physics.md, "Instability").

@@ -97,6 +97,8 @@ pub(super) struct Scratch {
     pub position: Pair,
     pub velocity: Pair,
     pub extra: Option<Extra>,
+    /// Whether the springs' lengths are forgotten.
+    pub anew: bool,
     /// What the latest length limits had to reckon with.
     pub reach: Reach,
     /// Which contacts are possible.
@@ -122,6 +124,7 @@ impl Scratch {
             position: parked(),
             velocity: pair(lattice.len),
             extra: Extra::new(lattice, physics.mass, physics.servo_gain),
+            anew: true,
             reach: Reach::default(),
             neighbours: Neighbours::default(),
         }
@@ -129,6 +132,7 @@ impl Scratch {
 
     /// At the start of a control step: what a substep leaves to the next but is not part of the state.
     pub fn begin(&mut self) {
+        self.anew = true;
         self.springs.iter_mut().for_each(Springs::forget);
         self.extra.iter_mut().for_each(Extra::forget);
     }
