@@ -4,7 +4,7 @@ use super::forces::{Pulls, Springs, Watch};
 use super::lattice::{FAMILIES, Lattice};
 use super::limits::Limits;
 use super::params::Physics;
-use super::series::LONG;
+use super::series::carefully;
 use super::state::{Pair, X, Y, pair};
 use crate::base::lanes::{BLOCK, Buffer, Lanes, each};
 
@@ -98,7 +98,7 @@ impl Extra {
             let pull = each!(i in [0, 1, 2, 3] => {
                 let square = square[i] * L::load(&self.inverse_rest_square, at + i * BLOCK);
                 let t = limits.excess(square).or_else(limits.beyond(square, all), L::splat(0.0));
-                share * LONG.carefully(t)
+                share * carefully(t)
             });
             self.put(at, vector, pull);
         }

@@ -10,10 +10,10 @@
 //!
 //!   k(1 − ρ/d₀) + k(ρ/d₀)·(1 − 1/√(1 + t)) = `initial` + `change`·(1 − 1/√(1 + t)).
 //!
-//! Within a substep t is small, and a short series does ([`Series`](super::series::Series)): neither root nor division.
+//! Within a substep t is small, and a short series does ([`super::series`]): neither root nor division.
 
 use super::lattice::FAMILIES;
-use super::series::{LONG, SHORT};
+use super::series::{RANGE, briefly, carefully};
 use super::state::{X, Y};
 use crate::base::lanes::{BLOCK, Lanes, each};
 
@@ -44,10 +44,10 @@ impl<L: Lanes> Watch<L> {
         self.depth = (L::splat(0.0) - y).max(self.depth);
     }
 
-    /// Whether all was as it was taken to be, for a series of some range.
+    /// Whether all was as it was taken to be,.
     #[inline(always)]
-    pub fn regular(self, range: f64) -> bool {
-        let beyond = self.stretch.above(L::splat(range)) | self.depth.above(L::splat(0.0));
+    pub fn regular(self) -> bool {
+        let beyond = self.stretch.above(L::splat(RANGE)) | self.depth.above(L::splat(0.0));
         !L::any(beyond)
     }
 }
@@ -98,7 +98,7 @@ impl Pulls {
             watch.springs(&t);
         }
         each!(i in [0, 1, 2, 3] => {
-            let shrunk = if CAREFUL { SHORT.carefully(t[i]) } else { SHORT.briefly(t[i]) };
+            let shrunk = if CAREFUL { carefully(t[i]) } else { briefly(t[i]) };
             L::load(&self.change[i], lane).mul_add(shrunk, L::load(&self.initial[i], lane))
         })
     }
@@ -141,7 +141,7 @@ impl Springs {
                 square[i].mul_add(before[i] * before[i], L::splat(-1.0))
             });
             watch.springs(&t);
-            each!(i in [0, 1, 2, 3] => before[i].mul_sub_from(LONG.briefly(t[i]), before[i]))
+            each!(i in [0, 1, 2, 3] => before[i].mul_sub_from(briefly(t[i]), before[i]))
         };
         each!(i in [0, 1, 2, 3] => {
             // rest/d₀ = 1 − gain·(1 − goal/d₀)

@@ -10,7 +10,6 @@ use super::forces::{Gather, Watch, squares, vectors};
 use super::lattice::Lattice;
 use super::limits::limit_all;
 use super::params::Physics;
-use super::series::{LONG, SHORT};
 use super::state::{Scratch, State, Work, X, Y, slices, slices_mut};
 use crate::base::lanes::{BLOCK, Lanes, each};
 
@@ -135,7 +134,7 @@ fn first_stage<L: Lanes, const CAREFUL: bool>(
             each!(axis in [X, Y] => first[axis].store(&mut work.first[axis], lane));
         }
     }
-    CAREFUL || watch.regular(LONG.range)
+    CAREFUL || watch.regular()
 }
 
 /// The second stage; leaves the positions of the third and of the fourth.
@@ -260,7 +259,7 @@ fn fourth_stage<L: Lanes, const CAREFUL: bool>(
             });
         }
     }
-    CAREFUL || watch.regular(SHORT.range)
+    CAREFUL || watch.regular()
 }
 
 /// Lanes in memory. Their alignment matters beyond them: a compiler that need not align the stack for anything else

@@ -6,7 +6,7 @@
 use super::forces::{Gather, squares, vectors};
 use super::lattice::{FAMILIES, Lattice};
 use super::params::Physics;
-use super::series::{LONG, SHORT};
+use super::series::{RANGE, TERMS, briefly, carefully};
 use super::state::{Pair, X, Y, slices, slices_mut};
 use crate::base::lanes::{BLOCK, Lanes, each};
 
@@ -115,8 +115,8 @@ fn limit_horizontal<L: Lanes>(lattice: &Lattice, physics: &Physics, from: &Pair,
             });
             others = others | ((other[0] | other[1]) | other[2]);
             let t = limits[0].excess(squares[0]).or_else(beyond, zero);
-            far = far | t.abs().above(L::splat(LONG.range));
-            let sums = gather.next_horizontal(share * LONG.briefly(t), &vectors);
+            far = far | t.abs().above(L::splat(RANGE));
+            let sums = gather.next_horizontal(share * briefly(t), &vectors);
             (L::load(from[X], slot) + sums[X]).store(to[X], slot);
             (L::load(from[Y], slot) + sums[Y]).store(to[Y], slot);
         }
@@ -158,8 +158,8 @@ fn limit_any<L: Lanes, const FAR: bool>(
             others = others | other;
             let t = each!(i in [0, 1, 2, 3] => limits[i].excess(squares[i]).or_else(beyond[i], zero));
             let greatest = t[0].max_abs(t[1]).max_abs(t[2].max_abs(t[3]));
-            far = far | greatest.above(L::splat(LONG.range));
-            let pull = each!(i in [0, 1, 2, 3] => share * if FAR { LONG.carefully(t[i]) } else { LONG.briefly(t[i]) });
+            far = far | greatest.above(L::splat(RANGE));
+            let pull = each!(i in [0, 1, 2, 3] => share * if FAR { carefully(t[i]) } else { briefly(t[i]) });
             let sums = gather.next(pull, &vectors, slot);
             (L::load(from[X], slot) + sums[X]).store(to[X], slot);
             (L::load(from[Y], slot) + sums[Y]).store(to[Y], slot);
@@ -206,10 +206,10 @@ pub(super) fn limit_rigid(lattice: &Lattice, physics: &Physics, [x, y]: &mut Pai
 /// 1 − 1/√(1 + t), in the order with the shortest chain.
 #[inline(always)]
 fn shrink_scalar(t: f64) -> f64 {
-    if t.abs() > SHORT.range {
+    if t.abs() > RANGE {
         return 1.0 - 1.0 / (1.0 + t).sqrt();
     }
-    let [c0, c1, c2, c3, c4] = SHORT.terms;
+    let [c0, c1, c2, c3, c4] = TERMS;
     let square = t * t;
     ((c0 + c1 * t) + square * ((c2 + c3 * t) + square * c4)) * t
 }
