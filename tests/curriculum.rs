@@ -3,9 +3,17 @@
 mod common;
 
 use common::program::{Sandbox, TINY, without_seconds};
+use morphcog::run::Config;
 use morphcog::run::archive::RunFile;
+use morphcog::run::curriculum::Period;
+use morphcog::run::evolve::{Observer, Options, Progress, evolve};
+use morphcog::run::folder::{IfExists, RunFolder};
+use morphcog::run::training::Training;
 use morphcog::task::fitness::Fitness;
 use morphcog::task::score::Answer;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
 
 /// Three stages in twelve generations, the last with three draws of images.
 fn staged() -> String {
@@ -36,6 +44,54 @@ fn a_curriculum_stopped_after_any_generation_goes_on_to_the_same_bytes() {
         sandbox.run("evolve -q -c run.toml -o part --resume").ended(0, &[]);
         assert_eq!(result(&sandbox, "part"), whole, "stopped after {generations}");
     }
+}
+
+/// Sets `stop` a moment after a generation, when the next stage has begun to evaluate the archive anew.
+struct Impatient {
+    after: u64,
+    stop: Arc<AtomicBool>,
+}
+
+impl Observer for Impatient {
+    fn started(&mut self, _: &RunFolder, _: &Training, _: &Progress) {}
+    fn period(&mut self, _: Period, _: &Training, _: &Progress) {}
+    fn warning(&mut self, _: &str) {}
+
+    fn generation(&mut self, progress: &Progress) {
+        if progress.done == self.after {
+            let stop = Arc::clone(&self.stop);
+            std::thread::spawn(move || {
+                std::thread::sleep(Duration::from_millis(50));
+                stop.store(true, Ordering::Relaxed);
+            });
+        }
+    }
+}
+
+#[test]
+fn a_run_stops_while_a_stage_evaluates_the_archive_anew_and_nothing_is_lost() {
+    let sandbox = sandbox();
+    // Seconds of work at the beginning of the second stage, in several parts.
+    let text = staged().replace("images_per_class = 2", "images_per_class = 900");
+    let config = Config::parse(&text, "run.toml", &[]).unwrap();
+    let out = sandbox.path("run");
+    let options = Options {
+        config,
+        name: "run".to_string(),
+        out: out.clone(),
+        if_exists: IfExists::Refuse,
+        data: None,
+        threads: Some(1),
+    };
+    let stop = Arc::new(AtomicBool::new(false));
+    let mut observer = Impatient { after: 4, stop: Arc::clone(&stop) };
+    let begin = Instant::now();
+    let finished = evolve(&options, &stop, &mut observer).unwrap();
+    assert_eq!((finished.stopped, finished.run.generations), (true, 4));
+    assert!(begin.elapsed() < Duration::from_secs(20), "{:?}", begin.elapsed());
+    // As if it had been stopped before the stage.
+    sandbox.run("evolve -q -c run.toml -o before -g 4").ended(0, &[]);
+    assert_eq!(sandbox.run_file("run").elites, sandbox.run_file("before").elites);
 }
 
 #[test]

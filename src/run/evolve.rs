@@ -5,16 +5,17 @@ use super::checkpoint::{self, Checkpoint, KnownBodies};
 use super::curriculum::Period;
 use super::folder::{self, IfExists, RunFolder};
 use super::metrics::{Metrics, Totals};
-use super::robust::{Scored, with_perturbed_lives};
+use super::robust::{Scored, evaluate_all, with_perturbed_lives};
 use super::training::{Training, load_dataset};
 use super::variation::Mutations;
 use super::{Config, Error, resume};
 use crate::base::files::write_atomically;
+use crate::body::Body;
 use crate::genome::GenomeError;
 use crate::qd::descriptor::count_bin;
 use crate::qd::{Archive, ArchiveStats, DescriptorSpace, Evaluated, MapElites};
 use crate::task::dataset::{Dataset, Split};
-use crate::task::evaluation::{Job, Outcome, Savings, evaluate};
+use crate::task::evaluation::{Job, Outcome, evaluate};
 use crate::task::grouping::Grouping;
 use rayon::prelude::*;
 use std::path::PathBuf;
@@ -74,7 +75,7 @@ pub struct Finished {
     pub stopped: bool,
 }
 
-/// Runs a config, or goes on with a run. `stop` is looked at after every generation.
+/// Runs a config, or goes on with a run. `stop` is looked at after every generation, and more often where a stage begins.
 ///
 /// # Errors
 /// What is wrong with config, data or folder; nothing that was there is lost.
@@ -191,7 +192,9 @@ impl<'a> Run<'a> {
         while self.generation < config.generations && !stop.load(Ordering::Relaxed) {
             let period = config.period(self.generation);
             if period != self.period {
-                self.begin(period)?;
+                if !self.begin(period, stop)? {
+                    break;
+                }
                 observer.period(period, &self.training, &self.progress());
             }
             self.next_generation()?;
@@ -207,29 +210,25 @@ impl<'a> Run<'a> {
         Ok(())
     }
 
-    /// Begins a period: other images, perhaps another fitness, and the elites evaluated anew.
-    fn begin(&mut self, period: Period) -> Result<(), Error> {
+    /// Begins a period: other images, perhaps another fitness, and the elites evaluated anew. Whether that was done: if
+    /// stopped meanwhile, nothing has changed.
+    fn begin(&mut self, period: Period, stop: &AtomicBool) -> Result<bool, Error> {
         let config = &self.options.config;
-        self.period = period;
-        self.training = Training::of(config, self.dataset, period)?;
-        self.grouping = config.grouping()?.with_fitness(config.fitness(self.generation));
+        let training = Training::of(config, self.dataset, period)?;
+        let grouping = config.grouping()?.with_fitness(config.fitness(self.generation));
         let elites: Vec<Robot> = self.search.archive().elites().map(|elite| elite.solution.clone()).collect();
+        let bodies: Vec<&Body> = elites.iter().map(|robot| &robot.body).collect();
+        let Some(scored) = evaluate_all(config, &training, &grouping, &bodies, stop) else {
+            return Ok(false);
+        };
         self.totals.evaluations += elites.len() as u64;
         self.known = KnownBodies::default();
-        for robot in &elites {
-            self.known.insert(robot.body.key());
-        }
-        let jobs: Vec<Job> = elites
-            .iter()
-            .map(|robot| Job { body: &robot.body, first_image: 0, may_win: Box::new(|_| true) })
-            .collect();
-        let savings = Savings { early_stop: false, ..config.savings };
-        let evaluations = evaluate(&jobs, &self.training.stimuli, &config.physics, &config.protocol, savings);
-        let scored = with_perturbed_lives(config, &self.training, &self.grouping, &jobs, evaluations);
-        drop(jobs);
+        elites.iter().for_each(|robot| _ = self.known.insert(robot.body.key()));
+        (self.period, self.training, self.grouping) = (period, training, grouping);
         self.search = MapElites::new(config.seed, config.map_elites.clone(), Archive::new());
         // In the order of their cells: of equals that now share a cell the first stays.
-        self.tell((0..).zip(elites).zip(scored))
+        self.tell((0..).zip(elites).zip(scored))?;
+        Ok(true)
     }
 
     /// Makes, evaluates and tells one generation.

@@ -12,6 +12,7 @@ use crate::task::fitness::Fitness;
 use crate::task::grouping::Grouping;
 use crate::task::perturbation::{Perturbation, Setting};
 use serde::{Deserialize, Serialize};
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// How robots are evaluated: section `[evaluation]`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -35,12 +36,37 @@ impl EvaluationConfig {
     }
 }
 
+/// Bodies per thread that are evaluated between two looks at whether to stop: enough for no core to wait long.
+const BODIES_AT_ONCE: usize = 4;
+
 /// A robot's evaluation, and what bounds its fitness besides.
 pub(super) struct Scored {
     /// Of the unchanged life; unstable if one of the others is. Showings are counted of all.
     pub evaluation: Evaluation,
     /// Least fitness, on its task, in the perturbed lives; infinite if there are none.
     pub at_most: f64,
+}
+
+/// Evaluates bodies to the end, none of them dropping out; nothing if `stop` is set meanwhile. All of an archive on many images can take
+/// longer than anybody waits for a run to stop, so it is looked at after every few bodies.
+pub(super) fn evaluate_all(
+    config: &Config,
+    training: &Training,
+    grouping: &Grouping,
+    bodies: &[&Body],
+    stop: &AtomicBool,
+) -> Option<Vec<Scored>> {
+    let savings = Savings { early_stop: false, ..config.savings };
+    let mut scored = Vec::new();
+    for part in bodies.chunks(BODIES_AT_ONCE * rayon::current_num_threads()) {
+        if stop.load(Ordering::Relaxed) {
+            return None;
+        }
+        let jobs: Vec<Job> = part.iter().map(|body| all_of(body)).collect();
+        let evaluations = evaluate(&jobs, &training.stimuli, &config.physics, &config.protocol, savings);
+        scored.extend(with_perturbed_lives(config, training, grouping, &jobs, evaluations));
+    }
+    Some(scored)
 }
 
 /// Lets the robots that may still win live their perturbed lives. Results in the jobs' order.
