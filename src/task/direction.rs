@@ -32,7 +32,7 @@ pub struct Assignment {
 impl Assignment {
     /// The assignment under which a robot's training answers are fitter (A left if it makes no difference).
     pub fn from_training(split: &Split, fitness: Fitness, answers: &[Answer]) -> Self {
-        let (a_right, a_left) = fitness.of_assignments(of_split(split, answers), 0);
+        let (a_right, a_left) = fitness.of_assignments(of_split(split, answers), [0, 0]);
         Assignment { a: if a_right > a_left { Direction::Right } else { Direction::Left } }
     }
 

@@ -15,6 +15,9 @@ const SLACK: f64 = 1e-9;
 
 /// How answers to several images become one number. An answer's *margin* is its displacement towards the right side, in
 /// voxel lengths, negative on the wrong one; of the two ways to assign sides to groups the fitter counts.
+///
+/// Where images are counted or averaged, both groups weigh the same, however many images they have: with one class against three,
+/// a robot that always walks the way of the three would else be right on three quarters, and the fittest for long.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Fitness {
@@ -24,8 +27,8 @@ pub enum Fitness {
     Min,
     /// The mean of the margins, each divided by ten voxel lengths and clipped to −1 … 1.
     MeanClipped,
-    /// How many images are answered right, by more than three voxel lengths; and, between 0 and 1, the mean of
-    /// (1 + m/(|m| + 10))/2 over the margins m, which tells equals apart and never saturates.
+    /// How many images are answered right, by more than three voxel lengths; and, between 0 and the worth of an image, the
+    /// mean of (1 + m/(|m| + 10))/2 over the margins m, which tells equals apart and never saturates.
     RightThenMargin,
 }
 
@@ -33,43 +36,50 @@ pub enum Fitness {
 pub(super) type Assignments = (f64, f64);
 
 impl Fitness {
-    /// Fitness under both assignments, of answers by group and displacement; if there are images `to_come`, upper
-    /// bounds of it. Infinite without any; not a number if an answer is none.
+    /// Fitness under both assignments, of answers by group and displacement; if there are images `to_come` (of group A, of
+    /// group B), upper bounds of it. Infinite without any; not a number if an answer is none.
     pub(super) fn of_assignments(
         self,
-        answers: impl Iterator<Item = (Group, f64)>,
-        to_come: usize,
+        answers: impl Iterator<Item = (Group, f64)> + Clone,
+        to_come: [usize; 2],
     ) -> Assignments {
         // Towards the right side if group A is to walk right; if it is to walk left, the negative.
-        let margins = answers.map(|(group, d)| if group == Group::A { d } else { -d });
+        let margins = answers.map(|(group, d)| if group == Group::A { (0, d) } else { (1, -d) });
         if self == Fitness::Min {
             let nothing = (f64::INFINITY, f64::INFINITY);
-            return margins.fold(nothing, |(right, left), m| (smaller(right, m), smaller(left, -m)));
+            return margins.fold(nothing, |(right, left), (_, m)| (smaller(right, m), smaller(left, -m)));
         }
-        let begin = (to_come as f64, to_come as f64);
         let mut images = to_come;
-        let (mut counts, mut sums) = (begin, begin);
-        for margin in margins {
-            images += 1;
-            for (count, sum, m) in
-                [(&mut counts.0, &mut sums.0, margin), (&mut counts.1, &mut sums.1, -margin)]
-            {
-                *count += f64::from(u8::from(m > WRONG));
-                *sum += match self {
-                    Fitness::RightThenMargin => (1.0 + m / (m.abs() + ENOUGH)) / 2.0,
-                    _ => (m / ENOUGH).clamp(-1.0, 1.0),
-                };
-            }
-        }
-        if images == 0 {
+        margins.clone().for_each(|(group, _)| images[group] += 1);
+        let all = images[0] + images[1];
+        if all == 0 {
             return (f64::INFINITY, f64::INFINITY);
         }
-        let slack = if to_come > 0 { SLACK } else { 0.0 };
-        let of = |count: f64, sum: f64| {
-            let right = if self == Fitness::RightThenMargin { count } else { 0.0 };
-            right + sum / images as f64 + slack
+        // Exactly 1 where both groups have as many, or one has none.
+        let weight =
+            |of_group: usize| if images.contains(&0) { 1.0 } else { all as f64 / (2 * of_group) as f64 };
+        let weights = images.map(weight);
+        // What is to come is as good as can be.
+        let best = weights[0] * to_come[0] as f64 + weights[1] * to_come[1] as f64;
+        let (mut counts, mut sums) = ([to_come; 2], [best; 2]);
+        for (group, margin) in margins {
+            for (way, m) in [margin, -margin].into_iter().enumerate() {
+                counts[way][group] += usize::from(m > WRONG);
+                sums[way] += weights[group]
+                    * match self {
+                        Fitness::RightThenMargin => (1.0 + m / (m.abs() + ENOUGH)) / 2.0,
+                        _ => (m / ENOUGH).clamp(-1.0, 1.0),
+                    };
+            }
+        }
+        let slack = if to_come == [0, 0] { 0.0 } else { SLACK };
+        let least = weights[0].min(weights[1]);
+        let of = |way: usize| {
+            let mean = sums[way] / all as f64;
+            let right = weights[0] * counts[way][0] as f64 + weights[1] * counts[way][1] as f64;
+            (if self == Fitness::RightThenMargin { right + least * mean } else { mean }) + slack
         };
-        (of(counts.0, sums.0), of(counts.1, sums.1))
+        (of(0), of(1))
     }
 }
 
@@ -93,15 +103,27 @@ mod tests {
     const MANY: [Fitness; 2] = [Fitness::MeanClipped, Fitness::RightThenMargin];
 
     fn fitness(kind: Fitness, answers: &[(Group, f64)]) -> f64 {
-        better(kind.of_assignments(answers.iter().copied(), 0))
+        better(kind.of_assignments(answers.iter().copied(), [0, 0]))
     }
 
     #[test]
     fn long_walks_count_no_more_than_enough() {
         let mean = |answers: &[(Group, f64)]| fitness(Fitness::MeanClipped, answers);
         assert_eq!(mean(&[(A, -5.0), (B, 40.0)]), 0.75);
-        assert_eq!(mean(&[(A, 40.0), (A, 40.0), (A, -10.0), (B, -10.0)]), 0.5);
+        assert_eq!(mean(&[(A, 40.0), (A, -10.0), (B, 2.0), (B, -10.0)]), 0.2);
         assert_eq!(mean(&[(A, 4.0), (B, 4.0)]), 0.0);
+    }
+
+    #[test]
+    fn groups_weigh_the_same_however_many_images_they_have() {
+        // One against three: always walking one way is worth nothing, and not three quarters.
+        let same_way = [(A, 20.0), (B, 20.0), (B, 20.0), (B, 20.0)];
+        assert!(fitness(Fitness::MeanClipped, &same_way).abs() < 1e-12);
+        let right = |answers: &[(Group, f64)]| fitness(Fitness::RightThenMargin, answers);
+        assert!((2.0..2.7).contains(&right(&same_way)), "{}", right(&same_way));
+        // All of A and two of three of B: 2 + 2 · 2/3 of 4.
+        let most = right(&[(A, 9.0), (B, -9.0), (B, -9.0), (B, 9.0)]);
+        assert!((2.0 + 4.0 / 3.0..4.0).contains(&most), "{most}");
     }
 
     #[test]
@@ -110,6 +132,8 @@ mod tests {
         let (short, long) =
             (right(&[(A, 3.1), (A, 3.1), (B, -3.1)]), right(&[(A, 90.0), (A, 3.0), (B, -90.0)]));
         assert!((3.0..4.0).contains(&short) && (2.0..3.0).contains(&long), "{short} {long}");
+        let (short, long) = (right(&[(A, 3.1), (B, -3.1)]), right(&[(A, 3.0), (B, -1e9)]));
+        assert!((2.0..3.0).contains(&short) && (1.0..2.0).contains(&long), "{short} {long}");
         // Nor does the tie-break ever saturate.
         assert!(right(&[(A, 1e4), (B, -1e4)]) > right(&[(A, 1e3), (B, -1e3)]));
         assert!(right(&[(A, f64::NAN), (B, -9.0)]).is_nan() && mean_of_nan().is_nan());
@@ -128,7 +152,8 @@ mod tests {
             let all: Vec<_> = answers.iter().map(answer).collect();
             let known: Vec<_> = answers.iter().filter(|a| a.2).map(answer).collect();
             for kind in MANY {
-                let bound = better(kind.of_assignments(known.iter().copied(), all.len() - known.len()));
+                let to_come = |group| answers.iter().filter(|a| !a.2 && answer(a).0 == group).count();
+                let bound = better(kind.of_assignments(known.iter().copied(), [to_come(A), to_come(B)]));
                 prop_assert!(bound >= fitness(kind, &all), "{kind:?}");
             }
         }

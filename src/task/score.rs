@@ -29,22 +29,23 @@ pub struct Score {
 /// Fitness on two groups, in voxel lengths: of both assignments of directions to groups the better one's smallest
 /// margin. Infinite without answers, not a number if an answer is none; never −0.
 pub fn two_group_fitness(answers: &[(Group, f64)]) -> f64 {
-    better(Fitness::Min.of_assignments(answers.iter().copied(), 0))
+    better(Fitness::Min.of_assignments(answers.iter().copied(), [0, 0]))
 }
 
-pub(super) fn of_split(split: &Split, answers: &[Answer]) -> impl Iterator<Item = (Group, f64)> {
+pub(super) fn of_split(split: &Split, answers: &[Answer]) -> impl Iterator<Item = (Group, f64)> + Clone {
     answers.iter().filter_map(|answer| Some((split.group(answer.class)?, answer.displacement)))
 }
 
 impl Grouping {
     /// Fitness on a task. Images of classes in neither of its groups do not count.
     pub fn fitness_on(&self, split: &Split, answers: &[Answer]) -> f64 {
-        better(self.fitness().of_assignments(of_split(split, answers), 0))
+        better(self.fitness().of_assignments(of_split(split, answers), [0, 0]))
     }
 
     /// The **upper bound** of the fitness on a task if images of the classes `to_come` follow.
     fn bound(&self, split: &Split, known: &[Answer], to_come: &[u8]) -> f64 {
-        let to_come = to_come.iter().filter(|class| split.group(**class).is_some()).count();
+        let of = |group| to_come.iter().filter(|class| split.group(**class) == Some(group)).count();
+        let to_come = [of(Group::A), of(Group::B)];
         better(self.fitness().of_assignments(of_split(split, known), to_come))
     }
 

@@ -54,9 +54,11 @@ pub(super) fn methods(dossier: &Dossier) -> String {
             "the smallest distance walked towards the right side, or minus the largest one towards the wrong side"
         }
         Fitness::MeanClipped => {
-            "the mean distance walked towards the right side, clipped at ten voxel lengths"
+            "the mean distance walked towards the right side, clipped at ten voxel lengths, both groups weighing the same"
         }
-        Fitness::RightThenMargin => "the number of images answered right, ties broken by how far it walked",
+        Fitness::RightThenMargin => {
+            "the number of images answered right, both groups weighing the same, ties broken by how far it walked"
+        }
     };
     let stages = match config.stage.len() {
         0 => String::new(),
