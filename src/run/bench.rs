@@ -71,7 +71,7 @@ const STEPS: u32 = 50;
 const WARM_UP: u32 = 50;
 
 /// Measures one body on one instruction set: the median of up to `repetitions` repetitions of fifty control steps of one
-/// life, fewer if they take longer than [`PATIENCE`].
+/// life, fewer if they take longer than two seconds.
 pub fn measure(specimen: &Specimen, set: InstructionSet, repetitions: usize) -> Speed {
     let physics = Physics::default();
     let lattice = Lattice::new(&specimen.body, &physics);
