@@ -1,8 +1,8 @@
 //! morphcog evolves soft robots whose bodies alone recognise images.
 //!
-//! A robot has no controller. Its muscle voxels oscillate, its sensor voxels swell or shrink with one pixel of an image each, and it is to walk
-//! left under some classes of images and right under the others. MAP-Elites evolves such bodies; the physics follows
-//! EvoGym's model.
+//! A robot has no controller. Its muscle voxels oscillate, its sensor voxels swell or shrink with one pixel of an image
+//! each, and it is to walk left under some classes of images and right under the others. MAP-Elites evolves such
+//! bodies; the physics follows EvoGym's model.
 //!
 //! # The map of the house
 //!

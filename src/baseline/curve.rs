@@ -21,7 +21,8 @@ pub fn parabola(points: &[(f64, f64)]) -> Option<[f64; 3]> {
     Some([solution[0], solution[1] / scale, solution[2] / (scale * scale)])
 }
 
-/// The smallest x in [from, to] at which a parabola reaches a value: where it is at or above it first. `None` if it never is.
+/// The smallest x in [from, to] at which a parabola reaches a value: where it is at or above it first. `None` if it
+/// never is.
 pub fn first_crossing([c0, c1, c2]: [f64; 3], value: f64, (from, to): (f64, f64)) -> Option<f64> {
     let at = |x: f64| c0 + x * (c1 + x * c2);
     if at(from) >= value {

@@ -25,7 +25,8 @@ pub(super) struct CapacityArgs {
     /// Early stopping waits on images of the training split, not, as in the paper, on the test images.
     #[arg(long)]
     clean: bool,
-    /// Only robots that morphcog audit found physical (audit.json is looked for beside the evaluation and one folder below).
+    /// Only robots that morphcog audit found physical (audit.json is looked for beside the evaluation and one folder
+    /// below).
     #[arg(long)]
     physical_only: bool,
     /// Settings: a TOML file (or JSON); keys that are not in it have their defaults.

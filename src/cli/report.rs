@@ -21,7 +21,8 @@ them together are looked for above their folders.";
 pub(super) struct ReportArgs {
     /// Run folders, or files run.json (default: the newest under runs/).
     runs: Vec<PathBuf>,
-    /// Robots that can be watched, the fittest of each run; the more, the fewer frames each has (the page stays below 20 MB).
+    /// Robots that can be watched, the fittest of each run; the more, the fewer frames each has (the page stays below
+    /// 20 MB).
     #[arg(long, default_value_t = 100)]
     lives: usize,
     /// Folder with the images.

@@ -218,8 +218,8 @@ impl RunFile {
         format!("{head}\n{}\n]}}\n", lines.join(",\n"))
     }
 
-    /// `elites.csv`: what pyribs' `ArchiveDataFrame` reads. `index`: cell; `objective`; `measures_i`: voxel counts (and task); `solution_i`:
-    /// voxels row-major; then id, task, generation and displacements.
+    /// `elites.csv`: what pyribs' `ArchiveDataFrame` reads. `index`: cell; `objective`; `measures_i`: voxel counts (and
+    /// task); `solution_i`: voxels row-major; then id, task, generation and displacements.
     ///
     /// # Errors
     /// If it cannot be written to memory.

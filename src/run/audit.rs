@@ -88,8 +88,8 @@ struct Trial {
     criteria: Criteria,
 }
 
-/// Audits robots. What an earlier audit of the same robots by the same criteria found is kept and not done again; the file is
-/// the same bytes however often it was stopped.
+/// Audits robots. What an earlier audit of the same robots by the same criteria found is kept and not done again; the
+/// file is the same bytes however often it was stopped.
 ///
 /// # Errors
 /// What is wrong with archive, data, selection or criteria.

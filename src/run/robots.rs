@@ -112,8 +112,8 @@ impl Selection {
         }
     }
 
-    /// The robots; where no order is given: task by task, the fittest first. `seed` is for the random ones. For a validation:
-    /// all that are to be looked at.
+    /// The robots; where no order is given: task by task, the fittest first. `seed` is for the random ones. For a
+    /// validation: all that are to be looked at.
     ///
     /// # Errors
     /// If there is no robot, or no single one, of an id; if only physical ones are asked for, and they are not known.

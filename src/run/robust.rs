@@ -47,8 +47,8 @@ pub(super) struct Scored {
     pub at_most: f64,
 }
 
-/// Evaluates bodies to the end, none of them dropping out; nothing if `stop` is set meanwhile. All of an archive on many images can take
-/// longer than anybody waits for a run to stop, so it is looked at after every few bodies.
+/// Evaluates bodies to the end, none of them dropping out; nothing if `stop` is set meanwhile. All of an archive on many
+/// images can take longer than anybody waits for a run to stop, so it is looked at after every few bodies.
 pub(super) fn evaluate_all(
     config: &Config,
     training: &Training,

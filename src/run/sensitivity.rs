@@ -47,9 +47,8 @@ pub fn lives(subject: &Subject) -> usize {
     subject.images.len() * (1 + sensors(subject).len())
 }
 
-/// Simulates all of them as the robot's protocol has it: in fresh lives, or in one after the images before, which stay as they
-/// are. `progress` is told after every life how many are
-/// done.
+/// Simulates all of them as the robot's protocol has it: in fresh lives, or in one after the images before, which stay
+/// as they are. `progress` is told after every life how many are done.
 pub fn sensitivity(subject: &Subject, progress: &(dyn Fn(u64) + Sync)) -> Vec<Sensitivity> {
     let config = &subject.found.config;
     let lattice = Lattice::new(&subject.found.body, &config.physics);

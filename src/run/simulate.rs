@@ -10,7 +10,8 @@ use serde::Deserialize;
 use serde::de::IgnoredAny;
 use std::path::Path;
 
-/// A body, what it sees, and for how long. The keys of a reference trajectory are understood too; its results are passed over.
+/// A body, what it sees, and for how long. The keys of a reference trajectory are understood too; its results are
+/// passed over.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Scenario {
@@ -139,8 +140,8 @@ impl Scenario {
     }
 }
 
-/// Lives the scenario; `line` gets the CSV's lines: `step,com_x,com_y`, then the centre of mass \[world units\] before the first
-/// and after every control step.
+/// Lives the scenario; `line` gets the CSV's lines: `step,com_x,com_y`, then the centre of mass \[world units\] before
+/// the first and after every control step.
 ///
 /// # Errors
 /// [`super::ErrorKind::Unstable`] if the life ends early, and what `line` says.

@@ -63,8 +63,8 @@ pub(super) fn read_versioned<T: DeserializeOwned>(
     read_json(text, name)
 }
 
-/// Reads settings, a JSON file if its name ends in `.json`, else TOML; keys that are not in it have their defaults. Then sets
-/// `overrides` (`key=value`).
+/// Reads settings, a JSON file if its name ends in `.json`, else TOML; keys that are not in it have their defaults.
+/// Then sets `overrides` (`key=value`).
 pub(super) fn load<T: Serialize + DeserializeOwned + Default>(
     path: Option<&Path>,
     overrides: &[String],

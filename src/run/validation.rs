@@ -1,8 +1,8 @@
 //! Choosing robots by their answers to images that are neither training nor test images.
 //!
-//! Validation images are drawn from the training split, by the run's seed; none of them is one that the run was ever trained
-//! on. Robots are screened in rounds: all on a tenth of the images, the better third of each task on three tenths, the better
-//! tenth on all. Results are kept beside the run.
+//! Validation images are drawn from the training split, by the run's seed; none of them is one that the run was ever
+//! trained on. Robots are screened in rounds: all on a tenth of the images, the better third of each task on three
+//! tenths, the better tenth on all. Results are kept beside the run.
 
 use super::archive::{Robot, RunFile};
 use super::audit_file::fingerprint;
@@ -148,8 +148,8 @@ pub struct Options {
     pub threads: Option<usize>,
 }
 
-/// Chooses the robots that a run's section `[validation]` asks for, as `eval` does it, and keeps them beside the run; `None`
-/// if stopped.
+/// Chooses the robots that a run's section `[validation]` asks for, as `eval` does it, and keeps them beside the run;
+/// `None` if stopped.
 ///
 /// # Errors
 /// What is wrong with run or data, or that there are not enough images.

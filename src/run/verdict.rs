@@ -217,8 +217,8 @@ impl<'a> Behaviour<'a> {
         (Verdict::Fragile, broken.join(", "))
     }
 
-    /// Root mean square difference of the perturbed lives' displacements from the unchanged ones, voxel lengths; unstable lives
-    /// have none.
+    /// Root mean square difference of the perturbed lives' displacements from the unchanged ones, voxel lengths;
+    /// unstable lives have none.
     pub fn spread(&self, lives: &[PerturbedLife]) -> f64 {
         let stable = lives.iter().filter_map(|life| life.displacements.as_ref());
         let squares: Vec<f64> =

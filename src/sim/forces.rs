@@ -44,7 +44,7 @@ impl<L: Lanes> Watch<L> {
         self.depth = (L::splat(0.0) - y).max(self.depth);
     }
 
-    /// Whether all was as it was taken to be,.
+    /// Whether all was as it was taken to be.
     #[inline(always)]
     pub fn regular(self) -> bool {
         let beyond = self.stretch.above(L::splat(RANGE)) | self.depth.above(L::splat(0.0));

@@ -2,8 +2,8 @@
 //!
 //! With accelerations a₁ … a₄ the four stages' positions are x₀, x₀ + (h/2)v₀, x₀ + (h/2)v₀ + (h²/4)a₁ and
 //! x₀ + hv₀ + (h²/2)a₂, so those of the first two are known at the start and those of the last two after the second;
-//! and the new positions are x₀ + hv₀ + (h²/6)(a₁ + a₂ + a₃). One sweep over the springs a stage: two in one would need more
-//! registers than there are, and what is spilled fills the queue of stores.
+//! and the new positions are x₀ + hv₀ + (h²/6)(a₁ + a₂ + a₃). One sweep over the springs a stage: two in one would need
+//! more registers than there are, and what is spilled fills the queue of stores.
 
 use super::extra::Extra;
 use super::forces::{Gather, Watch, squares, vectors};

@@ -4,8 +4,8 @@ use serde::{Deserialize, Serialize};
 
 /// The constants of the physics. Defaults are EvoGym's (simulator v2.2.5), as `physics.md` states them.
 ///
-/// Units: a *world unit* (wu) is ten voxel lengths; masses are in units of a point's mass; a *second* is 10⁴ default substeps.
-/// All of them can be set under `[physics]` in a run config and are recorded with the run.
+/// Units: a *world unit* (wu) is ten voxel lengths; masses are in units of a point's mass; a *second* is 10⁴ default
+/// substeps. All of them can be set under `[physics]` in a run config and are recorded with the run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Physics {

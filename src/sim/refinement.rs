@@ -9,7 +9,8 @@
 //! So the modelled material is a Kelvin–Voigt solid, and h/n with k·n and g/n leaves both as they are. (With g/n alone
 //! stiffness and viscosity would both fall with n, and a robot would be another at every time step.)
 //! The length limits remove a share s of an excess per substep; 1 − (1 − s)^(1/n) removes as much in n of them. Drag,
-//! gravity, contacts and the floor are forces already, per time, and stay. Displacements converge as n grows (`docs/audit.md`).
+//! gravity, contacts and the floor are forces already, per time, and stay. Displacements converge as n grows
+//! (`docs/audit.md`).
 
 use super::params::Physics;
 

@@ -16,8 +16,9 @@ const SLACK: f64 = 1e-9;
 /// How answers to several images become one number. An answer's *margin* is its displacement towards the right side, in
 /// voxel lengths, negative on the wrong one; of the two ways to assign sides to groups the fitter counts.
 ///
-/// Where images are counted or averaged, both groups weigh the same, however many images they have: with one class against three,
-/// a robot that always walks the way of the three would else be right on three quarters, and the fittest for long.
+/// Where images are counted or averaged, both groups weigh the same, however many images they have: with one class
+/// against three, a robot that always walks the way of the three would else be right on three quarters, and the fittest
+/// for long.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Fitness {
@@ -146,7 +147,10 @@ mod tests {
     proptest! {
         #[test]
         fn what_is_known_bounds_what_can_come(
-            answers in prop::collection::vec((any::<bool>(), prop_oneof![-30.0..30.0f64, Just(10.0), Just(-10.0)], any::<bool>()), 1..40)
+            answers in prop::collection::vec(
+                (any::<bool>(), prop_oneof![-30.0..30.0f64, Just(10.0), Just(-10.0)], any::<bool>()),
+                1..40,
+            )
         ) {
             let answer = |a: &(bool, f64, bool)| (if a.0 { A } else { B }, a.1);
             let all: Vec<_> = answers.iter().map(answer).collect();

@@ -25,7 +25,8 @@ pub struct Protocol {
     pub control_steps: u32,
     /// Grid row of the body's bottom row at the start \[voxels\]. Default 2: on the ground.
     pub start_row: u32,
-    /// Grid column of its left edge \[voxels\]. Default 493, the paper's; only the pegs below the ground tell columns apart.
+    /// Grid column of its left edge \[voxels\]. Default 493, the paper's; only the pegs below the ground tell columns
+    /// apart.
     pub start_column: i64,
 }
 

@@ -51,9 +51,9 @@ impl Grouping {
 
     /// The task a robot performs, the one it is fittest on (the first wins a tie), and its fitness there.
     ///
-    /// With one image per class and the smallest margin this is the paper's rule: min |d|, and the signs say which task. A robot that
-    /// walks the same way for all classes goes to that bin with min |d| if there is one, else to its best split
-    /// with that one's negative fitness.
+    /// With one image per class and the smallest margin this is the paper's rule: min |d|, and the signs say which
+    /// task. A robot that walks the same way for all classes goes to that bin with min |d| if there is one, else to its
+    /// best split with that one's negative fitness.
     pub fn score(&self, answers: &[Answer]) -> Score {
         let mut best = Score { task: 0, fitness: f64::NEG_INFINITY };
         for (task, split) in self.tasks().iter().enumerate() {

@@ -4,7 +4,8 @@
 //! world a picture shows; `scene` and `panel` make drawing primitives of one frame; `raster` paints them. On top of
 //! these stand the animated GIF, the self-contained HTML page and the view in a terminal. Figures for print are vectors and
 //! stand apart, in [`plot`].
-//! these stand the animated GIF, the self-contained HTML page and the view in a terminal. `serve` is a page of its own, over HTTP.
+//! these stand the animated GIF, the self-contained HTML page and the view in a terminal. `serve` is a page of its own,
+//! over HTTP.
 
 pub mod bar;
 pub mod colour;

@@ -41,15 +41,13 @@ pub fn capacity(console: &Console, file: &CapacityFile, out: &Path) {
     console.line(&format!("wrote {} and {}", out.display(), out.with_extension("csv").display()));
 }
 
-/// The paper's table: each task with its robots, their accuracy (0 to 1) and their capacity as far as it is known, the paper's figures
-/// beside.
+/// The paper's table: each task with its robots, their accuracy (0 to 1) and their capacity as far as it is known, the
+/// paper's figures beside.
 pub(super) fn papers_table<'a>(
     console: &Console,
     dataset: &str,
     tasks: impl Iterator<Item = (&'a str, usize, f64, Option<&'a TaskCapacity>)>,
 ) {
-    let size = |size: Option<f64>| size.map_or("no match".to_string(), |size| format!("{size:.1}"));
-    let unknown = || "–".to_string();
     let rows = tasks.map(|(task, robots, accuracy, capacity)| {
         let paper = published::row(dataset, task);
         let own = |network: &str| capacity.and_then(|known| known.worth(network)).map_or_else(unknown, size);
@@ -71,6 +69,16 @@ pub(super) fn papers_table<'a>(
     console.table(&headers, &rows.collect::<Vec<_>>());
 }
 
+/// A capacity in a table.
+fn size(capacity: Option<f64>) -> String {
+    capacity.map_or_else(|| "no match".to_string(), |size| format!("{size:.1}"))
+}
+
+/// What nobody measured, in a table.
+fn unknown() -> String {
+    "–".to_string()
+}
+
 /// The figure beside a `capacity.json`, as SVG and as PNG; the files.
 ///
 /// # Errors
@@ -88,18 +96,16 @@ pub fn table(console: &Console, finished: &Finished) {
     if console.mode() == Mode::Json {
         return console.event("reproduced", &finished.rows);
     }
-    let number = |value: Option<f64>| value.map_or("–".to_string(), |value| format!("{value:.1}"));
-    let size = |size: Option<f64>| size.map_or("no match".to_string(), |size| format!("{size:.1}"));
+    let number = |value: Option<f64>| value.map_or_else(unknown, |value| format!("{value:.1}"));
     let rows = finished.rows.iter().map(|row| {
-        let own = |value: Option<f64>| if row.robots == 0 { "–".to_string() } else { size(value) };
-        let paper =
-            |value: Option<f64>| if row.paper_accuracy.is_none() { "–".to_string() } else { size(value) };
+        let own = |value: Option<f64>| if row.robots == 0 { unknown() } else { size(value) };
+        let paper = |value: Option<f64>| if row.paper_accuracy.is_none() { unknown() } else { size(value) };
         vec![
             row.task.clone(),
             row.robots.to_string(),
             format!("{} of {}", row.physical, row.audited),
             number(row.accuracy),
-            row.interval.map_or("–".to_string(), |[low, high]| format!("{low:.1}–{high:.1}")),
+            row.interval.map_or_else(unknown, |[low, high]| format!("{low:.1}–{high:.1}")),
             number(row.paper_accuracy),
             number(row.balanced_accuracy),
             number(row.larger_group),

@@ -19,8 +19,21 @@ use std::path::Path;
 /// Robots shown after an evolution.
 const SHOWN: usize = 5;
 
-fn percent(share: f64) -> String {
+pub(super) fn percent(share: f64) -> String {
     format!("{:.1}", 100.0 * share)
+}
+
+/// What tables of evaluated robots begin with: robot, task, fitness, accuracy, its interval, balanced accuracy.
+pub(super) fn of_robot(robot: &RobotReport) -> Vec<String> {
+    let [low, high] = robot.interval.map(percent);
+    vec![
+        robot.id.clone(),
+        robot.task.clone(),
+        format!("{:.2}", robot.objective),
+        percent(robot.accuracy),
+        format!("{low}–{high}"),
+        percent(robot.balanced_accuracy),
+    ]
 }
 
 /// After an evolution: the fittest robots, what was saved, and what to do next.
@@ -114,15 +127,7 @@ pub fn evaluation(console: &Console, report: &EvalFile, capacity: Option<&Capaci
     let validated = report.robots.iter().any(|robot| robot.validation.is_some());
     headers.extend(validated.then_some("validated %"));
     let rows = report.robots.iter().map(|robot| {
-        let [low, high] = robot.interval.map(percent);
-        let mut row = vec![
-            robot.id.clone(),
-            robot.task.clone(),
-            format!("{:.2}", robot.objective),
-            percent(robot.accuracy),
-            format!("{low}–{high}"),
-            percent(robot.balanced_accuracy),
-        ];
+        let mut row = of_robot(robot);
         row.extend(robot.per_class.values().map(|share| percent(*share)));
         row.extend([format!("{:.1}", robot.mean_distance), percent(robot.not_moved)]);
         row.extend([robot.unstable.to_string(), robot.simulated.to_string()]);

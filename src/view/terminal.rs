@@ -66,7 +66,8 @@ fn indexed(rgb: [u8; 3]) -> u8 {
 }
 
 /// A frame as exactly `rows` lines of exactly `columns` characters, joined by newlines: a line of read-outs, then the
-/// world, followed by the camera. With colours, two pixels a character (half blocks); without, plain ASCII: `#` rigid, `:` soft, `/` and `\` muscles, `-` and `+` sensors.
+/// world, followed by the camera. With colours, two pixels a character (half blocks); without, plain ASCII: `#` rigid,
+/// `:` soft, `/` and `\` muscles, `-` and `+` sensors.
 pub fn frame(walk: &Walk, frame: usize, columns: usize, rows: usize, depth: Depth) -> String {
     let colour = depth != Depth::Plain;
     let (columns, rows) = (columns.min(1000), rows.min(1000));

@@ -74,7 +74,8 @@ impl Figure {
         )
     }
 
-    /// The figure as PNG, `scale` pixels per point ([`PRINT`] is good for print); the file says how large it is meant to be.
+    /// The figure as PNG, `scale` pixels per point ([`PRINT`] is good for print); the file says how large it is meant
+    /// to be.
     ///
     /// # Errors
     /// [`PictureError::Figure`] if it would have no pixels or too many, [`PictureError::Encode`] if it cannot be made.

@@ -17,8 +17,8 @@ const LARGEST: f64 = 7.0;
 /// Opacity of the first pose.
 const FAINTEST: f64 = 0.22;
 
-/// Poses of a life every so many control steps (0: as suits the walk), earlier ones fainter; a panel per stimulus. `of` says
-/// whose it is.
+/// Poses of a life every so many control steps (0: as suits the walk), earlier ones fainter; a panel per stimulus. `of`
+/// says whose it is.
 ///
 /// # Errors
 /// [`PictureError::Recording`] if the recording cannot be drawn.

@@ -4,12 +4,13 @@ use super::words;
 use crate::base::lanes::InstructionSet;
 use crate::run::audit_file::AuditFile;
 use crate::run::capacity_file::CapacityFile;
-use crate::run::eval_file::EvalFile;
+use crate::run::eval_file::{EvalFile, Mean, RobotReport};
 use crate::run::published;
 use crate::run::report::Dossier;
 use crate::run::verdict::Verdict;
 use crate::view::html::escape;
 use crate::view::progress::duration;
+use crate::view::summary::{of_robot, percent};
 
 /// Robots of a test or an audit that are listed one by one.
 const LISTED: usize = 50;
@@ -34,10 +35,6 @@ fn table(headers: &[&str], rows: impl IntoIterator<Item = Vec<String>>) -> Strin
     format!(
         "<div class=\"card scroll\"><table><thead><tr>{head}</tr></thead><tbody>\n{rows}</tbody></table></div>\n"
     )
-}
-
-fn percent(share: f64) -> String {
-    format!("{:.1}", 100.0 * share)
 }
 
 fn or_none<T>(value: Option<T>, text: impl Fn(T) -> String) -> String {
@@ -123,7 +120,7 @@ pub(super) fn eval(report: &EvalFile) -> String {
         escape(&report.selected),
         report.threshold
     );
-    let row = |(task, mean): (&String, &crate::run::eval_file::Mean)| {
+    let row = |(task, mean): (&String, &Mean)| {
         let known = report.baselines.get(task);
         vec![
             task.clone(),
@@ -151,18 +148,11 @@ pub(super) fn eval(report: &EvalFile) -> String {
         "nearest image %",
     ];
     out += &table(&headers, report.means.iter().map(row));
-    let row = |robot: &crate::run::eval_file::RobotReport| {
-        let [low, high] = robot.interval.map(percent);
-        vec![
-            robot.id.clone(),
-            robot.task.clone(),
-            format!("{:.2}", robot.objective),
-            percent(robot.accuracy),
-            format!("{low}–{high}"),
-            percent(robot.balanced_accuracy),
-            percent(robot.not_moved),
-            or_none(robot.validation.as_ref(), |found| percent(found.balanced_accuracy)),
-        ]
+    let row = |robot: &RobotReport| {
+        let mut row = of_robot(robot);
+        row.push(percent(robot.not_moved));
+        row.push(or_none(robot.validation.as_ref(), |found| percent(found.balanced_accuracy)));
+        row
     };
     let headers = [
         "robot",
