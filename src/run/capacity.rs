@@ -9,7 +9,7 @@ use super::trainings::Trainings;
 use super::{Error, audit_file::AuditFile, eval};
 use crate::base::files::write_atomically;
 use crate::base::hash::sha256_hex;
-use crate::baseline::{Kind, Trained, curve};
+use crate::baseline::{Kind, Pooling, Trained, curve};
 use crate::task::grouping;
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
@@ -62,11 +62,12 @@ pub fn capacity(
     }
     let config = &options.config;
     let side = setting.body.height.min(setting.body.width);
-    if config.cnn.kernel > side {
-        let kernel = config.cnn.kernel;
-        return Err(Error::input(format!(
-            "capacity: cnn.kernel = {kernel}: expected up to {side}, an image's side"
-        )));
+    let (kernel, pooling) = (config.cnn.kernel, config.cnn.pooling);
+    // Something must be left to pool.
+    let most = if pooling == Pooling::Max2 { side.saturating_sub(1) } else { side };
+    if kernel > most && config.networks.contains(&Kind::Cnn) {
+        let of = format!("with images of {side} pixels and pooling {pooling:?}").to_lowercase();
+        return Err(Error::input(format!("capacity: cnn.kernel = {kernel}: expected up to {most}, {of}")));
     }
     eval::check_out(&options.out, &options.eval)?;
     let robots = robots(&report, options)?;
@@ -110,16 +111,16 @@ pub fn capacity(
         let of_task: Vec<f64> =
             robots.iter().filter(|robot| robot.task == split.name()).map(|robot| robot.accuracy).collect();
         let accuracy = of_task.iter().sum::<f64>() / of_task.len() as f64;
-        let samples = Task::new(split, &images)?;
         let mut curves = Vec::new();
         for &kind in &config.networks {
             let key = key(split, kind);
+            let samples = Task::new(split, kind, config, &images)?;
             let mut points = Vec::new();
             for size in config.sizes() {
                 let open = known.of(&key, size).len()..config.trainings;
                 let train = |number: usize| {
                     let trained =
-                        (!stop.load(Ordering::Relaxed)).then(|| samples.train((kind, size), config, number));
+                        (!stop.load(Ordering::Relaxed)).then(|| samples.train(size, config, number));
                     observer.progress(done.fetch_add(1, Ordering::Relaxed) + 1);
                     trained
                 };

@@ -43,11 +43,7 @@ impl Default for CapacityConfig {
             waiting_images: 400,
             seed: 1,
             mlp: Hyperparameters::default(),
-            cnn: Hyperparameters {
-                learning_rate: 3e-4,
-                pooling: Pooling::Max2,
-                ..Hyperparameters::default()
-            },
+            cnn: Hyperparameters { pooling: Pooling::Max2, ..Hyperparameters::default() },
         }
     }
 }

@@ -93,38 +93,40 @@ fn waiting(
     Ok(all)
 }
 
-/// The images of a task, with their groups.
+/// The images of a task, with their groups, as networks of a kind see them.
 pub(super) struct Task {
+    kind: Kind,
     training: Vec<Samples>,
     waiting: Option<Samples>,
     test: Samples,
 }
 
 impl Task {
-    pub fn new(split: &grouping::Split, images: &Images) -> Result<Self, Error> {
+    pub fn new(
+        split: &grouping::Split,
+        kind: Kind,
+        config: &CapacityConfig,
+        images: &Images,
+    ) -> Result<Self, Error> {
         let samples = |of: &[Seen]| {
             let grouped = of.iter().filter_map(|seen| Some((&seen.stimulus, split.group(seen.class)?)));
             let (stimuli, groups): (Vec<&Grid<f64>>, Vec<u32>) =
                 grouped.map(|(stimulus, group)| (stimulus, u32::from(group == Group::B))).unzip();
-            Samples::new(&stimuli, &groups).map_err(failed)
+            Samples::new(&stimuli, &groups, kind, config.of(kind)).map_err(failed)
         };
         let training: Result<Vec<Samples>, Error> = images.training.iter().map(|run| samples(run)).collect();
         let waiting = (!images.waiting.is_empty()).then(|| samples(&images.waiting)).transpose()?;
-        Ok(Task { training: training?, waiting, test: samples(&images.test)? })
+        Ok(Task { kind, training: training?, waiting, test: samples(&images.test)? })
     }
 
     /// The training of this number; the runs take turns in lending their images.
-    pub fn train(
-        &self,
-        (kind, size): (Kind, usize),
-        config: &CapacityConfig,
-        number: usize,
-    ) -> Result<Trained, Error> {
+    pub fn train(&self, size: usize, config: &CapacityConfig, number: usize) -> Result<Trained, Error> {
+        let kind = self.kind;
         let training = &self.training[number % self.training.len()];
         let waiting = self.waiting.as_ref().unwrap_or(&self.test);
         let rng =
             &mut stream(config.seed, Purpose::Networks, ((kind as u64) << 32) + size as u64, number as u64);
-        train((kind, size), config.of(kind), training, waiting, &self.test, rng).map_err(failed)
+        train(size, config.of(kind), training, waiting, &self.test, rng).map_err(failed)
     }
 }
 

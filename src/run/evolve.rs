@@ -294,15 +294,14 @@ impl<'a> Run<'a> {
     fn job<'b>(&'b self, parent: Option<usize>, robot: &'b Robot) -> Job<'b> {
         let archive = self.search.archive();
         let parent = parent.and_then(|cell| archive.get(cell)).map(|elite| &elite.solution.displacements);
-        let least =
-            |d: &Vec<f64>| d.iter().enumerate().min_by(|a, b| a.1.abs().total_cmp(&b.1.abs())).map(|m| m.0);
         let bins = self.bins(robot);
         let may_win = move |known: &[Option<f64>]| {
             let incumbent = |task| archive.objective(self.space.index(&self.cell(bins.clone(), task))?);
             self.training.may_win(&self.grouping, known, incumbent)
         };
-        let first_image = parent.and_then(least).unwrap_or(0);
-        Job { body: &robot.body, first_image, may_win: Box::new(may_win) }
+        let answers = |d: &Vec<f64>| self.training.answers(d.iter().copied().map(Some));
+        let order = parent.map_or_else(Vec::new, |d| self.grouping.hardest_first(&answers(d)));
+        Job { body: &robot.body, order, may_win: Box::new(may_win) }
     }
 
     fn scored(&self, child: u64, robot: Robot, displacements: Vec<f64>, at_most: f64) -> Evaluated<Robot> {

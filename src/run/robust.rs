@@ -127,7 +127,7 @@ fn may_win(
 }
 
 fn all_of(body: &Body) -> Job<'_> {
-    Job { body, first_image: 0, may_win: Box::new(|_| true) }
+    Job { body, order: Vec::new(), may_win: Box::new(|_| true) }
 }
 
 fn setting(config: &Config, training: &Training, body: &Body) -> Setting {

@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// What the file calls itself, and the version of its schema.
-const FORMAT: (&str, u32) = ("morphcog-trainings", 1);
+const FORMAT: (&str, u32) = ("morphcog-trainings", 2);
 
 /// Known trainings.
 #[derive(Debug)]

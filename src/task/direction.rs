@@ -45,6 +45,14 @@ impl Assignment {
         }
     }
 
+    /// How far a displacement leads towards the right side; negative if it leads to the wrong one.
+    pub fn margin(self, group: Group, displacement: f64) -> f64 {
+        match self.expected(group) {
+            Direction::Right => displacement,
+            Direction::Left => -displacement,
+        }
+    }
+
     /// Whether a displacement is the right answer to an image of a group: farther than `threshold`, the right way.
     pub fn is_right(self, group: Group, displacement: f64, threshold: f64) -> bool {
         Direction::of(displacement, threshold) == Some(self.expected(group))

@@ -62,8 +62,9 @@ pub type MayWin<'a> = dyn Fn(&[Option<f64>]) -> bool + Sync + Send + 'a;
 pub struct Job<'a> {
     /// The body.
     pub body: &'a Body,
-    /// The image to begin with, where the order is free (fresh lives): the one that limits its parent.
-    pub first_image: usize,
+    /// In which order to show the images where that is free (fresh lives): those first under which it is likely to
+    /// drop out. Images that are not in it come last, in their order.
+    pub order: Vec<usize>,
     /// Whether it may still get into the archive, given some of its displacements; asked with early stopping only.
     pub may_win: Box<MayWin<'a>>,
 }
@@ -121,10 +122,10 @@ struct Candidate<'a> {
     protocol: &'a Protocol,
     early_stop: bool,
     lattice: Lattice,
-    /// For each image the one whose life it shares.
-    same_as: Vec<usize>,
     /// The images that need showing, in order.
     order: Vec<usize>,
+    /// For each image its place in that order, or that of the image whose life it shares.
+    places: Vec<usize>,
     /// In the order in which they count.
     lives: Mutex<Vec<Option<Lived>>>,
 }
@@ -143,10 +144,15 @@ impl<'a> Candidate<'a> {
             true => same_to_sensors(job.body, &images.iter().collect::<Vec<_>>()),
             false => all.clone(),
         };
-        let mut order: Vec<usize> = all.into_iter().filter(|&image| same_as[image] == image).collect();
-        if is_fresh && let Some(first) = same_as.get(job.first_image) {
-            order.sort_by_key(|image| (image != first, *image));
+        let wished: &[usize] = if is_fresh { &job.order } else { &[] };
+        let (mut order, mut places) = (Vec::new(), vec![None; images.len()]);
+        for image in wished.iter().chain(&all).filter_map(|&image| same_as.get(image).copied()) {
+            if places[image].is_none() {
+                places[image] = Some(order.len());
+                order.push(image);
+            }
         }
+        let places = same_as.iter().map(|&image| places[image].unwrap_or_default()).collect();
         let lives = if is_fresh { order.len() } else { 1 };
         Candidate {
             job,
@@ -155,8 +161,8 @@ impl<'a> Candidate<'a> {
             protocol,
             early_stop: savings.early_stop,
             lattice: Lattice::new(job.body, physics),
-            same_as,
             order,
+            places,
             lives: Mutex::new((0..lives).map(|_| None).collect()),
         }
     }
@@ -203,8 +209,7 @@ impl<'a> Candidate<'a> {
 
     /// Displacement per image, as far as known from the first showings.
     fn known(&self, displacements: &[Option<f64>]) -> Vec<Option<f64>> {
-        let shown = |image: &usize| self.order.iter().position(|shown| shown == image);
-        self.same_as.iter().map(|image| *displacements.get(shown(image)?)?).collect()
+        self.places.iter().map(|place| *displacements.get(*place)?).collect()
     }
 
     /// How the evaluation ends, as soon as that is known. Lives count in their order, whichever was done first.
@@ -230,8 +235,7 @@ impl<'a> Candidate<'a> {
     }
 
     fn ended(&self, outcome: Outcome, simulated: usize) -> Evaluation {
-        let open = &self.order[simulated..];
-        let stopped = self.same_as.iter().filter(|same| open.contains(same)).count() as u64;
+        let stopped = self.places.iter().filter(|place| **place >= simulated).count() as u64;
         let (all, simulated) = (self.images.len() as u64, simulated as u64);
         Evaluation { outcome, simulated, shared: all - simulated - stopped, stopped }
     }

@@ -5,6 +5,7 @@
 //! both cases are then the smallest margin. Two things follow that make savings lossless: fitness is continuous
 //! (d = 0 counts as wrong, with margin 0), and the fitness of some of the images bounds that of all from above.
 
+use super::direction::Assignment;
 use super::fitness::{Fitness, better};
 use super::grouping::{Group, Grouping, Split};
 
@@ -85,6 +86,30 @@ impl Grouping {
             let possible = bound >= 0.0 || !never_negative;
             possible && wins(task, bound)
         })
+    }
+
+    /// The answers from the worst to the best on the task the robot performs, both groups by turns: a robot that always
+    /// walks one way is right on all of a group. Images of classes in neither group are left out.
+    pub fn hardest_first(&self, answers: &[Answer]) -> Vec<usize> {
+        let split = &self.tasks()[self.score(answers).task];
+        let assignment = Assignment::from_training(split, self.fitness(), answers);
+        let mut margins: Vec<(f64, Group, usize)> = (answers.iter().zip(0..))
+            .filter_map(|(answer, image)| {
+                let group = split.group(answer.class)?;
+                Some((assignment.margin(group, answer.displacement), group, image))
+            })
+            .collect();
+        margins.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let mut worse = [0; 2];
+        let mut turns: Vec<(usize, usize)> = Vec::new();
+        for (_, group, image) in margins {
+            let worse = &mut worse[usize::from(group == Group::B)];
+            turns.push((*worse, image));
+            *worse += 1;
+        }
+        // Stable: of the two groups' next ones the worse comes first.
+        turns.sort_by_key(|(worse, _)| *worse);
+        turns.into_iter().map(|(_, image)| image).collect()
     }
 
     /// Whether the robot's fitness will surely be 0 or more, so that no task it is bound to fail can be its own:
@@ -191,6 +216,21 @@ mod tests {
         assert_eq!([None, Some(-5.1), Some(-5.0)].map(against), [true, true, false]);
         // Nothing is known: everything is possible.
         assert!(digits(false).can_still_win(&[], &[0, 1, 2, 3], |_| Some(1e9)));
+    }
+
+    #[test]
+    fn the_hardest_images_of_both_groups_come_first_by_turns() {
+        // 0 left, 1 right; 2 is in neither group.
+        let lone = Grouping::two_groups(&[0], &[1]).unwrap().with_fitness(Fitness::MeanClipped);
+        let answer = |(class, displacement)| Answer { class, displacement };
+        let answers =
+            [(0, -8.0), (0, -1.0), (1, 9.0), (1, -2.0), (2, 1.0), (0, -4.0), (0, -9.0), (1, 7.0)].map(answer);
+        assert_eq!(lone.hardest_first(&answers), [3, 1, 5, 7, 0, 2, 6]);
+        assert_eq!(
+            lone.hardest_first(&answers.map(|a| Answer { displacement: -a.displacement, ..a })),
+            [3, 1, 5, 7, 0, 2, 6]
+        );
+        assert!(lone.hardest_first(&[]).is_empty());
     }
 
     fn group() -> impl Strategy<Value = Group> {
