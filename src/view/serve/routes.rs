@@ -84,7 +84,12 @@ pub fn refused(refusal: Refusal) -> Response {
 
 /// Refuses other sites that let a name of theirs point here (DNS rebinding), and requests that other sites' pages send.
 fn stranger(port: u16, request: &Request) -> Option<Response> {
-    let own = [format!("127.0.0.1:{port}"), format!("localhost:{port}")];
+    let names = ["127.0.0.1", "localhost"];
+    let mut own = names.map(|name| format!("{name}:{port}")).to_vec();
+    if port == 80 {
+        // HTTP's own port is not named.
+        own.extend(names.map(str::to_string));
+    }
     match request.header("host") {
         None => return Some(Response::refusal(400, "expected one Host header")),
         Some(host) if !own.iter().any(|name| name.eq_ignore_ascii_case(host)) => {
