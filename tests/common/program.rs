@@ -14,7 +14,7 @@ pub const PROGRAM: &str = env!("CARGO_BIN_EXE_morphcog");
 /// No command of a test may take longer.
 const LIMIT: Duration = Duration::from_secs(120);
 /// What the environment of the tests must not decide.
-const SETTINGS: [&str; 5] = ["MORPHCOG_DATA", "MORPHCOG_ISA", "NO_COLOR", "TERM", "RAYON_NUM_THREADS"];
+pub const SETTINGS: [&str; 5] = ["MORPHCOG_DATA", "MORPHCOG_ISA", "NO_COLOR", "TERM", "RAYON_NUM_THREADS"];
 
 /// A tiny run that still does everything: two digits, bodies of 5 × 5, a fifth of a second.
 pub const TINY: &str = r#"
