@@ -15,11 +15,11 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-/// Three stages in twelve generations, the last with three draws of images.
+/// Three stages in twelve generations, the last with three draws of images, the hardest of three times as many.
 fn staged() -> String {
     let stages = "\n[[stage]]\ngenerations = 4\n\
         [[stage]]\ngenerations = 3\nimages_per_class = 2\nfitness = \"mean_clipped\"\n\
-        [[stage]]\nimages_per_class = 3\nfitness = \"right_then_margin\"\nredraw = 2\n";
+        [[stage]]\nimages_per_class = 3\npool = 9\nfitness = \"right_then_margin\"\nredraw = 2\n";
     format!("{TINY}{stages}")
 }
 

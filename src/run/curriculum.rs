@@ -14,6 +14,10 @@ pub struct StageConfig {
     /// Training images of each class, drawn by the run's seed. Default: the images of the section `[data]`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub images_per_class: Option<usize>,
+    /// Images of each class among which to choose, drawn in the same way: those that are hardest to tell from another class
+    /// become the training images. Default: no choice.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub pool: Option<usize>,
     /// How answers to several images are judged together. Default `evaluation.fitness`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fitness: Option<Fitness>,
@@ -65,6 +69,11 @@ impl Config {
         self.stage.get(period.stage)?.images_per_class
     }
 
+    /// Images of each class among which the hardest are chosen in a period; `None`: no choice.
+    pub fn pool(&self, period: Period) -> Option<usize> {
+        self.stage.get(period.stage)?.pool
+    }
+
     /// Checks the stages.
     pub(super) fn validate_stages(&self) -> Result<(), Error> {
         let refuse = |number: usize, text: String| Err(Error::input(format!("stage {}: {text}", number + 1)));
@@ -89,6 +98,23 @@ impl Config {
             }
             if stage.redraw == Some(0) {
                 return refuse(number, "redraw = 0: expected 1 or more".to_string());
+            }
+            if let Some(pool) = stage.pool {
+                match stage.images_per_class {
+                    None => {
+                        return refuse(
+                            number,
+                            "pool: expected images_per_class, too: how many are chosen of it".to_string(),
+                        );
+                    }
+                    Some(images) if pool < images => {
+                        return refuse(
+                            number,
+                            format!("pool = {pool}: expected images_per_class, {images}, or more"),
+                        );
+                    }
+                    Some(_) => {}
+                }
             }
             if stage.redraw.is_some() && stage.images_per_class.is_none() {
                 return refuse(
@@ -146,6 +172,8 @@ mod tests {
             ("[[stage]]\nimages_per_class = 0", "stage 1: images_per_class = 0"),
             ("[[stage]]\nredraw = 5", "stage 1: redraw: expected images_per_class"),
             ("[[stage]]\nimages_per_class = 2\nredraw = 0", "stage 1: redraw = 0"),
+            ("[[stage]]\npool = 5", "stage 1: pool: expected images_per_class"),
+            ("[[stage]]\nimages_per_class = 8\npool = 7", "stage 1: pool = 7: expected images_per_class, 8"),
         ] {
             let error = config(stages).unwrap_err().to_string();
             assert!(error.contains(expected), "{error}");

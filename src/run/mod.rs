@@ -18,6 +18,7 @@ pub mod eval_file;
 pub mod evolve;
 pub mod folder;
 pub mod gallery;
+mod hardest;
 pub mod metrics;
 pub mod plan;
 pub mod plot;

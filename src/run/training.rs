@@ -2,6 +2,7 @@
 
 use super::config::{BodyConfig, DataConfig};
 use super::curriculum::Period;
+use super::hardest::hardest;
 use super::{Config, Error};
 use crate::base::Grid;
 use crate::task::dataset::{BUILTIN, Dataset, DatasetError, Split};
@@ -106,7 +107,15 @@ impl Training {
             dataset.draw(Split::Train, &classes, per_class, config.seed, number).map_err(refuse)
         };
         match (config.drawn_per_class(period), &config.data.train_images) {
-            (Some(per_class), _) => draw(per_class, period.number()),
+            (Some(per_class), _) => {
+                let Some(pool) = config.pool(period) else { return draw(per_class, period.number()) };
+                let pool = draw(pool, period.number())?;
+                let label = |&index: &usize| dataset.label(Split::Train, index).map_err(refuse);
+                let labels = pool.iter().map(label).collect::<Result<Vec<u8>, Error>>()?;
+                let stimulus = |&index: &usize| see(config, dataset, Split::Train, index);
+                let stimuli = pool.iter().map(stimulus).collect::<Result<Vec<_>, Error>>()?;
+                Ok(hardest(&labels, &stimuli, per_class).into_iter().map(|number| pool[number]).collect())
+            }
             (None, Some(indices)) => Ok(indices.clone()),
             (None, None) => draw(config.data.images_per_class, 0),
         }

@@ -304,7 +304,12 @@ mod tests {
         #[test]
         fn robots_that_cannot_win_any_more_never_enter(
             grouping in any_grouping(),
-            kind in prop_oneof![Just(Fitness::Min), Just(Fitness::MeanClipped), Just(Fitness::RightThenMargin)],
+            kind in prop_oneof![
+                Just(Fitness::Min),
+                Just(Fitness::MeanClipped),
+                Just(Fitness::RightThenMargin),
+                Just(Fitness::RightThenMin)
+            ],
             images in prop::collection::vec((0..5u8, displacement(), prop::bool::ANY), 1..8),
             one_each: bool,
             incumbents in prop::collection::vec(prop::option::of(displacement()), 32),

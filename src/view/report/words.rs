@@ -59,6 +59,9 @@ pub(super) fn methods(dossier: &Dossier) -> String {
         Fitness::RightThenMargin => {
             "the number of images answered right, both groups weighing the same, ties broken by how far it walked"
         }
+        Fitness::RightThenMin => {
+            "the number of images answered right, both groups weighing the same, ties broken by its worst answer"
+        }
     };
     let stages = match config.stage.len() {
         0 => String::new(),
