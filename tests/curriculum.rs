@@ -146,6 +146,6 @@ fn stages_that_want_more_images_than_there_are_are_refused_before_the_first_gene
         "run.toml",
         format!("{TINY}\n[[stage]]\ngenerations = 5\n[[stage]]\nimages_per_class = 1000000\n"),
     );
-    sandbox.run("evolve -c run.toml -o run").ended(3, &["1000000"]);
+    sandbox.run("evolve -c run.toml -o run").ended(3, &["stage 2: images_per_class: ", "1000000"]);
     assert!(!sandbox.path("run/run.json").exists());
 }

@@ -87,7 +87,29 @@ pub(super) fn load<T: Serialize + DeserializeOwned + Default>(
 fn refused(name: &str, line: Option<usize>, key: &str, message: &str) -> Error {
     let line = line.map_or(String::new(), |line| format!(":{line}"));
     let key = if key.is_empty() || key == "." { String::new() } else { format!("{key}: ") };
-    Error::input(format!("{name}{line}: {key}{}", message.trim_end()))
+    Error::input(format!("{name}{line}: {key}{}", spoken(message)))
+}
+
+/// A message of serde's with the type that it expected in words.
+fn spoken(message: &str) -> String {
+    let message = message.trim_end();
+    let words = [
+        ("u8", "a whole number from 0 to 255"),
+        ("u16", "a whole number from 0 to 65535"),
+        ("u32", "a whole number from 0 to 4294967295"),
+        ("u64", "a whole number from 0"),
+        ("usize", "a whole number from 0"),
+        ("i64", "a whole number"),
+        ("f64", "a number"),
+        ("a boolean", "true or false"),
+        ("a sequence", "a list"),
+    ];
+    for (kind, words) in words {
+        if let Some(start) = message.strip_suffix(&format!("expected {kind}")) {
+            return format!("{start}expected {words}");
+        }
+    }
+    message.to_string()
 }
 
 fn line_at(text: &str, span: Option<std::ops::Range<usize>>) -> Option<usize> {
@@ -115,10 +137,7 @@ pub(super) fn set<T: Serialize + DeserializeOwned>(config: &T, assignment: &str)
         place = table.entry(part).or_insert_with(|| toml::Value::Table(toml::Table::new()));
     }
     *place = value;
-    serde_path_to_error::deserialize(root).map_err(|error| {
-        let message = error.inner().message().trim_end().to_string();
-        refuse(message)
-    })
+    serde_path_to_error::deserialize(root).map_err(|error| refuse(spoken(error.inner().message())))
 }
 
 #[cfg(test)]
@@ -153,7 +172,11 @@ mod tests {
     #[test]
     fn what_is_wrong_in_toml_is_said_with_file_line_and_key() {
         let error = toml_error("name = 'a'\n\n[inner]\ncount = 'x'\n");
-        assert!(error.starts_with("own.toml:4: inner.count: ") && error.contains("expected u8"), "{error}");
+        assert!(
+            error.starts_with("own.toml:4: inner.count: ")
+                && error.ends_with("expected a whole number from 0 to 255"),
+            "{error}"
+        );
         let error = toml_error("name = 'a'\n[inner]\nlist = [1.0,\n 2.0,\n 'x']\n");
         assert!(error.starts_with("own.toml:5: inner.list[2]: "), "{error}");
         let error = toml_error("name = 'a'\n[inner]\ncont = 1\n");
@@ -169,7 +192,11 @@ mod tests {
     #[test]
     fn what_is_wrong_in_json_is_said_with_file_line_and_key() {
         let error = json_error("{\"name\": \"a\",\n\"inner\": {\n\"count\": -1}}");
-        assert!(error.starts_with("own.json:3: inner.count: ") && error.contains("expected u8"), "{error}");
+        assert!(
+            error.starts_with("own.json:3: inner.count: ")
+                && error.ends_with("expected a whole number from 0 to 255"),
+            "{error}"
+        );
         assert!(!error.contains("column"), "the place is said once: {error}");
         let error = json_error("{\"name\": \"a\",\n\"inner\": {\"list\": [1, null]}}");
         assert!(error.starts_with("own.json:2: inner.list[1]: "), "{error}");

@@ -101,23 +101,29 @@ impl Training {
     /// # Errors
     /// If a class has not as many images as are to be drawn.
     pub fn indices(config: &Config, dataset: &Dataset, period: Period) -> Result<Vec<usize>, Error> {
-        let refuse = |error: DatasetError| Error::input(format!("data.train_images: {error}"));
         let classes = config.classes();
-        let draw = |per_class, number| {
-            dataset.draw(Split::Train, &classes, per_class, config.seed, number).map_err(refuse)
+        let refuse = |key: &str, error: DatasetError| Error::input(format!("{key}: {error}"));
+        let draw = |key: &str, per_class, number| {
+            let drawn = dataset.draw(Split::Train, &classes, per_class, config.seed, number);
+            drawn.map_err(|error| refuse(key, error))
         };
         match (config.drawn_per_class(period), &config.data.train_images) {
             (Some(per_class), _) => {
-                let Some(pool) = config.pool(period) else { return draw(per_class, period.number()) };
-                let pool = draw(pool, period.number())?;
-                let label = |&index: &usize| dataset.label(Split::Train, index).map_err(refuse);
+                let key = |key: &str| format!("stage {}: {key}", period.stage + 1);
+                let Some(pool) = config.pool(period) else {
+                    return draw(&key("images_per_class"), per_class, period.number());
+                };
+                let pool = draw(&key("pool"), pool, period.number())?;
+                let label = |&index: &usize| {
+                    dataset.label(Split::Train, index).map_err(|error| refuse(&key("pool"), error))
+                };
                 let labels = pool.iter().map(label).collect::<Result<Vec<u8>, Error>>()?;
                 let stimulus = |&index: &usize| see(config, dataset, Split::Train, index);
                 let stimuli = pool.iter().map(stimulus).collect::<Result<Vec<_>, Error>>()?;
                 Ok(hardest(&labels, &stimuli, per_class).into_iter().map(|number| pool[number]).collect())
             }
             (None, Some(indices)) => Ok(indices.clone()),
-            (None, None) => draw(config.data.images_per_class, 0),
+            (None, None) => draw("data.images_per_class", config.data.images_per_class, 0),
         }
     }
 
