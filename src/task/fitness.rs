@@ -32,7 +32,7 @@ pub enum Fitness {
     /// mean of (1 + m/(|m| + 10))/2 over the margins m, which tells equals apart and never saturates.
     RightThenMargin,
     /// How many images are answered right, as above; and (1 + m/(|m| + 10))/2 of the smallest margin m alone. One image on
-    /// which a robot is worse than an elite rules it out, so hundreds of images cost little more than a few.
+    /// which a robot is worse than an equally good elite rules it out: on many images, sooner than with the mean.
     RightThenMin,
 }
 
