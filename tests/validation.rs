@@ -81,6 +81,16 @@ fn a_run_that_asks_for_it_chooses_robots_at_its_end() {
     assert_eq!(sandbox.read("run/validation.json"), kept);
     let report = EvalFile::read(&sandbox.path("run/eval.json")).unwrap();
     assert!(report.robots.iter().all(|robot| robot.validation.as_ref().unwrap().images == 60));
+    // Who asks for fewer gets the first of those.
+    let said =
+        sandbox.run("eval --archive run/run.json --robots best-validation:1 --images 20").ended(0, &[]);
+    assert!(!said.err.contains("validating"), "{}", said.err);
+    assert_eq!(sandbox.read("run/validation.json"), kept);
+    let fewer = EvalFile::read(&sandbox.path("run/eval.json")).unwrap().robots;
+    let ids = |robots: &[morphcog::run::eval_file::RobotReport]| {
+        robots.iter().map(|robot| robot.id.clone()).collect::<Vec<_>>()
+    };
+    assert_eq!((fewer.len(), ids(&fewer)), (1, ids(&report.robots[..1])));
     // A run that is resumed at its end, with nothing left to do, says it again.
     sandbox.run("evolve -c run.toml -o run --resume").ended(0, &[]);
     assert_eq!(sandbox.read("run/validation.json"), kept);

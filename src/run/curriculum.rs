@@ -99,27 +99,21 @@ impl Config {
             if stage.redraw == Some(0) {
                 return refuse(number, "redraw = 0: expected 1 or more".to_string());
             }
-            if let Some(pool) = stage.pool {
-                match stage.images_per_class {
-                    None => {
-                        return refuse(
-                            number,
-                            "pool: expected images_per_class, too: how many are chosen of it".to_string(),
-                        );
-                    }
-                    Some(images) if pool < images => {
-                        return refuse(
-                            number,
-                            format!("pool = {pool}: expected images_per_class, {images}, or more"),
-                        );
-                    }
-                    Some(_) => {}
-                }
+            let drawing = [
+                ("pool", stage.pool.is_some(), "how many are chosen of it"),
+                ("redraw", stage.redraw.is_some(), "what is to be drawn"),
+            ];
+            if stage.images_per_class.is_none()
+                && let Some((key, _, what)) = drawing.iter().find(|(_, given, _)| *given)
+            {
+                return refuse(number, format!("{key}: expected images_per_class, too: {what}"));
             }
-            if stage.redraw.is_some() && stage.images_per_class.is_none() {
+            if let (Some(pool), Some(images)) = (stage.pool, stage.images_per_class)
+                && pool < images
+            {
                 return refuse(
                     number,
-                    "redraw: expected images_per_class, too: what is to be drawn".to_string(),
+                    format!("pool = {pool}: expected images_per_class, {images}, or more"),
                 );
             }
         }

@@ -188,23 +188,31 @@ pub(super) fn best<'a>(
 ) -> Result<Option<Vec<(&'a Robot, Validated)>>, Error> {
     let run = &source.run;
     let images = images(run, dataset, wanted.images)?;
-    let key = key(run, &robots, wanted, &images, walker.control_steps);
+    // Whoever asks for fewer than the run's end has found gets the first of those.
+    let searched = &Wanted { count: wanted.count.max(run.config.validation.best), ..*wanted };
+    let key = key(run, &robots, searched, &images, walker.control_steps);
     let path = source.path.with_file_name(VALIDATION_JSON);
     let known = read_text(&path).ok().and_then(|text| serde_json::from_str::<ValidationFile>(&text).ok());
     let by_id = |validated: &Validated| {
         let robot = robots.iter().find(|robot| robot.id == validated.id && robot.task == validated.task)?;
         Some((*robot, validated.clone()))
     };
+    let first = |all: &[Validated]| {
+        let before =
+            |place: usize, task: &str| all[..place].iter().filter(|other| other.task == task).count();
+        let is_first = |(place, robot): &(usize, &Validated)| before(*place, &robot.task) < wanted.count;
+        all.iter().enumerate().filter(is_first).filter_map(|(_, robot)| by_id(robot)).collect()
+    };
     if let Some(file) = known.filter(|file| file.key == key) {
-        return Ok(Some(file.robots.iter().filter_map(by_id).collect()));
+        return Ok(Some(first(&file.robots)));
     }
-    let Some(chosen) = screened(run, dataset, grouping, &robots, wanted, &images, walker)? else {
+    let Some(chosen) = screened(run, dataset, grouping, &robots, searched, &images, walker)? else {
         return Ok(None);
     };
     let file = ValidationFile { format: FORMAT.0.to_string(), format_version: FORMAT.1, key, robots: chosen };
     let text = serde_json::to_string(&file).map_err(|error| Error::other(error.to_string()))? + "\n";
     write_atomically(&path, text.as_bytes()).map_err(|error| Error::writing(&path, &error))?;
-    Ok(Some(file.robots.iter().filter_map(by_id).collect()))
+    Ok(Some(first(&file.robots)))
 }
 
 /// Of all that the result depends on.
