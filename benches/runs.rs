@@ -77,8 +77,10 @@ fn evaluations(criterion: &mut Criterion) {
     group.sample_size(10);
     for (name, bodies, images) in cases {
         let images: Vec<Grid<f64>> = (0..images).map(stimulus).collect();
-        let jobs: Vec<Job> =
-            bodies.iter().map(|&body| Job { body, order: Vec::new(), may_win: Box::new(|_| true) }).collect();
+        let jobs: Vec<Job> = bodies
+            .iter()
+            .map(|&body| Job { body, order: Vec::new(), may_win: Box::new(|_| true), settled: None })
+            .collect();
         group.throughput(Throughput::Elements((bodies.len() * images.len()) as u64));
         for threads in [1, 2] {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads start");

@@ -4,22 +4,27 @@ mod common;
 
 use common::program::{Sandbox, TINY, without_seconds};
 use morphcog::run::Config;
-use morphcog::run::archive::RunFile;
+use morphcog::run::archive::{Robot, RunFile};
 use morphcog::run::curriculum::Period;
 use morphcog::run::evolve::{Observer, Options, Progress, evolve};
 use morphcog::run::folder::{IfExists, RunFolder};
-use morphcog::run::training::Training;
+use morphcog::run::training::{Training, load_dataset};
+use morphcog::sim::Lattice;
+use morphcog::task::dataset::Split;
 use morphcog::task::fitness::Fitness;
-use morphcog::task::score::Answer;
+use morphcog::task::protocol::Protocol;
+use morphcog::task::rollout::walk;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-/// Three stages in twelve generations, the last with three draws of images, the hardest of three times as many.
+/// Three stages in twelve generations: the second with shorter lives; the last with three draws of images, the hardest of
+/// three times as many, and with the four fittest elites at the beginning of each.
 fn staged() -> String {
     let stages = "\n[[stage]]\ngenerations = 4\n\
         [[stage]]\ngenerations = 3\nimages_per_class = 2\nfitness = \"mean_clipped\"\n\
-        [[stage]]\nimages_per_class = 3\npool = 9\nfitness = \"right_then_margin\"\nredraw = 2\n";
+        control_steps = 15\n\
+        [[stage]]\nimages_per_class = 3\npool = 9\nfitness = \"right_then_margin\"\nredraw = 2\nkeep = 4\n";
     format!("{TINY}{stages}")
 }
 
@@ -110,6 +115,40 @@ fn neither_threads_nor_savings_change_a_curriculum() {
 }
 
 #[test]
+fn what_follows_the_fifth_wrong_answer_is_not_shown_and_changes_nothing() {
+    let sandbox = Sandbox::new();
+    let stages = "\n[[stage]]\ngenerations = 8\n\
+        [[stage]]\nimages_per_class = 12\nfitness = \"until_fifth_wrong\"\nredraw = 2\n";
+    sandbox.write("run.toml", format!("{TINY}{stages}"));
+    sandbox.run("evolve -q -c run.toml -o plain --threads 1").ended(0, &[]);
+    let run = sandbox.run_file("plain");
+    // By turns, of both classes.
+    assert!(run.training_images.chunks(2).all(|pair| (pair[0].label, pair[1].label) == (0, 1)));
+    // In so short lives nobody gets far enough to be right.
+    assert!(run.elites.len() > 4 && run.elites.iter().all(|robot| robot.displacements.len() == 5));
+    let others = ["--threads 3", "--set savings.early_stop=false", "--set savings.shared_lives=false"];
+    for (number, options) in others.iter().enumerate() {
+        sandbox.run(&format!("evolve -q -c run.toml -o other{number} {options}")).ended(0, &[]);
+        assert_eq!(sandbox.run_file(&format!("other{number}")).elites, run.elites, "{options}");
+    }
+    // Stopped and gone on with; read by other commands.
+    sandbox.run("evolve -q -c run.toml -o part -g 9").ended(0, &[]);
+    sandbox.run("evolve -q -c run.toml -o part --resume").ended(0, &[]);
+    assert_eq!(result(&sandbox, "part"), result(&sandbox, "plain"));
+    sandbox.run("eval --archive plain/run.json --images 20 --robots top:2").ended(0, &[]);
+    sandbox.run("audit --archive plain/run.json --robots top:1").ended(0, &[]);
+    sandbox.run("report plain/run.json -o report.html").ended(0, &[]);
+    // Every row of the table has all columns.
+    let table = sandbox.read("plain/elites.csv");
+    let columns: Vec<usize> = table.lines().map(|line| line.split(',').count()).collect();
+    assert!(columns.iter().all(|count| *count == columns[0]), "{columns:?}");
+    // A robot that lacks a displacement it had to walk for is refused.
+    let broken = sandbox.read("plain/run.json").replacen("\"displacements\":[", "\"displacements\":[0.5,", 1);
+    sandbox.write("broken.json", broken);
+    sandbox.run("eval --archive broken.json --images 20").ended(3, &["displacement"]);
+}
+
+#[test]
 fn elites_stand_in_the_archive_with_what_they_do_on_the_last_images() {
     let sandbox = sandbox();
     sandbox.run("evolve -q -c run.toml -o run").ended(0, &[]);
@@ -117,16 +156,56 @@ fn elites_stand_in_the_archive_with_what_they_do_on_the_last_images() {
     assert_eq!((run.training_images.len(), run.fitness()), (6, Fitness::RightThenMargin));
     let grouping = run.config.grouping().unwrap().with_fitness(run.fitness());
     for robot in &run.elites {
-        let answer = |(image, &displacement): (&morphcog::run::training::ImageRef, &f64)| Answer {
-            class: image.label,
-            displacement,
-        };
-        let answers: Vec<_> = run.training_images.iter().zip(&robot.displacements).map(answer).collect();
-        assert_eq!(grouping.score(&answers).fitness, robot.objective, "{}", robot.id);
+        assert_eq!(grouping.score(&run.answers(robot)).fitness, robot.objective, "{}", robot.id);
     }
     // Other commands read it.
     sandbox.run("eval --archive run/run.json --images 20 --robots top:2").ended(0, &[]);
     sandbox.run("audit --archive run/run.json --robots top:2").ended(0, &[]);
+}
+
+#[test]
+fn a_stage_with_shorter_lives_judges_by_them_and_other_commands_by_whole_ones() {
+    let sandbox = sandbox();
+    sandbox.run("evolve -q -c run.toml -o run -g 7").ended(0, &[]);
+    let run: RunFile = sandbox.run_file("run");
+    assert_eq!((run.protocol().control_steps, run.config.protocol.control_steps), (15, 20));
+    let dataset = load_dataset(&run.config, None, &[Split::Train]).unwrap();
+    let walked = |protocol: &Protocol, robot: &Robot| {
+        let lattice = Lattice::new(&robot.body, &run.config.physics);
+        let training = Training::of(&run.config, &dataset, run.config.period(6)).unwrap();
+        walk(&lattice, &run.config.physics, protocol, &training.stimuli, false).unwrap().0
+    };
+    for robot in &run.elites {
+        assert_eq!(walked(&run.protocol(), robot), robot.displacements, "{}", robot.id);
+    }
+    let warnings = sandbox.run("audit --archive run/run.json --robots top:2").ended(0, &[]).err;
+    assert!(!warnings.contains("walks otherwise"), "{warnings}");
+    let audit: serde_json::Value = serde_json::from_str(&sandbox.read("run/audit.json")).unwrap();
+    for judged in audit["robots"].as_array().unwrap() {
+        let robot = run.elites.iter().find(|robot| judged["id"] == robot.id).unwrap();
+        let displacements: Vec<f64> = serde_json::from_value(judged["displacements"].clone()).unwrap();
+        assert_eq!(displacements, walked(&run.config.protocol, robot));
+    }
+}
+
+#[test]
+fn a_stage_starts_with_the_fittest_it_keeps_on_its_own_images() {
+    let sandbox = sandbox();
+    let elites = |name: &str, text: String, generations: u64| {
+        sandbox.write("run.toml", text);
+        sandbox.run(&format!("evolve -q -c run.toml -o {name} -g {generations}")).ended(0, &[]);
+        sandbox.run_file(name).elites
+    };
+    // Nobody is born in the third stage's first generation: no parents, and a newcomer that can be told by its age.
+    let lonely = |text: String| text.replace("parents = 8", "parents = 0\nnewcomers = 1");
+    let all = elites("all", lonely(staged()).replace("keep = 4", ""), 8);
+    let mut kept = elites("kept", lonely(staged()).replace("keep = 4", "keep = 2"), 8);
+    let mut fittest: Vec<Robot> = all.into_iter().filter(|robot| robot.generation < 7).collect();
+    fittest.sort_by(|a, b| b.objective.total_cmp(&a.objective));
+    fittest.truncate(2);
+    kept.retain(|robot| robot.generation < 7);
+    kept.sort_by(|a, b| b.objective.total_cmp(&a.objective));
+    assert_eq!(kept, fittest);
 }
 
 #[test]

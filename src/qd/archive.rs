@@ -90,6 +90,30 @@ impl<S> Archive<S> {
         Ok(old.map_or(Insertion::New, |old| Insertion::Improved { old }))
     }
 
+    /// Takes out all but the `count` fittest of each kind; of equally fit ones those in the first cells stay.
+    pub fn retain_fittest<K: Ord>(&mut self, count: usize, kind: impl Fn(&S) -> K) {
+        let mut ranked: Vec<(f64, usize)> = self.elites().map(|e| (e.objective, e.cell)).collect();
+        // Stable: elites come in the order of their cells.
+        ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let mut kept: BTreeMap<K, usize> = BTreeMap::new();
+        for (_, cell) in ranked {
+            let Some(elite) = self.elites.get(&cell) else { continue };
+            let kept = kept.entry(kind(&elite.solution)).or_default();
+            *kept += 1;
+            if *kept > count {
+                self.elites.remove(&cell);
+            }
+        }
+    }
+
+    /// Objective of the `count`-th fittest elite (from 1) among those that are `of` a kind; none if there are fewer.
+    pub fn nth_fittest(&self, count: usize, of: impl Fn(&S) -> bool) -> Option<f64> {
+        let mut objectives: Vec<f64> =
+            self.elites().filter(|e| of(&e.solution)).map(|e| e.objective).collect();
+        objectives.sort_by(|a, b| b.total_cmp(a));
+        objectives.get(count.checked_sub(1)?).copied()
+    }
+
     /// The elite of a cell.
     pub fn get(&self, cell: usize) -> Option<&Elite<S>> {
         self.elites.get(&cell)
@@ -185,6 +209,25 @@ mod tests {
         assert_eq!(archive.insert(elite(3, 2.0, 'c')), Ok(Insertion::Improved { old }));
         assert_eq!(archive.insert(elite(3, 1.0, 'd')), Ok(Insertion::Rejected));
         assert_eq!((archive.get(3), archive.len()), (Some(&elite(3, 2.0, 'c')), 1));
+    }
+
+    #[test]
+    fn the_fittest_of_each_kind_can_be_kept() {
+        let told =
+            [(5, 2.0, 'a'), (1, 2.0, 'a'), (2, 3.0, 'a'), (7, -1.0, 'b'), (8, 0.0, 'b'), (9, 9.0, 'c')];
+        let elites = told.map(|(cell, objective, kind)| elite(cell, objective, kind)).to_vec();
+        let kept = |count| {
+            let mut archive = Archive::try_from(elites.clone()).unwrap();
+            archive.retain_fittest(count, |kind| *kind);
+            archive.elites().map(|e| e.cell).collect::<Vec<_>>()
+        };
+        assert_eq!(kept(1), [2, 8, 9]);
+        assert_eq!(kept(2), [1, 2, 7, 8, 9]);
+        assert_eq!(kept(3).len(), 6);
+        assert!(kept(0).is_empty());
+        let archive = Archive::try_from(elites.clone()).unwrap();
+        let nth = |count, kind| archive.nth_fittest(count, |k| *k == kind);
+        assert_eq!([nth(0, 'a'), nth(1, 'a'), nth(3, 'a'), nth(4, 'a')], [None, Some(3.0), Some(2.0), None]);
     }
 
     #[test]

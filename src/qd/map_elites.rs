@@ -39,6 +39,11 @@ impl<S> MapElites<S> {
         &self.archive
     }
 
+    /// Takes elites out of the archive; see [`Archive::retain_fittest`].
+    pub fn retain_fittest<K: Ord>(&mut self, count: usize, kind: impl Fn(&S) -> K) {
+        self.archive.retain_fittest(count, kind);
+    }
+
     /// What a generation consists of; see [`EmitterParams::ask`].
     pub fn ask(&self, generation: u64) -> Vec<Proposal> {
         self.params.ask(&self.archive, self.seed, generation)

@@ -1,13 +1,15 @@
 //! `run.json`: a run's archive with everything that made it; the file that `eval` and `replay` read.
 
-use super::training::{DatasetRef, ImageRef};
+use super::training::{DatasetRef, ImageRef, answers};
 use super::{Config, Error};
 use crate::base::files::read_text;
 use crate::body::{Body, VoxelCounts};
 use crate::genome::Genome;
-use crate::qd::descriptor::possible_cells;
+use crate::qd::descriptor::{count_bin, possible_cells};
 use crate::qd::{Archive, ArchiveStats, DescriptorSpace, Elite};
 use crate::task::fitness::Fitness;
+use crate::task::protocol::Protocol;
+use crate::task::score::Answer;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -29,7 +31,8 @@ pub struct Robot {
     pub task: String,
     /// Its fitness, voxel lengths.
     pub objective: f64,
-    /// Displacement under each training image, voxel lengths, right positive.
+    /// Displacement under each training image, voxel lengths, right positive; with `until_fifth_wrong` under those that it
+    /// had to be shown, the first.
     pub displacements: Vec<f64>,
     /// Its voxels by kind.
     pub voxels: VoxelCounts,
@@ -41,6 +44,15 @@ pub struct Robot {
     pub body: Body,
     /// Its genome.
     pub genome: Genome,
+}
+
+impl Robot {
+    /// Bins of its three voxel counts.
+    pub fn bins(&self) -> Vec<usize> {
+        let area = self.body.voxels().area();
+        let VoxelCounts { muscle, sensor, total, .. } = self.voxels;
+        [muscle, sensor, total].map(|count| count_bin(count, area)).to_vec()
+    }
 }
 
 /// Dimensions of an archive.
@@ -171,8 +183,10 @@ impl RunFile {
             if space.index(&robot.cell).is_none() {
                 return refuse("there is no such cell in the archive");
             }
-            if robot.displacements.len() != self.training_images.len() {
-                return refuse("it has not one displacement per training image");
+            let needed =
+                self.config.grouping()?.with_fitness(self.fitness()).settled_by(&self.answers(robot));
+            if robot.displacements.len() != needed.unwrap_or(self.training_images.len()) {
+                return refuse("it has not one displacement per training image that it has to be shown");
             }
         }
         self.archive().map(|_| ())
@@ -185,7 +199,22 @@ impl RunFile {
 
     /// How its elites' answers were judged.
     pub fn fitness(&self) -> Fitness {
-        self.config.fitness(self.generations.saturating_sub(1))
+        self.config.fitness(self.latest())
+    }
+
+    /// How its elites were shown images.
+    pub fn protocol(&self) -> Protocol {
+        self.config.protocol_in(self.config.period(self.latest()))
+    }
+
+    /// What an elite answered to the training images.
+    pub fn answers(&self, robot: &Robot) -> Vec<Answer> {
+        answers(&self.training_images, robot.displacements.iter().copied().map(Some))
+    }
+
+    /// The last generation done, from 0.
+    fn latest(&self) -> u64 {
+        self.generations.saturating_sub(1)
     }
 
     /// The elites as an archive to go on with.
@@ -244,6 +273,8 @@ impl RunFile {
             row.extend(robot.body.voxels().cells().iter().map(|material| material.code().to_string()));
             row.extend([robot.id.clone(), robot.task.clone(), robot.generation.to_string()]);
             row.extend(robot.displacements.iter().map(f64::to_string));
+            // Empty where it did not have to be shown an image.
+            row.resize(header.len(), String::new());
             writer.write_record(&row)?;
         }
         writer.into_inner().map_err(|error| csv::Error::from(error.into_error()))

@@ -22,6 +22,9 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 /// Robots whose lives are lived side by side; what is finished is saved after so many.
 const BATCH: usize = 8;
 
+/// Most training images of a class that a robot is audited on: it lives them some twenty times.
+const IMAGES_PER_CLASS: usize = 16;
+
 /// Whose robots are audited.
 #[derive(Clone, Debug)]
 pub enum Source {
@@ -164,11 +167,13 @@ fn open(options: &Options) -> Result<Opened, Error> {
             let run = &source.run;
             check_out(&options.out, path)?;
             let training = training_of(run, options)?;
+            // A stage may have shown images for another time than the protocol, which is what is judged.
+            let is_known = run.protocol() == run.config.protocol && training.images == run.training_images;
             let subject = |robot: &Robot| Subject {
                 id: robot.id.clone(),
                 task: robot.task.clone(),
                 body: robot.body.clone(),
-                known: Some(robot.displacements.clone()),
+                known: is_known.then(|| robot.displacements.clone()),
             };
             let mut subjects: Vec<Subject> = Vec::new();
             for chosen in options.robots.of(std::slice::from_ref(&source), options.seed)? {
@@ -183,16 +188,23 @@ fn open(options: &Options) -> Result<Opened, Error> {
     }
 }
 
-/// The images a run's robots were evolved on. Of other data, verdicts would mean nothing.
+/// The images a run's robots were evolved on, of each class the first few. Of other data, verdicts would mean nothing.
 fn training_of(run: &RunFile, options: &Options) -> Result<Training, Error> {
     let dataset = load_dataset(&run.config, options.data.as_deref(), &[Split::Train])?;
     if dataset.fingerprint(Split::Train).unwrap_or_default() != run.dataset.train_sha256 {
         let text = "the training images here are not those the run was made with (another SHA-256)";
         return Err(Error::input(text.to_string()).hint("name their folder with --data".to_string()));
     }
+    let mut taken = [0; 256];
+    let mut images = run.training_images.clone();
+    images.retain(|image| {
+        let taken = &mut taken[usize::from(image.label)];
+        *taken += 1;
+        *taken <= IMAGES_PER_CLASS
+    });
     let see = |image: &super::training::ImageRef| see(&run.config, &dataset, Split::Train, image.index);
-    let stimuli: Result<Vec<_>, Error> = run.training_images.iter().map(see).collect();
-    Ok(Training { dataset: run.dataset.clone(), images: run.training_images.clone(), stimuli: stimuli? })
+    let (dataset, stimuli) = (run.dataset.clone(), images.iter().map(see).collect::<Result<Vec<_>, Error>>());
+    Ok(Training { dataset, images, stimuli: stimuli?, protocol: run.config.protocol.clone() })
 }
 
 impl Trial {

@@ -2,6 +2,7 @@
 
 use super::{Config, Error};
 use crate::task::fitness::Fitness;
+use crate::task::protocol::Protocol;
 use serde::{Deserialize, Serialize};
 
 /// A stage: table `[[stage]]`. It starts with the archive of the stage before it, evaluated anew.
@@ -25,6 +26,14 @@ pub struct StageConfig {
     /// archive. Default: never.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub redraw: Option<u64>,
+    /// Control steps an image is shown for. Default `protocol.control_steps`. Shorter lives are cheaper, and who walks the
+    /// right way usually does so from the start.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub control_steps: Option<u32>,
+    /// Elites of each task that stay in the archive: the fittest, at any time. Who is not among them is not let in, and can
+    /// be told early. Default: all.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub keep: Option<usize>,
 }
 
 /// Generations with the same training images and the same fitness.
@@ -60,7 +69,12 @@ impl Config {
 
     /// How answers are judged in a generation (from 0).
     pub fn fitness(&self, generation: u64) -> Fitness {
-        let stage = self.stage.get(self.period(generation).stage);
+        self.fitness_in(self.period(generation))
+    }
+
+    /// How answers are judged in a period.
+    pub fn fitness_in(&self, period: Period) -> Fitness {
+        let stage = self.stage.get(period.stage);
         stage.and_then(|stage| stage.fitness).unwrap_or(self.evaluation.fitness)
     }
 
@@ -72,6 +86,20 @@ impl Config {
     /// Images of each class among which the hardest are chosen in a period; `None`: no choice.
     pub fn pool(&self, period: Period) -> Option<usize> {
         self.stage.get(period.stage)?.pool
+    }
+
+    /// How images are shown in a period.
+    pub fn protocol_in(&self, period: Period) -> Protocol {
+        let control_steps = self.stage.get(period.stage).and_then(|stage| stage.control_steps);
+        Protocol {
+            control_steps: control_steps.unwrap_or(self.protocol.control_steps),
+            ..self.protocol.clone()
+        }
+    }
+
+    /// Elites of each task that stay in the archive in a period; `None`: all.
+    pub fn keep(&self, period: Period) -> Option<usize> {
+        self.stage.get(period.stage)?.keep
     }
 
     /// Checks the stages.
@@ -93,11 +121,14 @@ impl Config {
             if begin > u64::from(u32::MAX) {
                 return refuse(number, format!("it ends with generation {begin}: expected less than 2³²"));
             }
-            if stage.images_per_class == Some(0) {
-                return refuse(number, "images_per_class = 0: expected 1 or more".to_string());
-            }
-            if stage.redraw == Some(0) {
-                return refuse(number, "redraw = 0: expected 1 or more".to_string());
+            let zeros = [
+                ("images_per_class", stage.images_per_class == Some(0)),
+                ("redraw", stage.redraw == Some(0)),
+                ("control_steps", stage.control_steps == Some(0)),
+                ("keep", stage.keep == Some(0)),
+            ];
+            if let Some((key, _)) = zeros.iter().find(|(_, is_zero)| *is_zero) {
+                return refuse(number, format!("{key} = 0: expected 1 or more"));
             }
             let drawing = [
                 ("pool", stage.pool.is_some(), "how many are chosen of it"),

@@ -149,13 +149,7 @@ pub(super) struct Trial<'a> {
 impl RobotReport {
     pub(super) fn new(trial: &Trial, displacements: Vec<Option<f64>>, simulated: usize) -> Self {
         let Trial { run, robot, split, images, threshold } = *trial;
-        let training = run.training_images.iter().zip(&robot.displacements);
-        let answer = |(image, &displacement): (&ImageRef, &f64)| crate::task::score::Answer {
-            class: image.label,
-            displacement,
-        };
-        let assignment =
-            Assignment::from_training(split, run.fitness(), &training.map(answer).collect::<Vec<_>>());
+        let assignment = Assignment::from_training(split, run.fitness(), &run.answers(robot));
         let is_right = |(image, displacement): (&ImageRef, &Option<f64>)| {
             let (group, displacement) = (split.group(image.label), *displacement);
             group.zip(displacement).is_some_and(|(g, d)| assignment.is_right(g, d, threshold))

@@ -4,76 +4,27 @@ use super::archive::{Dimensions, FORMAT, FORMAT_VERSION, Robot, RunFile};
 use super::checkpoint::{self, Checkpoint, KnownBodies};
 use super::curriculum::Period;
 use super::folder::{self, IfExists, RunFolder};
+use super::keep::Floors;
 use super::metrics::{Metrics, Totals};
-use super::robust::{Scored, evaluate_all, with_perturbed_lives};
+use super::robust::{Scored, settled, with_perturbed_lives};
+pub use super::session::{Finished, Observer, Options, Progress};
 use super::training::{Training, load_dataset};
 use super::variation::Mutations;
 use super::{Config, Error, resume};
 use crate::base::files::write_atomically;
-use crate::body::Body;
 use crate::genome::GenomeError;
-use crate::qd::descriptor::count_bin;
 use crate::qd::{Archive, ArchiveStats, DescriptorSpace, Evaluated, MapElites};
 use crate::task::dataset::{Dataset, Split};
 use crate::task::evaluation::{Job, Outcome, evaluate};
 use crate::task::grouping::Grouping;
 use rayon::prelude::*;
-use std::path::PathBuf;
+use std::mem::{replace, take};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-/// What to evolve and where to.
-#[derive(Clone, Debug)]
-pub struct Options {
-    /// Everything the result depends on.
-    pub config: Config,
-    /// Name of the run.
-    pub name: String,
-    /// Its folder.
-    pub out: PathBuf,
-    /// What to do if there is a run in it.
-    pub if_exists: IfExists,
-    /// Where the data are, if the command line says.
-    pub data: Option<PathBuf>,
-    /// Number of threads; `None`: one per core.
-    pub threads: Option<usize>,
-}
-
-/// How far a run is.
-#[derive(Clone, Copy, Debug)]
-pub struct Progress {
-    /// Generations done.
-    pub done: u64,
-    /// Generations to be done in all.
-    pub generations: u64,
-    /// Figures of the archive.
-    pub stats: ArchiveStats,
-    /// Counts so far.
-    pub totals: Totals,
-}
-
-/// Who is told how a run goes.
-pub trait Observer {
-    /// Before the first generation of this session.
-    fn started(&mut self, folder: &RunFolder, training: &Training, progress: &Progress);
-    /// When other training images, or another fitness, are begun with.
-    fn period(&mut self, period: Period, training: &Training, progress: &Progress);
-    /// After every generation.
-    fn generation(&mut self, progress: &Progress);
-    /// Something the user should know.
-    fn warning(&mut self, text: &str);
-}
-
-/// How a session of a run ended.
-#[derive(Clone, Debug)]
-pub struct Finished {
-    /// The run as it stands in `run.json`.
-    pub run: RunFile,
-    /// Counts of the whole run.
-    pub totals: Totals,
-    /// Whether a signal stopped it before its last generation.
-    pub stopped: bool,
-}
+/// Elites evaluated at the beginning of a period between two looks at whether to stop: few enough for nobody to wait long.
+/// What is simulated depends on it, so not on the number of threads.
+const ELITES_AT_ONCE: usize = 8;
 
 /// Runs a config, or goes on with a run. `stop` is looked at after every generation, and more often where a stage begins.
 ///
@@ -216,18 +167,32 @@ impl<'a> Run<'a> {
         let config = &self.options.config;
         let training = Training::of(config, self.dataset, period)?;
         let grouping = config.grouping()?.with_fitness(config.fitness(self.generation));
-        let elites: Vec<Robot> = self.search.archive().elites().map(|elite| elite.solution.clone()).collect();
-        let bodies: Vec<&Body> = elites.iter().map(|robot| &robot.body).collect();
-        let Some(scored) = evaluate_all(config, &training, &grouping, &bodies, stop) else {
-            return Ok(false);
-        };
-        self.totals.evaluations += elites.len() as u64;
-        self.known = KnownBodies::default();
-        elites.iter().for_each(|robot| _ = self.known.insert(robot.body.key()));
-        (self.period, self.training, self.grouping) = (period, training, grouping);
-        self.search = MapElites::new(config.seed, config.map_elites.clone(), Archive::new());
         // In the order of their cells: of equals that now share a cell the first stays.
-        self.tell((0..).zip(elites).zip(scored))?;
+        let mut elites: Vec<Robot> =
+            self.search.archive().elites().map(|elite| elite.solution.clone()).collect();
+        if config.keep(period).is_some() {
+            // The fitter ones first: of those who come after, most are told early that they cannot stay.
+            elites.sort_by(|a, b| b.objective.total_cmp(&a.objective));
+        }
+        let search = MapElites::new(config.seed, config.map_elites.clone(), Archive::new());
+        let before = (
+            replace(&mut self.period, period),
+            replace(&mut self.training, training),
+            replace(&mut self.grouping, grouping),
+            replace(&mut self.search, search),
+            take(&mut self.known),
+            self.totals,
+        );
+        elites.iter().for_each(|robot| _ = self.known.insert(robot.body.key()));
+        self.totals.evaluations += elites.len() as u64;
+        let mut elites = (0..).zip(elites).map(|(number, robot)| (number, None, robot)).peekable();
+        while elites.peek().is_some() {
+            if stop.load(Ordering::Relaxed) {
+                (self.period, self.training, self.grouping, self.search, self.known, self.totals) = before;
+                return Ok(false);
+            }
+            self.evaluate(elites.by_ref().take(ELITES_AT_ONCE).collect())?;
+        }
         Ok(true)
     }
 
@@ -245,44 +210,49 @@ impl<'a> Run<'a> {
         for (proposal, robot) in proposals.iter().zip(robots) {
             let is_new = self.known.insert(robot.body.key());
             if is_new || !config.savings.known_bodies {
-                fresh.push((proposal, robot));
+                fresh.push((proposal.child, proposal.parent, robot));
             } else {
                 self.totals.saved_known_bodies += images;
             }
         }
-        let jobs: Vec<Job> = fresh.iter().map(|(proposal, robot)| self.job(proposal.parent, robot)).collect();
-        let evaluations =
-            evaluate(&jobs, &self.training.stimuli, &config.physics, &config.protocol, config.savings);
-        let scored = with_perturbed_lives(config, &self.training, &self.grouping, &jobs, evaluations);
-        drop(jobs);
-
-        let children = fresh.into_iter().map(|(proposal, robot)| (proposal.child, robot));
-        self.tell(children.zip(scored))?;
+        self.evaluate(fresh)?;
         self.generation += 1;
         Ok(())
     }
 
-    /// Counts evaluations and puts those who walked into the archive.
-    fn tell(&mut self, evaluated: impl Iterator<Item = ((u64, Robot), Scored)>) -> Result<(), Error> {
+    /// Evaluates robots, each with its number and its parent's cell, counts that, and puts those into the archive who walked
+    /// and are fit enough.
+    fn evaluate(&mut self, robots: Vec<(u64, Option<usize>, Robot)>) -> Result<(), Error> {
+        let Config { physics, savings, .. } = &self.options.config;
+        let Training { stimuli, protocol, .. } = &self.training;
+        let floors = self.floors();
+        let jobs = robots.iter().map(|(_, parent, robot)| self.job(*parent, robot, &floors));
+        let jobs: Vec<Job> = jobs.collect();
+        let evaluations = evaluate(&jobs, stimuli, physics, protocol, *savings);
+        let scored =
+            with_perturbed_lives(&self.options.config, &self.training, &self.grouping, &jobs, evaluations);
+        drop(jobs);
+
         let mut told = Vec::new();
-        for ((child, robot), Scored { evaluation, at_most }) in evaluated {
+        for ((child, _, robot), Scored { evaluation, at_most }) in robots.into_iter().zip(scored) {
             self.totals.count(&evaluation);
             match evaluation.outcome {
                 Outcome::Walked(displacements) => {
-                    told.push(self.scored(child, robot, displacements, at_most))
+                    told.extend(self.scored(child, robot, displacements, at_most, &floors))
                 }
                 Outcome::Unstable(_) => self.totals.unstable += 1,
                 Outcome::Stopped => {}
             }
         }
-        self.search.tell(told).map(drop).map_err(|error| Error::other(error.to_string()))
+        self.search.tell(told).map_err(|error| Error::other(error.to_string()))?;
+        if let Some(keep) = self.options.config.keep(self.period) {
+            self.search.retain_fittest(keep, |robot| robot.task.clone());
+        }
+        Ok(())
     }
 
-    /// Bins of the three voxel counts.
-    fn bins(&self, robot: &Robot) -> Vec<usize> {
-        let area = robot.body.voxels().area();
-        let counts = robot.voxels;
-        [counts.muscle, counts.sensor, counts.total].map(|count| count_bin(count, area)).to_vec()
+    fn floors(&self) -> Floors {
+        Floors::of(self.search.archive(), &self.grouping, self.options.config.keep(self.period))
     }
 
     /// Coordinates of the cell of a robot that performs a task.
@@ -291,29 +261,46 @@ impl<'a> Run<'a> {
         bins
     }
 
-    fn job<'b>(&'b self, parent: Option<usize>, robot: &'b Robot) -> Job<'b> {
+    fn job<'b>(&'b self, parent: Option<usize>, robot: &'b Robot, floors: &'b Floors) -> Job<'b> {
         let archive = self.search.archive();
         let parent = parent.and_then(|cell| archive.get(cell)).map(|elite| &elite.solution.displacements);
-        let bins = self.bins(robot);
+        let bins = robot.bins();
         let may_win = move |known: &[Option<f64>]| {
-            let incumbent = |task| archive.objective(self.space.index(&self.cell(bins.clone(), task))?);
-            self.training.may_win(&self.grouping, known, incumbent)
+            let cell = |task| self.space.index(&self.cell(bins.clone(), task));
+            let to_beat = |task| floors.to_beat(task, cell(task).and_then(|cell| archive.objective(cell)));
+            self.grouping.can_still_win(&self.training.answers(known.iter().copied()), to_beat)
         };
         let answers = |d: &Vec<f64>| self.training.answers(d.iter().copied().map(Some));
         let order = parent.map_or_else(Vec::new, |d| self.grouping.hardest_first(&answers(d)));
-        Job { body: &robot.body, order, may_win: Box::new(may_win) }
+        Job {
+            body: &robot.body,
+            order,
+            may_win: Box::new(may_win),
+            settled: settled(&self.training, &self.grouping),
+        }
     }
 
-    fn scored(&self, child: u64, robot: Robot, displacements: Vec<f64>, at_most: f64) -> Evaluated<Robot> {
+    /// A robot as it is told to the archive; nothing if a stage that keeps only the fittest does not let it in.
+    fn scored(
+        &self,
+        child: u64,
+        robot: Robot,
+        mut displacements: Vec<f64>,
+        at_most: f64,
+        floors: &Floors,
+    ) -> Option<Evaluated<Robot>> {
         let answers = self.training.answers(displacements.iter().copied().map(Some));
+        // More may be known, but not always.
+        displacements.truncate(self.grouping.settled_by(&answers).unwrap_or(displacements.len()));
         let score = self.grouping.score(&answers);
-        let coordinates = self.cell(self.bins(&robot), score.task);
+        let coordinates = self.cell(robot.bins(), score.task);
         // The coordinates are bins of this very space.
         let cell = self.space.index(&coordinates).unwrap_or_default();
         let task = self.grouping.tasks()[score.task].name();
         let objective = score.fitness.min(at_most);
         let solution = Robot { cell: coordinates, task, objective, displacements, ..robot };
-        Evaluated { child, cell, objective, solution }
+        let is_in = floors.to_beat(score.task, None).is_none_or(|floor| objective > floor);
+        is_in.then_some(Evaluated { child, cell, objective, solution })
     }
 
     /// Writes checkpoint, `run.json` and `elites.csv`.

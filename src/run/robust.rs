@@ -7,12 +7,11 @@
 use super::Config;
 use super::training::Training;
 use crate::body::Body;
-use crate::task::evaluation::{Evaluation, Job, Outcome, Savings, evaluate};
+use crate::task::evaluation::{Evaluation, Job, MayWin, Outcome, Savings, evaluate};
 use crate::task::fitness::Fitness;
 use crate::task::grouping::Grouping;
 use crate::task::perturbation::{Perturbation, Setting};
 use serde::{Deserialize, Serialize};
-use std::sync::atomic::{AtomicBool, Ordering};
 
 /// How robots are evaluated: section `[evaluation]`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -36,37 +35,12 @@ impl EvaluationConfig {
     }
 }
 
-/// Bodies per thread that are evaluated between two looks at whether to stop: enough for no core to wait long.
-const BODIES_AT_ONCE: usize = 4;
-
 /// A robot's evaluation, and what bounds its fitness besides.
 pub(super) struct Scored {
     /// Of the unchanged life; unstable if one of the others is. Showings are counted of all.
     pub evaluation: Evaluation,
     /// Least fitness, on its task, in the perturbed lives; infinite if there are none.
     pub at_most: f64,
-}
-
-/// Evaluates bodies to the end, none of them dropping out; nothing if `stop` is set meanwhile. All of an archive on many
-/// images can take longer than anybody waits for a run to stop, so it is looked at after every few bodies.
-pub(super) fn evaluate_all(
-    config: &Config,
-    training: &Training,
-    grouping: &Grouping,
-    bodies: &[&Body],
-    stop: &AtomicBool,
-) -> Option<Vec<Scored>> {
-    let savings = Savings { early_stop: false, ..config.savings };
-    let mut scored = Vec::new();
-    for part in bodies.chunks(BODIES_AT_ONCE * rayon::current_num_threads()) {
-        if stop.load(Ordering::Relaxed) {
-            return None;
-        }
-        let jobs: Vec<Job> = part.iter().map(|body| all_of(body)).collect();
-        let evaluations = evaluate(&jobs, &training.stimuli, &config.physics, &config.protocol, savings);
-        scored.extend(with_perturbed_lives(config, training, grouping, &jobs, evaluations));
-    }
-    Some(scored)
 }
 
 /// Lets the robots that may still win live their perturbed lives. Results in the jobs' order.
@@ -92,7 +66,8 @@ pub(super) fn with_perturbed_lives(
         // What evolution changes is of the world or the start: the same for every body.
         let Setting { physics, protocol, stimuli, .. } =
             perturbation.apply(&setting(config, training, jobs[first].body));
-        let lives: Vec<Job> = open.iter().map(|&(index, _)| all_of(jobs[index].body)).collect();
+        let lives: Vec<Job> =
+            open.iter().map(|&(index, _)| all_of(jobs[index].body, training, grouping)).collect();
         let savings = Savings { early_stop: false, ..config.savings };
         for (&(index, task), life) in
             open.iter().zip(evaluate(&lives, &stimuli, &physics, &protocol, savings))
@@ -126,11 +101,18 @@ fn may_win(
     wins.then(|| grouping.score(&training.answers(known)).task)
 }
 
-fn all_of(body: &Body) -> Job<'_> {
-    Job { body, order: Vec::new(), may_win: Box::new(|_| true) }
+fn all_of<'a>(body: &'a Body, training: &'a Training, grouping: &'a Grouping) -> Job<'a> {
+    Job { body, order: Vec::new(), may_win: Box::new(|_| true), settled: settled(training, grouping) }
+}
+
+/// Whether displacements under the training images settle a fitness; `None` where only all of them do.
+pub(super) fn settled<'a>(training: &'a Training, grouping: &'a Grouping) -> Option<Box<MayWin<'a>>> {
+    let is_settled =
+        move |known: &[Option<f64>]| grouping.is_settled(&training.answers(known.iter().copied()));
+    (grouping.fitness() == Fitness::UntilFifthWrong).then(|| Box::new(is_settled) as Box<MayWin>)
 }
 
 fn setting(config: &Config, training: &Training, body: &Body) -> Setting {
-    let (physics, protocol) = (config.physics.clone(), config.protocol.clone());
+    let (physics, protocol) = (config.physics.clone(), training.protocol.clone());
     Setting { body: body.clone(), physics, protocol, stimuli: training.stimuli.clone() }
 }

@@ -7,7 +7,8 @@ use super::{Config, Error};
 use crate::base::Grid;
 use crate::task::dataset::{BUILTIN, Dataset, DatasetError, Split};
 use crate::task::files::places;
-use crate::task::grouping::Grouping;
+use crate::task::fitness::Fitness;
+use crate::task::protocol::Protocol;
 use crate::task::score::Answer;
 use crate::task::stimulus::{StimulusParams, stimulus};
 use serde::{Deserialize, Serialize};
@@ -31,7 +32,7 @@ pub struct DatasetRef {
     pub train_sha256: String,
 }
 
-/// The images a run evolves on.
+/// The images a run evolves on, and how they are shown.
 #[derive(Clone, Debug)]
 pub struct Training {
     /// Where they come from.
@@ -40,6 +41,8 @@ pub struct Training {
     pub images: Vec<ImageRef>,
     /// What the sensors see of each: H × W in [0, 1].
     pub stimuli: Vec<Grid<f64>>,
+    /// How they are shown.
+    pub protocol: Protocol,
 }
 
 /// Loads the dataset of a config; `data` is the folder given on the command line.
@@ -111,7 +114,10 @@ impl Training {
             (Some(per_class), _) => {
                 let key = |key: &str| format!("stage {}: {key}", period.stage + 1);
                 let Some(pool) = config.pool(period) else {
-                    return draw(&key("images_per_class"), per_class, period.number());
+                    let drawn = draw(&key("images_per_class"), per_class, period.number())?;
+                    // The fifth wrong answer is not to come while one class is shown.
+                    let takes_turns = config.fitness_in(period) == Fitness::UntilFifthWrong;
+                    return Ok(if takes_turns { by_turns(drawn, per_class) } else { drawn });
                 };
                 let pool = draw(&key("pool"), pool, period.number())?;
                 let label = |&index: &usize| {
@@ -154,26 +160,25 @@ impl Training {
         }
         let train_sha256 = dataset.fingerprint(Split::Train).unwrap_or_default();
         let dataset = DatasetRef { name: dataset.name().to_string(), train_sha256 };
-        Ok(Training { dataset, images, stimuli })
+        Ok(Training { dataset, images, stimuli, protocol: config.protocol_in(period) })
     }
 
-    /// The answers that displacements under the images are; `None` where unknown.
+    /// The answers that displacements under the images are, in their order; those that are missing are still to come.
     pub fn answers(&self, displacements: impl IntoIterator<Item = Option<f64>>) -> Vec<Answer> {
-        let answer = |(image, displacement): (&ImageRef, Option<f64>)| {
-            Some(Answer { class: image.label, displacement: displacement? })
-        };
-        self.images.iter().zip(displacements).filter_map(answer).collect()
+        answers(&self.images, displacements)
     }
+}
 
-    /// Whether a robot with some displacements known may still enter a cell whose elite has `incumbent(task)`.
-    pub fn may_win(
-        &self,
-        grouping: &Grouping,
-        known: &[Option<f64>],
-        incumbent: impl Fn(usize) -> Option<f64>,
-    ) -> bool {
-        let unknown = self.images.iter().zip(known).filter(|(_, displacement)| displacement.is_none());
-        let to_come: Vec<u8> = unknown.map(|(image, _)| image.label).collect();
-        grouping.can_still_win(&self.answers(known.iter().copied()), &to_come, incumbent)
-    }
+/// The answers that displacements under images are, in their order; those that are missing are still to come.
+pub(super) fn answers(
+    images: &[ImageRef],
+    displacements: impl IntoIterator<Item = Option<f64>>,
+) -> Vec<Answer> {
+    let all = displacements.into_iter().chain(std::iter::repeat(None));
+    images.iter().zip(all).map(|(image, displacement)| Answer { class: image.label, displacement }).collect()
+}
+
+/// Images of one class after the other, as drawn, so that the classes take turns.
+fn by_turns(drawn: Vec<usize>, per_class: usize) -> Vec<usize> {
+    (0..per_class).flat_map(|turn| drawn.iter().skip(turn).step_by(per_class).copied()).collect()
 }

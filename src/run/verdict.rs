@@ -148,7 +148,7 @@ impl<'a> Behaviour<'a> {
         classes: &[u8],
         plain: Vec<f64>,
     ) -> Self {
-        let answer = |(&class, &displacement): (&u8, &f64)| Answer { class, displacement };
+        let answer = |(&class, &d): (&u8, &f64)| Answer { class, displacement: Some(d) };
         let answers: Vec<_> = classes.iter().zip(&plain).map(answer).collect();
         let assignment = Assignment::from_training(split, fitness, &answers);
         let right = |group| assignment.expected(group) == Direction::Right;

@@ -32,7 +32,7 @@ pub struct Assignment {
 impl Assignment {
     /// The assignment under which a robot's training answers are fitter (A left if it makes no difference).
     pub fn from_training(split: &Split, fitness: Fitness, answers: &[Answer]) -> Self {
-        let (a_right, a_left) = fitness.of_assignments(of_split(split, answers), [0, 0]);
+        let (a_right, a_left) = fitness.of_assignments(of_split(split, answers));
         Assignment { a: if a_right > a_left { Direction::Right } else { Direction::Left } }
     }
 
@@ -71,7 +71,7 @@ mod tests {
         let grouping = Grouping::two_groups(&[0], &[1]).unwrap();
         let split = &grouping.tasks()[0];
         let fixed = |displacements: [f64; 2]| {
-            let of = |class| Answer { class, displacement: displacements[usize::from(class)] };
+            let of = |class| Answer { class, displacement: Some(displacements[usize::from(class)]) };
             Assignment::from_training(split, Fitness::Min, &[of(0), of(1)])
         };
         assert_eq!((fixed([-5.0, 8.0]).a, fixed([5.0, -8.0]).a), (Left, Right));

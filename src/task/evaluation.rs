@@ -8,7 +8,7 @@ use crate::sim::{Lattice, Physics, Unstable};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::cmp::Reverse;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// Savings that change no archive; keys of a config's section `[savings]`. All on by default.
@@ -33,7 +33,8 @@ impl Default for Savings {
 /// How an evaluation ended.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Outcome {
-    /// The displacement under every image, in the images' order, voxel lengths.
+    /// The displacement under every image, in the images' order, voxel lengths; where the fitness is [settled](Job::settled)
+    /// by the first of them, of those at least.
     Walked(Vec<f64>),
     /// A life became unstable: no fitness.
     Unstable(Unstable),
@@ -55,7 +56,7 @@ pub struct Evaluation {
     pub stopped: u64,
 }
 
-/// Whether a robot with these displacements so far may still get into the archive.
+/// Whether something holds for a robot with these displacements so far.
 pub type MayWin<'a> = dyn Fn(&[Option<f64>]) -> bool + Sync + Send + 'a;
 
 /// A body to be evaluated.
@@ -67,6 +68,8 @@ pub struct Job<'a> {
     pub order: Vec<usize>,
     /// Whether it may still get into the archive, given some of its displacements; asked with early stopping only.
     pub may_win: Box<MayWin<'a>>,
+    /// Whether its fitness is known, whatever its other displacements: they are then not simulated. Without it all are.
+    pub settled: Option<Box<MayWin<'a>>>,
 }
 
 /// Evaluates jobs, each on all images; results in the jobs' order, the same on any number of threads.
@@ -128,6 +131,8 @@ struct Candidate<'a> {
     places: Vec<usize>,
     /// In the order in which they count.
     lives: Mutex<Vec<Option<Lived>>>,
+    /// Whether it is known how it ends.
+    is_over: AtomicBool,
 }
 
 impl<'a> Candidate<'a> {
@@ -164,6 +169,7 @@ impl<'a> Candidate<'a> {
             order,
             places,
             lives: Mutex::new((0..lives).map(|_| None).collect()),
+            is_over: AtomicBool::new(false),
         }
     }
 
@@ -178,7 +184,7 @@ impl<'a> Candidate<'a> {
 
     /// Lives one life, unless the robot has dropped out.
     fn live(&self, place: usize) {
-        if self.early_stop && self.verdict(&self.locked()).is_some() {
+        if self.is_over.load(Ordering::Relaxed) {
             return;
         }
         let mut lived = Lived { displacements: Vec::new(), unstable: None };
@@ -191,13 +197,19 @@ impl<'a> Candidate<'a> {
                 let mut rollout = Rollout::new(&self.lattice, self.physics, self.protocol);
                 for image in self.images {
                     lived.add(rollout.show(image, |_| ()));
-                    if lived.unstable.is_some() || self.drops_out(&lived.displacements) {
+                    let is_over =
+                        self.drops_out(&lived.displacements) || self.is_settled(&lived.displacements);
+                    if lived.unstable.is_some() || is_over {
                         break;
                     }
                 }
             }
         }
-        self.locked()[place] = Some(lived);
+        let mut lives = self.locked();
+        lives[place] = Some(lived);
+        if self.verdict(&lives).is_some() {
+            self.is_over.store(true, Ordering::Relaxed);
+        }
     }
 
     /// Whether a robot with these displacements, in the order of showing, need not be shown the rest.
@@ -205,6 +217,11 @@ impl<'a> Candidate<'a> {
         self.early_stop
             && displacements.len() < self.order.len()
             && !(self.job.may_win)(&self.known(displacements))
+    }
+
+    /// Whether displacements, in the order of showing, settle the fitness.
+    fn is_settled(&self, displacements: &[Option<f64>]) -> bool {
+        self.job.settled.as_ref().is_some_and(|settled| settled(&self.known(displacements)))
     }
 
     /// Displacement per image, as far as known from the first showings.
@@ -216,21 +233,26 @@ impl<'a> Candidate<'a> {
     fn verdict(&self, lives: &[Option<Lived>]) -> Option<Evaluation> {
         let mut displacements = Vec::new();
         let mut unstable = None;
+        // (Not of all images: there may be such that are not known between them.)
+        let first = |known: Vec<Option<f64>>| Outcome::Walked(known.into_iter().map_while(|d| d).collect());
         for life in lives {
             let life = life.as_ref()?;
             for displacement in &life.displacements {
                 displacements.push(*displacement);
+                if displacement.is_some() && self.is_settled(&displacements) {
+                    return Some(self.ended(first(self.known(&displacements)), displacements.len()));
+                }
                 if displacement.is_some() && self.drops_out(&displacements) {
                     return Some(self.ended(Outcome::Stopped, displacements.len()));
                 }
             }
             unstable = unstable.or(life.unstable);
-            if self.early_stop && unstable.is_some() {
+            // If images before that one settle the fitness, it does not count.
+            if self.early_stop && unstable.is_some() && self.job.settled.is_none() {
                 break;
             }
         }
-        let walked = || Outcome::Walked(self.known(&displacements).into_iter().flatten().collect());
-        let outcome = unstable.map_or_else(walked, Outcome::Unstable);
+        let outcome = unstable.map_or_else(|| first(self.known(&displacements)), Outcome::Unstable);
         Some(self.ended(outcome, displacements.len()))
     }
 

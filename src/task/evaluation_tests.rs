@@ -26,9 +26,20 @@ const WILD: [[f64; 3]; 5] =
     [[0.4, 0.0, 0.3], [0.2, 0.5, 0.4], [1.0, 0.0, 1.0], [0.2, 0.9, 0.4], [1.0, 0.7, 1.0]];
 
 fn run(rows: &[[f64; 3]], life: Life, savings: Savings, order: &[usize], may_win: Box<MayWin>) -> Evaluation {
+    run_until(rows, life, savings, order, may_win, None)
+}
+
+fn run_until(
+    rows: &[[f64; 3]],
+    life: Life,
+    savings: Savings,
+    order: &[usize],
+    may_win: Box<MayWin>,
+    settled: Option<Box<MayWin>>,
+) -> Evaluation {
     let protocol = Protocol { life, control_steps: 8, ..Protocol::default() };
     let body = body();
-    let job = Job { body: &body, order: order.to_vec(), may_win };
+    let job = Job { body: &body, order: order.to_vec(), may_win, settled };
     let mut evaluations = evaluate(&[job], &images(rows), &physics(), &protocol, savings);
     assert_eq!(evaluations.len(), 1);
     let evaluation = evaluations.remove(0);
@@ -105,4 +116,34 @@ fn a_sequential_life_keeps_the_order_of_the_images() {
     };
     run(&CALM, Life::Sequential, Savings::default(), &[3, 4], Box::new(may_win));
     assert_eq!(*asked.lock().unwrap(), BTreeSet::from([1, 2, 3, 4]));
+}
+
+#[test]
+fn what_is_not_needed_is_not_simulated_and_cannot_spoil_what_is() {
+    for (life, savings) in
+        [Life::Fresh, Life::Sequential].into_iter().flat_map(|l| all_savings().map(move |s| (l, s)))
+    {
+        let plain = run(&CALM, life, savings, &[], Box::new(|_| true));
+        let Outcome::Walked(all) = plain.outcome else { panic!("{plain:?}") };
+        for (rows, order) in [&CALM, &WILD].into_iter().flat_map(|r| ORDERS.map(|order| (r, order))) {
+            // The third image of the wild ones is unstable: not needed, or needed.
+            for needed in [2, 3] {
+                let settled = move |known: &[Option<f64>]| known[..needed].iter().all(Option::is_some);
+                let evaluation =
+                    run_until(rows, life, savings, order, Box::new(|_| true), Some(Box::new(settled)));
+                match evaluation.outcome {
+                    Outcome::Walked(first) => {
+                        assert!(rows == &CALM || needed == 2, "{life:?} {savings:?} {order:?}");
+                        assert!(first.len() >= needed);
+                        assert_eq!(first[..2], all[..2]);
+                    }
+                    Outcome::Unstable(_) => assert!(rows == &WILD && needed == 3),
+                    Outcome::Stopped => panic!("{evaluation:?}"),
+                }
+                if order.is_empty() && rows == &CALM {
+                    assert_eq!(evaluation.simulated, needed as u64);
+                }
+            }
+        }
+    }
 }

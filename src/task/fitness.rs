@@ -10,6 +10,9 @@ const ENOUGH: f64 = 10.0;
 /// Displacements up to this are wrong, as in the paper's test \[voxel lengths\].
 const WRONG: f64 = 3.0;
 
+/// Wrong answers that end [`Fitness::UntilFifthWrong`].
+const FIFTH: f64 = 5.0;
+
 /// More than rounding can make of a sum over images.
 const SLACK: f64 = 1e-9;
 
@@ -34,39 +37,42 @@ pub enum Fitness {
     /// How many images are answered right, as above; and (1 + m/(|m| + 10))/2 of the smallest margin m alone. One image on
     /// which a robot is worse than an equally good elite rules it out: on many images, sooner than with the mean.
     RightThenMin,
+    /// How many images are answered right before the fifth wrong answer, in the images' order, the classes by turns; ties
+    /// as with [`Fitness::RightThenMargin`], of the images so far. What comes after need not be shown: bodies that know
+    /// little are told after few images, and hundreds tell the good from the better.
+    UntilFifthWrong,
 }
 
 /// The two ways to assign sides to groups: group A is to walk right, or left.
 pub(super) type Assignments = (f64, f64);
 
 impl Fitness {
-    /// Fitness under both assignments, of answers by group and displacement; if there are images `to_come` (of group A, of
-    /// group B), upper bounds of it. Infinite without any; not a number if an answer is none.
+    /// Fitness under both assignments, of answers by group and displacement in the images' order; if some are still to
+    /// come (`None`), upper bounds of it. Infinite without any image; not a number if an answer is none.
     pub(super) fn of_assignments(
         self,
-        answers: impl Iterator<Item = (Group, f64)> + Clone,
-        to_come: [usize; 2],
+        answers: impl Iterator<Item = (Group, Option<f64>)> + Clone,
     ) -> Assignments {
-        // Towards the right side if group A is to walk right; if it is to walk left, the negative.
-        let margins = answers.map(|(group, d)| if group == Group::A { (0, d) } else { (1, -d) });
+        let margins = margins(answers);
         if self == Fitness::Min {
             let nothing = (f64::INFINITY, f64::INFINITY);
-            return margins.fold(nothing, |(right, left), (_, m)| (smaller(right, m), smaller(left, -m)));
+            let known = margins.filter_map(|(_, m)| m);
+            return known.fold(nothing, |(right, left), m| (smaller(right, m), smaller(left, -m)));
         }
-        let mut images = to_come;
-        margins.clone().for_each(|(group, _)| images[group] += 1);
+        let (images, weights) = weights(margins.clone());
         let all = images[0] + images[1];
         if all == 0 {
             return (f64::INFINITY, f64::INFINITY);
         }
-        // Exactly 1 where both groups have as many, or one has none.
-        let weight =
-            |of_group: usize| if images.contains(&0) { 1.0 } else { all as f64 / (2 * of_group) as f64 };
-        let weights = images.map(weight);
+        if self == Fitness::UntilFifthWrong {
+            return (run(margins.clone(), weights, 1.0).0, run(margins, weights, -1.0).0);
+        }
+        let mut to_come = images;
+        margins.clone().filter(|(_, m)| m.is_some()).for_each(|(group, _)| to_come[group] -= 1);
         // What is to come is as good as can be.
         let best = weights[0] * to_come[0] as f64 + weights[1] * to_come[1] as f64;
         let (mut counts, mut sums, mut least) = ([to_come; 2], [best; 2], [1.0; 2]);
-        for (group, margin) in margins {
+        for (group, margin) in margins.filter_map(|(group, m)| Some((group, m?))) {
             for (way, m) in [margin, -margin].into_iter().enumerate() {
                 counts[way][group] += usize::from(m > WRONG);
                 let worth =
@@ -89,6 +95,54 @@ impl Fitness {
         };
         (of(0), of(1))
     }
+
+    /// Whether answers that are still to come (`None`) cannot change the fitness under either assignment.
+    pub(super) fn is_settled(self, answers: impl Iterator<Item = (Group, Option<f64>)> + Clone) -> bool {
+        let margins = margins(answers);
+        let (_, weights) = weights(margins.clone());
+        self == Fitness::UntilFifthWrong
+            && run(margins.clone(), weights, 1.0).1
+            && run(margins, weights, -1.0).1
+    }
+}
+
+/// By number of the group: displacements towards the right side if group A is to walk right; if it is to walk left, the
+/// negatives of those.
+fn margins(
+    answers: impl Iterator<Item = (Group, Option<f64>)> + Clone,
+) -> impl Iterator<Item = (usize, Option<f64>)> + Clone {
+    answers.map(|(group, d)| if group == Group::A { (0, d) } else { (1, d.map(|d| -d)) })
+}
+
+/// How many images each group has, and what one of them weighs: exactly 1 where both have as many, or one has none.
+fn weights(margins: impl Iterator<Item = (usize, Option<f64>)>) -> ([usize; 2], [f64; 2]) {
+    let mut images = [0; 2];
+    margins.for_each(|(group, _)| images[group] += 1);
+    let all = images[0] + images[1];
+    let weight = |of_group: usize| if images.contains(&0) { 1.0 } else { all as f64 / (2 * of_group) as f64 };
+    (images, images.map(weight))
+}
+
+/// Fitness up to the fifth wrong answer under one of the assignments, or an upper bound of it; and whether it is known that
+/// the fifth was given, and when.
+fn run(margins: impl Iterator<Item = (usize, Option<f64>)>, weights: [f64; 2], sign: f64) -> (f64, bool) {
+    let (mut right, mut wrong, mut shown, mut sum) = (0.0, 0.0, 0.0, 0.0);
+    let (mut is_known, mut is_over) = (true, false);
+    for (group, margin) in margins {
+        // What is to come is as good as can be.
+        let margin = margin.map(|m| sign * m);
+        is_known &= margin.is_some();
+        shown += weights[group];
+        sum += weights[group] * margin.map_or(1.0, grown);
+        let counts = if margin.is_none_or(|m| m > WRONG) { &mut right } else { &mut wrong };
+        *counts += weights[group];
+        is_over = wrong > FIFTH - SLACK;
+        if is_over {
+            break;
+        }
+    }
+    let slack = if is_known { 0.0 } else { SLACK };
+    (right + weights[0].min(weights[1]) * sum / shown + slack, is_known && is_over)
 }
 
 /// A margin as a number between 0 and 1 that never stops growing: 1/2 for standing still.
@@ -113,10 +167,11 @@ mod tests {
     use Group::{A, B};
     use proptest::prelude::*;
 
-    const MANY: [Fitness; 3] = [Fitness::MeanClipped, Fitness::RightThenMargin, Fitness::RightThenMin];
+    const MANY: [Fitness; 4] =
+        [Fitness::MeanClipped, Fitness::RightThenMargin, Fitness::RightThenMin, Fitness::UntilFifthWrong];
 
     fn fitness(kind: Fitness, answers: &[(Group, f64)]) -> f64 {
-        better(kind.of_assignments(answers.iter().copied(), [0, 0]))
+        better(kind.of_assignments(answers.iter().map(|&(group, d)| (group, Some(d)))))
     }
 
     #[test]
@@ -163,9 +218,40 @@ mod tests {
         assert!(right(&[(A, 5.0), (B, -5.0)]) > right(&[(A, 4.0), (B, -90.0)]));
         assert!(right(&[(A, -1.0), (B, -5.0)]) > right(&[(A, -2.0), (B, -90.0)]));
         // The worst image known says at once how good a robot can become.
-        let bound =
-            better(Fitness::RightThenMin.of_assignments([(A, 10.0), (B, -30.0)].into_iter(), [40, 40]));
+        let to_come = (0..40).flat_map(|_| [(A, None), (B, None)]);
+        let known = [(A, Some(10.0)), (B, Some(-30.0))].into_iter();
+        let bound = better(Fitness::RightThenMin.of_assignments(known.chain(to_come)));
         assert!((82.75..82.75 + 1e-6).contains(&bound), "{bound}");
+    }
+
+    #[test]
+    fn the_fifth_wrong_answer_ends_it() {
+        let until = |answers: &[(Group, f64)]| fitness(Fitness::UntilFifthWrong, answers);
+        let (right, wrong) = ([(A, 9.0), (B, -9.0)], [(A, 3.0), (B, 1.0)]);
+        // Six right, four wrong, two right: eight, and less than one for how far it walked.
+        let alive = [right, right, right, wrong, wrong, right].concat();
+        assert!((8.0..9.0).contains(&until(&alive)), "{}", until(&alive));
+        // Then two wrong ones: with the first of them it is over, whatever comes.
+        let over = [&alive[..], &wrong].concat();
+        assert!((8.0..9.0).contains(&until(&over)));
+        assert_eq!(until(&over), until(&[&over[..], &right, &right].concat()));
+        // Two of three images are of group B, and weigh 3/4 each; one of A's, 3/2. Until seven of B are wrong, four of A.
+        let same_way: Vec<_> = (0..12).flat_map(|_| [(A, -9.0), (B, -9.0), (B, -9.0)]).collect();
+        assert!((6.0..6.75).contains(&until(&same_way)), "{}", until(&same_way));
+        assert!(until(&[(A, f64::NAN), (B, 1.0)]).is_nan());
+    }
+
+    #[test]
+    fn what_comes_after_the_fifth_wrong_answer_is_known_not_to_count() {
+        let settled =
+            |answers: &[(Group, Option<f64>)]| Fitness::UntilFifthWrong.is_settled(answers.iter().copied());
+        // Neither way right: both assignments are over after five.
+        let (stood, to_come) = ([(A, Some(0.0)), (B, Some(0.0))], [(A, None), (B, None)]);
+        assert!(settled(&[stood, stood, stood, to_come].concat()));
+        assert!(!settled(&[stood, stood, to_come, to_come].concat()));
+        // Something is missing before.
+        assert!(!settled(&[stood, to_come, stood, stood].concat()));
+        assert!(MANY[..3].iter().all(|kind| !kind.is_settled([stood, stood, stood].concat().into_iter())));
     }
 
     fn mean_of_nan() -> f64 {
@@ -180,13 +266,15 @@ mod tests {
                 1..40,
             )
         ) {
-            let answer = |a: &(bool, f64, bool)| (if a.0 { A } else { B }, a.1);
-            let all: Vec<_> = answers.iter().map(answer).collect();
-            let known: Vec<_> = answers.iter().filter(|a| a.2).map(answer).collect();
+            let all = answers.iter().map(|&(a, d, _)| (if a { A } else { B }, Some(d)));
+            let known = answers.iter().map(|&(a, d, known)| (if a { A } else { B }, known.then_some(d)));
             for kind in MANY {
-                let to_come = |group| answers.iter().filter(|a| !a.2 && answer(a).0 == group).count();
-                let bound = better(kind.of_assignments(known.iter().copied(), [to_come(A), to_come(B)]));
-                prop_assert!(bound >= fitness(kind, &all), "{kind:?}");
+                let fitness = kind.of_assignments(all.clone());
+                let bound = kind.of_assignments(known.clone());
+                prop_assert!(bound.0 >= fitness.0 && bound.1 >= fitness.1, "{kind:?}");
+                if kind.is_settled(known.clone()) {
+                    prop_assert_eq!(bound, fitness);
+                }
             }
         }
 

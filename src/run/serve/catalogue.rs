@@ -7,7 +7,6 @@ use crate::run::archive::{Robot, RunFile};
 use crate::run::audit_file::{AUDIT_JSON, AuditFile};
 use crate::run::{Config, Error, gallery};
 use crate::task::direction::Assignment;
-use crate::task::score::Answer;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
@@ -177,10 +176,7 @@ fn archive(path: &Path, notes: &mut Vec<String>) -> Result<Collection, Error> {
     let grouping = run.config.grouping()?;
     let judge = |robot: &Robot| {
         let split = grouping.tasks().iter().find(|split| split.name() == robot.task)?;
-        let shown = run.training_images.iter().zip(&robot.displacements);
-        let answers: Vec<Answer> =
-            shown.map(|(image, &displacement)| Answer { class: image.label, displacement }).collect();
-        Judge::of(split, Assignment::from_training(split, run.fitness(), &answers))
+        Judge::of(split, Assignment::from_training(split, run.fitness(), &run.answers(robot)))
     };
     let audited = |robot: &Robot| {
         let found = audit.as_ref()?.robot(&robot.id)?;

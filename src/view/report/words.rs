@@ -62,6 +62,9 @@ pub(super) fn methods(dossier: &Dossier) -> String {
         Fitness::RightThenMin => {
             "the number of images answered right, both groups weighing the same, ties broken by its worst answer"
         }
+        Fitness::UntilFifthWrong => {
+            "the number of images answered right before the fifth wrong answer, both groups weighing the same, ties broken by how far it walked"
+        }
     };
     let stages = match config.stage.len() {
         0 => String::new(),

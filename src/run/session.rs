@@ -1,0 +1,63 @@
+//! What a session of a run is given ([`Options`]), tells ([`Observer`]) and ends with ([`Finished`]).
+
+use super::Config;
+use super::archive::RunFile;
+use super::curriculum::Period;
+use super::folder::{IfExists, RunFolder};
+use super::metrics::Totals;
+use super::training::Training;
+use crate::qd::ArchiveStats;
+use std::path::PathBuf;
+
+/// What to evolve and where to.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// Everything the result depends on.
+    pub config: Config,
+    /// Name of the run.
+    pub name: String,
+    /// Its folder.
+    pub out: PathBuf,
+    /// What to do if there is a run in it.
+    pub if_exists: IfExists,
+    /// Where the data are, if the command line says.
+    pub data: Option<PathBuf>,
+    /// Number of threads; `None`: one per core.
+    pub threads: Option<usize>,
+}
+
+/// How far a run is.
+#[derive(Clone, Copy, Debug)]
+pub struct Progress {
+    /// Generations done.
+    pub done: u64,
+    /// Generations to be done in all.
+    pub generations: u64,
+    /// Figures of the archive.
+    pub stats: ArchiveStats,
+    /// Counts so far.
+    pub totals: Totals,
+}
+
+/// Who is told how a run goes.
+pub trait Observer {
+    /// Before the first generation of this session.
+    fn started(&mut self, folder: &RunFolder, training: &Training, progress: &Progress);
+    /// When other training images, or another fitness, are begun with.
+    fn period(&mut self, period: Period, training: &Training, progress: &Progress);
+    /// After every generation.
+    fn generation(&mut self, progress: &Progress);
+    /// Something the user should know.
+    fn warning(&mut self, text: &str);
+}
+
+/// How a session of a run ended.
+#[derive(Clone, Debug)]
+pub struct Finished {
+    /// The run as it stands in `run.json`.
+    pub run: RunFile,
+    /// Counts of the whole run.
+    pub totals: Totals,
+    /// Whether a signal stopped it before its last generation.
+    pub stopped: bool,
+}
