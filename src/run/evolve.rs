@@ -22,9 +22,9 @@ use std::mem::{replace, take};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-/// Elites evaluated at the beginning of a period between two looks at whether to stop: few enough for nobody to wait long.
-/// What is simulated depends on it, so not on the number of threads.
-const ELITES_AT_ONCE: usize = 8;
+/// Lives, or a few more, of elites that are evaluated at the beginning of a period between two looks at whether to stop: few
+/// enough for nobody to wait long. What is simulated depends on it, so not on the number of threads.
+const LIVES_AT_ONCE: usize = 256;
 
 /// Runs a config, or goes on with a run. `stop` is looked at after every generation, and more often where a stage begins.
 ///
@@ -185,13 +185,14 @@ impl<'a> Run<'a> {
         );
         elites.iter().for_each(|robot| _ = self.known.insert(robot.body.key()));
         self.totals.evaluations += elites.len() as u64;
+        let at_once = LIVES_AT_ONCE.div_ceil(self.training.images.len().max(1));
         let mut elites = (0..).zip(elites).map(|(number, robot)| (number, None, robot)).peekable();
         while elites.peek().is_some() {
             if stop.load(Ordering::Relaxed) {
                 (self.period, self.training, self.grouping, self.search, self.known, self.totals) = before;
                 return Ok(false);
             }
-            self.evaluate(elites.by_ref().take(ELITES_AT_ONCE).collect())?;
+            self.evaluate(elites.by_ref().take(at_once).collect())?;
         }
         Ok(true)
     }
