@@ -8,6 +8,7 @@ use morphcog::run::archive::{Robot, RunFile};
 use morphcog::run::curriculum::Period;
 use morphcog::run::evolve::{Observer, Options, Progress, evolve};
 use morphcog::run::folder::{IfExists, RunFolder};
+use morphcog::run::start::StartRef;
 use morphcog::run::training::{Training, load_dataset};
 use morphcog::sim::Lattice;
 use morphcog::task::dataset::Split;
@@ -59,6 +60,7 @@ struct Impatient {
 
 impl Observer for Impatient {
     fn started(&mut self, _: &RunFolder, _: &Training, _: &Progress) {}
+    fn starting_from(&mut self, _: &StartRef, _: usize) {}
     fn period(&mut self, _: Period, _: &Training, _: &Progress) {}
     fn warning(&mut self, _: &str) {}
 

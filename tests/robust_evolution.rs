@@ -1,9 +1,10 @@
-//! `[evaluation] robust = true`: the worst life counts, savings are lossless, and without it nothing is different.
+//! `robust = true`, in `[evaluation]` or a stage: the worst life counts, savings are lossless, and without it nothing is
+//! different.
 
 mod common;
 
 use common::program::{Sandbox, TINY};
-use morphcog::run::archive::RunFile;
+use morphcog::run::archive::{Robot, RunFile};
 use morphcog::run::audit_file::AuditFile;
 use morphcog::task::grouping::Group::{A, B};
 use morphcog::task::score::two_group_fitness;
@@ -64,4 +65,28 @@ fn without_it_nothing_is_different() {
     assert!(sandbox.read("robust/config.toml").contains("robust = true"));
     assert_ne!(robust.elites, plain.elites);
     sandbox.run("evolve --config tiny.toml --out x --set evaluation.robust=1").ended(2, &["robust"]);
+}
+
+#[test]
+fn a_stage_may_be_robust_by_itself() {
+    let sandbox = Sandbox::new();
+    let tiny = TINY.replace("control_steps = 20", "control_steps = 60");
+    let run = |out: &str, stages: &str| {
+        sandbox.write(&format!("{out}.toml"), format!("{tiny}\n{stages}"));
+        sandbox.run(&format!("evolve --config {out}.toml --generations 20 --out {out}")).ended(0, &[]);
+        sandbox.run_file(out)
+    };
+    let (first, last) = ("[[stage]]\ngenerations = 12", "[[stage]]");
+    let plain = run("plain", &format!("{first}\n{last}"));
+    let robust = run("robust", &format!("{first}\n{last}\nrobust = true"));
+    assert_ne!(robust.elites, plain.elites);
+    // The elites of the first stage, too, are as fit as in the worst of their lives.
+    let plain_life =
+        |robot: &Robot| two_group_fitness(&[(A, robot.displacements[0]), (B, robot.displacements[1])]);
+    let stayed = robust.elites.iter().filter(|robot| plain.elites.iter().any(|other| other.id == robot.id));
+    assert!(stayed.clone().any(|robot| robot.objective < plain_life(robot)), "{} stayed", stayed.count());
+    // Or do without.
+    let off = "robust = false";
+    let off = run("off", &format!("[evaluation]\nrobust = true\n{first}\n{off}\n{last}\n{off}"));
+    assert_eq!(off.elites, plain.elites);
 }

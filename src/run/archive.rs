@@ -1,5 +1,6 @@
 //! `run.json`: a run's archive with everything that made it; the file that `eval` and `replay` read.
 
+use super::start::StartRef;
 use super::training::{DatasetRef, ImageRef, answers};
 use super::{Config, Error};
 use crate::base::files::read_text;
@@ -31,7 +32,7 @@ pub struct Robot {
     pub task: String,
     /// Its fitness, voxel lengths.
     pub objective: f64,
-    /// Displacement under each training image, voxel lengths, right positive; with `until_fifth_wrong` under those that it
+    /// Displacement under each training image, voxel lengths, right positive; with `until_…_wrong` under those that it
     /// had to be shown, the first.
     pub displacements: Vec<f64>,
     /// Its voxels by kind.
@@ -105,6 +106,9 @@ pub struct RunFile {
     pub training_images: Vec<ImageRef>,
     /// The archive's dimensions.
     pub dimensions: Dimensions,
+    /// The archive it started from, if it did.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub start: Option<StartRef>,
     /// Generations done.
     pub generations: u64,
     /// Figures of the archive.

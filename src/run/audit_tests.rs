@@ -4,6 +4,7 @@ use crate::run::config::BUILT_IN;
 use crate::run::training::{DatasetRef, ImageRef};
 use crate::run::verdict::Verdict;
 use crate::sim::Physics;
+use crate::task::protocol::Protocol;
 
 /// Two images, of classes 0 and 1, the first dark and the second bright, each in a fresh life of five cycles.
 fn trial(height: usize, width: usize, physics: Physics) -> Trial {
@@ -67,4 +68,24 @@ fn a_stopped_audit_has_no_verdict() {
     let trial = trial(body.height(), body.width(), Physics::default());
     let subject = Subject { id: "x".to_string(), task: "same way".to_string(), body, known: None };
     assert!(trial.robot(&subject, &AtomicBool::new(true), &AtomicU64::new(0), &Silent).is_none());
+}
+
+#[test]
+fn images_that_are_the_same_to_the_sensors_are_one_life_with_the_same_end() {
+    // Its one sensor sees the top right pixel; the images differ elsewhere, too.
+    let body: Body = "444425/444422/333311/330011".parse().unwrap();
+    let image =
+        |sensed: f64, other: f64| Grid::from_fn(4, 6, |r, c| if (r, c) == (0, 5) { sensed } else { other });
+    let stimuli = vec![image(0.0, 0.0), image(1.0, 0.0), image(0.0, 1.0), image(1.0, 1.0), image(0.0, 0.5)];
+    let Trial { config, .. } = trial(4, 6, Physics::default());
+    let setting = Setting { body, physics: config.physics, protocol: config.protocol, stimuli };
+    let (displacements, _) = live(&setting, false).unwrap();
+    let (all, _) = live(&setting, true).unwrap();
+    assert_eq!(displacements, all);
+    assert_ne!(all[0], all[1], "it sees something");
+    let sequential =
+        Setting { protocol: Protocol { life: Life::Sequential, ..setting.protocol.clone() }, ..setting };
+    let (displacements, _) = live(&sequential, false).unwrap();
+    assert_eq!(displacements.len(), 5);
+    assert_ne!(displacements[0], displacements[2], "what comes later begins elsewhere");
 }

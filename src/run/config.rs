@@ -3,6 +3,8 @@
 use super::Error;
 use super::curriculum::StageConfig;
 use super::robust::EvaluationConfig;
+use super::start::StartConfig;
+pub use super::task_config::TaskConfig;
 use super::toml_text::{self, Format};
 use super::validation::{self, ValidationConfig};
 use crate::base::files::read_text;
@@ -79,6 +81,9 @@ pub struct Config {
     /// How robots are evaluated. Left out of files where it is the default.
     #[serde(default, skip_serializing_if = "EvaluationConfig::is_default")]
     pub evaluation: EvaluationConfig,
+    /// Which archive a run starts from. Left out of files where it is the default.
+    #[serde(default, skip_serializing_if = "StartConfig::is_default")]
+    pub start: StartConfig,
     /// How robots are chosen on images that they were not trained on. Left out of files where it is the default.
     #[serde(default, skip_serializing_if = "ValidationConfig::is_default")]
     pub validation: ValidationConfig,
@@ -110,48 +115,6 @@ pub struct BodyConfig {
 impl Default for BodyConfig {
     fn default() -> Self {
         BodyConfig { height: 14, width: 14, min_muscles: 3 }
-    }
-}
-
-/// Which classes are to be told apart: section `[task]`, either `groups` or `splits`.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct TaskConfig {
-    /// One task: two groups of classes that are to walk opposite ways.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub groups: Option<[Vec<u8>; 2]>,
-    /// All ways to split these classes in two groups; the task a robot performs is a dimension of the archive.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub splits: Option<Vec<u8>>,
-    /// With `splits`: one more bin for robots that walk the same way for all classes, as in the published code.
-    pub same_way_bin: bool,
-}
-
-impl TaskConfig {
-    /// The tasks.
-    ///
-    /// # Errors
-    /// If the section `[task]` makes none.
-    pub fn grouping(&self) -> Result<Grouping, Error> {
-        let TaskConfig { groups, splits, same_way_bin } = self;
-        let grouping = match (groups, splits) {
-            (Some([a, b]), None) if !same_way_bin => Grouping::two_groups(a, b),
-            (None, Some(classes)) => Grouping::all_splits(classes, *same_way_bin),
-            (Some(_), None) => {
-                return Err(Error::input("task.same_way_bin: expected only with task.splits".to_string()));
-            }
-            _ => {
-                let text = "task: expected either groups, as in groups = [[0], [1]], or splits, as in splits = [0, 1, 2, 3]";
-                return Err(Error::input(text.to_string()));
-            }
-        };
-        grouping.map_err(|error| Error::input(format!("task: {error}")))
-    }
-
-    /// All classes of the task, in its order.
-    pub fn classes(&self) -> Vec<u8> {
-        let TaskConfig { groups, splits, .. } = self;
-        groups.iter().flatten().chain(splits).flatten().copied().collect()
     }
 }
 

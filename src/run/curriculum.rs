@@ -34,6 +34,9 @@ pub struct StageConfig {
     /// be told early. Default: all.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub keep: Option<usize>,
+    /// Fitness is that of the worst of a few perturbed lives, the unchanged one included. Default `evaluation.robust`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub robust: Option<bool>,
 }
 
 /// Generations with the same training images and the same fitness.
@@ -76,6 +79,12 @@ impl Config {
     pub fn fitness_in(&self, period: Period) -> Fitness {
         let stage = self.stage.get(period.stage);
         stage.and_then(|stage| stage.fitness).unwrap_or(self.evaluation.fitness)
+    }
+
+    /// Whether perturbed lives count in a period.
+    pub fn robust(&self, period: Period) -> bool {
+        let stage = self.stage.get(period.stage);
+        stage.and_then(|stage| stage.robust).unwrap_or(self.evaluation.robust)
     }
 
     /// Training images of each class in a period; `None`: those of the section `[data]`.

@@ -1,16 +1,19 @@
 //! `morphcog evolve`: MAP-Elites over bodies, resumable, the same bits however it is run.
 
-use super::archive::{Dimensions, FORMAT, FORMAT_VERSION, Robot, RunFile};
-use super::checkpoint::{self, Checkpoint, KnownBodies};
+mod saving;
+
+use super::archive::{Dimensions, Robot};
+use super::checkpoint::{Checkpoint, KnownBodies};
 use super::curriculum::Period;
 use super::folder::{self, IfExists, RunFolder};
 use super::keep::Floors;
 use super::metrics::{Metrics, Totals};
 use super::robust::{Scored, settled, with_perturbed_lives};
 pub use super::session::{Finished, Observer, Options, Progress};
+use super::start::{Start, StartRef};
 use super::training::{Training, load_dataset};
 use super::variation::Mutations;
-use super::{Config, Error, resume};
+use super::{Error, resume};
 use crate::base::files::write_atomically;
 use crate::genome::GenomeError;
 use crate::qd::{Archive, ArchiveStats, DescriptorSpace, Evaluated, MapElites};
@@ -43,11 +46,16 @@ pub fn evolve(
         Training::of(config, &dataset, stage)?;
     }
     Mutations { seed: config.seed, spec: config.body_spec(), params: &config.genome }.check()?;
+    let resumes = options.if_exists == IfExists::Resume;
+    let start = if resumes { None } else { Start::read(config)? };
     let folder = RunFolder::open(&options.out, options.if_exists)?;
-    let saved = match options.if_exists {
-        IfExists::Resume => resume::saved(&folder, config, &dataset, |text| observer.warning(&text))?,
-        _ => None,
+    let saved = match resumes {
+        true => resume::saved(&folder, config, &dataset, |text| observer.warning(&text))?,
+        false => None,
     };
+    // A run that has begun has its elites.
+    let begun = saved.as_ref().is_some_and(|saved| saved.run.generations > 0);
+    let start = if resumes && !begun { Start::read(config)? } else { start };
     let write = |name: &str, content: &[u8]| {
         let path = folder.path().join(name);
         write_atomically(&path, content).map_err(|error| Error::writing(&path, &error))
@@ -57,7 +65,7 @@ pub fn evolve(
     let pool = pool.map_err(|error| Error::other(format!("no threads: {error}")))?;
     let mut run = Run::new(options, &dataset, first, saved)?;
     let mut metrics = Metrics::open(folder.path(), run.generation)?;
-    pool.install(|| run.live(&folder, &mut metrics, stop, observer))?;
+    pool.install(|| run.live(start, &folder, &mut metrics, stop, observer))?;
     metrics.flush()?;
     let file = run.save(&folder)?;
     let stopped = run.generation < config.generations;
@@ -77,6 +85,8 @@ struct Run<'a> {
     search: MapElites<Robot>,
     known: KnownBodies,
     totals: Totals,
+    /// The archive it started from.
+    origin: Option<StartRef>,
     /// Generations done.
     generation: u64,
     began: Instant,
@@ -90,9 +100,11 @@ impl<'a> Run<'a> {
         saved: Option<Checkpoint>,
     ) -> Result<Self, Error> {
         let config = &options.config;
-        let (archive, known, totals, generation) = match saved {
-            Some(saved) => (saved.run.archive()?, saved.known_bodies, saved.totals, saved.run.generations),
-            None => (Archive::new(), KnownBodies::default(), Totals::default(), 0),
+        let (archive, known, totals, generation, origin) = match saved {
+            Some(Checkpoint { run, totals, known_bodies }) => {
+                (run.archive()?, known_bodies, totals, run.generations, run.start)
+            }
+            None => (Archive::new(), KnownBodies::default(), Totals::default(), 0, None),
         };
         let latest = generation.saturating_sub(1);
         let period = config.period(latest);
@@ -110,6 +122,7 @@ impl<'a> Run<'a> {
             search: MapElites::new(config.seed, config.map_elites.clone(), archive),
             known,
             totals,
+            origin,
             generation,
             began: Instant::now(),
         })
@@ -131,6 +144,7 @@ impl<'a> Run<'a> {
 
     fn live(
         &mut self,
+        start: Option<Start>,
         folder: &RunFolder,
         metrics: &mut Metrics,
         stop: &AtomicBool,
@@ -140,10 +154,19 @@ impl<'a> Run<'a> {
         observer.started(folder, &self.training, &self.progress());
         let every = Duration::try_from_secs_f64(config.checkpoint.seconds).unwrap_or(Duration::MAX);
         let mut saved = Instant::now();
+        if let Some(Start { origin, robots }) = start {
+            observer.starting_from(&origin, robots.len());
+            self.origin = Some(origin);
+            if !self.begin(self.period, robots, stop)? {
+                return Ok(());
+            }
+        }
         while self.generation < config.generations && !stop.load(Ordering::Relaxed) {
             let period = config.period(self.generation);
             if period != self.period {
-                if !self.begin(period, stop)? {
+                // In the order of their cells: of equals that now share a cell the first stays.
+                let elites = self.search.archive().elites().map(|elite| elite.solution.clone()).collect();
+                if !self.begin(period, elites, stop)? {
                     break;
                 }
                 observer.period(period, &self.training, &self.progress());
@@ -161,15 +184,12 @@ impl<'a> Run<'a> {
         Ok(())
     }
 
-    /// Begins a period: other images, perhaps another fitness, and the elites evaluated anew. Whether that was done: if
-    /// stopped meanwhile, nothing has changed.
-    fn begin(&mut self, period: Period, stop: &AtomicBool) -> Result<bool, Error> {
+    /// Begins a period: other images, perhaps another fitness, and elites of before evaluated anew. Whether that was done:
+    /// if stopped meanwhile, nothing has changed.
+    fn begin(&mut self, period: Period, mut elites: Vec<Robot>, stop: &AtomicBool) -> Result<bool, Error> {
         let config = &self.options.config;
         let training = Training::of(config, self.dataset, period)?;
         let grouping = config.grouping()?.with_fitness(config.fitness(self.generation));
-        // In the order of their cells: of equals that now share a cell the first stays.
-        let mut elites: Vec<Robot> =
-            self.search.archive().elites().map(|elite| elite.solution.clone()).collect();
         if config.keep(period).is_some() {
             // The fitter ones first: of those who come after, most are told early that they cannot stay.
             elites.sort_by(|a, b| b.objective.total_cmp(&a.objective));
@@ -224,14 +244,17 @@ impl<'a> Run<'a> {
     /// Evaluates robots, each with its number and its parent's cell, counts that, and puts those into the archive who walked
     /// and are fit enough.
     fn evaluate(&mut self, robots: Vec<(u64, Option<usize>, Robot)>) -> Result<(), Error> {
-        let Config { physics, savings, .. } = &self.options.config;
+        let config = &self.options.config;
         let Training { stimuli, protocol, .. } = &self.training;
         let floors = self.floors();
         let jobs = robots.iter().map(|(_, parent, robot)| self.job(*parent, robot, &floors));
         let jobs: Vec<Job> = jobs.collect();
-        let evaluations = evaluate(&jobs, stimuli, physics, protocol, *savings);
-        let scored =
-            with_perturbed_lives(&self.options.config, &self.training, &self.grouping, &jobs, evaluations);
+        let evaluations = evaluate(&jobs, stimuli, &config.physics, protocol, config.savings);
+        let scored = if config.robust(self.period) {
+            with_perturbed_lives(config, &self.training, &self.grouping, &jobs, evaluations)
+        } else {
+            evaluations.into_iter().map(Scored::from).collect()
+        };
         drop(jobs);
 
         let mut told = Vec::new();
@@ -246,7 +269,7 @@ impl<'a> Run<'a> {
             }
         }
         self.search.tell(told).map_err(|error| Error::other(error.to_string()))?;
-        if let Some(keep) = self.options.config.keep(self.period) {
+        if let Some(keep) = config.keep(self.period) {
             self.search.retain_fittest(keep, |robot| robot.task.clone());
         }
         Ok(())
@@ -302,35 +325,5 @@ impl<'a> Run<'a> {
         let solution = Robot { cell: coordinates, task, objective, displacements, ..robot };
         let is_in = floors.to_beat(score.task, None).is_none_or(|floor| objective > floor);
         is_in.then_some(Evaluated { child, cell, objective, solution })
-    }
-
-    /// Writes checkpoint, `run.json` and `elites.csv`.
-    fn save(&self, folder: &RunFolder) -> Result<RunFile, Error> {
-        let run = self.file();
-        let checkpoint = Checkpoint { run, totals: self.totals(), known_bodies: self.known.clone() };
-        checkpoint::write(folder.path(), &checkpoint)?;
-        let run = checkpoint.run;
-        let csv = run.to_csv().map_err(|error| Error::other(error.to_string()))?;
-        for (name, content) in [(folder::RUN_JSON, run.to_json().into_bytes()), (folder::ELITES, csv)] {
-            let path = folder.path().join(name);
-            write_atomically(&path, &content).map_err(|error| Error::writing(&path, &error))?;
-        }
-        Ok(run)
-    }
-
-    fn file(&self) -> RunFile {
-        RunFile {
-            format: FORMAT.to_string(),
-            format_version: FORMAT_VERSION,
-            program_version: env!("CARGO_PKG_VERSION").to_string(),
-            name: self.options.name.clone(),
-            config: self.options.config.clone(),
-            dataset: self.training.dataset.clone(),
-            training_images: self.training.images.clone(),
-            dimensions: self.dimensions.clone(),
-            generations: self.generation,
-            stats: self.stats(),
-            elites: self.search.archive().elites().map(|elite| elite.solution.clone()).collect(),
-        }
     }
 }

@@ -122,6 +122,7 @@ pub fn source(data: Option<&Path>) -> Result<Source, Error> {
         dataset: training.dataset,
         training_images: training.images,
         dimensions: Dimensions::of(&config)?,
+        start: None,
         generations: config.generations,
         stats: Archive::<Robot>::new().stats(1, 0.0),
         elites,

@@ -1,4 +1,4 @@
-//! Robust evolution (`[evaluation] robust = true`): a robot is as fit as in the worst of its lives, the unchanged one and a
+//! Robust evolution (`robust = true` in `[evaluation]` or a stage): a robot is as fit as in the worst of its lives, the unchanged one and a
 //! few that no honest walker should notice.
 //!
 //! The task it performs is that of the unchanged life. Its fitness is then never above the unchanged life's, so that
@@ -43,6 +43,13 @@ pub(super) struct Scored {
     pub at_most: f64,
 }
 
+impl From<Evaluation> for Scored {
+    /// Without perturbed lives.
+    fn from(evaluation: Evaluation) -> Self {
+        Scored { evaluation, at_most: f64::INFINITY }
+    }
+}
+
 /// Lets the robots that may still win live their perturbed lives. Results in the jobs' order.
 pub(super) fn with_perturbed_lives(
     config: &Config,
@@ -51,11 +58,7 @@ pub(super) fn with_perturbed_lives(
     jobs: &[Job],
     evaluations: Vec<Evaluation>,
 ) -> Vec<Scored> {
-    let unbound = |evaluation| Scored { evaluation, at_most: f64::INFINITY };
-    let mut scored: Vec<Scored> = evaluations.into_iter().map(unbound).collect();
-    if !config.evaluation.robust {
-        return scored;
-    }
+    let mut scored: Vec<Scored> = evaluations.into_iter().map(Scored::from).collect();
     for perturbation in Perturbation::of_evolution() {
         let open: Vec<(usize, usize)> = (0..jobs.len())
             .filter_map(|index| {
@@ -109,7 +112,7 @@ fn all_of<'a>(body: &'a Body, training: &'a Training, grouping: &'a Grouping) ->
 pub(super) fn settled<'a>(training: &'a Training, grouping: &'a Grouping) -> Option<Box<MayWin<'a>>> {
     let is_settled =
         move |known: &[Option<f64>]| grouping.is_settled(&training.answers(known.iter().copied()));
-    (grouping.fitness() == Fitness::UntilFifthWrong).then(|| Box::new(is_settled) as Box<MayWin>)
+    grouping.fitness().last_wrong().map(|_| Box::new(is_settled) as Box<MayWin>)
 }
 
 fn setting(config: &Config, training: &Training, body: &Body) -> Setting {

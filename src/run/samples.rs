@@ -35,6 +35,7 @@ pub fn run(robots: &[(&str, f64)]) -> RunFile {
         dataset: DatasetRef { name: "builtin".to_string(), train_sha256: "0".to_string() },
         training_images: vec![image(0), image(1)],
         dimensions: Dimensions::of(&config).unwrap(),
+        start: None,
         generations: 1,
         stats: Archive::<Robot>::new().stats(1, 0.0),
         elites: robots.iter().enumerate().map(robot).collect(),

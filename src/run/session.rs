@@ -5,6 +5,7 @@ use super::archive::RunFile;
 use super::curriculum::Period;
 use super::folder::{IfExists, RunFolder};
 use super::metrics::Totals;
+use super::start::StartRef;
 use super::training::Training;
 use crate::qd::ArchiveStats;
 use std::path::PathBuf;
@@ -43,6 +44,8 @@ pub struct Progress {
 pub trait Observer {
     /// Before the first generation of this session.
     fn started(&mut self, folder: &RunFolder, training: &Training, progress: &Progress);
+    /// Before the elites of another archive are evaluated, if the run starts from one.
+    fn starting_from(&mut self, origin: &StartRef, robots: usize);
     /// When other training images, or another fitness, are begun with.
     fn period(&mut self, period: Period, training: &Training, progress: &Progress);
     /// After every generation.

@@ -7,7 +7,6 @@ use super::{Config, Error};
 use crate::base::Grid;
 use crate::task::dataset::{BUILTIN, Dataset, DatasetError, Split};
 use crate::task::files::places;
-use crate::task::fitness::Fitness;
 use crate::task::protocol::Protocol;
 use crate::task::score::Answer;
 use crate::task::stimulus::{StimulusParams, stimulus};
@@ -115,8 +114,8 @@ impl Training {
                 let key = |key: &str| format!("stage {}: {key}", period.stage + 1);
                 let Some(pool) = config.pool(period) else {
                     let drawn = draw(&key("images_per_class"), per_class, period.number())?;
-                    // The fifth wrong answer is not to come while one class is shown.
-                    let takes_turns = config.fitness_in(period) == Fitness::UntilFifthWrong;
+                    // The last wrong answer is not to come while one class is shown.
+                    let takes_turns = config.fitness_in(period).last_wrong().is_some();
                     return Ok(if takes_turns { by_turns(drawn, per_class) } else { drawn });
                 };
                 let pool = draw(&key("pool"), pool, period.number())?;

@@ -10,9 +10,6 @@ const ENOUGH: f64 = 10.0;
 /// Displacements up to this are wrong, as in the paper's test \[voxel lengths\].
 const WRONG: f64 = 3.0;
 
-/// Wrong answers that end [`Fitness::UntilFifthWrong`].
-const FIFTH: f64 = 5.0;
-
 /// More than rounding can make of a sum over images.
 const SLACK: f64 = 1e-9;
 
@@ -41,12 +38,24 @@ pub enum Fitness {
     /// as with [`Fitness::RightThenMargin`], of the images so far. What comes after need not be shown: bodies that know
     /// little are told after few images, and hundreds tell the good from the better.
     UntilFifthWrong,
+    /// The same up to the twentieth wrong answer: for robots that know so little that up to the fifth they are shown a dozen
+    /// images, and told by luck.
+    UntilTwentiethWrong,
 }
 
 /// The two ways to assign sides to groups: group A is to walk right, or left.
 pub(super) type Assignments = (f64, f64);
 
 impl Fitness {
+    /// Wrong answers after which nothing counts; `None` where all images do.
+    pub fn last_wrong(self) -> Option<u16> {
+        match self {
+            Fitness::UntilFifthWrong => Some(5),
+            Fitness::UntilTwentiethWrong => Some(20),
+            _ => None,
+        }
+    }
+
     /// Fitness under both assignments, of answers by group and displacement in the images' order; if some are still to
     /// come (`None`), upper bounds of it. Infinite without any image; not a number if an answer is none.
     pub(super) fn of_assignments(
@@ -64,8 +73,8 @@ impl Fitness {
         if all == 0 {
             return (f64::INFINITY, f64::INFINITY);
         }
-        if self == Fitness::UntilFifthWrong {
-            return (run(margins.clone(), weights, 1.0).0, run(margins, weights, -1.0).0);
+        if let Some(last) = self.last_wrong() {
+            return (run(margins.clone(), weights, 1.0, last).0, run(margins, weights, -1.0, last).0);
         }
         let mut to_come = images;
         margins.clone().filter(|(_, m)| m.is_some()).for_each(|(group, _)| to_come[group] -= 1);
@@ -100,9 +109,9 @@ impl Fitness {
     pub(super) fn is_settled(self, answers: impl Iterator<Item = (Group, Option<f64>)> + Clone) -> bool {
         let margins = margins(answers);
         let (_, weights) = weights(margins.clone());
-        self == Fitness::UntilFifthWrong
-            && run(margins.clone(), weights, 1.0).1
-            && run(margins, weights, -1.0).1
+        self.last_wrong().is_some_and(|last| {
+            run(margins.clone(), weights, 1.0, last).1 && run(margins, weights, -1.0, last).1
+        })
     }
 }
 
@@ -123,9 +132,14 @@ fn weights(margins: impl Iterator<Item = (usize, Option<f64>)>) -> ([usize; 2], 
     (images, images.map(weight))
 }
 
-/// Fitness up to the fifth wrong answer under one of the assignments, or an upper bound of it; and whether it is known that
-/// the fifth was given, and when.
-fn run(margins: impl Iterator<Item = (usize, Option<f64>)>, weights: [f64; 2], sign: f64) -> (f64, bool) {
+/// Fitness up to the `last` wrong answer under one of the assignments, or an upper bound of it; and whether it is known that
+/// that was given, and when.
+fn run(
+    margins: impl Iterator<Item = (usize, Option<f64>)>,
+    weights: [f64; 2],
+    sign: f64,
+    last: u16,
+) -> (f64, bool) {
     let (mut right, mut wrong, mut shown, mut sum) = (0.0, 0.0, 0.0, 0.0);
     let (mut is_known, mut is_over) = (true, false);
     for (group, margin) in margins {
@@ -136,7 +150,7 @@ fn run(margins: impl Iterator<Item = (usize, Option<f64>)>, weights: [f64; 2], s
         sum += weights[group] * margin.map_or(1.0, grown);
         let counts = if margin.is_none_or(|m| m > WRONG) { &mut right } else { &mut wrong };
         *counts += weights[group];
-        is_over = wrong > FIFTH - SLACK;
+        is_over = wrong > f64::from(last) - SLACK;
         if is_over {
             break;
         }
@@ -167,8 +181,13 @@ mod tests {
     use Group::{A, B};
     use proptest::prelude::*;
 
-    const MANY: [Fitness; 4] =
-        [Fitness::MeanClipped, Fitness::RightThenMargin, Fitness::RightThenMin, Fitness::UntilFifthWrong];
+    const MANY: [Fitness; 5] = [
+        Fitness::MeanClipped,
+        Fitness::RightThenMargin,
+        Fitness::RightThenMin,
+        Fitness::UntilFifthWrong,
+        Fitness::UntilTwentiethWrong,
+    ];
 
     fn fitness(kind: Fitness, answers: &[(Group, f64)]) -> f64 {
         better(kind.of_assignments(answers.iter().map(|&(group, d)| (group, Some(d)))))
@@ -239,6 +258,12 @@ mod tests {
         let same_way: Vec<_> = (0..12).flat_map(|_| [(A, -9.0), (B, -9.0), (B, -9.0)]).collect();
         assert!((6.0..6.75).contains(&until(&same_way)), "{}", until(&same_way));
         assert!(until(&[(A, f64::NAN), (B, 1.0)]).is_nan());
+        // Five times as many as there are here end the other.
+        let longer = |answers: &[(Group, f64)]| fitness(Fitness::UntilTwentiethWrong, answers);
+        let same_way = |images| vec![[(A, -9.0), (B, -9.0)]; images].concat();
+        assert!((19.0..20.0).contains(&longer(&same_way(20))));
+        assert_eq!(longer(&same_way(20)), longer(&same_way(30)));
+        assert!(longer(&same_way(19)) < longer(&same_way(20)));
     }
 
     #[test]

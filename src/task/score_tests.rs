@@ -190,7 +190,8 @@ proptest! {
             Just(Fitness::MeanClipped),
             Just(Fitness::RightThenMargin),
             Just(Fitness::RightThenMin),
-            Just(Fitness::UntilFifthWrong)
+            Just(Fitness::UntilFifthWrong),
+            Just(Fitness::UntilTwentiethWrong)
         ],
         images in prop::collection::vec((0..5u8, displacement(), prop::bool::weighted(0.7)), 1..24),
         one_each: bool,

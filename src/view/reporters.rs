@@ -5,6 +5,7 @@ use crate::run::curriculum::Period;
 use crate::run::data::catalogue::RemoteFile;
 use crate::run::data::fetch::{Attempt, FetchObserver};
 use crate::run::folder::RunFolder;
+use crate::run::start::StartRef;
 use crate::run::training::{ImageRef, Training};
 use crate::run::{audit, capacity, eval, evolve, reproduce};
 use std::sync::{OnceLock, RwLock};
@@ -53,6 +54,11 @@ impl evolve::Observer for Evolution<'_> {
         let bar = self.console.progress(progress.generations);
         bar.update(&shown(progress));
         self.bar = Some(bar);
+    }
+
+    fn starting_from(&mut self, origin: &StartRef, robots: usize) {
+        let StartRef { name, generations, .. } = origin;
+        self.console.info(&format!("starting from {robots} elites of {name}, {generations} generations old"));
     }
 
     fn period(&mut self, period: Period, training: &Training, progress: &evolve::Progress) {

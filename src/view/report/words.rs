@@ -65,6 +65,9 @@ pub(super) fn methods(dossier: &Dossier) -> String {
         Fitness::UntilFifthWrong => {
             "the number of images answered right before the fifth wrong answer, both groups weighing the same, ties broken by how far it walked"
         }
+        Fitness::UntilTwentiethWrong => {
+            "the number of images answered right before the twentieth wrong answer, both groups weighing the same, ties broken by how far it walked"
+        }
     };
     let stages = match config.stage.len() {
         0 => String::new(),

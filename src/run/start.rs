@@ -1,0 +1,75 @@
+//! A run that starts from another run's archive: section `[start]`.
+
+use super::archive::{Robot, RunFile};
+use super::audit_file::fingerprint;
+use super::config::BodyConfig;
+use super::{Config, Error};
+use serde::{Deserialize, Serialize};
+use std::path::PathBuf;
+
+/// Where a run starts: section `[start]`. Default: with random individuals.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct StartConfig {
+    /// The run.json of a run, of whatever task, whose elites are evaluated before the first generation and are its
+    /// parents.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub archive: Option<PathBuf>,
+}
+
+impl StartConfig {
+    /// Whether runs start with random individuals; it is then left out of files.
+    pub fn is_default(&self) -> bool {
+        *self == StartConfig::default()
+    }
+}
+
+/// Which archive a run started from, wherever that lay.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct StartRef {
+    /// Name of the run.
+    pub name: String,
+    /// Its generations.
+    pub generations: u64,
+    /// SHA-256 of its content.
+    pub sha256: String,
+}
+
+/// An archive to start from.
+pub(super) struct Start {
+    pub origin: StartRef,
+    /// Its elites in the order of their cells, as individuals of no generation of this run.
+    pub robots: Vec<Robot>,
+}
+
+impl Start {
+    /// What a config says to start from; `None`: random individuals.
+    ///
+    /// # Errors
+    /// If the file is missing or broken, or its bodies are not what the config asks for.
+    pub fn read(config: &Config) -> Result<Option<Self>, Error> {
+        let Some(path) = &config.start.archive else { return Ok(None) };
+        let refuse = |text: String| Error::input(format!("start.archive: {}: {text}", path.display()));
+        let run = RunFile::read(path).map_err(|error| error.within("start.archive"))?;
+        let BodyConfig { height, width, min_muscles } = config.body;
+        let BodyConfig { height: rows, width: columns, .. } = run.config.body;
+        if (rows, columns) != (height, width) {
+            return Err(refuse(format!(
+                "its bodies are {rows} × {columns} voxels, expected {height} × {width}, as in this config's [body]"
+            )));
+        }
+        if let Some(robot) = run.elites.iter().find(|robot| robot.voxels.muscle < min_muscles) {
+            return Err(refuse(format!(
+                "elite {} has {} muscles, expected {min_muscles} or more (body.min_muscles)",
+                robot.id, robot.voxels.muscle
+            )));
+        }
+        if run.elites.is_empty() {
+            return Err(refuse("it has no elites".to_string()));
+        }
+        let origin = StartRef { sha256: fingerprint(&run), name: run.name, generations: run.generations };
+        let robots = run.elites.into_iter().map(|robot| Robot { generation: 0, ..robot }).collect();
+        Ok(Some(Start { origin, robots }))
+    }
+}
