@@ -11,6 +11,7 @@ use morphcog::run::curriculum::Period;
 use morphcog::run::evolve::{Observer, Options, Progress, evolve};
 use morphcog::run::folder::{IfExists, RunFolder};
 use morphcog::run::metrics::Totals;
+use morphcog::run::start::StartRef;
 use morphcog::run::training::Training;
 use morphcog::run::{archive::RunFile, bench};
 use morphcog::sim::Lattice;
@@ -31,6 +32,7 @@ struct Silent;
 
 impl Observer for Silent {
     fn started(&mut self, _: &RunFolder, _: &Training, _: &Progress) {}
+    fn starting_from(&mut self, _: &StartRef, _: usize) {}
     fn period(&mut self, _: Period, _: &Training, _: &Progress) {}
     fn generation(&mut self, _: &Progress) {}
     fn warning(&mut self, _: &str) {}
