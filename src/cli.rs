@@ -117,7 +117,7 @@ fn run_evolve(args: EvolveArgs, console: &Console) -> Result<(), Error> {
     }
     if finished.run.config.validation.best > 0 {
         let archive = out.join(folder::RUN_JSON);
-        let options = validation::Options { archive, data: args.data.clone(), threads };
+        let options = validation::Options { archive, best: None, data: args.data.clone(), threads };
         match validation::validate(&options, &stop, &reporters::Evaluation::new(console))? {
             Some(best) => summary::validation(console, &best),
             None => {

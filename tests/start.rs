@@ -9,7 +9,9 @@ use morphcog::run::curriculum::Period;
 use morphcog::run::evolve::{Observer, Options, Progress, evolve};
 use morphcog::run::folder::{IfExists, RunFolder};
 use morphcog::run::start::StartRef;
-use morphcog::run::training::Training;
+use morphcog::run::training::{Training, load_dataset};
+use morphcog::run::validation::images;
+use morphcog::task::dataset::Split;
 use std::collections::BTreeSet;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -55,6 +57,36 @@ fn a_run_begins_with_the_elites_of_another_evaluated_on_its_own_task() {
 }
 
 #[test]
+fn images_that_the_other_run_was_trained_on_are_not_for_validation() {
+    let (sandbox, other) = sandbox();
+    sandbox.run("evolve -q -c run.toml -o run -g 6").ended(0, &[]);
+    // A start of a start.
+    let again =
+        sandbox.read("run.toml").replace("other/run.json", "run/run.json").replace("seed = 3", "seed = 4");
+    sandbox.write("again.toml", again);
+    sandbox.run("evolve -q -c again.toml -o again -g 2").ended(0, &[]);
+    let run = sandbox.run_file("again");
+    let dataset = load_dataset(&run.config, None, &[Split::Train]).unwrap();
+    let mut trained: BTreeSet<usize> = other.training_images.iter().map(|image| image.index).collect();
+    let before = sandbox.run_file("run");
+    for generation in [0, 5] {
+        trained
+            .extend(Training::indices(&before.config, &dataset, before.config.period(generation)).unwrap());
+    }
+    let start: BTreeSet<usize> = run.start.as_ref().unwrap().trained_on.iter().copied().collect();
+    assert_eq!(start, trained);
+    let own: BTreeSet<usize> = run.training_images.iter().map(|image| image.index).collect();
+    let free = |class| {
+        let all = dataset.indices_of(Split::Train, class).iter();
+        all.filter(|index| !start.contains(index) && !own.contains(index)).count()
+    };
+    let most = 2 * free(0).min(free(1));
+    let drawn = images(&run, &dataset, most).unwrap();
+    assert!(drawn.iter().all(|image| !start.contains(&image.index) && !own.contains(&image.index)));
+    assert!(images(&run, &dataset, most + 2).is_err());
+}
+
+#[test]
 fn it_goes_on_to_the_same_bytes_and_needs_the_other_run_only_to_begin() {
     let (sandbox, _) = sandbox();
     let result = |folder: &str| {
@@ -88,7 +120,11 @@ fn an_archive_that_cannot_be_started_from_is_refused_before_anything_is_written(
         sandbox.run(&format!("evolve -q -c run.toml -o none {set}")).ended(code, words);
         assert!(!sandbox.path("none").exists(), "{set}");
     };
-    refused("--set start.archive=\"no/run.json\"", 3, &["start.archive", "no/run.json"]);
+    refused(
+        "--set start.archive=\"no/run.json\"",
+        3,
+        &["start.archive", "no/run.json", "make that run first"],
+    );
     refused("--set start.archive=\"run.toml\"", 3, &["start.archive", "run.toml"]);
     refused("--set body.width=6", 3, &["its bodies are 5 × 5 voxels, expected 5 × 6"]);
     refused("--set body.min_muscles=20", 3, &["muscles, expected 20 or more"]);

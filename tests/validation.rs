@@ -3,6 +3,7 @@
 mod common;
 
 use common::program::{Sandbox, TINY};
+use morphcog::run::audit_file::AuditFile;
 use morphcog::run::eval_file::EvalFile;
 use morphcog::run::training::{Training, load_dataset};
 use morphcog::run::validation::images;
@@ -104,4 +105,24 @@ fn too_few_or_too_many_validation_images_are_refused() {
     };
     with("--validation 10").ended(2, &["--validation 10", "40"]);
     with("--validation 1000000").ended(3, &["--validation 1000000", "ask for at most"]);
+}
+
+#[test]
+fn those_that_are_best_on_validation_images_can_be_audited_by_themselves() {
+    let sandbox = Sandbox::new();
+    sandbox.write("run.toml", format!("{TINY}\n[validation]\nimages = 60\n"));
+    sandbox.run("evolve -q -c run.toml -o run").ended(0, &[]);
+    let audit = "audit --archive run/run.json --robots best-validation:2 --set threshold=0";
+    sandbox.run(audit).ended(0, &["validating"]);
+    // Found before, they are not searched for again; eval finds the same.
+    let said = sandbox.run(audit).ended(0, &[]);
+    assert!(!said.err.contains("validating"), "{}", said.err);
+    sandbox.run("eval -q --archive run/run.json --images 20 --robots best-validation:2").ended(0, &[]);
+    let best: EvalFile = serde_json::from_str(&sandbox.read("run/eval.json")).unwrap();
+    let audit = AuditFile::read(&sandbox.path("run/audit.json")).unwrap();
+    let mut audited: Vec<&String> = audit.robots.iter().map(|robot| &robot.id).collect();
+    let mut expected: Vec<&String> = best.robots.iter().map(|robot| &robot.id).collect();
+    audited.sort();
+    expected.sort();
+    assert_eq!((audited.len(), audited), (2, expected));
 }

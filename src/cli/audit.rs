@@ -4,16 +4,18 @@ use crate::run::audit::{self, Options, Source};
 use crate::run::audit_file::AUDIT_JSON;
 use crate::run::robots::Selection;
 use crate::run::verdict::Criteria;
-use crate::run::{Error, folder, gallery, signals};
+use crate::run::{Error, folder, gallery, signals, validation};
 use crate::view::console::Console;
 use crate::view::{reporters, verdicts};
 use clap::Args;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
 
 pub(super) const EXAMPLES: &str = "\
 Examples:
   morphcog audit --archive runs/zero_one-seed1/run.json
   morphcog audit --archive runs/zero_one-seed1/run.json --robots top:10
+  morphcog audit --archive runs/zero_one-seed1/run.json --robots best-validation:3
   morphcog audit --archive runs/a/run.json --archive runs/b/run.json
   morphcog audit --robots gallery                     the robots published with the paper
   morphcog audit --set perturbations.time_step=[2,4,8] --set threshold=2
@@ -25,7 +27,8 @@ pub(super) struct AuditArgs {
     /// A run.json (default: the newest under runs/); may be given several times.
     #[arg(short, long, value_name = "FILE")]
     archive: Vec<PathBuf>,
-    /// all, top:N, random:N, or ids (or beginnings of ids) separated by commas; or gallery, or names of published robots.
+    /// all, top:N, random:N, best-validation:N (the best of each task on the validation images of the run's config), or ids
+    /// (or beginnings of ids) separated by commas; or gallery, or names of published robots.
     #[arg(short, long, visible_alias = "select", default_value = "all")]
     robots: Selection,
     /// Seed of robots drawn with random:N.
@@ -61,9 +64,13 @@ pub(super) fn run(args: AuditArgs, console: &Console) -> Result<(), Error> {
             Source::Archive(path) => path.with_file_name(AUDIT_JSON),
             Source::Gallery => Path::new("gallery-audit.json").to_path_buf(),
         };
+        let robots = match (&source, args.robots.validated()) {
+            (Source::Archive(path), Some(best)) => validated(&args, path, best, &stop, console)?,
+            _ => args.robots.clone(),
+        };
         let options = Options {
             source,
-            robots: args.robots.clone(),
+            robots,
             seed: args.seed,
             criteria: criteria.clone(),
             data: args.data.clone(),
@@ -78,6 +85,27 @@ pub(super) fn run(args: AuditArgs, console: &Console) -> Result<(), Error> {
         }
     }
     Ok(())
+}
+
+/// The best robots on validation images: those found before, or else searched for now.
+fn validated(
+    args: &AuditArgs,
+    archive: &Path,
+    best: usize,
+    stop: &AtomicBool,
+    console: &Console,
+) -> Result<Selection, Error> {
+    let options = validation::Options {
+        archive: archive.to_path_buf(),
+        best: Some(best),
+        data: args.data.clone(),
+        threads: args.threads.map(usize::from),
+    };
+    let Some(found) = validation::validate(&options, stop, &reporters::Evaluation::new(console))? else {
+        let text = "stopped before the robots were chosen; nothing is audited";
+        return Err(Error::stopped(text.to_string()).hint("the same command goes on".to_string()));
+    };
+    Ok(Selection::Ids(found.into_iter().map(|robot| robot.id).collect()))
 }
 
 /// The archives, or the gallery if that is what the robots are named from.

@@ -21,7 +21,7 @@ use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
 /// Configs that are part of the program: name and text.
-pub const BUILT_IN: [(&str, &str); 7] = [
+pub const BUILT_IN: [(&str, &str); 8] = [
     ("quickstart.toml", include_str!("../../configs/quickstart.toml")),
     ("zero_one.toml", include_str!("../../configs/zero_one.toml")),
     ("zero_one_published.toml", include_str!("../../configs/zero_one_published.toml")),
@@ -29,6 +29,7 @@ pub const BUILT_IN: [(&str, &str); 7] = [
     ("four_digit_published.toml", include_str!("../../configs/four_digit_published.toml")),
     ("zero_one_curriculum.toml", include_str!("../../configs/zero_one_curriculum.toml")),
     ("four_digit_curriculum.toml", include_str!("../../configs/four_digit_curriculum.toml")),
+    ("four_digit_task.toml", include_str!("../../configs/four_digit_task.toml")),
 ];
 
 /// Largest seed: TOML's numbers are signed.

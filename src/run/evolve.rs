@@ -47,7 +47,7 @@ pub fn evolve(
     }
     Mutations { seed: config.seed, spec: config.body_spec(), params: &config.genome }.check()?;
     let resumes = options.if_exists == IfExists::Resume;
-    let start = if resumes { None } else { Start::read(config)? };
+    let start = if resumes { None } else { Start::read(config, &dataset)? };
     let folder = RunFolder::open(&options.out, options.if_exists)?;
     let saved = match resumes {
         true => resume::saved(&folder, config, &dataset, |text| observer.warning(&text))?,
@@ -55,7 +55,7 @@ pub fn evolve(
     };
     // A run that has begun has its elites.
     let begun = saved.as_ref().is_some_and(|saved| saved.run.generations > 0);
-    let start = if resumes && !begun { Start::read(config)? } else { start };
+    let start = if resumes && !begun { Start::read(config, &dataset)? } else { start };
     let write = |name: &str, content: &[u8]| {
         let path = folder.path().join(name);
         write_atomically(&path, content).map_err(|error| Error::writing(&path, &error))

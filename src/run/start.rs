@@ -3,8 +3,11 @@
 use super::archive::{Robot, RunFile};
 use super::audit_file::fingerprint;
 use super::config::BodyConfig;
+use super::validation::trained_on;
 use super::{Config, Error};
+use crate::task::dataset::{Dataset, Split};
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeSet;
 use std::path::PathBuf;
 
 /// Where a run starts: section `[start]`. Default: with random individuals.
@@ -34,6 +37,8 @@ pub struct StartRef {
     pub generations: u64,
     /// SHA-256 of its content.
     pub sha256: String,
+    /// Indices of the images that its robots were ever trained on, if they are of the same data: not for validation.
+    pub trained_on: Vec<usize>,
 }
 
 /// An archive to start from.
@@ -48,10 +53,14 @@ impl Start {
     ///
     /// # Errors
     /// If the file is missing or broken, or its bodies are not what the config asks for.
-    pub fn read(config: &Config) -> Result<Option<Self>, Error> {
+    pub fn read(config: &Config, dataset: &Dataset) -> Result<Option<Self>, Error> {
         let Some(path) = &config.start.archive else { return Ok(None) };
         let refuse = |text: String| Error::input(format!("start.archive: {}: {text}", path.display()));
-        let run = RunFile::read(path).map_err(|error| error.within("start.archive"))?;
+        let run = RunFile::read(path).map_err(|error| {
+            let hint = "the run.json of the run to start from is named with --set start.archive=PATH; make that run first";
+            let error = error.within("start.archive");
+            if path.exists() { error } else { error.hint(hint.to_string()) }
+        })?;
         let BodyConfig { height, width, min_muscles } = config.body;
         let BodyConfig { height: rows, width: columns, .. } = run.config.body;
         if (rows, columns) != (height, width) {
@@ -68,7 +77,15 @@ impl Start {
         if run.elites.is_empty() {
             return Err(refuse("it has no elites".to_string()));
         }
-        let origin = StartRef { sha256: fingerprint(&run), name: run.name, generations: run.generations };
+        let same_data =
+            dataset.fingerprint(Split::Train).is_some_and(|sha256| sha256 == run.dataset.train_sha256);
+        let trained_on = if same_data { trained_on(&run, dataset)? } else { BTreeSet::new() };
+        let origin = StartRef {
+            sha256: fingerprint(&run),
+            name: run.name,
+            generations: run.generations,
+            trained_on: trained_on.into_iter().collect(),
+        };
         let robots = run.elites.into_iter().map(|robot| Robot { generation: 0, ..robot }).collect();
         Ok(Some(Start { origin, robots }))
     }

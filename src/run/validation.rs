@@ -95,9 +95,10 @@ struct ValidationFile {
     robots: Vec<Validated>,
 }
 
-/// Indices of all images that a run was trained on so far, in any of its periods.
-fn trained_on(run: &RunFile, dataset: &Dataset) -> Result<BTreeSet<usize>, Error> {
+/// Indices of all images that a run was trained on so far, in any of its periods, and before where it started from.
+pub(super) fn trained_on(run: &RunFile, dataset: &Dataset) -> Result<BTreeSet<usize>, Error> {
     let mut seen: BTreeSet<usize> = run.training_images.iter().map(|image| image.index).collect();
+    seen.extend(run.start.iter().flat_map(|start| &start.trained_on));
     let mut latest = None;
     for period in (0..run.generations).map(|generation| run.config.period(generation)) {
         if latest != Some(period) {
@@ -137,19 +138,21 @@ pub fn images(run: &RunFile, dataset: &Dataset, count: usize) -> Result<Vec<Imag
     Ok(turns.take(count).collect())
 }
 
-/// What to validate at a run's end.
+/// Which robots of a run are to be chosen.
 #[derive(Clone, Debug)]
 pub struct Options {
     /// The run.json.
     pub archive: PathBuf,
+    /// How many of each task; `None`: as the config says.
+    pub best: Option<usize>,
     /// Where the data are, if the command line says.
     pub data: Option<PathBuf>,
     /// Number of threads; `None`: one per core.
     pub threads: Option<usize>,
 }
 
-/// Chooses the robots that a run's section `[validation]` asks for, as `eval` does it, and keeps them beside the run;
-/// `None` if stopped.
+/// Chooses the best robots of a run on the images of its section `[validation]`, as `eval` does it, and keeps them beside
+/// the run; `None` if stopped.
 ///
 /// # Errors
 /// What is wrong with run or data, or that there are not enough images.
@@ -161,6 +164,7 @@ pub fn validate(
     let source = Source::read(&options.archive)?;
     let config = &source.run.config;
     let ValidationConfig { images, best: count } = config.validation;
+    let count = options.best.unwrap_or(count);
     let grouping = config.grouping()?;
     let dataset = load_dataset(config, options.data.as_deref(), &[Split::Train])?;
     let pool = eval::pool(options.threads)?;
