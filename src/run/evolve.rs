@@ -160,6 +160,7 @@ impl<'a> Run<'a> {
             if !self.begin(self.period, robots, stop)? {
                 return Ok(());
             }
+            observer.period(self.period, &self.training, &self.progress());
         }
         while self.generation < config.generations && !stop.load(Ordering::Relaxed) {
             let period = config.period(self.generation);

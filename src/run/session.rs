@@ -46,7 +46,7 @@ pub trait Observer {
     fn started(&mut self, folder: &RunFolder, training: &Training, progress: &Progress);
     /// Before the elites of another archive are evaluated, if the run starts from one.
     fn starting_from(&mut self, origin: &StartRef, robots: usize);
-    /// When other training images, or another fitness, are begun with.
+    /// When other training images, or another fitness, are begun with, and elites of before have been evaluated on them.
     fn period(&mut self, period: Period, training: &Training, progress: &Progress);
     /// After every generation.
     fn generation(&mut self, progress: &Progress);
