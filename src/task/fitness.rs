@@ -258,7 +258,7 @@ mod tests {
         let same_way: Vec<_> = (0..12).flat_map(|_| [(A, -9.0), (B, -9.0), (B, -9.0)]).collect();
         assert!((6.0..6.75).contains(&until(&same_way)), "{}", until(&same_way));
         assert!(until(&[(A, f64::NAN), (B, 1.0)]).is_nan());
-        // Five times as many as there are here end the other.
+        // The other ends with the twentieth; walking one way is right on every second image until then.
         let longer = |answers: &[(Group, f64)]| fitness(Fitness::UntilTwentiethWrong, answers);
         let same_way = |images| vec![[(A, -9.0), (B, -9.0)]; images].concat();
         assert!((20.0..21.0).contains(&longer(&same_way(20))));
