@@ -7,16 +7,15 @@ use super::robots::{self, Selection};
 use super::training::{Training, load_dataset, see};
 use super::verdict::{Behaviour, Criteria, PerturbedLife};
 use super::{Config, Error, gallery};
-use crate::base::Grid;
 use crate::base::hash::sha256_hex;
 use crate::body::Body;
 use crate::sim::{Energy, Lattice};
 use crate::task::dataset::Split;
+use crate::task::evaluation::{Job, Outcome, Savings, evaluate};
 use crate::task::fitness::Fitness;
 use crate::task::grouping::Grouping;
 use crate::task::perturbation::{Perturbation, Setting};
-use crate::task::protocol::Life;
-use crate::task::rollout::{same_to_sensors, walk};
+use crate::task::rollout::walk;
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -285,25 +284,18 @@ impl Trial {
     }
 }
 
-/// Displacements and energies of a life; `None` if it is unstable.
+/// Displacements of a life, and energies if they are to be `measured`; `None` if it is unstable.
 fn live(setting: &Setting, measured: bool) -> Option<(Vec<f64>, Energy)> {
     let Setting { body, physics, protocol, stimuli } = setting;
-    let live =
-        |stimuli: &[Grid<f64>]| walk(&Lattice::new(body, physics), physics, protocol, stimuli, measured).ok();
-    if measured || protocol.life != Life::Fresh {
-        return live(stimuli);
+    if measured {
+        return walk(&Lattice::new(body, physics), physics, protocol, stimuli, true).ok();
     }
-    // Images that are the same to the sensors are one life.
-    let first = same_to_sensors(body, &stimuli.iter().collect::<Vec<_>>());
-    let seen: Vec<Grid<f64>> =
-        (0..).zip(stimuli).filter(|&(image, _)| first[image] == image).map(|(_, s)| s.clone()).collect();
-    let (lived, energy) = live(&seen)?;
-    let mut lived = lived.into_iter();
-    let mut displacements: Vec<f64> = Vec::with_capacity(first.len());
-    for (image, &first) in first.iter().enumerate() {
-        displacements.push(if first == image { lived.next()? } else { displacements[first] });
+    let job = Job { body, order: Vec::new(), may_win: Box::new(|_| true), settled: None };
+    let savings = Savings { early_stop: false, ..Savings::default() };
+    match evaluate(&[job], stimuli, physics, protocol, savings).pop()?.outcome {
+        Outcome::Walked(displacements) => Some((displacements, Energy::default())),
+        Outcome::Unstable(_) | Outcome::Stopped => None,
     }
-    Some((displacements, energy))
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@ use crate::run::config::BUILT_IN;
 use crate::run::training::{DatasetRef, ImageRef};
 use crate::run::verdict::Verdict;
 use crate::sim::Physics;
-use crate::task::protocol::Protocol;
+use crate::task::protocol::{Life, Protocol};
 
 /// Two images, of classes 0 and 1, the first dark and the second bright, each in a fresh life of five cycles.
 fn trial(height: usize, width: usize, physics: Physics) -> Trial {
