@@ -20,12 +20,13 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 /// Three stages in twelve generations: the second with shorter lives; the last with three draws of images, the hardest of
-/// three times as many, and with the four fittest elites at the beginning of each.
+/// three times as many, with the four fittest elites at the beginning of each, and half of the offspring changed in one voxel.
 fn staged() -> String {
     let stages = "\n[[stage]]\ngenerations = 4\n\
         [[stage]]\ngenerations = 3\nimages_per_class = 2\nfitness = \"mean_clipped\"\n\
         control_steps = 15\n\
-        [[stage]]\nimages_per_class = 3\npool = 9\nfitness = \"right_then_margin\"\nredraw = 2\nkeep = 4\n";
+        [[stage]]\nimages_per_class = 3\npool = 9\nfitness = \"right_then_margin\"\nredraw = 2\nkeep = 4\n\
+        voxel_mutations = 0.5\n";
     format!("{TINY}{stages}")
 }
 
@@ -45,8 +46,14 @@ fn a_curriculum_stopped_after_any_generation_goes_on_to_the_same_bytes() {
     let sandbox = sandbox();
     sandbox.run("evolve -q -c run.toml -o whole").ended(0, &[]);
     let whole = result(&sandbox, "whole");
+    let edited = |folder: &str| {
+        sandbox.run_file(folder).elites.iter().filter(|robot| !robot.genome.edits().is_empty()).count()
+    };
+    assert!(edited("whole") > 0);
     for generations in 1..12 {
         sandbox.run(&format!("evolve -q -c run.toml -o part --force -g {generations}")).ended(0, &[]);
+        // Voxels are mutated in the last stage only.
+        assert!(generations > 7 || edited("part") == 0, "after {generations}");
         sandbox.run("evolve -q -c run.toml -o part --resume").ended(0, &[]);
         assert_eq!(result(&sandbox, "part"), whole, "stopped after {generations}");
     }

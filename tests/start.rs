@@ -125,6 +125,7 @@ fn an_archive_that_cannot_be_started_from_is_refused_before_anything_is_written(
         3,
         &["start.archive", "no/run.json", "make that run first"],
     );
+    refused("--resume --set start.archive=\"no/run.json\"", 3, &["start.archive", "no/run.json"]);
     refused("--set start.archive=\"run.toml\"", 3, &["start.archive", "run.toml"]);
     refused("--set body.width=6", 3, &["its bodies are 5 × 5 voxels, expected 5 × 6"]);
     refused("--set body.min_muscles=20", 3, &["muscles, expected 20 or more"]);

@@ -1,23 +1,28 @@
 //! Floor 2: genomes. A [`Genome`] describes a [`Body`]; it knows nothing of physics, tasks or archives.
 
 pub mod cppn;
+mod edits;
 mod express;
 mod file;
 pub mod function;
 pub mod mutation;
 
 use crate::base::{hash, random::Stream};
-use crate::body::{Body, BodyError};
+use crate::body::{Body, BodyError, Material};
 pub use cppn::Cppn;
+pub use edits::Edits;
 pub use file::CppnError;
 pub use mutation::MutationParams;
 use serde::{Deserialize, Serialize};
 
-/// What evolution varies: a network that describes a body. In files `{"cppn": …}`, see [`Cppn`].
+/// What evolution varies: a network that describes a body, and single voxels in which the body differs from that. In files
+/// `{"cppn": …, "edits": …}`, see [`Cppn`] and [`Edits`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Genome {
     cppn: Cppn,
+    #[serde(default, skip_serializing_if = "Edits::is_empty")]
+    edits: Edits,
 }
 
 /// Which bodies evolution may use (paper: 14 × 14 voxels, connected, at least three muscles).
@@ -61,7 +66,7 @@ pub enum GenomeError {
 impl Genome {
     /// Where evolution starts: [`Cppn::initial`], an empty body.
     pub fn initial() -> Self {
-        Genome { cppn: Cppn::initial() }
+        Genome { cppn: Cppn::initial(), edits: Edits::default() }
     }
 
     /// Its network.
@@ -69,7 +74,12 @@ impl Genome {
         &self.cppn
     }
 
-    /// One random mutation (paper, section "Genome").
+    /// Voxels that are not what the network says.
+    pub fn edits(&self) -> &Edits {
+        &self.edits
+    }
+
+    /// One random mutation of the network (paper, section "Genome").
     pub fn mutate(&mut self, params: &MutationParams, rng: &mut Stream) {
         mutation::mutate(&mut self.cppn, params, rng);
     }
@@ -79,19 +89,59 @@ impl Genome {
     /// # Errors
     /// [`BodyError`] if the size is not a body's.
     pub fn body(&self, height: usize, width: usize) -> Result<Body, BodyError> {
-        self.cppn.express(height, width)
+        let described = self.cppn.express(height, width)?;
+        if self.edits.is_empty() { Ok(described) } else { Body::new(self.edits.apply(&described)) }
     }
 
     /// A short id, the same for the same genome: the first ten hexadecimal digits of its content's hash.
     pub fn id(&self) -> String {
-        hash::sha256_hex(&self.cppn.canonical_bytes())[..10].to_string()
+        let content = [self.cppn.canonical_bytes(), self.edits.canonical_bytes()].concat();
+        hash::sha256_hex(&content)[..10].to_string()
     }
 
-    /// A copy mutated once, and again until its body is valid; with that body.
+    /// A copy with one mutation, and more of them until its body is valid; with that body. Of one in so many, as
+    /// [`MutationParams::voxel_mutations`] says, not the network is mutated but one voxel.
     ///
     /// # Errors
     /// [`GenomeError`] if the size is not a body's or [`MAX_MUTATIONS`] give no valid body.
     pub fn offspring(
+        &self,
+        spec: BodySpec,
+        params: &MutationParams,
+        rng: &mut Stream,
+    ) -> Result<(Genome, Body), GenomeError> {
+        // Without voxel mutations nothing is drawn, and runs are what they were before there were any.
+        if params.voxel_mutations > 0.0 && rng.unit() < params.voxel_mutations {
+            return self.with_one_voxel_changed(spec, rng);
+        }
+        self.with_mutated_network(spec, params, rng)
+    }
+
+    /// A copy of which one voxel is of another material, drawn anew from the same parent until its body is valid.
+    fn with_one_voxel_changed(
+        &self,
+        spec: BodySpec,
+        rng: &mut Stream,
+    ) -> Result<(Genome, Body), GenomeError> {
+        let BodySpec { height, width, min_muscles } = spec;
+        let (described, body) = (self.cppn.express(height, width)?, self.body(height, width)?);
+        for _ in 0..MAX_MUTATIONS {
+            let place = (rng.below(height), rng.below(width));
+            // One of the six others.
+            let now = usize::from(body.voxels()[place].code());
+            let material =
+                Material::ALL[(now + 1 + rng.below(Material::ALL.len() - 1)) % Material::ALL.len()];
+            let mut genome = self.clone();
+            genome.edits.set(place, material, described.voxels()[place]);
+            let body = genome.body(height, width)?;
+            if body.is_valid(min_muscles) {
+                return Ok((genome, body));
+            }
+        }
+        Err(GenomeError::NoValidBody { mutations: MAX_MUTATIONS, height, width, min_muscles })
+    }
+
+    fn with_mutated_network(
         &self,
         spec: BodySpec,
         params: &MutationParams,
@@ -119,7 +169,7 @@ impl Genome {
         params: &MutationParams,
         rng: &mut Stream,
     ) -> Result<(Genome, Body), GenomeError> {
-        Genome::initial().offspring(spec, params, rng)
+        Genome::initial().with_mutated_network(spec, params, rng)
     }
 }
 
@@ -166,6 +216,52 @@ mod tests {
         assert!(text.starts_with(r#"{"cppn":{"version":1,"#));
         let read: Genome = serde_json::from_str(&text).unwrap();
         assert_eq!((read.id(), read.id().len()), (genome.id(), 10));
+    }
+
+    #[test]
+    fn a_voxel_mutation_changes_one_voxel_and_nothing_else() {
+        let always = MutationParams { voxel_mutations: 1.0, ..MutationParams::default() };
+        let rng = &mut rng(3);
+        let (mut parent, mut body) = Genome::random(PAPER, &always, rng).unwrap();
+        assert!(parent.edits().is_empty());
+        for _ in 0..200 {
+            let (child, changed) = parent.offspring(PAPER, &always, rng).unwrap();
+            let pairs = body.voxels().cells().iter().zip(changed.voxels().cells());
+            assert_eq!(pairs.filter(|(before, after)| before != after).count(), 1);
+            assert!(child.cppn() == parent.cppn() && child.id() != parent.id() && changed.is_valid(3));
+            (parent, body) = (child, changed);
+        }
+        assert!((20..=196).contains(&parent.edits().len()), "{}", parent.edits().len());
+        // The network goes on mutating below the edits, and files keep both.
+        let text = serde_json::to_string(&parent).unwrap();
+        let read: Genome = serde_json::from_str(&text).unwrap();
+        assert_eq!((read.id(), read.body(14, 14)), (parent.id(), Ok(body)));
+        let (child, _) = read.offspring(PAPER, &MutationParams::default(), rng).unwrap();
+        assert!(child.edits() == read.edits() && child.cppn() != read.cppn());
+    }
+
+    #[test]
+    fn every_voxel_and_material_is_as_likely_to_be_mutated() {
+        let always = MutationParams { voxel_mutations: 1.0, ..MutationParams::default() };
+        let (parent, _) = Genome::random(PAPER, &MutationParams::default(), &mut rng(5)).unwrap();
+        let spec = BodySpec { min_muscles: 0, ..PAPER };
+        // What is not connected is no body: all of a full grid but its own material can come out.
+        let mut full = parent.clone();
+        let described = parent.cppn.express(14, 14).unwrap();
+        (0..196).for_each(|i| {
+            full.edits.set((i / 14, i % 14), Material::Soft, described.voxels()[(i / 14, i % 14)])
+        });
+        let (mut places, mut materials) = ([0; 196], [0; 7]);
+        for seed in 0..6000 {
+            let (_, body) = full.offspring(spec, &always, &mut rng(seed)).unwrap();
+            let mut cells = body.voxels().cells().iter().zip(0..);
+            let (material, place) = cells.find(|(m, _)| **m != Material::Soft).unwrap();
+            places[place] += 1;
+            materials[usize::from(material.code())] += 1;
+        }
+        assert!(places.iter().all(|n| (10..60).contains(n)), "{places:?}");
+        assert_eq!(materials[2], 0);
+        assert!([0, 1, 3, 4, 5, 6].iter().all(|m| (880..1120).contains(&materials[*m])), "{materials:?}");
     }
 
     #[test]

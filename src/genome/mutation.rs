@@ -18,12 +18,29 @@ pub struct MutationParams {
     /// Size of the weight of an added edge; its sign is random. Default 0.1.
     #[serde(deserialize_with = "size")]
     pub new_edge_weight: f64,
+    /// Share of offspring of which one voxel is mutated instead of the network ([`Edits`](super::Edits)). Default 0, as in
+    /// the paper; then left out of files.
+    #[serde(deserialize_with = "share", skip_serializing_if = "is_zero")]
+    pub voxel_mutations: f64,
 }
 
 impl Default for MutationParams {
     fn default() -> Self {
-        MutationParams { weight_sigma: 0.5, weight_limit: 1.0, new_edge_weight: 0.1 }
+        MutationParams { weight_sigma: 0.5, weight_limit: 1.0, new_edge_weight: 0.1, voxel_mutations: 0.0 }
     }
+}
+
+fn is_zero(value: &f64) -> bool {
+    *value == 0.0
+}
+
+/// A number from 0 to 1.
+fn share<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
+    let value = f64::deserialize(deserializer)?;
+    if (0.0..=1.0).contains(&value) {
+        return Ok(value);
+    }
+    Err(serde::de::Error::custom(format!("{value} is out of range; expected a number from 0 to 1")))
 }
 
 fn size<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
@@ -304,6 +321,8 @@ mod tests {
         assert_eq!(read("{}").unwrap(), MutationParams::default());
         assert_eq!(read(r#"{"weight_sigma": 0.2}"#).unwrap().weight_sigma, 0.2);
         assert!(read(r#"{"weight_sigma": -1}"#).unwrap_err().contains("-1 is out of range"));
+        assert!(read(r#"{"voxel_mutations": 1.01}"#).unwrap_err().contains("1.01 is out of range"));
+        assert!(!serde_json::to_string(&MutationParams::default()).unwrap().contains("voxel"));
         assert!(read(r#"{"weight_sgma": 1}"#).unwrap_err().contains("weight_sgma"));
     }
 

@@ -1,12 +1,13 @@
 //! Stages of a run: what robots are trained on, and how they are judged, from which generation on.
 
 use super::{Config, Error};
+use crate::genome::MutationParams;
 use crate::task::fitness::Fitness;
 use crate::task::protocol::Protocol;
 use serde::{Deserialize, Serialize};
 
 /// A stage: table `[[stage]]`. It starts with the archive of the stage before it, evaluated anew.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct StageConfig {
     /// Generations it lasts; the last stage lasts to the run's last generation, whatever it says.
@@ -37,6 +38,9 @@ pub struct StageConfig {
     /// Fitness is that of the worst of a few perturbed lives, the unchanged one included. Default `evaluation.robust`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub robust: Option<bool>,
+    /// Share of offspring of which one voxel is mutated instead of the network. Default `genome.voxel_mutations`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub voxel_mutations: Option<f64>,
 }
 
 /// Generations with the same training images and the same fitness.
@@ -111,6 +115,15 @@ impl Config {
         self.stage.get(period.stage)?.keep
     }
 
+    /// How genomes mutate in a period.
+    pub fn mutation_in(&self, period: Period) -> MutationParams {
+        let voxel_mutations = self.stage.get(period.stage).and_then(|stage| stage.voxel_mutations);
+        MutationParams {
+            voxel_mutations: voxel_mutations.unwrap_or(self.genome.voxel_mutations),
+            ..self.genome.clone()
+        }
+    }
+
     /// Checks the stages.
     pub(super) fn validate_stages(&self) -> Result<(), Error> {
         let refuse = |number: usize, text: String| Err(Error::input(format!("stage {}: {text}", number + 1)));
@@ -138,6 +151,9 @@ impl Config {
             ];
             if let Some((key, _)) = zeros.iter().find(|(_, is_zero)| *is_zero) {
                 return refuse(number, format!("{key} = 0: expected 1 or more"));
+            }
+            if let Some(share) = stage.voxel_mutations.filter(|share| !(0.0..=1.0).contains(share)) {
+                return refuse(number, format!("voxel_mutations = {share}: expected a number from 0 to 1"));
             }
             let drawing = [
                 ("pool", stage.pool.is_some(), "how many are chosen of it"),
@@ -206,6 +222,10 @@ mod tests {
             ("[[stage]]\nimages_per_class = 0", "stage 1: images_per_class = 0"),
             ("[[stage]]\nredraw = 5", "stage 1: redraw: expected images_per_class"),
             ("[[stage]]\nimages_per_class = 2\nredraw = 0", "stage 1: redraw = 0"),
+            (
+                "[[stage]]\nvoxel_mutations = 1.5",
+                "stage 1: voxel_mutations = 1.5: expected a number from 0 to 1",
+            ),
             ("[[stage]]\npool = 5", "stage 1: pool: expected images_per_class"),
             ("[[stage]]\nimages_per_class = 8\npool = 7", "stage 1: pool = 7: expected images_per_class, 8"),
         ] {

@@ -47,15 +47,16 @@ pub fn evolve(
     }
     Mutations { seed: config.seed, spec: config.body_spec(), params: &config.genome }.check()?;
     let resumes = options.if_exists == IfExists::Resume;
-    let start = if resumes { None } else { Start::read(config, &dataset)? };
+    // A run that goes on may have begun, and then has its elites: that is not known before its folder is open.
+    let may_have_begun = resumes && options.out.exists();
+    let start = if may_have_begun { None } else { Start::read(config, &dataset)? };
     let folder = RunFolder::open(&options.out, options.if_exists)?;
     let saved = match resumes {
         true => resume::saved(&folder, config, &dataset, |text| observer.warning(&text))?,
         false => None,
     };
-    // A run that has begun has its elites.
     let begun = saved.as_ref().is_some_and(|saved| saved.run.generations > 0);
-    let start = if resumes && !begun { Start::read(config, &dataset)? } else { start };
+    let start = if may_have_begun && !begun { Start::read(config, &dataset)? } else { start };
     let write = |name: &str, content: &[u8]| {
         let path = folder.path().join(name);
         write_atomically(&path, content).map_err(|error| Error::writing(&path, &error))
@@ -221,7 +222,8 @@ impl<'a> Run<'a> {
     /// Makes, evaluates and tells one generation.
     fn next_generation(&mut self) -> Result<(), Error> {
         let config = &self.options.config;
-        let mutations = Mutations { seed: config.seed, spec: config.body_spec(), params: &config.genome };
+        let params = config.mutation_in(self.period);
+        let mutations = Mutations { seed: config.seed, spec: config.body_spec(), params: &params };
         let proposals = self.search.ask(self.generation);
         let robots: Result<Vec<Robot>, GenomeError> =
             proposals.par_iter().map(|&proposal| self.search.make(proposal, &mutations)).collect();

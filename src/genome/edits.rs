@@ -1,0 +1,120 @@
+//! [`Edits`]: single voxels in which a body differs from what its network describes.
+
+use crate::base::Grid;
+use crate::body::{Body, MAX_SIDE, Material};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// Voxels that are not what a genome's network says: a direct encoding on top of the indirect one, for the last touches that
+/// no change of a network makes alone (HybrID of Clune, Beckmann, Pennock & Ofria, ECAL 2009). In files a list of
+/// `[row, column, material]`. Those outside a body's grid have no effect.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(try_from = "Vec<(usize, usize, Material)>", into = "Vec<(usize, usize, Material)>")]
+pub struct Edits(BTreeMap<(usize, usize), Material>);
+
+/// Why a list is not one of edits.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum EditError {
+    /// A voxel beyond the largest body.
+    #[error("edits: row {0}, column {1}: bodies have at most {MAX_SIDE} rows and columns")]
+    Place(usize, usize),
+    /// Two edits of one voxel.
+    #[error("edits: row {0}, column {1} is there twice")]
+    Twice(usize, usize),
+}
+
+impl Edits {
+    /// Whether the body is just what the network describes.
+    pub fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+
+    /// How many voxels differ.
+    pub fn len(&self) -> usize {
+        self.0.len()
+    }
+
+    /// Makes the voxel at a place (row, column) of `material`, where the network says `described`.
+    pub(super) fn set(&mut self, place: (usize, usize), material: Material, described: Material) {
+        if material == described {
+            self.0.remove(&place);
+        } else {
+            self.0.insert(place, material);
+        }
+    }
+
+    /// What the network describes, edited.
+    pub(super) fn apply(&self, described: &Body) -> Grid<Material> {
+        let voxels = described.voxels();
+        Grid::from_fn(voxels.height(), voxels.width(), |row, column| {
+            self.0.get(&(row, column)).copied().unwrap_or(voxels[(row, column)])
+        })
+    }
+
+    /// Bytes that are the same for equal edits, and only for those.
+    pub(super) fn canonical_bytes(&self) -> Vec<u8> {
+        // Rows and columns are below MAX_SIDE.
+        self.0
+            .iter()
+            .flat_map(|((row, column), material)| [*row as u8, *column as u8, material.code()])
+            .collect()
+    }
+}
+
+impl TryFrom<Vec<(usize, usize, Material)>> for Edits {
+    type Error = EditError;
+    fn try_from(list: Vec<(usize, usize, Material)>) -> Result<Self, EditError> {
+        let mut edits = BTreeMap::new();
+        for (row, column, material) in list {
+            if row >= MAX_SIDE || column >= MAX_SIDE {
+                return Err(EditError::Place(row, column));
+            }
+            if edits.insert((row, column), material).is_some() {
+                return Err(EditError::Twice(row, column));
+            }
+        }
+        Ok(Edits(edits))
+    }
+}
+
+impl From<Edits> for Vec<(usize, usize, Material)> {
+    fn from(edits: Edits) -> Self {
+        edits.0.into_iter().map(|((row, column), material)| (row, column, material)).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(text: &str) -> Result<Edits, String> {
+        serde_json::from_str(text).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn edits_replace_what_the_network_describes() {
+        let described: Body = "012/345".parse().unwrap();
+        let edits = read("[[1,2,6],[0,0,3],[40,0,1]]").unwrap();
+        assert_eq!(Body::new(edits.apply(&described)).unwrap().to_string(), "312\n346");
+        assert_eq!(Body::new(Edits::default().apply(&described)).unwrap(), described);
+    }
+
+    #[test]
+    fn what_is_as_described_is_no_edit() {
+        let mut edits = Edits::default();
+        edits.set((1, 2), Material::Rigid, Material::Soft);
+        assert_eq!(edits.len(), 1);
+        edits.set((1, 2), Material::Soft, Material::Soft);
+        assert!(edits.is_empty());
+    }
+
+    #[test]
+    fn files_hold_them_in_one_order_and_nonsense_is_refused_with_its_place() {
+        let edits = read("[[1,2,6],[0,0,3]]").unwrap();
+        assert_eq!(serde_json::to_string(&edits).unwrap(), "[[0,0,3],[1,2,6]]");
+        assert_eq!(edits.canonical_bytes(), [0, 0, 3, 1, 2, 6]);
+        assert!(read("[[1,2,6],[1,2,3]]").unwrap_err().contains("row 1, column 2 is there twice"));
+        assert!(read("[[64,2,6]]").unwrap_err().contains("row 64, column 2"));
+        assert!(read("[[1,2,7]]").unwrap_err().contains('7'));
+    }
+}
