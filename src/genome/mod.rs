@@ -99,8 +99,8 @@ impl Genome {
         hash::sha256_hex(&content)[..10].to_string()
     }
 
-    /// A copy with one mutation, and more of them until its body is valid; with that body. Of one in so many, as
-    /// [`MutationParams::voxel_mutations`] says, not the network is mutated but one voxel.
+    /// A copy with one mutation, and more of them until its body is valid; with that body. Of some, as many as
+    /// [`MutationParams::voxel_mutations`] says, one voxel is mutated and not the network.
     ///
     /// # Errors
     /// [`GenomeError`] if the size is not a body's or [`MAX_MUTATIONS`] give no valid body.
@@ -124,16 +124,16 @@ impl Genome {
         rng: &mut Stream,
     ) -> Result<(Genome, Body), GenomeError> {
         let BodySpec { height, width, min_muscles } = spec;
-        let (described, body) = (self.cppn.express(height, width)?, self.body(height, width)?);
+        let described = self.cppn.express(height, width)?;
+        let now = self.edits.apply(&described);
         for _ in 0..MAX_MUTATIONS {
             let place = (rng.below(height), rng.below(width));
             // One of the six others.
-            let now = usize::from(body.voxels()[place].code());
-            let material =
-                Material::ALL[(now + 1 + rng.below(Material::ALL.len() - 1)) % Material::ALL.len()];
+            let step = 1 + rng.below(Material::ALL.len() - 1);
+            let material = Material::ALL[(usize::from(now[place].code()) + step) % Material::ALL.len()];
             let mut genome = self.clone();
             genome.edits.set(place, material, described.voxels()[place]);
-            let body = genome.body(height, width)?;
+            let body = Body::new(genome.edits.apply(&described))?;
             if body.is_valid(min_muscles) {
                 return Ok((genome, body));
             }
