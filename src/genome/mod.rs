@@ -10,7 +10,7 @@ pub mod mutation;
 use crate::base::{hash, random::Stream};
 use crate::body::{Body, BodyError, Material};
 pub use cppn::Cppn;
-pub use edits::Edits;
+pub use edits::{EditError, Edits};
 pub use file::CppnError;
 pub use mutation::MutationParams;
 use serde::{Deserialize, Serialize};
@@ -245,7 +245,7 @@ mod tests {
         let always = MutationParams { voxel_mutations: 1.0, ..MutationParams::default() };
         let (parent, _) = Genome::random(PAPER, &MutationParams::default(), &mut rng(5)).unwrap();
         let spec = BodySpec { min_muscles: 0, ..PAPER };
-        // What is not connected is no body: all of a full grid but its own material can come out.
+        // A full grid stays connected whatever one voxel becomes: nothing is drawn twice.
         let mut full = parent.clone();
         let described = parent.cppn.express(14, 14).unwrap();
         (0..196).for_each(|i| {
