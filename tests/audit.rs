@@ -120,6 +120,47 @@ fn without_verdicts_on_this_very_archive_nothing_is_drawn() {
 }
 
 #[test]
+fn the_best_physical_on_validation_needs_no_verdicts_on_those_behind_it() {
+    let sandbox = Sandbox::new();
+    let config = TINY.replace("control_steps = 20", "control_steps = 150");
+    sandbox.write("tiny.toml", format!("{config}\n[validation]\nimages = 40\nbest = 8\n"));
+    sandbox.run("evolve --config tiny.toml --out run --generations 40").ended(0, &[]);
+    let eval =
+        |options: &str| sandbox.run(&format!("eval --archive run/run.json --images 4 --robots {options}"));
+    let chosen = || -> Vec<String> {
+        let report: serde_json::Value = serde_json::from_str(&sandbox.read("run/eval.json")).unwrap();
+        let robots = report["robots"].as_array().unwrap();
+        robots.iter().map(|robot| robot["id"].as_str().unwrap().to_string()).collect()
+    };
+    let best = "best-validation:1 --physical-only";
+    eval(best).ended(3, &["hint: morphcog audit --archive run/run.json"]);
+    audit(&sandbox, "");
+    let whole = verdicts(&sandbox);
+    eval("best-validation:8").ended(0, &[]);
+    let ranking = chosen();
+    let is_physical = |id: &String| whole.robot(id).unwrap().is_physical();
+    let place = ranking.iter().position(is_physical).expect("one of the first eight is physical");
+    // Verdicts on the first of the ranking only, without that one and with it.
+    let known = |count: usize| {
+        let mut part = verdicts(&sandbox);
+        part.robots =
+            whole.robots.iter().filter(|robot| ranking[..count].contains(&robot.id)).cloned().collect();
+        assert!(part.robots.len() == count && count < whole.robots.len());
+        sandbox.write("run/audit.json", part.to_json());
+    };
+    known(place);
+    let number = format!("robot {}, number {} of 0|1 on validation images", ranking[place], place + 1);
+    eval(best).ended(3, &[&number, &format!("--robots best-validation:{}", place + 1)]);
+    known(place + 1);
+    eval(best).ended(0, &[]);
+    assert_eq!(chosen(), [ranking[place].clone()]);
+    // With verdicts on all it is the same robot.
+    sandbox.write("run/audit.json", whole.to_json());
+    eval(best).ended(0, &[]);
+    assert_eq!(chosen(), [ranking[place].clone()]);
+}
+
+#[test]
 fn an_audit_says_what_it_found_in_a_table_and_as_json() {
     let sandbox = evolved();
     let said =

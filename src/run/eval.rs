@@ -120,19 +120,19 @@ pub fn eval(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Re
         None => (robots, Vec::new()),
         Some(count) => {
             let wanted = validation::Wanted { count, images: validated, threshold: options.threshold };
-            let mut best = Vec::new();
-            for (number, source) in sources.iter().enumerate() {
-                let own = robots.iter().filter(|chosen| chosen.source == number).map(|chosen| chosen.robot);
-                match validation::best(source, &dataset, &grouping, own.collect(), &wanted, &walker())? {
-                    Some(of_run) => best.extend(
-                        of_run.into_iter().map(|(robot, score)| (Chosen { source: number, robot }, score)),
-                    ),
-                    None => {
-                        report.stopped = true;
-                        return Ok(report);
-                    }
-                }
-            }
+            let Some(best) = validation::chosen(
+                &sources,
+                &robots,
+                &options.robots,
+                &dataset,
+                &grouping,
+                &wanted,
+                &walker,
+            )?
+            else {
+                report.stopped = true;
+                return Ok(report);
+            };
             best.into_iter().unzip()
         }
     };

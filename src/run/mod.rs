@@ -21,6 +21,7 @@ pub mod gallery;
 mod hardest;
 mod keep;
 pub mod metrics;
+mod physical;
 pub mod plan;
 pub mod plot;
 pub mod published;

@@ -2,7 +2,7 @@
 
 use super::Error;
 use super::archive::{Robot, RunFile};
-use super::audit_file::{AUDIT_JSON, AuditFile};
+use super::physical::{all_audited, physical};
 use crate::base::random::{Purpose, stream};
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
@@ -160,65 +160,17 @@ impl Selection {
                 let find = |(source, id): &(usize, String)| by_id(&of_run(*source).collect::<Vec<_>>(), id);
                 robots.iter().map(find).collect()
             }
+            // The first in a ranking can be told without the last; it is asked when they are ranked.
+            Selection::Physical(of) if of.validated().is_some() && !all_audited(&fittest, sources)? => {
+                Ok(fittest)
+            }
             Selection::Physical(of) => of.among(physical(of, fittest, sources)?, sources, seed),
         }
     }
 }
 
-/// The physical ones, fittest first; those that are named must be among them.
-fn physical<'a>(
-    selection: &Selection,
-    fittest: Vec<Chosen<'a>>,
-    sources: &'a [Source],
-) -> Result<Vec<Chosen<'a>>, Error> {
-    let path = |source: &Source| source.path.with_file_name(AUDIT_JSON);
-    let audits: Result<Vec<AuditFile>, Error> =
-        sources.iter().map(|source| AuditFile::of_run(&source.run, &path(source))).collect();
-    let audits = audits?;
-    let name = |chosen: &Chosen| path(&sources[chosen.source]).display().to_string();
-    let found = |chosen: &Chosen| audits[chosen.source].robot(&chosen.robot.id);
-    let hint = "morphcog audit goes on with the robots that are missing; give it the same --archive";
-    let mut named = Vec::new();
-    if let Selection::Ids(ids) = selection {
-        for id in ids.iter().filter(|id| *id != "best") {
-            named.push(by_id(&fittest, id)?);
-        }
-    }
-    // Who names robots needs to know of those only; of a part of an archive nothing can be drawn fairly.
-    let is_named = matches!(selection, Selection::Ids(ids) if ids.len() == named.len());
-    for chosen in if is_named { &named } else { &fittest } {
-        if found(chosen).is_none() {
-            let audit = &audits[chosen.source];
-            let (name, known, all) = (name(chosen), audit.robots.len(), audit.elites);
-            let id = &chosen.robot.id;
-            let text = format!("{name}: robot {id} has not been audited ({known} of {all} have)");
-            return Err(Error::input(text).hint(hint.to_string()));
-        }
-    }
-    for chosen in &named {
-        if let Some(found) = found(chosen).filter(|found| !found.is_physical()) {
-            let text =
-                format!("{}: robot {} is not physical: {}", name(chosen), found.id, found.conclusion());
-            return Err(
-                Error::input(text).hint("leave --physical-only away to take it all the same".to_string())
-            );
-        }
-    }
-    let physical: Vec<Chosen> =
-        fittest.iter().filter(|chosen| found(chosen).is_some_and(|r| r.is_physical())).copied().collect();
-    if physical.is_empty() {
-        let names: Vec<String> = sources.iter().map(|source| path(source).display().to_string()).collect();
-        return Err(Error::input(format!(
-            "{}: none of {} robots is physical",
-            names.join(", "),
-            fittest.len()
-        )));
-    }
-    Ok(physical)
-}
-
 /// The robot of an id, or of the unique beginning of one; "best" is the first.
-fn by_id<'a>(robots: &[Chosen<'a>], id: &str) -> Result<Chosen<'a>, Error> {
+pub(super) fn by_id<'a>(robots: &[Chosen<'a>], id: &str) -> Result<Chosen<'a>, Error> {
     if id == "best" {
         return Ok(robots[0]);
     }

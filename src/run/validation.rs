@@ -8,7 +8,8 @@ use super::archive::{Robot, RunFile};
 use super::audit_file::fingerprint;
 use super::eval::{self, Observer, Walker};
 use super::eval_file::{RobotReport, Trial};
-use super::robots::{Selection, Source};
+use super::physical::first_physical;
+use super::robots::{Chosen, Selection, Source};
 use super::training::{ImageRef, Training, load_dataset, see};
 use super::{Config, Error};
 use crate::base::files::{read_text, write_atomically};
@@ -176,6 +177,37 @@ pub fn validate(
     let wanted = Wanted { count, images, threshold: eval::THRESHOLD };
     let best = best(&source, &dataset, &grouping, robots, &wanted, &walker)?;
     Ok(best.map(|best| best.into_iter().map(|(_, validated)| validated).collect()))
+}
+
+/// The best of each run and task among some robots, or the best physical ones if the selection says so, with how they did;
+/// `None` if stopped.
+///
+/// # Errors
+/// As of [`best`] and [`first_physical`].
+pub(super) fn chosen<'a>(
+    sources: &'a [Source],
+    robots: &[Chosen<'a>],
+    selection: &Selection,
+    dataset: &Dataset,
+    grouping: &Grouping,
+    wanted: &Wanted,
+    walker: &impl Fn() -> Walker<'a>,
+) -> Result<Option<Vec<(Chosen<'a>, Validated)>>, Error> {
+    let mut all = Vec::new();
+    for (number, source) in sources.iter().enumerate() {
+        let own = robots.iter().filter(|chosen| chosen.source == number).map(|chosen| chosen.robot).collect();
+        let is_physical = matches!(selection, Selection::Physical(_));
+        // Among those that are known at the run's end, in any case, since some will not be physical.
+        let count =
+            if is_physical { wanted.count.max(source.run.config.validation.best) } else { wanted.count };
+        let searched = Wanted { count, ..*wanted };
+        let Some(ranked) = best(source, dataset, grouping, own, &searched, &walker())? else {
+            return Ok(None);
+        };
+        let ranked = if is_physical { first_physical(ranked, source, wanted.count)? } else { ranked };
+        all.extend(ranked.into_iter().map(|(robot, score)| (Chosen { source: number, robot }, score)));
+    }
+    Ok(Some(all))
 }
 
 /// The best of each task among some robots of a run, best first, with how they did; `None` if stopped.
