@@ -191,9 +191,10 @@ proptest! {
             Just(Fitness::RightThenMargin),
             Just(Fitness::RightThenMin),
             Just(Fitness::UntilFifthWrong),
-            Just(Fitness::UntilTwentiethWrong)
+            Just(Fitness::UntilTwentiethWrong),
+            Just(Fitness::UntilFifthWrongOfClass)
         ],
-        images in prop::collection::vec((0..5u8, displacement(), prop::bool::weighted(0.7)), 1..24),
+        images in prop::collection::vec((0..5u8, displacement(), prop::bool::weighted(0.7)), 1..40),
         one_each: bool,
         incumbents in prop::collection::vec(prop::option::of(displacement()), 32),
     ) {
