@@ -1,55 +1,9 @@
-//! The six mutations of a [`Cppn`] and their parameters.
+//! The six mutations of a [`Cppn`].
 
 use super::cppn::{Cppn, FIRST_HIDDEN, INPUTS, MAX_HIDDEN, OUTPUTS};
 use super::function::Function;
+use super::params::MutationParams;
 use crate::base::random::Stream;
-use serde::{Deserialize, Deserializer, Serialize};
-
-/// Sizes of mutations: section `[genome]` of a config (paper, section "Genome").
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct MutationParams {
-    /// Standard deviation of what is added to a weight that changes. Default 0.5.
-    #[serde(deserialize_with = "size")]
-    pub weight_sigma: f64,
-    /// A changed weight is clipped to [−limit, limit]. Default 1.
-    #[serde(deserialize_with = "size")]
-    pub weight_limit: f64,
-    /// Size of the weight of an added edge; its sign is random. Default 0.1.
-    #[serde(deserialize_with = "size")]
-    pub new_edge_weight: f64,
-    /// Share of offspring of which one voxel is mutated instead of the network ([`Edits`](super::Edits)). Default 0, as in
-    /// the paper; then left out of files.
-    #[serde(deserialize_with = "share", skip_serializing_if = "is_zero")]
-    pub voxel_mutations: f64,
-}
-
-impl Default for MutationParams {
-    fn default() -> Self {
-        MutationParams { weight_sigma: 0.5, weight_limit: 1.0, new_edge_weight: 0.1, voxel_mutations: 0.0 }
-    }
-}
-
-fn is_zero(value: &f64) -> bool {
-    *value == 0.0
-}
-
-/// A number from 0 to 1.
-fn share<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
-    let value = f64::deserialize(deserializer)?;
-    if (0.0..=1.0).contains(&value) {
-        return Ok(value);
-    }
-    Err(serde::de::Error::custom(format!("{value} is out of range; expected a number from 0 to 1")))
-}
-
-fn size<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
-    let value = f64::deserialize(deserializer)?;
-    if value > 0.0 && value <= 1000.0 {
-        return Ok(value);
-    }
-    Err(serde::de::Error::custom(format!("{value} is out of range; expected a number above 0, at most 1000")))
-}
 
 /// One kind of mutation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -313,17 +267,6 @@ mod tests {
             counts[Mutation::ALL.iter().position(|m| *m == drawn).unwrap()] += 1;
         }
         assert!(counts.iter().all(|c| (880..1120).contains(c)), "{counts:?}");
-    }
-
-    #[test]
-    fn parameters_have_the_papers_defaults_and_refuse_nonsense() {
-        let read = |text: &str| serde_json::from_str::<MutationParams>(text).map_err(|e| e.to_string());
-        assert_eq!(read("{}").unwrap(), MutationParams::default());
-        assert_eq!(read(r#"{"weight_sigma": 0.2}"#).unwrap().weight_sigma, 0.2);
-        assert!(read(r#"{"weight_sigma": -1}"#).unwrap_err().contains("-1 is out of range"));
-        assert!(read(r#"{"voxel_mutations": 1.01}"#).unwrap_err().contains("1.01 is out of range"));
-        assert!(!serde_json::to_string(&MutationParams::default()).unwrap().contains("voxel"));
-        assert!(read(r#"{"weight_sgma": 1}"#).unwrap_err().contains("weight_sgma"));
     }
 
     proptest! {

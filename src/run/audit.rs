@@ -205,7 +205,9 @@ fn training_of(run: &RunFile, options: &Options) -> Result<Training, Error> {
     });
     let see = |image: &super::training::ImageRef| see(&run.config, &dataset, Split::Train, image.index);
     let (dataset, stimuli) = (run.dataset.clone(), images.iter().map(see).collect::<Result<Vec<_>, Error>>());
-    Ok(Training { dataset, images, stimuli: stimuli?, protocol: run.config.protocol.clone() })
+    // As in a test, every life starts in the same place, however the robot was trained.
+    let raised = vec![0; images.len()];
+    Ok(Training { dataset, images, stimuli: stimuli?, raised, protocol: run.config.protocol.clone() })
 }
 
 impl Trial {
@@ -292,7 +294,7 @@ fn live(setting: &Setting, measured: bool) -> Option<(Vec<f64>, Energy)> {
     }
     let job = Job { body, order: Vec::new(), may_win: Box::new(|_| true), settled: None };
     let savings = Savings { early_stop: false, ..Savings::default() };
-    match evaluate(&[job], stimuli, physics, protocol, savings).pop()?.outcome {
+    match evaluate(&[job], stimuli, &[], physics, protocol, savings).pop()?.outcome {
         Outcome::Walked(displacements) => Some((displacements, Energy::default())),
         Outcome::Unstable(_) | Outcome::Stopped => None,
     }

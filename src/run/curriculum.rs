@@ -2,8 +2,9 @@
 
 use super::{Config, Error};
 use crate::genome::MutationParams;
+use crate::genome::params::MAX_CANDIDATES;
 use crate::task::fitness::Fitness;
-use crate::task::protocol::Protocol;
+use crate::task::protocol::{Life, Protocol};
 use serde::{Deserialize, Serialize};
 
 /// A stage: table `[[stage]]`. It starts with the archive of the stage before it, evaluated anew.
@@ -41,6 +42,17 @@ pub struct StageConfig {
     /// Share of offspring of which one voxel is mutated instead of the network. Default `genome.voxel_mutations`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub voxel_mutations: Option<f64>,
+    /// Most voxel mutations among which an offspring's is chosen. Default `genome.voxel_candidates`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub voxel_candidates: Option<u16>,
+    /// Most voxels of an offspring that change. Default `genome.voxel_changes`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub voxel_changes: Option<u16>,
+    /// Rows up to which starts are raised: of each class the first image is shown to a robot that starts as ever, the next to
+    /// one that starts a row higher, and so on by turns, so that nobody can live off how it first touches the ground. Fresh
+    /// lives only. Default 0.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub raised_starts: Option<u32>,
 }
 
 /// Generations with the same training images and the same fitness.
@@ -110,6 +122,11 @@ impl Config {
         }
     }
 
+    /// Rows up to which starts are raised in a period, by turns within a class.
+    pub fn raised_starts(&self, period: Period) -> u32 {
+        self.stage.get(period.stage).and_then(|stage| stage.raised_starts).unwrap_or(0)
+    }
+
     /// Elites of each task that stay in the archive in a period; `None`: all.
     pub fn keep(&self, period: Period) -> Option<usize> {
         self.stage.get(period.stage)?.keep
@@ -117,9 +134,11 @@ impl Config {
 
     /// How genomes mutate in a period.
     pub fn mutation_in(&self, period: Period) -> MutationParams {
-        let voxel_mutations = self.stage.get(period.stage).and_then(|stage| stage.voxel_mutations);
+        let stage = self.stage.get(period.stage).copied().unwrap_or_default();
         MutationParams {
-            voxel_mutations: voxel_mutations.unwrap_or(self.genome.voxel_mutations),
+            voxel_mutations: stage.voxel_mutations.unwrap_or(self.genome.voxel_mutations),
+            voxel_candidates: stage.voxel_candidates.unwrap_or(self.genome.voxel_candidates),
+            voxel_changes: stage.voxel_changes.unwrap_or(self.genome.voxel_changes),
             ..self.genome.clone()
         }
     }
@@ -154,6 +173,20 @@ impl Config {
             }
             if let Some(share) = stage.voxel_mutations.filter(|share| !(0.0..=1.0).contains(share)) {
                 return refuse(number, format!("voxel_mutations = {share}: expected a number from 0 to 1"));
+            }
+            if stage.raised_starts.is_some_and(|rows| rows > 0) && self.protocol.life == Life::Sequential {
+                let text = "raised_starts: expected protocol.life = \"fresh\": a sequential life starts once";
+                return refuse(number, text.to_string());
+            }
+            let counts =
+                [("voxel_candidates", stage.voxel_candidates), ("voxel_changes", stage.voxel_changes)];
+            for (key, count) in counts {
+                if let Some(count) = count.filter(|count| !(1..=MAX_CANDIDATES).contains(count)) {
+                    return refuse(
+                        number,
+                        format!("{key} = {count}: expected a number from 1 to {MAX_CANDIDATES}"),
+                    );
+                }
             }
             let drawing = [
                 ("pool", stage.pool.is_some(), "how many are chosen of it"),
@@ -215,6 +248,19 @@ mod tests {
     }
 
     #[test]
+    fn starts_are_raised_in_fresh_lives_only() {
+        let with = |life: &str, stages: &str| {
+            let life = format!("protocol.life={life}");
+            Config::parse(&format!("{}\n{stages}", BUILT_IN[0].1), "stages.toml", &[life])
+        };
+        let sequential = with("sequential", "[[stage]]\nraised_starts = 2").unwrap_err();
+        let text = sequential.to_string();
+        assert!(text.contains("stage 1: raised_starts: expected protocol.life = \"fresh\""), "{text}");
+        let fresh = with("fresh", "[[stage]]\nraised_starts = 2\ngenerations = 1\n[[stage]]").unwrap();
+        assert_eq!([0, 1].map(|generation| fresh.raised_starts(fresh.period(generation))), [2, 0]);
+    }
+
+    #[test]
     fn stages_that_cannot_be_are_refused() {
         for (stages, expected) in [
             ("[[stage]]\nimages_per_class = 2\n[[stage]]", "stage 1: expected generations"),
@@ -225,6 +271,14 @@ mod tests {
             (
                 "[[stage]]\nvoxel_mutations = 1.5",
                 "stage 1: voxel_mutations = 1.5: expected a number from 0 to 1",
+            ),
+            (
+                "[[stage]]\nvoxel_candidates = 0",
+                "stage 1: voxel_candidates = 0: expected a number from 1 to 1000",
+            ),
+            (
+                "[[stage]]\nvoxel_changes = 1001",
+                "stage 1: voxel_changes = 1001: expected a number from 1 to 1000",
             ),
             ("[[stage]]\npool = 5", "stage 1: pool: expected images_per_class"),
             ("[[stage]]\nimages_per_class = 8\npool = 7", "stage 1: pool = 7: expected images_per_class, 8"),

@@ -45,7 +45,8 @@ pub fn evolve(
     for stage in (0..config.stage.len()).map(|stage| Period { stage, draw: 0 }) {
         Training::of(config, &dataset, stage)?;
     }
-    Mutations { seed: config.seed, spec: config.body_spec(), params: &config.genome }.check()?;
+    Mutations { seed: config.seed, spec: config.body_spec(), params: &config.genome, lessons: None }
+        .check()?;
     let resumes = options.if_exists == IfExists::Resume;
     // A run that goes on may have begun, and then has its elites: that is not known before its folder is open.
     let may_have_begun = resumes && options.out.exists();
@@ -223,7 +224,8 @@ impl<'a> Run<'a> {
     fn next_generation(&mut self) -> Result<(), Error> {
         let config = &self.options.config;
         let params = config.mutation_in(self.period);
-        let mutations = Mutations { seed: config.seed, spec: config.body_spec(), params: &params };
+        let lessons = Some((&self.training, &self.grouping));
+        let mutations = Mutations { seed: config.seed, spec: config.body_spec(), params: &params, lessons };
         let proposals = self.search.ask(self.generation);
         let robots: Result<Vec<Robot>, GenomeError> =
             proposals.par_iter().map(|&proposal| self.search.make(proposal, &mutations)).collect();
@@ -248,11 +250,11 @@ impl<'a> Run<'a> {
     /// and are fit enough.
     fn evaluate(&mut self, robots: Vec<(u64, Option<usize>, Robot)>) -> Result<(), Error> {
         let config = &self.options.config;
-        let Training { stimuli, protocol, .. } = &self.training;
+        let Training { stimuli, raised, protocol, .. } = &self.training;
         let floors = self.floors();
         let jobs = robots.iter().map(|(_, parent, robot)| self.job(*parent, robot, &floors));
         let jobs: Vec<Job> = jobs.collect();
-        let evaluations = evaluate(&jobs, stimuli, &config.physics, protocol, config.savings);
+        let evaluations = evaluate(&jobs, stimuli, raised, &config.physics, protocol, config.savings);
         let scored = if config.robust(self.period) {
             with_perturbed_lives(config, &self.training, &self.grouping, &jobs, evaluations)
         } else {

@@ -73,7 +73,7 @@ pub(super) fn with_perturbed_lives(
             open.iter().map(|&(index, _)| all_of(jobs[index].body, training, grouping)).collect();
         let savings = Savings { early_stop: false, ..config.savings };
         for (&(index, task), life) in
-            open.iter().zip(evaluate(&lives, &stimuli, &physics, &protocol, savings))
+            open.iter().zip(evaluate(&lives, &stimuli, &training.raised, &physics, &protocol, savings))
         {
             let robot = &mut scored[index];
             robot.evaluation.simulated += life.simulated;

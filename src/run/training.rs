@@ -40,6 +40,8 @@ pub struct Training {
     pub images: Vec<ImageRef>,
     /// What the sensors see of each: H × W in [0, 1].
     pub stimuli: Vec<Grid<f64>>,
+    /// By how many rows the start is raised under each, in a fresh life.
+    pub raised: Vec<u32>,
     /// How they are shown.
     pub protocol: Protocol,
 }
@@ -159,7 +161,8 @@ impl Training {
         }
         let train_sha256 = dataset.fingerprint(Split::Train).unwrap_or_default();
         let dataset = DatasetRef { name: dataset.name().to_string(), train_sha256 };
-        Ok(Training { dataset, images, stimuli, protocol: config.protocol_in(period) })
+        let raised = raised(&images, config.raised_starts(period));
+        Ok(Training { dataset, images, stimuli, raised, protocol: config.protocol_in(period) })
     }
 
     /// The answers that displacements under the images are, in their order; those that are missing are still to come.
@@ -177,7 +180,32 @@ pub(super) fn answers(
     images.iter().zip(all).map(|(image, displacement)| Answer { class: image.label, displacement }).collect()
 }
 
+/// Rows from 0 up to `most` by turns, within each class for itself.
+fn raised(images: &[ImageRef], most: u32) -> Vec<u32> {
+    let mut turns = [0_u64; u8::MAX as usize + 1];
+    let row = |image: &ImageRef| {
+        let turn = &mut turns[usize::from(image.label)];
+        *turn += 1;
+        ((*turn - 1) % (u64::from(most) + 1)) as u32
+    };
+    images.iter().map(row).collect()
+}
+
 /// Images of one class after the other, as drawn, so that the classes take turns.
 fn by_turns(drawn: Vec<usize>, per_class: usize) -> Vec<usize> {
     (0..per_class).flat_map(|turn| drawn.iter().skip(turn).step_by(per_class).copied()).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn starts_are_raised_by_turns_within_each_class() {
+        let image = |label| ImageRef { index: 0, label };
+        let images = [0, 1, 0, 1, 0, 1, 0, 7].map(image);
+        assert_eq!(raised(&images, 2), [0, 0, 1, 1, 2, 2, 0, 0]);
+        assert_eq!(raised(&images, 0), [0; 8]);
+        assert_eq!(raised(&[image(0), image(0)], u32::MAX), [0, 1]);
+    }
 }

@@ -2,16 +2,22 @@
 
 use super::Error;
 use super::archive::Robot;
+use super::training::Training;
 use crate::base::random::{Purpose, stream};
 use crate::body::Body;
 use crate::genome::{BodySpec, Genome, GenomeError, MutationParams};
 use crate::qd::Variation;
+use crate::task::grouping::Grouping;
+use crate::task::surrogate::Surrogate;
+use std::cell::LazyCell;
 
 /// How genomes vary in this run.
 pub(super) struct Mutations<'a> {
     pub seed: u64,
     pub spec: BodySpec,
     pub params: &'a MutationParams,
+    /// What parents were trained on; where there is none, candidates all promise the same.
+    pub lessons: Option<(&'a Training, &'a Grouping)>,
 }
 
 /// A robot that has not lived yet.
@@ -35,6 +41,13 @@ impl Mutations<'_> {
     pub fn check(&self) -> Result<(), Error> {
         self.newcomer(0, 0).map(drop).map_err(|error| Error::input(format!("body: {error}")))
     }
+
+    fn surrogate<'b>(&'b self, parent: &'b Robot) -> Option<Surrogate<'b>> {
+        let (training, grouping) = self.lessons?;
+        let split = grouping.tasks().iter().find(|split| split.name() == parent.task)?;
+        let answers = training.answers(parent.displacements.iter().copied().map(Some));
+        Surrogate::of(&parent.body, &training.stimuli, &answers, split, grouping.fitness())
+    }
 }
 
 impl Variation<Robot> for Mutations<'_> {
@@ -47,7 +60,10 @@ impl Variation<Robot> for Mutations<'_> {
 
     fn offspring(&self, parent: &Robot, generation: u64, child: u64) -> Result<Robot, GenomeError> {
         let rng = &mut stream(self.seed, Purpose::Mutation, generation, child);
-        let made = parent.genome.offspring(self.spec, self.params, rng)?;
+        // Fitted when first asked: most runs never do.
+        let surrogate = LazyCell::new(|| self.surrogate(parent));
+        let promise = |body: &Body| surrogate.as_ref().map_or(0.0, |surrogate| surrogate.worth(body));
+        let made = parent.genome.promising_offspring(self.spec, self.params, rng, promise)?;
         Ok(newborn(made, generation, Some(parent)))
     }
 }

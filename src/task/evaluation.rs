@@ -8,6 +8,7 @@ use crate::sim::{Lattice, Physics, Unstable};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::cmp::Reverse;
+use std::collections::HashMap;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
@@ -72,7 +73,8 @@ pub struct Job<'a> {
     pub settled: Option<Box<MayWin<'a>>>,
 }
 
-/// Evaluates jobs, each on all images; results in the jobs' order, the same on any number of threads.
+/// Evaluates jobs, each on all images; results in the jobs' order, the same on any number of threads. In a fresh life under an
+/// image the start is `raised` by so many rows; those that are missing are 0.
 ///
 /// All lives of all jobs are one list of work: first every robot's first image, then every second one, and so on, large
 /// bodies first so that no core waits long at the end. A life whose robot has dropped out by then is passed over. One
@@ -80,12 +82,13 @@ pub struct Job<'a> {
 pub fn evaluate(
     jobs: &[Job],
     images: &[Grid<f64>],
+    raised: &[u32],
     physics: &Physics,
     protocol: &Protocol,
     savings: Savings,
 ) -> Vec<Evaluation> {
-    let candidates: Vec<Candidate> =
-        jobs.iter().map(|job| Candidate::new(job, images, physics, protocol, savings)).collect();
+    let candidate = |job| Candidate::new(job, images, raised, physics, protocol, savings);
+    let candidates: Vec<Candidate> = jobs.iter().map(candidate).collect();
     let mut work: Vec<(usize, &Candidate)> = candidates
         .iter()
         .flat_map(|candidate| (0..candidate.lives()).map(move |place| (place, candidate)))
@@ -117,10 +120,16 @@ impl Lived {
     }
 }
 
+/// Rows by which the start is raised under an image.
+fn rows(raised: &[u32], image: usize) -> u32 {
+    raised.get(image).copied().unwrap_or(0)
+}
+
 /// A job being done.
 struct Candidate<'a> {
     job: &'a Job<'a>,
     images: &'a [Grid<f64>],
+    raised: &'a [u32],
     physics: &'a Physics,
     protocol: &'a Protocol,
     early_stop: bool,
@@ -139,6 +148,7 @@ impl<'a> Candidate<'a> {
     fn new(
         job: &'a Job<'a>,
         images: &'a [Grid<f64>],
+        raised: &'a [u32],
         physics: &'a Physics,
         protocol: &'a Protocol,
         savings: Savings,
@@ -149,6 +159,15 @@ impl<'a> Candidate<'a> {
             true => same_to_sensors(job.body, &images.iter().collect::<Vec<_>>()),
             false => all.clone(),
         };
+        // Another start is another life.
+        let mut first = HashMap::new();
+        let starts = all.iter().map(|&image| rows(raised, image));
+        let same_as: Vec<usize> = same_as
+            .into_iter()
+            .zip(starts)
+            .zip(&all)
+            .map(|(life, &image)| *first.entry(life).or_insert(image))
+            .collect();
         let wished: &[usize] = if is_fresh { &job.order } else { &[] };
         let (mut order, mut places) = (Vec::new(), vec![None; images.len()]);
         for image in wished.iter().chain(&all).filter_map(|&image| same_as.get(image).copied()) {
@@ -162,6 +181,7 @@ impl<'a> Candidate<'a> {
         Candidate {
             job,
             images,
+            raised,
             physics,
             protocol,
             early_stop: savings.early_stop,
@@ -190,8 +210,10 @@ impl<'a> Candidate<'a> {
         let mut lived = Lived { displacements: Vec::new(), unstable: None };
         match self.protocol.life {
             Life::Fresh => {
-                let image = &self.images[self.order[place]];
-                lived.add(fresh_life(&self.lattice, self.physics, self.protocol, image));
+                let image = self.order[place];
+                let start_row = self.protocol.start_row.saturating_add(rows(self.raised, image));
+                let protocol = Protocol { start_row, ..self.protocol.clone() };
+                lived.add(fresh_life(&self.lattice, self.physics, &protocol, &self.images[image]));
             }
             Life::Sequential => {
                 let mut rollout = Rollout::new(&self.lattice, self.physics, self.protocol);

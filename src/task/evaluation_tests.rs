@@ -40,7 +40,7 @@ fn run_until(
     let protocol = Protocol { life, control_steps: 8, ..Protocol::default() };
     let body = body();
     let job = Job { body: &body, order: order.to_vec(), may_win, settled };
-    let mut evaluations = evaluate(&[job], &images(rows), &physics(), &protocol, savings);
+    let mut evaluations = evaluate(&[job], &images(rows), &[], &physics(), &protocol, savings);
     assert_eq!(evaluations.len(), 1);
     let evaluation = evaluations.remove(0);
     let Evaluation { simulated, shared, stopped, .. } = evaluation;
@@ -103,6 +103,31 @@ fn fresh_lives_follow_the_order_and_stop_when_nothing_can_be_won() {
     };
     let evaluation = run(&CALM, Life::Fresh, Savings::default(), &[3, 4], Box::new(may_win));
     assert_eq!(evaluation, Evaluation { outcome: Outcome::Stopped, simulated: 2, shared: 2, stopped: 1 });
+}
+
+#[test]
+fn a_raised_start_is_another_life_even_under_the_same_image() {
+    let protocol = Protocol { life: Life::Fresh, control_steps: 30, ..Protocol::default() };
+    let (body, physics, images) = (body(), physics(), images(&CALM));
+    let lattice = Lattice::new(&body, &physics);
+    let live = |image: usize, rows: u32| {
+        let raised = Protocol { start_row: protocol.start_row + rows, ..protocol.clone() };
+        fresh_life(&lattice, &physics, &raised, &images[image]).unwrap()
+    };
+    // Images 1 and 3, and 0 and 4, show the sensors the same; of the last pair, the start is, too.
+    let raised = [1, 0, 1, 2];
+    let expected = [live(0, 1), live(1, 0), live(2, 1), live(3, 2), live(4, 0)];
+    assert!(expected[1] != expected[3] && expected[0] != expected[4], "{expected:?}");
+    for savings in all_savings() {
+        let evaluated = |raised: &[u32]| {
+            let job = Job { body: &body, order: Vec::new(), may_win: Box::new(|_| true), settled: None };
+            evaluate(&[job], &images, raised, &physics, &protocol, savings).remove(0)
+        };
+        let evaluation = evaluated(&raised);
+        assert_eq!((evaluation.outcome, evaluation.simulated), (Outcome::Walked(expected.to_vec()), 5));
+        let lives = if savings.shared_lives { 4 } else { 5 };
+        assert_eq!(evaluated(&[1, 0, 1, 2, 1]).simulated, lives);
+    }
 }
 
 #[test]

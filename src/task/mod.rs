@@ -18,3 +18,4 @@ pub mod rollout;
 pub mod score;
 pub mod stimulus;
 mod strokes;
+pub mod surrogate;
