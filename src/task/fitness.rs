@@ -1,7 +1,6 @@
 //! [`Fitness`]: how good a robot's answers to several images are together.
 
 use super::grouping::Group;
-use super::score::Answer;
 use serde::{Deserialize, Serialize};
 
 /// Displacement at which an answer is as good as can be, for [`Fitness::MeanClipped`]; and half as good as can be, for
@@ -42,12 +41,6 @@ pub enum Fitness {
     /// The same up to the twentieth wrong answer: for robots that know so little that up to the fifth they are shown a dozen
     /// images, and told by luck.
     UntilTwentiethWrong,
-    /// How many images are answered right, as above, before the fifth wrong answer to images of one and the same class. A robot
-    /// that knows all classes but one is told as early as one that knows nothing: it is worth little, and no longer the top of a
-    /// hill from which all ways lead down.
-    UntilFifthWrongOfClass,
-    /// The same up to the twentieth wrong answer to images of a class.
-    UntilTwentiethWrongOfClass,
 }
 
 /// The two ways to assign sides to groups: group A is to walk right, or left.
@@ -57,24 +50,19 @@ impl Fitness {
     /// Wrong answers after which nothing counts; `None` where all images do.
     pub fn last_wrong(self) -> Option<u16> {
         match self {
-            Fitness::UntilFifthWrong | Fitness::UntilFifthWrongOfClass => Some(5),
-            Fitness::UntilTwentiethWrong | Fitness::UntilTwentiethWrongOfClass => Some(20),
+            Fitness::UntilFifthWrong => Some(5),
+            Fitness::UntilTwentiethWrong => Some(20),
             _ => None,
         }
     }
 
-    /// Whether the last wrong answer is that of a class, and not of all.
-    fn is_of_class(self) -> bool {
-        matches!(self, Fitness::UntilFifthWrongOfClass | Fitness::UntilTwentiethWrongOfClass)
-    }
-
-    /// Fitness under both assignments, of answers by group in the images' order; if some are still to come (`None`), upper
-    /// bounds of it. Infinite without any image; not a number if an answer is none.
+    /// Fitness under both assignments, of answers by group and displacement in the images' order; if some are still to
+    /// come (`None`), upper bounds of it. Infinite without any image; not a number if an answer is none.
     pub(super) fn of_assignments(
         self,
-        answers: impl Iterator<Item = (Group, Answer)> + Clone,
+        answers: impl Iterator<Item = (Group, Option<f64>)> + Clone,
     ) -> Assignments {
-        let margins = margins(answers.clone());
+        let margins = margins(answers);
         if self == Fitness::Min {
             let nothing = (f64::INFINITY, f64::INFINITY);
             let known = margins.filter_map(|(_, m)| m);
@@ -86,8 +74,7 @@ impl Fitness {
             return (f64::INFINITY, f64::INFINITY);
         }
         if let Some(last) = self.last_wrong() {
-            let run = |sign| self.run(answers.clone(), weights, sign, last).0;
-            return (run(1.0), run(-1.0));
+            return (run(margins.clone(), weights, 1.0, last).0, run(margins, weights, -1.0, last).0);
         }
         let mut to_come = images;
         margins.clone().filter(|(_, m)| m.is_some()).for_each(|(group, _)| to_come[group] -= 1);
@@ -119,58 +106,21 @@ impl Fitness {
     }
 
     /// Whether answers that are still to come (`None`) cannot change the fitness under either assignment.
-    pub(super) fn is_settled(self, answers: impl Iterator<Item = (Group, Answer)> + Clone) -> bool {
-        let (_, weights) = weights(margins(answers.clone()));
+    pub(super) fn is_settled(self, answers: impl Iterator<Item = (Group, Option<f64>)> + Clone) -> bool {
+        let margins = margins(answers);
+        let (_, weights) = weights(margins.clone());
         self.last_wrong().is_some_and(|last| {
-            [1.0, -1.0].into_iter().all(|sign| self.run(answers.clone(), weights, sign, last).1)
+            run(margins.clone(), weights, 1.0, last).1 && run(margins, weights, -1.0, last).1
         })
-    }
-
-    /// Fitness up to the `last` wrong answer under one of the assignments, or an upper bound of it; and whether it is known
-    /// that that was given, and when.
-    fn run(
-        self,
-        answers: impl Iterator<Item = (Group, Answer)> + Clone,
-        weights: [f64; 2],
-        sign: f64,
-        last: u16,
-    ) -> (f64, bool) {
-        let (mut right, mut shown, mut sum) = (0.0, 0.0, 0.0);
-        let mut wrong = [0.0; u8::MAX as usize + 1];
-        let (mut is_known, mut is_over) = (true, false);
-        let classes = answers.clone().map(|(_, answer)| usize::from(answer.class));
-        for ((group, margin), class) in margins(answers).zip(classes) {
-            // What is to come is as good as can be.
-            let margin = margin.map(|m| sign * m);
-            is_known &= margin.is_some();
-            shown += weights[group];
-            sum += weights[group] * margin.map_or(1.0, grown);
-            if margin.is_none_or(|m| m > WRONG) {
-                right += weights[group];
-                continue;
-            }
-            // Images of one class all weigh the same: there they are just counted.
-            let (kind, counts) = if self.is_of_class() { (class, 1.0) } else { (0, weights[group]) };
-            wrong[kind] += counts;
-            is_over = wrong[kind] > f64::from(last) - SLACK;
-            if is_over {
-                break;
-            }
-        }
-        let slack = if is_known { 0.0 } else { SLACK };
-        (right + weights[0].min(weights[1]) * sum / shown + slack, is_known && is_over)
     }
 }
 
 /// By number of the group: displacements towards the right side if group A is to walk right; if it is to walk left, the
 /// negatives of those.
 fn margins(
-    answers: impl Iterator<Item = (Group, Answer)> + Clone,
+    answers: impl Iterator<Item = (Group, Option<f64>)> + Clone,
 ) -> impl Iterator<Item = (usize, Option<f64>)> + Clone {
-    answers.map(|(group, Answer { displacement, .. })| match group {
-        Group::A => (0, displacement),
-        Group::B => (1, displacement.map(|d| -d)),
-    })
+    answers.map(|(group, d)| if group == Group::A { (0, d) } else { (1, d.map(|d| -d)) })
 }
 
 /// How many images each group has, and what one of them weighs: exactly 1 where both have as many, or one has none.
@@ -180,6 +130,33 @@ fn weights(margins: impl Iterator<Item = (usize, Option<f64>)>) -> ([usize; 2], 
     let all = images[0] + images[1];
     let weight = |of_group: usize| if images.contains(&0) { 1.0 } else { all as f64 / (2 * of_group) as f64 };
     (images, images.map(weight))
+}
+
+/// Fitness up to the `last` wrong answer under one of the assignments, or an upper bound of it; and whether it is known that
+/// that was given, and when.
+fn run(
+    margins: impl Iterator<Item = (usize, Option<f64>)>,
+    weights: [f64; 2],
+    sign: f64,
+    last: u16,
+) -> (f64, bool) {
+    let (mut right, mut wrong, mut shown, mut sum) = (0.0, 0.0, 0.0, 0.0);
+    let (mut is_known, mut is_over) = (true, false);
+    for (group, margin) in margins {
+        // What is to come is as good as can be.
+        let margin = margin.map(|m| sign * m);
+        is_known &= margin.is_some();
+        shown += weights[group];
+        sum += weights[group] * margin.map_or(1.0, grown);
+        let counts = if margin.is_none_or(|m| m > WRONG) { &mut right } else { &mut wrong };
+        *counts += weights[group];
+        is_over = wrong > f64::from(last) - SLACK;
+        if is_over {
+            break;
+        }
+    }
+    let slack = if is_known { 0.0 } else { SLACK };
+    (right + weights[0].min(weights[1]) * sum / shown + slack, is_known && is_over)
 }
 
 /// A margin as a number between 0 and 1 that never stops growing: 1/2 for standing still.
@@ -199,5 +176,139 @@ pub(super) fn better((x, y): Assignments) -> f64 {
 }
 
 #[cfg(test)]
-#[path = "fitness_tests.rs"]
-mod tests;
+mod tests {
+    use super::*;
+    use Group::{A, B};
+    use proptest::prelude::*;
+
+    const MANY: [Fitness; 5] = [
+        Fitness::MeanClipped,
+        Fitness::RightThenMargin,
+        Fitness::RightThenMin,
+        Fitness::UntilFifthWrong,
+        Fitness::UntilTwentiethWrong,
+    ];
+
+    fn fitness(kind: Fitness, answers: &[(Group, f64)]) -> f64 {
+        better(kind.of_assignments(answers.iter().map(|&(group, d)| (group, Some(d)))))
+    }
+
+    #[test]
+    fn long_walks_count_no_more_than_enough() {
+        let mean = |answers: &[(Group, f64)]| fitness(Fitness::MeanClipped, answers);
+        assert_eq!(mean(&[(A, -5.0), (B, 40.0)]), 0.75);
+        assert_eq!(mean(&[(A, 40.0), (A, -10.0), (B, 2.0), (B, -10.0)]), 0.2);
+        assert_eq!(mean(&[(A, 4.0), (B, 4.0)]), 0.0);
+    }
+
+    #[test]
+    fn groups_weigh_the_same_however_many_images_they_have() {
+        // One against three: always walking one way is worth nothing, and not three quarters.
+        let same_way = [(A, 20.0), (B, 20.0), (B, 20.0), (B, 20.0)];
+        assert!(fitness(Fitness::MeanClipped, &same_way).abs() < 1e-12);
+        let right = |answers: &[(Group, f64)]| fitness(Fitness::RightThenMargin, answers);
+        assert!((2.0..2.7).contains(&right(&same_way)), "{}", right(&same_way));
+        // All of A and two of three of B: 2 + 2 · 2/3 of 4.
+        let most = right(&[(A, 9.0), (B, -9.0), (B, -9.0), (B, 9.0)]);
+        assert!((2.0 + 4.0 / 3.0..4.0).contains(&most), "{most}");
+    }
+
+    #[test]
+    fn one_more_right_answer_beats_any_margin() {
+        for kind in [Fitness::RightThenMargin, Fitness::RightThenMin] {
+            let right = |answers: &[(Group, f64)]| fitness(kind, answers);
+            let (short, long) =
+                (right(&[(A, 3.1), (A, 3.1), (B, -3.1)]), right(&[(A, 90.0), (A, 3.0), (B, -90.0)]));
+            assert!((3.0..4.0).contains(&short) && (2.0..3.0).contains(&long), "{kind:?} {short} {long}");
+            let (short, long) = (right(&[(A, 3.1), (B, -3.1)]), right(&[(A, 3.0), (B, -1e9)]));
+            assert!((2.0..3.0).contains(&short) && (1.0..2.0).contains(&long), "{kind:?} {short} {long}");
+            // Nor does the tie-break ever saturate.
+            assert!(right(&[(A, 1e4), (B, -1e4)]) > right(&[(A, 1e3), (B, -1e3)]));
+            assert!(right(&[(A, f64::NAN), (B, -9.0)]).is_nan());
+        }
+        assert!(mean_of_nan().is_nan());
+    }
+
+    #[test]
+    fn of_equals_in_right_answers_the_one_with_the_better_worst_is_fitter() {
+        let right = |answers: &[(Group, f64)]| fitness(Fitness::RightThenMin, answers);
+        // A worst margin of 10 is worth 3/4 of an image, here of one of A's, 3/4; what the others are does not matter.
+        assert_eq!(right(&[(A, 90.0), (A, 10.0), (B, -30.0)]), 3.0 + 0.75 * 0.75);
+        assert!(right(&[(A, 5.0), (B, -5.0)]) > right(&[(A, 4.0), (B, -90.0)]));
+        assert!(right(&[(A, -1.0), (B, -5.0)]) > right(&[(A, -2.0), (B, -90.0)]));
+        // The worst image known says at once how good a robot can become.
+        let to_come = (0..40).flat_map(|_| [(A, None), (B, None)]);
+        let known = [(A, Some(10.0)), (B, Some(-30.0))].into_iter();
+        let bound = better(Fitness::RightThenMin.of_assignments(known.chain(to_come)));
+        assert!((82.75..82.75 + 1e-6).contains(&bound), "{bound}");
+    }
+
+    #[test]
+    fn the_fifth_wrong_answer_ends_it() {
+        let until = |answers: &[(Group, f64)]| fitness(Fitness::UntilFifthWrong, answers);
+        let (right, wrong) = ([(A, 9.0), (B, -9.0)], [(A, 3.0), (B, 1.0)]);
+        // Six right, four wrong, two right: eight, and less than one for how far it walked.
+        let alive = [right, right, right, wrong, wrong, right].concat();
+        assert!((8.0..9.0).contains(&until(&alive)), "{}", until(&alive));
+        // Then two wrong ones: with the first of them it is over, whatever comes.
+        let over = [&alive[..], &wrong].concat();
+        assert!((8.0..9.0).contains(&until(&over)));
+        assert_eq!(until(&over), until(&[&over[..], &right, &right].concat()));
+        // Two of three images are of group B, and weigh 3/4 each; one of A's, 3/2. Until seven of B are wrong, four of A.
+        let same_way: Vec<_> = (0..12).flat_map(|_| [(A, -9.0), (B, -9.0), (B, -9.0)]).collect();
+        assert!((6.0..6.75).contains(&until(&same_way)), "{}", until(&same_way));
+        assert!(until(&[(A, f64::NAN), (B, 1.0)]).is_nan());
+        // The other ends with the twentieth; walking one way is right on every second image until then.
+        let longer = |answers: &[(Group, f64)]| fitness(Fitness::UntilTwentiethWrong, answers);
+        let same_way = |images| vec![[(A, -9.0), (B, -9.0)]; images].concat();
+        assert!((20.0..21.0).contains(&longer(&same_way(20))));
+        assert_eq!(longer(&same_way(20)), longer(&same_way(30)));
+        assert!(longer(&same_way(19)) < longer(&same_way(20)));
+    }
+
+    #[test]
+    fn what_comes_after_the_fifth_wrong_answer_is_known_not_to_count() {
+        let settled =
+            |answers: &[(Group, Option<f64>)]| Fitness::UntilFifthWrong.is_settled(answers.iter().copied());
+        // Neither way right: both assignments are over after five.
+        let (stood, to_come) = ([(A, Some(0.0)), (B, Some(0.0))], [(A, None), (B, None)]);
+        assert!(settled(&[stood, stood, stood, to_come].concat()));
+        assert!(!settled(&[stood, stood, to_come, to_come].concat()));
+        // Something is missing before.
+        assert!(!settled(&[stood, to_come, stood, stood].concat()));
+        assert!(MANY[..3].iter().all(|kind| !kind.is_settled([stood, stood, stood].concat().into_iter())));
+    }
+
+    fn mean_of_nan() -> f64 {
+        fitness(Fitness::MeanClipped, &[(A, 1.0), (B, f64::NAN)])
+    }
+
+    proptest! {
+        #[test]
+        fn what_is_known_bounds_what_can_come(
+            answers in prop::collection::vec(
+                (any::<bool>(), prop_oneof![-30.0..30.0f64, Just(10.0), Just(-10.0)], any::<bool>()),
+                1..40,
+            )
+        ) {
+            let all = answers.iter().map(|&(a, d, _)| (if a { A } else { B }, Some(d)));
+            let known = answers.iter().map(|&(a, d, known)| (if a { A } else { B }, known.then_some(d)));
+            for kind in MANY {
+                let fitness = kind.of_assignments(all.clone());
+                let bound = kind.of_assignments(known.clone());
+                prop_assert!(bound.0 >= fitness.0 && bound.1 >= fitness.1, "{kind:?}");
+                if kind.is_settled(known.clone()) {
+                    prop_assert_eq!(bound, fitness);
+                }
+            }
+        }
+
+        #[test]
+        fn mirrored_answers_are_as_fit(answers in prop::collection::vec((any::<bool>(), -30.0..30.0f64), 1..20)) {
+            let of = |sign: f64| answers.iter().map(move |&(a, d)| (if a { A } else { B }, sign * d)).collect::<Vec<_>>();
+            for kind in MANY {
+                prop_assert_eq!(fitness(kind, &of(1.0)), fitness(kind, &of(-1.0)));
+            }
+        }
+    }
+}

@@ -30,13 +30,14 @@ pub struct Score {
 /// Fitness on two groups, in voxel lengths: of both assignments of directions to groups the better one's smallest
 /// margin. Infinite without answers, not a number if an answer is none; never −0.
 pub fn two_group_fitness(answers: &[(Group, f64)]) -> f64 {
-    // To the smallest margin classes are all the same.
-    let answer = |&(group, d)| (group, Answer { class: 0, displacement: Some(d) });
-    better(Fitness::Min.of_assignments(answers.iter().map(answer)))
+    better(Fitness::Min.of_assignments(answers.iter().map(|&(group, d)| (group, Some(d)))))
 }
 
-pub(super) fn of_split(split: &Split, answers: &[Answer]) -> impl Iterator<Item = (Group, Answer)> + Clone {
-    answers.iter().filter_map(|&answer| Some((split.group(answer.class)?, answer)))
+pub(super) fn of_split(
+    split: &Split,
+    answers: &[Answer],
+) -> impl Iterator<Item = (Group, Option<f64>)> + Clone {
+    answers.iter().filter_map(|answer| Some((split.group(answer.class)?, answer.displacement)))
 }
 
 impl Grouping {

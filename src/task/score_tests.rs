@@ -191,10 +191,9 @@ proptest! {
             Just(Fitness::RightThenMargin),
             Just(Fitness::RightThenMin),
             Just(Fitness::UntilFifthWrong),
-            Just(Fitness::UntilTwentiethWrong),
-            Just(Fitness::UntilFifthWrongOfClass)
+            Just(Fitness::UntilTwentiethWrong)
         ],
-        images in prop::collection::vec((0..5u8, displacement(), prop::bool::weighted(0.7)), 1..40),
+        images in prop::collection::vec((0..5u8, displacement(), prop::bool::weighted(0.7)), 1..24),
         one_each: bool,
         incumbents in prop::collection::vec(prop::option::of(displacement()), 32),
     ) {

@@ -68,12 +68,6 @@ pub(super) fn methods(dossier: &Dossier) -> String {
         Fitness::UntilTwentiethWrong => {
             "the number of images answered right before the twentieth wrong answer, both groups weighing the same, ties broken by how far it walked"
         }
-        Fitness::UntilFifthWrongOfClass => {
-            "the number of images answered right before the fifth wrong answer to images of one class, both groups weighing the same, ties broken by how far it walked"
-        }
-        Fitness::UntilTwentiethWrongOfClass => {
-            "the number of images answered right before the twentieth wrong answer to images of one class, both groups weighing the same, ties broken by how far it walked"
-        }
     };
     let stages = match config.stage.len() {
         0 => String::new(),
