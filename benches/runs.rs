@@ -87,7 +87,7 @@ fn evaluations(criterion: &mut Criterion) {
         for threads in [1, 2] {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads start");
             group.bench_function(format!("{name}, {threads} threads"), |bencher| {
-                let run = || evaluate(&jobs, &images, &config.physics, &config.protocol, savings);
+                let run = || evaluate(&jobs, &images, &[], &config.physics, &config.protocol, savings);
                 bencher.iter(|| pool.install(run));
             });
         }

@@ -127,7 +127,7 @@ impl Linear {
     /// some images from the others.
     fn of(shown: &[(Vec<f64>, f64)], sensors: &[((usize, usize), f64)]) -> Option<Self> {
         let count = sensors.len();
-        let (mean, means) = Moments::means(shown, count)?;
+        let (mean, means) = means(shown, count)?;
         if count == 0 {
             return Some(Linear { reach: REACHES[0], weights: DMatrix::zeros(0, 1), mean, means });
         }
@@ -160,6 +160,17 @@ impl Linear {
     }
 }
 
+/// The mean displacement, and that of what each sensor saw; `None` of no images.
+fn means(shown: &[(Vec<f64>, f64)], count: usize) -> Option<(f64, Vec<f64>)> {
+    let (mut sum, mut sums) = (0.0, vec![0.0; count]);
+    for (seen, displacement) in shown {
+        sum += displacement;
+        sums.iter_mut().zip(seen).for_each(|(sum, x)| *sum += x);
+    }
+    let number = shown.len() as f64;
+    (number > 0.0).then(|| (sum / number, sums.into_iter().map(|sum| sum / number).collect()))
+}
+
 /// Sums over images, of products of what sensors saw with each other, and with the displacement.
 #[derive(Clone)]
 struct Moments {
@@ -169,12 +180,6 @@ struct Moments {
 }
 
 impl Moments {
-    fn means(shown: &[(Vec<f64>, f64)], count: usize) -> Option<(f64, Vec<f64>)> {
-        let number = shown.len() as f64;
-        let mean = |of: &dyn Fn(&(Vec<f64>, f64)) -> f64| shown.iter().map(of).sum::<f64>() / number;
-        (!shown.is_empty()).then(|| (mean(&|s| s.1), (0..count).map(|i| mean(&|s| s.0[i])).collect()))
-    }
-
     fn of<'b>(images: impl Iterator<Item = &'b (DVector<f64>, f64)>, count: usize) -> Self {
         let (mut matrix, mut vector) = (DMatrix::zeros(count, count), DMatrix::zeros(count, 1));
         for (seen, displacement) in images {
