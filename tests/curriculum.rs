@@ -20,8 +20,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 /// Three stages in twelve generations: the second with shorter lives; the last with three draws of images, the hardest of
-/// three times as many, with the four fittest elites at the beginning of each, half of the offspring changed in one voxel, of several that
-/// were thought of, and every second start raised.
+/// three times as many, with the four fittest elites at the beginning of each, half of the offspring changed in up to four voxels, each
+/// chosen among several, and every second start raised.
 fn staged() -> String {
     let stages = "\n[[stage]]\ngenerations = 4\n\
         [[stage]]\ngenerations = 3\nimages_per_class = 2\nfitness = \"mean_clipped\"\n\

@@ -98,6 +98,13 @@ impl<T> Grid<T> {
     }
 }
 
+impl<T: Copy + Default> Grid<T> {
+    /// The cell at (row, column); outside the grid the default, as dark as a pixel can be.
+    pub fn or_default(&self, (row, column): (usize, usize)) -> T {
+        self.get(row as isize, column as isize).copied().unwrap_or_default()
+    }
+}
+
 impl<T: Clone> Grid<T> {
     /// A grid with the same value in every cell.
     pub fn filled(height: usize, width: usize, value: T) -> Self {

@@ -171,9 +171,9 @@ mod tests {
     use super::*;
     use crate::base::random::{Purpose, stream};
 
-    const PAPER: BodySpec = BodySpec { height: 14, width: 14, min_muscles: 3 };
+    pub(super) const PAPER: BodySpec = BodySpec { height: 14, width: 14, min_muscles: 3 };
 
-    fn rng(seed: u64) -> Stream {
+    pub(super) fn rng(seed: u64) -> Stream {
         stream(seed, Purpose::Newcomer, 0, 0)
     }
 

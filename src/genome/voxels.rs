@@ -1,6 +1,6 @@
 //! Mutations of single voxels, whatever the network describes.
 
-use super::{BodySpec, Genome, GenomeError, MAX_MUTATIONS, MutationParams};
+use super::{BodySpec, Edits, Genome, GenomeError, MAX_MUTATIONS, MutationParams};
 use crate::base::random::Stream;
 use crate::body::{Body, Material};
 
@@ -14,21 +14,20 @@ impl Genome {
         rng: &mut Stream,
         promise: impl Fn(&Body) -> f64,
     ) -> Result<(Genome, Body), GenomeError> {
-        if params.voxel_candidates == 1 && params.voxel_changes == 1 {
-            return self.with_one_voxel_changed(spec, rng);
-        }
+        let described = self.cppn.express(spec.height, spec.width)?;
         let is_choice = params.voxel_candidates > 1;
         let promise = |body: &Body| if is_choice { promise(body) } else { 0.0 };
-        let candidates = 1 + rng.below(usize::from(params.voxel_candidates));
+        // Nothing is drawn where there is nothing to choose.
+        let more = if is_choice { rng.below(usize::from(params.voxel_candidates)) } else { 0 };
         let mut changes = 1;
         while changes < params.voxel_changes && rng.unit() < 0.5 {
             changes = changes.saturating_mul(2).min(params.voxel_changes);
         }
-        let chosen = |genome: &Genome, rng: &mut Stream| -> Result<_, GenomeError> {
-            let mut best = genome.with_one_voxel_changed(spec, rng)?;
+        let chosen = |edits: &Edits, rng: &mut Stream| -> Result<_, GenomeError> {
+            let mut best = one_voxel_changed(edits, &described, spec, rng)?;
             let mut most = promise(&best.1);
-            for _ in 1..candidates {
-                let candidate = genome.with_one_voxel_changed(spec, rng)?;
+            for _ in 0..more {
+                let candidate = one_voxel_changed(edits, &described, spec, rng)?;
                 let promised = promise(&candidate.1);
                 if promised > most {
                     (best, most) = (candidate, promised);
@@ -36,52 +35,46 @@ impl Genome {
             }
             Ok((best, most))
         };
-        let (mut offspring, mut most) = chosen(self, rng)?;
+        let ((mut edits, mut body), mut most) = chosen(&self.edits, rng)?;
         for _ in 1..changes {
-            let (next, promised) = chosen(&offspring.0, rng)?;
+            let (next, promised) = chosen(&edits, rng)?;
             if is_choice && promised <= most {
                 break;
             }
-            (offspring, most) = (next, promised);
+            ((edits, body), most) = (next, promised);
         }
-        Ok(offspring)
+        Ok((Genome { cppn: self.cppn.clone(), edits }, body))
     }
+}
 
-    /// A copy of which one voxel is of another material, drawn anew from the same parent until its body is valid.
-    fn with_one_voxel_changed(
-        &self,
-        spec: BodySpec,
-        rng: &mut Stream,
-    ) -> Result<(Genome, Body), GenomeError> {
-        let BodySpec { height, width, min_muscles } = spec;
-        let described = self.cppn.express(height, width)?;
-        let now = self.edits.apply(&described);
-        for _ in 0..MAX_MUTATIONS {
-            let place = (rng.below(height), rng.below(width));
-            // One of the six others.
-            let step = 1 + rng.below(Material::ALL.len() - 1);
-            let material = Material::ALL[(usize::from(now[place].code()) + step) % Material::ALL.len()];
-            let mut genome = self.clone();
-            genome.edits.set(place, material, described.voxels()[place]);
-            let body = Body::new(genome.edits.apply(&described))?;
-            if body.is_valid(min_muscles) {
-                return Ok((genome, body));
-            }
+/// Edits of what a network describes, with one more voxel of another material, drawn anew until their body is valid; with that.
+fn one_voxel_changed(
+    edits: &Edits,
+    described: &Body,
+    spec: BodySpec,
+    rng: &mut Stream,
+) -> Result<(Edits, Body), GenomeError> {
+    let BodySpec { height, width, min_muscles } = spec;
+    let now = edits.apply(described);
+    for _ in 0..MAX_MUTATIONS {
+        let place = (rng.below(height), rng.below(width));
+        // One of the six others.
+        let step = 1 + rng.below(Material::ALL.len() - 1);
+        let material = Material::ALL[(usize::from(now[place].code()) + step) % Material::ALL.len()];
+        let mut edits = edits.clone();
+        edits.set(place, material, described.voxels()[place]);
+        let body = Body::new(edits.apply(described))?;
+        if body.is_valid(min_muscles) {
+            return Ok((edits, body));
         }
-        Err(GenomeError::NoValidBody { mutations: MAX_MUTATIONS, height, width, min_muscles })
     }
+    Err(GenomeError::NoValidBody { mutations: MAX_MUTATIONS, height, width, min_muscles })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::base::random::{Purpose, stream};
-
-    const PAPER: BodySpec = BodySpec { height: 14, width: 14, min_muscles: 3 };
-
-    fn rng(seed: u64) -> Stream {
-        stream(seed, Purpose::Newcomer, 0, 0)
-    }
+    use crate::genome::tests::{PAPER, rng};
 
     #[test]
     fn a_voxel_mutation_changes_one_voxel_and_nothing_else() {
@@ -149,7 +142,9 @@ mod tests {
             let same = parent.offspring(PAPER, &many, &mut rng(seed)).unwrap();
             let rng = &mut rng(seed);
             let _ = (rng.unit(), rng.below(40));
-            assert_eq!(same, parent.with_one_voxel_changed(PAPER, rng).unwrap());
+            let described = parent.cppn.express(14, 14).unwrap();
+            let (edits, body) = one_voxel_changed(&parent.edits, &described, PAPER, rng).unwrap();
+            assert_eq!(same, (Genome { cppn: parent.cppn.clone(), edits }, body));
         }
     }
 

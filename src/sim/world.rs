@@ -103,7 +103,7 @@ impl<'a> World<'a> {
     pub fn set_stimulus(&mut self, stimulus: &Grid<f64>) {
         for (voxel, pixel) in self.lattice.active.iter().zip(&mut self.pixels) {
             let (row, column) = voxel.place;
-            *pixel = stimulus.get(row as isize, column as isize).copied().unwrap_or(0.0);
+            *pixel = stimulus.or_default((row, column));
         }
     }
 

@@ -39,8 +39,7 @@ pub fn best_pixel(split: &Split, images: &[Labelled]) -> Option<PixelRule> {
     let mut best: Option<(usize, PixelRule)> = None;
     for row in 0..first.height() {
         for column in 0..first.width() {
-            let value =
-                |image: &Labelled| image.stimulus.get(row as isize, column as isize).copied().unwrap_or(0.0);
+            let value = |image: &Labelled| image.stimulus.or_default((row, column));
             let mut sorted: Vec<(f64, bool)> =
                 images.iter().map(|i| (value(i), split.group(i.class) == Some(Group::A))).collect();
             sorted.sort_by(|x, y| x.0.total_cmp(&y.0));
@@ -70,7 +69,7 @@ impl PixelRule {
     /// Share of images it answers right.
     pub fn accuracy(&self, split: &Split, images: &[Labelled]) -> f64 {
         let answer = |image: &Labelled| {
-            let value = image.stimulus.get(self.row as isize, self.column as isize).copied().unwrap_or(0.0);
+            let value = image.stimulus.or_default((self.row, self.column));
             if (value > self.level) == (self.above == Group::A) { Group::A } else { Group::B }
         };
         share(images, |image| split.group(image.class) == Some(answer(image)))

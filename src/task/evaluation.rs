@@ -120,6 +120,21 @@ impl Lived {
     }
 }
 
+/// What is known of a robot's lives.
+#[derive(Default)]
+struct Lives {
+    /// In the order in which they count, until they are counted.
+    lived: Vec<Option<Lived>>,
+    /// How many are.
+    counted: usize,
+    /// Of those, in the order of showing.
+    displacements: Vec<Option<f64>>,
+    /// How the first of those became unstable that did.
+    unstable: Option<Unstable>,
+    /// How the evaluation ends, as soon as that is known.
+    verdict: Option<Evaluation>,
+}
+
 /// Rows by which the start is raised under an image.
 fn rows(raised: &[u32], image: usize) -> u32 {
     raised.get(image).copied().unwrap_or(0)
@@ -138,8 +153,7 @@ struct Candidate<'a> {
     order: Vec<usize>,
     /// For each image its place in that order, or that of the image whose life it shares.
     places: Vec<usize>,
-    /// In the order in which they count.
-    lives: Mutex<Vec<Option<Lived>>>,
+    lives: Mutex<Lives>,
     /// Whether it is known how it ends.
     is_over: AtomicBool,
 }
@@ -156,18 +170,15 @@ impl<'a> Candidate<'a> {
         let all: Vec<usize> = (0..images.len()).collect();
         let is_fresh = protocol.life == Life::Fresh;
         let same_as = match is_fresh && savings.shared_lives {
-            true => same_to_sensors(job.body, &images.iter().collect::<Vec<_>>()),
+            true => {
+                // Another start is another life.
+                let mut first = HashMap::new();
+                let same = same_to_sensors(job.body, &images.iter().collect::<Vec<_>>());
+                let lives = same.into_iter().zip(all.iter().map(|&image| rows(raised, image)));
+                lives.zip(&all).map(|(life, &image)| *first.entry(life).or_insert(image)).collect()
+            }
             false => all.clone(),
         };
-        // Another start is another life.
-        let mut first = HashMap::new();
-        let starts = all.iter().map(|&image| rows(raised, image));
-        let same_as: Vec<usize> = same_as
-            .into_iter()
-            .zip(starts)
-            .zip(&all)
-            .map(|(life, &image)| *first.entry(life).or_insert(image))
-            .collect();
         let wished: &[usize] = if is_fresh { &job.order } else { &[] };
         let (mut order, mut places) = (Vec::new(), vec![None; images.len()]);
         for image in wished.iter().chain(&all).filter_map(|&image| same_as.get(image).copied()) {
@@ -188,16 +199,16 @@ impl<'a> Candidate<'a> {
             lattice: Lattice::new(job.body, physics),
             order,
             places,
-            lives: Mutex::new((0..lives).map(|_| None).collect()),
+            lives: Mutex::new(Lives { lived: (0..lives).map(|_| None).collect(), ..Lives::default() }),
             is_over: AtomicBool::new(false),
         }
     }
 
     fn lives(&self) -> usize {
-        self.locked().len()
+        self.locked().lived.len()
     }
 
-    fn locked(&self) -> MutexGuard<'_, Vec<Option<Lived>>> {
+    fn locked(&self) -> MutexGuard<'_, Lives> {
         // A thread that panicked leaves whole entries.
         self.lives.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -228,8 +239,9 @@ impl<'a> Candidate<'a> {
             }
         }
         let mut lives = self.locked();
-        lives[place] = Some(lived);
-        if self.verdict(&lives).is_some() {
+        lives.lived[place] = Some(lived);
+        self.count(&mut lives);
+        if lives.verdict.is_some() {
             self.is_over.store(true, Ordering::Relaxed);
         }
     }
@@ -251,31 +263,40 @@ impl<'a> Candidate<'a> {
         self.places.iter().map(|place| *displacements.get(*place)?).collect()
     }
 
-    /// How the evaluation ends, as soon as that is known. Lives count in their order, whichever was done first.
-    fn verdict(&self, lives: &[Option<Lived>]) -> Option<Evaluation> {
-        let mut displacements = Vec::new();
-        let mut unstable = None;
+    /// Counts the lives that are known, in their order, whichever was done first: every one once, since each takes a look at
+    /// all images.
+    fn count(&self, lives: &mut Lives) {
         // (Not of all images: there may be such that are not known between them.)
         let first = |known: Vec<Option<f64>>| Outcome::Walked(known.into_iter().map_while(|d| d).collect());
-        for life in lives {
-            let life = life.as_ref()?;
-            for displacement in &life.displacements {
-                displacements.push(*displacement);
-                if displacement.is_some() && self.is_settled(&displacements) {
-                    return Some(self.ended(first(self.known(&displacements)), displacements.len()));
-                }
-                if displacement.is_some() && self.drops_out(&displacements) {
-                    return Some(self.ended(Outcome::Stopped, displacements.len()));
-                }
-            }
-            unstable = unstable.or(life.unstable);
+        let is_over = |lives: &Lives| {
             // If images before that one settle the fitness, it does not count.
-            if self.early_stop && unstable.is_some() && self.job.settled.is_none() {
-                break;
-            }
+            let is_lost = self.early_stop && lives.unstable.is_some() && self.job.settled.is_none();
+            is_lost || lives.counted == lives.lived.len()
+        };
+        if lives.verdict.is_some() {
+            return;
         }
-        let outcome = unstable.map_or_else(|| first(self.known(&displacements)), Outcome::Unstable);
-        Some(self.ended(outcome, displacements.len()))
+        while !is_over(lives) {
+            let Some(life) = lives.lived[lives.counted].take() else { return };
+            lives.counted += 1;
+            for displacement in life.displacements {
+                lives.displacements.push(displacement);
+                let shown = &lives.displacements;
+                let outcome = if displacement.is_some() && self.is_settled(shown) {
+                    first(self.known(shown))
+                } else if displacement.is_some() && self.drops_out(shown) {
+                    Outcome::Stopped
+                } else {
+                    continue;
+                };
+                lives.verdict = Some(self.ended(outcome, shown.len()));
+                return;
+            }
+            lives.unstable = lives.unstable.or(life.unstable);
+        }
+        let shown = &lives.displacements;
+        let outcome = lives.unstable.map_or_else(|| first(self.known(shown)), Outcome::Unstable);
+        lives.verdict = Some(self.ended(outcome, shown.len()));
     }
 
     fn ended(&self, outcome: Outcome, simulated: usize) -> Evaluation {
@@ -286,8 +307,9 @@ impl<'a> Candidate<'a> {
 
     fn evaluation(&self) -> Evaluation {
         // All lives are done that the verdict needs; without images there is nothing to walk for.
-        let verdict = self.verdict(&self.locked());
-        verdict.unwrap_or_else(|| self.ended(Outcome::Walked(Vec::new()), 0))
+        let mut lives = self.locked();
+        self.count(&mut lives);
+        lives.verdict.take().unwrap_or_else(|| self.ended(Outcome::Walked(Vec::new()), 0))
     }
 }
 

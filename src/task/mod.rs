@@ -9,6 +9,7 @@ pub mod files;
 pub mod fitness;
 pub mod grouping;
 pub mod idx;
+mod influences;
 pub mod info;
 mod pen;
 pub mod perturbation;

@@ -126,8 +126,7 @@ pub fn same_to_sensors(body: &Body, stimuli: &[&Grid<f64>]) -> Vec<usize> {
     let sensors = || body.voxels().iter().filter(|(_, m)| m.is_sensor()).map(|(place, _)| place);
     let mut first = std::collections::HashMap::new();
     let seen = |stimulus: &Grid<f64>| {
-        let pixel = |(r, c)| stimulus.get(r as isize, c as isize).copied().unwrap_or(0.0).to_bits();
-        sensors().map(pixel).collect::<Vec<u64>>()
+        sensors().map(|place| stimulus.or_default(place).to_bits()).collect::<Vec<u64>>()
     };
     stimuli.iter().enumerate().map(|(i, stimulus)| *first.entry(seen(stimulus)).or_insert(i)).collect()
 }

@@ -2,36 +2,36 @@
 //! them has lived (pre-selection by a surrogate, as surveyed by Jin 2011).
 //!
 //! Bodies that recognise images turn out to be nearly linear: of the variance of displacements over hundreds of images, a model
-//! with one number per sensor explains 85 to 93 % (robots of `zero_one_curriculum.toml`, on images it was not fitted to).
+//! with one number per sensor explains 85 to 93 % (five robots trained on hundreds of zeros and ones; images it was not fitted to).
 
 use super::direction::Assignment;
 use super::fitness::{Fitness, WRONG};
 use super::grouping::{Group, Split};
+use super::influences::{Influences, alike};
 use super::score::Answer;
 use crate::base::Grid;
 use crate::body::{Body, Material};
-use nalgebra::{DMatrix, DVector};
-
-/// Distances over which a robot's influences may be alike \[voxels\]: the one is taken that foretells best.
-const REACHES: [f64; 2] = [1.5, 3.0];
-
-/// What influences may be charged for, in images that are missed by as much: the one is taken that foretells best.
-const CHARGES: [f64; 4] = [1.0, 8.0, 64.0, 512.0];
-
-/// Every so manieth image is foretold from the others. (Classes often take turns, and are two or four: no fold is to be of one.)
-const FOLDS: usize = 5;
 
 /// A linear model of a robot's displacements.
 #[derive(Clone, Debug)]
 pub struct Surrogate<'a> {
     body: &'a Body,
-    stimuli: &'a [Grid<f64>],
     /// By how much a pixel of 1 moves the robot to the right, by place, where there is a sensor that expands; minus that, one that
     /// shrinks.
     influence: Grid<f64>,
-    /// For each image that counts: its number, 1 if the robot is to walk right and −1 if left, its displacement (as it was, or else as
-    /// the model has it), and what it weighs.
-    images: Vec<(usize, f64, f64, f64)>,
+    /// The images that count.
+    images: Vec<Counted<'a>>,
+}
+
+/// An image of one of the groups, and how it was answered, or else how the model says it would be.
+#[derive(Clone, Debug)]
+struct Counted<'a> {
+    stimulus: &'a Grid<f64>,
+    /// 1 if the robot is to walk right, −1 if left.
+    right: f64,
+    displacement: f64,
+    /// What it weighs: both groups weigh 1.
+    weight: f64,
 }
 
 /// Which way a voxel's width goes with its pixel.
@@ -56,12 +56,12 @@ impl<'a> Surrogate<'a> {
         let sensors: Vec<((usize, usize), f64)> =
             voxels.iter().map(|(place, m)| (place, sense(*m))).filter(|(_, sense)| *sense != 0.0).collect();
         let seen = |stimulus: &Grid<f64>| -> Vec<f64> {
-            sensors.iter().map(|&(place, sense)| sense * pixel(stimulus, place)).collect()
+            sensors.iter().map(|&(place, sense)| sense * stimulus.or_default(place)).collect()
         };
         let shown: Vec<(Vec<f64>, f64)> = (stimuli.iter().zip(answers))
             .filter_map(|(stimulus, answer)| Some((seen(stimulus), answer.displacement?)))
             .collect();
-        let Linear { reach, weights, mean, means } = Linear::of(&shown, &sensors)?;
+        let Influences { reach, weights, mean, means } = Influences::of(&shown, &sensors)?;
         let influence = Grid::from_fn(voxels.height(), voxels.width(), |row, column| {
             let of = |(&(place, _), weight): (&((usize, usize), f64), &f64)| {
                 weight * alike((row, column), place, reach)
@@ -74,22 +74,21 @@ impl<'a> Surrogate<'a> {
         let groups = || answers.iter().map(|answer| split.group(answer.class));
         let count = |group| groups().filter(|g| *g == Some(group)).count().max(1) as f64;
         let weights = [1.0 / count(Group::A), 1.0 / count(Group::B)];
-        let images = (stimuli.iter().zip(answers).zip(groups()).enumerate())
-            .filter_map(|(number, ((stimulus, answer), group))| {
+        let images = (stimuli.iter().zip(answers).zip(groups()))
+            .filter_map(|((stimulus, answer), group)| {
                 let group = group?;
                 let terms = |((x, m), w): ((f64, &f64), &f64)| (x - m) * w;
                 let model =
                     || mean + seen(stimulus).into_iter().zip(&means).zip(&of_sensors).map(terms).sum::<f64>();
-                let displacement = answer.displacement.unwrap_or_else(model);
-                Some((
-                    number,
-                    a_right.margin(group, 1.0),
-                    displacement,
-                    weights[usize::from(group == Group::B)],
-                ))
+                Some(Counted {
+                    stimulus,
+                    right: a_right.margin(group, 1.0),
+                    displacement: answer.displacement.unwrap_or_else(model),
+                    weight: weights[usize::from(group == Group::B)],
+                })
             })
             .collect();
-        Some(Surrogate { body, stimuli, influence, images })
+        Some(Surrogate { body, influence, images })
     }
 
     /// How well a body would do that differs in a few voxels, if nothing else changed but what its sensors see: the mean of its
@@ -102,134 +101,13 @@ impl<'a> Surrogate<'a> {
                 (change != 0.0).then_some((place, change))
             })
             .collect();
-        let worth = |&(number, right, displacement, weight): &(usize, f64, f64, f64)| {
-            let stimulus = &self.stimuli[number];
-            let change: f64 = changes.iter().map(|&(place, each)| each * pixel(stimulus, place)).sum();
+        let worth = |&Counted { stimulus, right, displacement, weight }: &Counted| {
+            let change: f64 = changes.iter().map(|&(place, each)| each * stimulus.or_default(place)).sum();
             let excess = right * (displacement + change) - WRONG;
             weight * excess / (excess.abs() + WRONG)
         };
         self.images.iter().map(worth).sum::<f64>() / 2.0
     }
-}
-
-/// Displacements as a mean and, for each sensor, a part in proportion to what it sees beyond its own mean.
-struct Linear {
-    reach: f64,
-    /// Of the sensors' likeness to a place, what makes its influence.
-    weights: DMatrix<f64>,
-    mean: f64,
-    means: Vec<f64>,
-}
-
-impl Linear {
-    /// The influences that are most likely, given what a robot saw and did, if those of near places are alike (regression with a
-    /// Gaussian process; Rasmussen & Williams 2006, chapter 2): how near, and how large they may be, is found out by foretelling
-    /// some images from the others.
-    fn of(shown: &[(Vec<f64>, f64)], sensors: &[((usize, usize), f64)]) -> Option<Self> {
-        let count = sensors.len();
-        let (mean, means) = means(shown, count)?;
-        if count == 0 {
-            return Some(Linear { reach: REACHES[0], weights: DMatrix::zeros(0, 1), mean, means });
-        }
-        let centred: Vec<(DVector<f64>, f64)> = (shown.iter())
-            .map(|(seen, d)| (DVector::from_fn(count, |i, _| seen[i] - means[i]), d - mean))
-            .collect();
-        let folds: Vec<Moments> =
-            (0..FOLDS).map(|fold| Moments::of(centred.iter().skip(fold).step_by(FOLDS), count)).collect();
-        let all = folds.iter().fold(Moments::of([].iter(), count), |sum, fold| sum.plus(fold, 1.0));
-        let mut best = (f64::INFINITY, REACHES[0], CHARGES[0]);
-        for reach in REACHES {
-            let likeness = likeness(sensors, reach);
-            let mut errors = CHARGES.map(|charge| (0.0, reach, charge));
-            for (number, fold) in folds.iter().enumerate() {
-                let others = all.plus(fold, -1.0);
-                let system = product(&others.matrix, &likeness);
-                for (error, _, charge) in &mut errors {
-                    let weights = charged(&system, *charge, &others.vector)?;
-                    let influence = product(&likeness, &weights);
-                    let missed = |(seen, d): &(DVector<f64>, f64)| d - seen.dot(&influence.column(0));
-                    let squared = |image| missed(image) * missed(image);
-                    *error += centred.iter().skip(number).step_by(FOLDS).map(squared).sum::<f64>();
-                }
-            }
-            best = errors.into_iter().fold(best, |best, next| if next.0 < best.0 { next } else { best });
-        }
-        let (_, reach, charge) = best;
-        let weights = charged(&product(&all.matrix, &likeness(sensors, reach)), charge, &all.vector)?;
-        Some(Linear { reach, weights, mean, means })
-    }
-}
-
-/// The mean displacement, and that of what each sensor saw; `None` of no images.
-fn means(shown: &[(Vec<f64>, f64)], count: usize) -> Option<(f64, Vec<f64>)> {
-    let (mut sum, mut sums) = (0.0, vec![0.0; count]);
-    for (seen, displacement) in shown {
-        sum += displacement;
-        sums.iter_mut().zip(seen).for_each(|(sum, x)| *sum += x);
-    }
-    let number = shown.len() as f64;
-    (number > 0.0).then(|| (sum / number, sums.into_iter().map(|sum| sum / number).collect()))
-}
-
-/// Sums over images, of products of what sensors saw with each other, and with the displacement.
-#[derive(Clone)]
-struct Moments {
-    matrix: DMatrix<f64>,
-    /// One column.
-    vector: DMatrix<f64>,
-}
-
-impl Moments {
-    fn of<'b>(images: impl Iterator<Item = &'b (DVector<f64>, f64)>, count: usize) -> Self {
-        let (mut matrix, mut vector) = (DMatrix::zeros(count, count), DMatrix::zeros(count, 1));
-        for (seen, displacement) in images {
-            vector.column_mut(0).axpy(*displacement, seen, 1.0);
-            for (mut column, x) in matrix.column_iter_mut().zip(seen.iter()) {
-                column.axpy(*x, seen, 1.0);
-            }
-        }
-        Moments { matrix, vector }
-    }
-
-    fn plus(&self, other: &Moments, factor: f64) -> Self {
-        Moments {
-            matrix: &self.matrix + &other.matrix * factor,
-            vector: &self.vector + &other.vector * factor,
-        }
-    }
-}
-
-/// The u for which influences K u, with K the likeness, make the sum of squared errors and the charge for u' K u smallest: of
-/// (M K + charge) u = vector, with M K the system.
-fn charged(system: &DMatrix<f64>, charge: f64, vector: &DMatrix<f64>) -> Option<DMatrix<f64>> {
-    let mut matrix = system.clone();
-    (0..matrix.nrows()).for_each(|i| matrix[(i, i)] += charge);
-    matrix.lu().solve(vector)
-}
-
-/// A product of matrices in one order of sums on every machine, which nalgebra's own is not.
-fn product(left: &DMatrix<f64>, right: &DMatrix<f64>) -> DMatrix<f64> {
-    let mut result = DMatrix::zeros(left.nrows(), right.ncols());
-    for (mut column, factors) in result.column_iter_mut().zip(right.column_iter()) {
-        for (of_left, x) in left.column_iter().zip(factors.iter()) {
-            column.axpy(*x, &of_left, 1.0);
-        }
-    }
-    result
-}
-
-fn likeness(sensors: &[((usize, usize), f64)], reach: f64) -> DMatrix<f64> {
-    DMatrix::from_fn(sensors.len(), sensors.len(), |i, j| alike(sensors[i].0, sensors[j].0, reach))
-}
-
-/// How much alike the influences of two places are taken to be: 1 of the same, half that at the reach.
-fn alike((row, column): (usize, usize), (r, c): (usize, usize), reach: f64) -> f64 {
-    let squared = (row.abs_diff(r) * row.abs_diff(r) + column.abs_diff(c) * column.abs_diff(c)) as f64;
-    1.0 / (1.0 + squared / (reach * reach))
-}
-
-fn pixel(stimulus: &Grid<f64>, (row, column): (usize, usize)) -> f64 {
-    stimulus.get(row as isize, column as isize).copied().unwrap_or(0.0)
 }
 
 #[cfg(test)]
@@ -282,7 +160,7 @@ mod tests {
         assert!((influence((0, 0)) + 12.0).abs() < 0.4 && (influence((2, 4)) + 6.0).abs() < 0.4);
         let truth = answers(&stimuli, 400);
         assert_eq!(model.images.len(), 400);
-        for &(number, right, displacement, weight) in &model.images {
+        for (number, &Counted { right, displacement, weight, .. }) in model.images.iter().enumerate() {
             let walked = truth[number].displacement.unwrap();
             // What was shown is kept as it was.
             assert!((displacement - walked).abs() < if number < 200 { 1e-12 } else { 0.5 });
@@ -333,7 +211,7 @@ mod tests {
         assert_eq!(model.images.len(), 45);
         // Everything right, by far; of three classes with as many images each.
         assert!((model.worth(&body) - 1.0).abs() < 1e-6);
-        let sum = |way: f64| model.images.iter().filter(|i| i.1 == way).map(|i| i.3).sum::<f64>();
+        let sum = |way: f64| model.images.iter().filter(|i| i.right == way).map(|i| i.weight).sum::<f64>();
         assert!((sum(1.0) - 1.0).abs() < 1e-12 && (sum(-1.0) - 1.0).abs() < 1e-12);
     }
 

@@ -1,0 +1,130 @@
+//! How much each sensor of a robot moves it, by what it saw and did: the regression behind the [surrogate](super::surrogate).
+
+use nalgebra::{DMatrix, DVector};
+
+/// Distances over which a robot's influences may be alike \[voxels\]: the one is taken that foretells best.
+const REACHES: [f64; 2] = [1.5, 3.0];
+
+/// What influences may be charged for, in images that are missed by as much: the one is taken that foretells best.
+const CHARGES: [f64; 4] = [1.0, 8.0, 64.0, 512.0];
+
+/// Every so manieth image is foretold from the others. (Classes often take turns, and are two or four: no fold is to be of one.)
+const FOLDS: usize = 5;
+
+/// Displacements as a mean and, for each sensor, a part in proportion to what it sees beyond its own mean.
+pub struct Influences {
+    /// Over which they are taken to be alike \[voxels\].
+    pub reach: f64,
+    /// Of the sensors' likeness to a place, what makes its influence.
+    pub weights: Vec<f64>,
+    /// The mean displacement, and of each sensor that of what it saw.
+    pub mean: f64,
+    pub means: Vec<f64>,
+}
+
+impl Influences {
+    /// The influences that are most likely, given what a robot saw and did, if those of near places are alike (regression with a
+    /// Gaussian process; Rasmussen & Williams 2006, chapter 2): how near, and how large they may be, is found out by foretelling
+    /// some images from the others.
+    pub fn of(shown: &[(Vec<f64>, f64)], sensors: &[((usize, usize), f64)]) -> Option<Self> {
+        let count = sensors.len();
+        let (mean, means) = means(shown, count)?;
+        // nalgebra has no columns of nothing.
+        if count == 0 {
+            return Some(Influences { reach: REACHES[0], weights: Vec::new(), mean, means });
+        }
+        let centred: Vec<(DVector<f64>, f64)> = (shown.iter())
+            .map(|(seen, d)| (DVector::from_fn(count, |i, _| seen[i] - means[i]), d - mean))
+            .collect();
+        let folds: Vec<Moments> =
+            (0..FOLDS).map(|fold| Moments::of(centred.iter().skip(fold).step_by(FOLDS), count)).collect();
+        let all = folds.iter().fold(Moments::of([].iter(), count), |sum, fold| sum.plus(fold, 1.0));
+        let mut best = (f64::INFINITY, REACHES[0], CHARGES[0]);
+        for reach in REACHES {
+            let likeness = likeness(sensors, reach);
+            let mut errors = CHARGES.map(|charge| (0.0, reach, charge));
+            for (number, fold) in folds.iter().enumerate() {
+                let others = all.plus(fold, -1.0);
+                let system = product(&others.matrix, &likeness);
+                for (error, _, charge) in &mut errors {
+                    let weights = charged(&system, *charge, &others.vector)?;
+                    let influence = product(&likeness, &weights);
+                    let missed = |(seen, d): &(DVector<f64>, f64)| d - seen.dot(&influence.column(0));
+                    let squared = |image| missed(image) * missed(image);
+                    *error += centred.iter().skip(number).step_by(FOLDS).map(squared).sum::<f64>();
+                }
+            }
+            best = errors.into_iter().fold(best, |best, next| if next.0 < best.0 { next } else { best });
+        }
+        let (_, reach, charge) = best;
+        let weights = charged(&product(&all.matrix, &likeness(sensors, reach)), charge, &all.vector)?;
+        Some(Influences { reach, weights: weights.as_slice().to_vec(), mean, means })
+    }
+}
+
+/// The mean displacement, and that of what each sensor saw; `None` of no images.
+fn means(shown: &[(Vec<f64>, f64)], count: usize) -> Option<(f64, Vec<f64>)> {
+    let (mut sum, mut sums) = (0.0, vec![0.0; count]);
+    for (seen, displacement) in shown {
+        sum += displacement;
+        sums.iter_mut().zip(seen).for_each(|(sum, x)| *sum += x);
+    }
+    let number = shown.len() as f64;
+    (number > 0.0).then(|| (sum / number, sums.into_iter().map(|sum| sum / number).collect()))
+}
+
+/// Sums over images, of products of what sensors saw with each other, and with the displacement.
+struct Moments {
+    matrix: DMatrix<f64>,
+    /// One column.
+    vector: DMatrix<f64>,
+}
+
+impl Moments {
+    fn of<'b>(images: impl Iterator<Item = &'b (DVector<f64>, f64)>, count: usize) -> Self {
+        let (mut matrix, mut vector) = (DMatrix::zeros(count, count), DMatrix::zeros(count, 1));
+        for (seen, displacement) in images {
+            vector.column_mut(0).axpy(*displacement, seen, 1.0);
+            for (mut column, x) in matrix.column_iter_mut().zip(seen.iter()) {
+                column.axpy(*x, seen, 1.0);
+            }
+        }
+        Moments { matrix, vector }
+    }
+
+    fn plus(&self, other: &Moments, factor: f64) -> Self {
+        Moments {
+            matrix: &self.matrix + &other.matrix * factor,
+            vector: &self.vector + &other.vector * factor,
+        }
+    }
+}
+
+/// The u for which influences K u, with K the likeness, make the sum of squared errors and the charge for u' K u smallest: of
+/// (M K + charge) u = vector, with M K the system.
+fn charged(system: &DMatrix<f64>, charge: f64, vector: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    let mut matrix = system.clone();
+    (0..matrix.nrows()).for_each(|i| matrix[(i, i)] += charge);
+    matrix.lu().solve(vector)
+}
+
+/// A product of matrices in one order of sums on every machine, which nalgebra's own is not.
+fn product(left: &DMatrix<f64>, right: &DMatrix<f64>) -> DMatrix<f64> {
+    let mut result = DMatrix::zeros(left.nrows(), right.ncols());
+    for (mut column, factors) in result.column_iter_mut().zip(right.column_iter()) {
+        for (of_left, x) in left.column_iter().zip(factors.iter()) {
+            column.axpy(*x, &of_left, 1.0);
+        }
+    }
+    result
+}
+
+fn likeness(sensors: &[((usize, usize), f64)], reach: f64) -> DMatrix<f64> {
+    DMatrix::from_fn(sensors.len(), sensors.len(), |i, j| alike(sensors[i].0, sensors[j].0, reach))
+}
+
+/// How much alike the influences of two places are taken to be: 1 of the same, half that at the reach.
+pub fn alike((row, column): (usize, usize), (r, c): (usize, usize), reach: f64) -> f64 {
+    let squared = (row.abs_diff(r) * row.abs_diff(r) + column.abs_diff(c) * column.abs_diff(c)) as f64;
+    1.0 / (1.0 + squared / (reach * reach))
+}
