@@ -2,6 +2,7 @@ use super::*;
 use crate::body::Material;
 use crate::sim::UnstableReason;
 use std::collections::BTreeSet;
+use std::sync::Arc;
 
 /// A sensor that expands at both ends: under a bright image it is wider than `Physics::blow_up_extent` here allows.
 fn body() -> Body {
@@ -47,6 +48,10 @@ fn run_until(
     assert_eq!(simulated + shared + stopped, rows.len() as u64, "{evaluation:?}");
     assert!(savings.shared_lives || shared == 0, "{evaluation:?}");
     evaluation
+}
+
+fn rayon(threads: usize) -> rayon::ThreadPool {
+    rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap()
 }
 
 /// Orders to show images in: none, a first one, all, and some with images that are there twice or not at all.
@@ -103,6 +108,28 @@ fn fresh_lives_follow_the_order_and_stop_when_nothing_can_be_won() {
     };
     let evaluation = run(&CALM, Life::Fresh, Savings::default(), &[3, 4], Box::new(may_win));
     assert_eq!(evaluation, Evaluation { outcome: Outcome::Stopped, simulated: 2, shared: 2, stopped: 1 });
+}
+
+#[test]
+fn every_life_is_looked_at_once() {
+    let rows: Vec<[f64; 3]> = (0..60).map(|i| [0.4 / 60.0 * f64::from(i), 0.0, 0.3]).collect();
+    let looks = || {
+        let looks = Arc::new(AtomicUsize::new(0));
+        let look = Arc::clone(&looks);
+        let asked = move |may: bool| {
+            look.fetch_add(1, Ordering::Relaxed);
+            may
+        };
+        (looks, asked)
+    };
+    let ((winning, may_win), (settling, settled)) = (looks(), looks());
+    let may_win: Box<MayWin> = Box::new(move |_| may_win(true));
+    let settled: Box<MayWin> = Box::new(move |_| settled(false));
+    let savings = Savings::default();
+    let evaluation = rayon(2).install(|| run_until(&rows, Life::Fresh, savings, &[], may_win, Some(settled)));
+    assert_eq!(evaluation.simulated, 60);
+    // After the last one there is no rest to be dropped.
+    assert_eq!([winning, settling].map(|looks| looks.load(Ordering::Relaxed)), [59, 60]);
 }
 
 #[test]

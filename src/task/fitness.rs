@@ -3,7 +3,7 @@
 use super::grouping::Group;
 use serde::{Deserialize, Serialize};
 
-/// Displacement at which an answer is as good as can be, for [`Fitness::MeanClipped`]; and half as good as can be, for
+/// Displacement at which an answer is as good as can be, for [`Fitness::MeanClipped`] and [`Fitness::MeanHinge`]; and half as good as can be, for
 /// the tie-breaks of [`Fitness::RightThenMargin`] and [`Fitness::RightThenMin`] \[voxel lengths\].
 const ENOUGH: f64 = 10.0;
 
@@ -28,6 +28,10 @@ pub enum Fitness {
     Min,
     /// The mean of the margins, each divided by ten voxel lengths and clipped to −1 … 1.
     MeanClipped,
+    /// The mean of the margins, each divided by ten voxel lengths, but never more than 1 (hinge loss; Cortes & Vapnik 1995):
+    /// the farther an answer leads astray, the more it costs, so that a robot which knows three classes and walks the wrong way
+    /// for all of the fourth is drawn away from there.
+    MeanHinge,
     /// How many images are answered right, by more than three voxel lengths; and, between 0 and the worth of an image, the
     /// mean of (1 + m/(|m| + 10))/2 over the margins m, which tells equals apart and never saturates.
     RightThenMargin,
@@ -84,8 +88,11 @@ impl Fitness {
         for (group, margin) in margins.filter_map(|(group, m)| Some((group, m?))) {
             for (way, m) in [margin, -margin].into_iter().enumerate() {
                 counts[way][group] += usize::from(m > WRONG);
-                let worth =
-                    if self == Fitness::MeanClipped { (m / ENOUGH).clamp(-1.0, 1.0) } else { grown(m) };
+                let worth = match self {
+                    Fitness::MeanClipped => (m / ENOUGH).clamp(-1.0, 1.0),
+                    Fitness::MeanHinge => hinged(m),
+                    _ => grown(m),
+                };
                 sums[way] += weights[group] * worth;
                 least[way] = smaller(least[way], worth);
             }
@@ -159,6 +166,11 @@ fn run(
     (right + weights[0].min(weights[1]) * sum / shown + slack, is_known && is_over)
 }
 
+/// A margin in tens of voxel lengths, but at most 1.
+pub(super) fn hinged(margin: f64) -> f64 {
+    smaller(1.0, margin / ENOUGH)
+}
+
 /// A margin as a number between 0 and 1 that never stops growing: 1/2 for standing still.
 fn grown(margin: f64) -> f64 {
     (1.0 + margin / (margin.abs() + ENOUGH)) / 2.0
@@ -181,8 +193,9 @@ mod tests {
     use Group::{A, B};
     use proptest::prelude::*;
 
-    const MANY: [Fitness; 5] = [
+    const MANY: [Fitness; 6] = [
         Fitness::MeanClipped,
+        Fitness::MeanHinge,
         Fitness::RightThenMargin,
         Fitness::RightThenMin,
         Fitness::UntilFifthWrong,
@@ -199,6 +212,20 @@ mod tests {
         assert_eq!(mean(&[(A, -5.0), (B, 40.0)]), 0.75);
         assert_eq!(mean(&[(A, 40.0), (A, -10.0), (B, 2.0), (B, -10.0)]), 0.2);
         assert_eq!(mean(&[(A, 4.0), (B, 4.0)]), 0.0);
+    }
+
+    #[test]
+    fn the_farther_astray_the_worse_is_a_hinged_answer_but_enough_is_enough() {
+        let mean = |answers: &[(Group, f64)]| fitness(Fitness::MeanHinge, answers);
+        assert_eq!(mean(&[(A, 5.0), (B, -40.0)]), 0.75);
+        assert_eq!(mean(&[(A, 40.0), (B, 40.0)]), -1.5);
+        // Three of four known by far and one by far wrong is worth less than all four a little.
+        let (three, four) =
+            ([(A, 30.0), (A, 30.0), (B, -30.0), (B, 30.0)], [(A, 1.0), (A, 1.0), (B, -1.0), (B, -1.0)]);
+        assert!(mean(&three) < mean(&four));
+        let clipped = |answers: &[(Group, f64)]| fitness(Fitness::MeanClipped, answers);
+        assert!(clipped(&three) > clipped(&four));
+        assert!(mean(&[(A, f64::NAN), (B, -9.0)]).is_nan());
     }
 
     #[test]
@@ -276,7 +303,7 @@ mod tests {
         assert!(!settled(&[stood, stood, to_come, to_come].concat()));
         // Something is missing before.
         assert!(!settled(&[stood, to_come, stood, stood].concat()));
-        assert!(MANY[..3].iter().all(|kind| !kind.is_settled([stood, stood, stood].concat().into_iter())));
+        assert!(MANY[..4].iter().all(|kind| !kind.is_settled([stood, stood, stood].concat().into_iter())));
     }
 
     fn mean_of_nan() -> f64 {

@@ -188,6 +188,7 @@ proptest! {
         kind in prop_oneof![
             Just(Fitness::Min),
             Just(Fitness::MeanClipped),
+            Just(Fitness::MeanHinge),
             Just(Fitness::RightThenMargin),
             Just(Fitness::RightThenMin),
             Just(Fitness::UntilFifthWrong),

@@ -5,7 +5,7 @@
 //! with one number per sensor explains 85 to 93 % (five robots trained on hundreds of zeros and ones; images it was not fitted to).
 
 use super::direction::Assignment;
-use super::fitness::{Fitness, WRONG};
+use super::fitness::{Fitness, WRONG, hinged};
 use super::grouping::{Group, Split};
 use super::influences::{Influences, alike};
 use super::score::Answer;
@@ -19,6 +19,7 @@ pub struct Surrogate<'a> {
     /// By how much a pixel of 1 moves the robot to the right, by place, where there is a sensor that expands; minus that, one that
     /// shrinks.
     influence: Grid<f64>,
+    fitness: Fitness,
     /// The images that count.
     images: Vec<Counted<'a>>,
 }
@@ -88,12 +89,13 @@ impl<'a> Surrogate<'a> {
                 })
             })
             .collect();
-        Some(Surrogate { body, influence, images })
+        Some(Surrogate { body, influence, fitness, images })
     }
 
     /// How well a body would do that differs in a few voxels, if nothing else changed but what its sensors see: the mean of its
     /// answers' worth, both groups weighing the same. An answer whose margin is u times 3 voxel lengths beyond what counts as right
-    /// is worth u/(1 + |u|): those that are nearly right, or nearly wrong, matter most, and none ceases to.
+    /// is worth u/(1 + |u|): those that are nearly right, or nearly wrong, matter most, and none ceases to. With
+    /// [`Fitness::MeanHinge`] it is worth what it is there.
     pub fn worth(&self, child: &Body) -> f64 {
         let changes: Vec<((usize, usize), f64)> = (child.voxels().iter())
             .filter_map(|(place, &material)| {
@@ -103,7 +105,11 @@ impl<'a> Surrogate<'a> {
             .collect();
         let worth = |&Counted { stimulus, right, displacement, weight }: &Counted| {
             let change: f64 = changes.iter().map(|&(place, each)| each * stimulus.or_default(place)).sum();
-            let excess = right * (displacement + change) - WRONG;
+            let margin = right * (displacement + change);
+            if self.fitness == Fitness::MeanHinge {
+                return weight * hinged(margin);
+            }
+            let excess = margin - WRONG;
             weight * excess / (excess.abs() + WRONG)
         };
         self.images.iter().map(worth).sum::<f64>() / 2.0
@@ -181,6 +187,27 @@ mod tests {
         assert!(now > without && without > turned, "{now} {without} {turned}");
         // What no sensor sees changes nothing.
         assert_eq!([worth("50004/00000/10006"), worth("50003/01110/20006")], [now, now]);
+    }
+
+    #[test]
+    fn with_hinged_answers_a_change_promises_what_the_fitness_would_gain() {
+        let (body, stimuli) = (body(), stimuli(200));
+        let answers = answers(&stimuli, 200);
+        let model = Surrogate::of(&body, &stimuli, &answers, &split(), Fitness::MeanHinge).unwrap();
+        let grouping = Grouping::two_groups(&[0], &[1]).unwrap().with_fitness(Fitness::MeanHinge);
+        let gain = |text: &str| model.worth(&text.parse::<Body>().unwrap()) - model.worth(&body);
+        let fitness = |of_last: f64| {
+            let walked = |(answer, stimulus): (&Answer, &Grid<f64>)| Answer {
+                displacement: answer.displacement.map(|d| d + of_last * stimulus[(2, 4)]),
+                ..*answer
+            };
+            let answers: Vec<Answer> = answers.iter().zip(&stimuli).map(walked).collect();
+            grouping.score(&answers).fitness
+        };
+        // Without the last sensor, and with it turned round.
+        assert!((gain("50003/00000/20000") - (fitness(6.0) - fitness(0.0))).abs() < 0.03);
+        assert!((gain("50003/00000/20005") - (fitness(12.0) - fitness(0.0))).abs() < 0.06);
+        assert!(gain("50003/00000/20000") > 0.02);
     }
 
     #[test]

@@ -56,6 +56,9 @@ pub(super) fn methods(dossier: &Dossier) -> String {
         Fitness::MeanClipped => {
             "the mean distance walked towards the right side, clipped at ten voxel lengths, both groups weighing the same"
         }
+        Fitness::MeanHinge => {
+            "the mean distance walked towards the right side, of each answer at most ten voxel lengths, both groups weighing the same"
+        }
         Fitness::RightThenMargin => {
             "the number of images answered right, both groups weighing the same, ties broken by how far it walked"
         }
