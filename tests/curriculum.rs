@@ -159,6 +159,47 @@ fn what_follows_the_fifth_wrong_answer_is_not_shown_and_changes_nothing() {
 }
 
 #[test]
+fn a_race_shows_less_and_is_as_exact_as_any_run() {
+    let sandbox = Sandbox::new();
+    let stage = "[[stage]]\nimages_per_class = 24\nfitness = \"mean_hinge\"\nkeep = 6\nvoxel_mutations = 0.5\nraised_starts = 1\n";
+    // Long enough lives for robots to differ.
+    let base = TINY
+        .replace("control_steps = 20", "control_steps = 100")
+        .replace("generations = 12", "generations = 14");
+    sandbox.write("plain.toml", format!("{base}\n[[stage]]\ngenerations = 6\n{stage}"));
+    sandbox.write("race.toml", format!("{base}\n[[stage]]\ngenerations = 6\n{stage}race = true\n"));
+    let run = |options: &str| {
+        sandbox.run(&format!("evolve -q {options} --force")).ended(0, &[]);
+        sandbox.run_file(options.split_whitespace().last().unwrap())
+    };
+    let all_shown = "--set savings.early_stop=false -o";
+    let (plain, race) =
+        (run(&format!("-c plain.toml {all_shown} plain")), run(&format!("-c race.toml {all_shown} race")));
+    // What was not shown counts as stopped early.
+    let stopped = |folder: &str| -> u64 {
+        let metrics = sandbox.read(&format!("{folder}/metrics.csv"));
+        assert_eq!(
+            metrics.lines().next().and_then(|names| names.split(',').nth(11)),
+            Some("saved_early_stop")
+        );
+        metrics.lines().last().and_then(|line| line.split(',').nth(11)).unwrap().parse().unwrap()
+    };
+    assert!(stopped("plain") == 0 && stopped("race") > 0 && !plain.elites.is_empty());
+    for options in [
+        "--threads 1",
+        "--threads 3",
+        "--set savings.known_bodies=false",
+        "--set savings.shared_lives=false --set savings.early_stop=false",
+    ] {
+        assert_eq!(run(&format!("-c race.toml {options} -o other")).elites, race.elites, "{options}");
+    }
+    let whole = result(&sandbox, "race");
+    sandbox.run(&format!("evolve -q -c race.toml --force -g 10 {all_shown} part")).ended(0, &[]);
+    sandbox.run(&format!("evolve -q -c race.toml --resume {all_shown} part")).ended(0, &[]);
+    assert_eq!(result(&sandbox, "part"), whole);
+}
+
+#[test]
 fn elites_stand_in_the_archive_with_what_they_do_on_the_last_images() {
     let sandbox = sandbox();
     sandbox.run("evolve -q -c run.toml -o run").ended(0, &[]);

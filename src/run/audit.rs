@@ -292,7 +292,7 @@ fn live(setting: &Setting, measured: bool) -> Option<(Vec<f64>, Energy)> {
     if measured {
         return walk(&Lattice::new(body, physics), physics, protocol, stimuli, true).ok();
     }
-    let job = Job { body, order: Vec::new(), may_win: Box::new(|_| true), settled: None };
+    let job = Job { body, order: Vec::new(), may_win: Box::new(|_| true), settled: None, given_up: None };
     let savings = Savings { early_stop: false, ..Savings::default() };
     match evaluate(&[job], stimuli, &[], physics, protocol, savings).pop()?.outcome {
         Outcome::Walked(displacements) => Some((displacements, Energy::default())),

@@ -53,6 +53,10 @@ pub struct StageConfig {
     /// lives only. Default 0.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub raised_starts: Option<u32>,
+    /// Offspring that fall behind their parent on the images so far are not shown the rest: not lossless. Only where fitness is a
+    /// mean. Default: not.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub race: Option<bool>,
 }
 
 /// Generations with the same training images and the same fitness.
@@ -127,6 +131,11 @@ impl Config {
         self.stage.get(period.stage).and_then(|stage| stage.raised_starts).unwrap_or(0)
     }
 
+    /// Whether offspring are raced against their parents in a period.
+    pub fn race(&self, period: Period) -> bool {
+        self.stage.get(period.stage).and_then(|stage| stage.race).unwrap_or(false)
+    }
+
     /// Elites of each task that stay in the archive in a period; `None`: all.
     pub fn keep(&self, period: Period) -> Option<usize> {
         self.stage.get(period.stage)?.keep
@@ -176,6 +185,11 @@ impl Config {
             }
             if stage.raised_starts.is_some_and(|rows| rows > 0) && self.protocol.life == Life::Sequential {
                 let text = "raised_starts: expected protocol.life = \"fresh\": a sequential life starts once";
+                return refuse(number, text.to_string());
+            }
+            let fitness = self.fitness_in(Period { stage: number, draw: 0 });
+            if stage.race == Some(true) && !fitness.is_mean() {
+                let text = "race: expected fitness = \"mean_clipped\" or \"mean_hinge\": how far an offspring is behind is told by a mean";
                 return refuse(number, text.to_string());
             }
             let counts =
@@ -279,6 +293,10 @@ mod tests {
             (
                 "[[stage]]\nvoxel_changes = 1001",
                 "stage 1: voxel_changes = 1001: expected a number from 1 to 1000",
+            ),
+            (
+                "[[stage]]\nrace = true",
+                "stage 1: race: expected fitness = \"mean_clipped\" or \"mean_hinge\"",
             ),
             ("[[stage]]\npool = 5", "stage 1: pool: expected images_per_class"),
             ("[[stage]]\nimages_per_class = 8\npool = 7", "stage 1: pool = 7: expected images_per_class, 8"),

@@ -18,8 +18,9 @@ use crate::base::files::write_atomically;
 use crate::genome::GenomeError;
 use crate::qd::{Archive, ArchiveStats, DescriptorSpace, Evaluated, MapElites};
 use crate::task::dataset::{Dataset, Split};
-use crate::task::evaluation::{Job, Outcome, evaluate};
+use crate::task::evaluation::{Job, MayWin, Outcome, evaluate};
 use crate::task::grouping::Grouping;
+use crate::task::race::Race;
 use rayon::prelude::*;
 use std::mem::{replace, take};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -232,10 +233,12 @@ impl<'a> Run<'a> {
         let robots = robots.map_err(|error| Error::input(format!("body: {error}")))?;
         self.totals.evaluations += robots.len() as u64;
 
+        // Whom one parent left behind, another might not: where there is a race nobody is evaluated twice, saving or not.
+        let saves_known = config.savings.known_bodies || config.race(self.period);
         let (images, mut fresh) = (self.training.stimuli.len() as u64, Vec::new());
         for (proposal, robot) in proposals.iter().zip(robots) {
             let is_new = self.known.insert(robot.body.key());
-            if is_new || !config.savings.known_bodies {
+            if is_new || !saves_known {
                 fresh.push((proposal.child, proposal.parent, robot));
             } else {
                 self.totals.saved_known_bodies += images;
@@ -294,18 +297,31 @@ impl<'a> Run<'a> {
         let archive = self.search.archive();
         let parent = parent.and_then(|cell| archive.get(cell)).map(|elite| &elite.solution.displacements);
         let bins = robot.bins();
+        let to_beat: Vec<Option<f64>> = (0..self.grouping.tasks().len())
+            .map(|task| {
+                let cell = self.space.index(&self.cell(bins.clone(), task));
+                floors.to_beat(task, cell.and_then(|cell| archive.objective(cell)))
+            })
+            .collect();
+        let (training, grouping, beaten) = (&self.training, &self.grouping, to_beat.clone());
         let may_win = move |known: &[Option<f64>]| {
-            let cell = |task| self.space.index(&self.cell(bins.clone(), task));
-            let to_beat = |task| floors.to_beat(task, cell(task).and_then(|cell| archive.objective(cell)));
-            self.grouping.can_still_win(&self.training.answers(known.iter().copied()), to_beat)
+            grouping.can_still_win(&training.answers(known.iter().copied()), |task| beaten[task])
         };
-        let answers = |d: &Vec<f64>| self.training.answers(d.iter().copied().map(Some));
-        let order = parent.map_or_else(Vec::new, |d| self.grouping.hardest_first(&answers(d)));
+        let answers = parent.map(|d| training.answers(d.iter().copied().map(Some)));
+        let rival = answers.as_ref().filter(|_| self.options.config.race(self.period));
+        let race = rival.and_then(|rival| Race::against(grouping, rival));
+        // Who races is shown the images in their order, else it would begin with what its parent did worst by bad luck.
+        let order = answers.filter(|_| race.is_none()).map_or_else(Vec::new, |a| grouping.hardest_first(&a));
+        let given_up = race.map(|race| {
+            Box::new(move |known: &[Option<f64>]| race.is_left_behind(known, |task| to_beat[task]))
+                as Box<MayWin>
+        });
         Job {
             body: &robot.body,
             order,
             may_win: Box::new(may_win),
-            settled: settled(&self.training, &self.grouping),
+            settled: settled(training, grouping),
+            given_up,
         }
     }
 

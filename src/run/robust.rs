@@ -105,7 +105,13 @@ fn may_win(
 }
 
 fn all_of<'a>(body: &'a Body, training: &'a Training, grouping: &'a Grouping) -> Job<'a> {
-    Job { body, order: Vec::new(), may_win: Box::new(|_| true), settled: settled(training, grouping) }
+    Job {
+        body,
+        order: Vec::new(),
+        may_win: Box::new(|_| true),
+        settled: settled(training, grouping),
+        given_up: None,
+    }
 }
 
 /// Whether displacements under the training images settle a fitness; `None` where only all of them do.

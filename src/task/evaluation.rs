@@ -39,7 +39,7 @@ pub enum Outcome {
     Walked(Vec<f64>),
     /// A life became unstable: no fitness.
     Unstable(Unstable),
-    /// Stopped because it could not get into the archive any more.
+    /// Stopped because it could not get into the archive any more, or was [given up](Job::given_up).
     Stopped,
 }
 
@@ -71,6 +71,9 @@ pub struct Job<'a> {
     pub may_win: Box<MayWin<'a>>,
     /// Whether its fitness is known, whatever its other displacements: they are then not simulated. Without it all are.
     pub settled: Option<Box<MayWin<'a>>>,
+    /// Whether it is given up, going by the images up to the first whose displacement is not known, and no others: so that it does
+    /// not matter which are shown first, or are one life.
+    pub given_up: Option<Box<MayWin<'a>>>,
 }
 
 /// Evaluates jobs, each on all images; results in the jobs' order, the same on any number of threads. In a fresh life under an
@@ -246,11 +249,14 @@ impl<'a> Candidate<'a> {
         }
     }
 
-    /// Whether a robot with these displacements, in the order of showing, need not be shown the rest.
+    /// Whether a robot with these displacements, in the order of showing, is not shown the rest, or not let in.
     fn drops_out(&self, displacements: &[Option<f64>]) -> bool {
-        self.early_stop
-            && displacements.len() < self.order.len()
-            && !(self.job.may_win)(&self.known(displacements))
+        let is_given_up =
+            self.job.given_up.as_ref().is_some_and(|given_up| given_up(&self.known(displacements)));
+        is_given_up
+            || self.early_stop
+                && displacements.len() < self.order.len()
+                && !(self.job.may_win)(&self.known(displacements))
     }
 
     /// Whether displacements, in the order of showing, settle the fitness.

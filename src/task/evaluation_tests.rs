@@ -40,7 +40,7 @@ fn run_until(
 ) -> Evaluation {
     let protocol = Protocol { life, control_steps: 8, ..Protocol::default() };
     let body = body();
-    let job = Job { body: &body, order: order.to_vec(), may_win, settled };
+    let job = Job { body: &body, order: order.to_vec(), may_win, settled, given_up: None };
     let mut evaluations = evaluate(&[job], &images(rows), &[], &physics(), &protocol, savings);
     assert_eq!(evaluations.len(), 1);
     let evaluation = evaluations.remove(0);
@@ -147,7 +147,13 @@ fn a_raised_start_is_another_life_even_under_the_same_image() {
     assert!(expected[1] != expected[3] && expected[0] != expected[4], "{expected:?}");
     for savings in all_savings() {
         let evaluated = |raised: &[u32]| {
-            let job = Job { body: &body, order: Vec::new(), may_win: Box::new(|_| true), settled: None };
+            let job = Job {
+                body: &body,
+                order: Vec::new(),
+                may_win: Box::new(|_| true),
+                settled: None,
+                given_up: None,
+            };
             evaluate(&[job], &images, raised, &physics, &protocol, savings).remove(0)
         };
         let evaluation = evaluated(&raised);

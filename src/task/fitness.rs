@@ -88,11 +88,7 @@ impl Fitness {
         for (group, margin) in margins.filter_map(|(group, m)| Some((group, m?))) {
             for (way, m) in [margin, -margin].into_iter().enumerate() {
                 counts[way][group] += usize::from(m > WRONG);
-                let worth = match self {
-                    Fitness::MeanClipped => (m / ENOUGH).clamp(-1.0, 1.0),
-                    Fitness::MeanHinge => hinged(m),
-                    _ => grown(m),
-                };
+                let worth = self.worth(m);
                 sums[way] += weights[group] * worth;
                 least[way] = smaller(least[way], worth);
             }
@@ -112,6 +108,20 @@ impl Fitness {
         (of(0), of(1))
     }
 
+    /// Whether it is nothing but the mean of what answers are [worth](Self::worth), both groups weighing the same.
+    pub fn is_mean(self) -> bool {
+        matches!(self, Fitness::MeanClipped | Fitness::MeanHinge)
+    }
+
+    /// What an answer with this margin is worth, at most 1, in the mean that the fitness is, or that breaks its ties.
+    pub(super) fn worth(self, margin: f64) -> f64 {
+        match self {
+            Fitness::MeanClipped => (margin / ENOUGH).clamp(-1.0, 1.0),
+            Fitness::MeanHinge => smaller(1.0, margin / ENOUGH),
+            _ => grown(margin),
+        }
+    }
+
     /// Whether answers that are still to come (`None`) cannot change the fitness under either assignment.
     pub(super) fn is_settled(self, answers: impl Iterator<Item = (Group, Option<f64>)> + Clone) -> bool {
         let margins = margins(answers);
@@ -124,14 +134,14 @@ impl Fitness {
 
 /// By number of the group: displacements towards the right side if group A is to walk right; if it is to walk left, the
 /// negatives of those.
-fn margins(
+pub(super) fn margins(
     answers: impl Iterator<Item = (Group, Option<f64>)> + Clone,
 ) -> impl Iterator<Item = (usize, Option<f64>)> + Clone {
     answers.map(|(group, d)| if group == Group::A { (0, d) } else { (1, d.map(|d| -d)) })
 }
 
 /// How many images each group has, and what one of them weighs: exactly 1 where both have as many, or one has none.
-fn weights(margins: impl Iterator<Item = (usize, Option<f64>)>) -> ([usize; 2], [f64; 2]) {
+pub(super) fn weights(margins: impl Iterator<Item = (usize, Option<f64>)>) -> ([usize; 2], [f64; 2]) {
     let mut images = [0; 2];
     margins.for_each(|(group, _)| images[group] += 1);
     let all = images[0] + images[1];
@@ -164,11 +174,6 @@ fn run(
     }
     let slack = if is_known { 0.0 } else { SLACK };
     (right + weights[0].min(weights[1]) * sum / shown + slack, is_known && is_over)
-}
-
-/// A margin in tens of voxel lengths, but at most 1.
-pub(super) fn hinged(margin: f64) -> f64 {
-    smaller(1.0, margin / ENOUGH)
 }
 
 /// A margin as a number between 0 and 1 that never stops growing: 1/2 for standing still.

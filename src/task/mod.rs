@@ -14,6 +14,7 @@ pub mod info;
 mod pen;
 pub mod perturbation;
 pub mod protocol;
+pub mod race;
 pub mod recording;
 pub mod rollout;
 pub mod score;

@@ -5,7 +5,7 @@
 //! with one number per sensor explains 85 to 93 % (five robots trained on hundreds of zeros and ones; images it was not fitted to).
 
 use super::direction::Assignment;
-use super::fitness::{Fitness, WRONG, hinged};
+use super::fitness::{Fitness, WRONG};
 use super::grouping::{Group, Split};
 use super::influences::{Influences, alike};
 use super::score::Answer;
@@ -107,7 +107,7 @@ impl<'a> Surrogate<'a> {
             let change: f64 = changes.iter().map(|&(place, each)| each * stimulus.or_default(place)).sum();
             let margin = right * (displacement + change);
             if self.fitness == Fitness::MeanHinge {
-                return weight * hinged(margin);
+                return weight * self.fitness.worth(margin);
             }
             let excess = margin - WRONG;
             weight * excess / (excess.abs() + WRONG)

@@ -1,0 +1,181 @@
+//! [`Race`]: offspring that fall behind their parent are not shown the rest of the images (racing; Maron & Moore 1994).
+//!
+//! Where fitness is a mean over hundreds of images, its upper bound says little before most of them are shown. How an offspring
+//! does beside its parent on the same images says much after a few dozen, but not for sure: this is no lossless saving.
+
+use super::direction::{Assignment, Direction};
+use super::fitness::{Fitness, margins, weights};
+use super::grouping::{Group, Grouping};
+use super::score::{Answer, of_split};
+
+/// Fewest images of a task that tell.
+const FEWEST: usize = 16;
+
+/// By how many standard errors of what is to come an offspring may be better than it was so far.
+const ERRORS: f64 = 2.0;
+
+/// What few images may hide of the spread, in worth of an answer: an offspring that did on all of them as its parent may yet differ.
+const DOUBT: f64 = 0.05;
+
+/// A parent to be raced against.
+pub struct Race {
+    fitness: Fitness,
+    /// Of every task both assignments of sides to groups.
+    lanes: Vec<Lane>,
+}
+
+/// A task with one of its assignments.
+struct Lane {
+    task: usize,
+    /// The parent's fitness.
+    fitness: f64,
+    /// What counts, in the images' order.
+    images: Vec<Image>,
+}
+
+struct Image {
+    number: usize,
+    /// 1 if the robot is to walk right, −1 if left.
+    right: f64,
+    weight: f64,
+    /// What the parent's answer is worth.
+    worth: f64,
+}
+
+impl Race {
+    /// Against a parent with these answers. `None` if its fitness is not a [mean](Fitness::is_mean), or not all of them are
+    /// known.
+    pub fn against(grouping: &Grouping, parent: &[Answer]) -> Option<Self> {
+        let fitness = grouping.fitness();
+        if !fitness.is_mean() || parent.iter().any(|answer| answer.displacement.is_none()) {
+            return None;
+        }
+        let lanes = (0..).zip(grouping.tasks()).flat_map(|(task, split)| {
+            let (right, left) = fitness.of_assignments(of_split(split, parent));
+            let (_, weights) = weights(margins(of_split(split, parent)));
+            [(Direction::Right, right), (Direction::Left, left)].map(|(a, reached)| {
+                let counted = |(number, answer): (usize, &Answer)| {
+                    let group = split.group(answer.class)?;
+                    let right = Assignment { a }.margin(group, 1.0);
+                    let worth = fitness.worth(right * answer.displacement?);
+                    Some(Image { number, right, weight: weights[usize::from(group == Group::B)], worth })
+                };
+                Lane {
+                    task,
+                    fitness: reached,
+                    images: parent.iter().enumerate().filter_map(counted).collect(),
+                }
+            })
+        });
+        Some(Race { fitness, lanes: lanes.collect() })
+    }
+
+    /// Whether an offspring with these displacements so far, an image each, fell behind on the first of them, or on more but not
+    /// all: whether, if it goes on beside its parent as it began, it will not exceed what is `to_beat` of any task.
+    pub fn is_left_behind(&self, known: &[Option<f64>], to_beat: impl Fn(usize) -> Option<f64>) -> bool {
+        self.lanes
+            .iter()
+            .all(|lane| to_beat(lane.task).is_some_and(|to_beat| self.is_behind(lane, known, to_beat)))
+    }
+
+    fn is_behind(&self, lane: &Lane, known: &[Option<f64>], to_beat: f64) -> bool {
+        let (mut sum, mut squares, all) = (0.0, 0.0, lane.images.len() as f64);
+        for (shown, image) in (1..lane.images.len()).zip(&lane.images) {
+            let Some(displacement) = known.get(image.number).copied().flatten() else { return false };
+            let gain = image.weight * (self.fitness.worth(image.right * displacement) - image.worth);
+            sum += gain;
+            squares += gain * gain;
+            if shown < FEWEST {
+                continue;
+            }
+            let shown = shown as f64;
+            let mean = sum / shown;
+            let variance = squares / shown - mean * mean + DOUBT * DOUBT;
+            // Of those shown nothing is left to chance.
+            let error = (variance / shown * (1.0 - shown / all)).sqrt();
+            if lane.fitness + mean + ERRORS * error <= to_beat {
+                return true;
+            }
+        }
+        false
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::base::random::{Purpose, stream};
+
+    const IMAGES: usize = 200;
+
+    /// Answers to classes by turns, one group each, of a robot whose margins are about `margin`.
+    fn answers(seed: u64, margin: f64) -> Vec<Answer> {
+        let mut random = stream(seed, Purpose::Images, 0, 0);
+        let mut answer = |class: u8| {
+            let margin = margin + 4.0 * random.unit() - 2.0;
+            Answer { class, displacement: Some(if class == 0 { margin } else { -margin }) }
+        };
+        (0..IMAGES).map(|number| answer((number % 2) as u8)).collect()
+    }
+
+    fn known(answers: &[Answer]) -> Vec<Option<f64>> {
+        answers.iter().map(|answer| answer.displacement).collect()
+    }
+
+    fn grouping(fitness: Fitness) -> Grouping {
+        Grouping::two_groups(&[0], &[1]).unwrap().with_fitness(fitness)
+    }
+
+    /// After how many images a robot with these margins is left behind by its parent, whose margins are about 4.
+    fn left_behind_after(seed: u64, margin: f64) -> Option<usize> {
+        let grouping = grouping(Fitness::MeanHinge);
+        let parent = answers(seed + 1000, 4.0);
+        let race = Race::against(&grouping, &parent).unwrap();
+        let (child, to_beat) = (known(&answers(seed, margin)), grouping.score(&parent).fitness);
+        let after = |shown: usize| race.is_left_behind(&child[..shown], |_| Some(to_beat));
+        let first = (0..=IMAGES).find(|&shown| after(shown));
+        // Once left behind, always left behind.
+        assert!(first.is_none_or(|first| (first..=IMAGES).all(after)));
+        first
+    }
+
+    #[test]
+    fn who_is_much_worse_is_told_after_a_few_images_and_who_is_better_seldom() {
+        for seed in 0..20 {
+            assert_eq!(left_behind_after(seed, 0.0), Some(FEWEST), "{seed}");
+            assert!(left_behind_after(seed, 2.5).is_some_and(|shown| shown <= 40), "{seed}");
+            assert_eq!(left_behind_after(seed, 4.8), None, "{seed}");
+        }
+        let of_slightly_better = (0..100).filter(|&seed| left_behind_after(seed, 4.2).is_some()).count();
+        assert!(of_slightly_better <= 20, "{of_slightly_better}");
+    }
+
+    #[test]
+    fn nobody_is_left_behind_where_a_cell_is_free_or_the_parent_is_far_ahead_of_it() {
+        let grouping = grouping(Fitness::MeanClipped);
+        let parent = answers(1, 4.0);
+        let race = Race::against(&grouping, &parent).unwrap();
+        let (worse, to_beat) = (known(&answers(2, 2.0)), grouping.score(&parent).fitness);
+        assert!(race.is_left_behind(&worse, |_| Some(to_beat)));
+        assert!(!race.is_left_behind(&worse, |_| Some(to_beat - 0.3)));
+        assert!(!race.is_left_behind(&worse, |_| None));
+        // Better the other way round is better.
+        let mirrored: Vec<_> = known(&answers(3, 6.0)).into_iter().map(|d| d.map(|d| -d)).collect();
+        assert!(!race.is_left_behind(&mirrored, |_| Some(to_beat)));
+    }
+
+    #[test]
+    fn gaps_and_other_fitness_and_few_images_are_no_race() {
+        let parent = answers(1, 4.0);
+        let race = Race::against(&grouping(Fitness::MeanHinge), &parent).unwrap();
+        let mut worse = known(&answers(2, 0.0));
+        assert!(race.is_left_behind(&worse, |_| Some(0.4)));
+        worse[FEWEST - 1] = None;
+        assert!(!race.is_left_behind(&worse, |_| Some(0.4)));
+        let few = Race::against(&grouping(Fitness::MeanHinge), &parent[..FEWEST]).unwrap();
+        assert!(!few.is_left_behind(&known(&answers(2, 0.0)), |_| Some(0.4)));
+        assert!(Race::against(&grouping(Fitness::RightThenMargin), &parent).is_none());
+        let unknown = Answer { class: 1, displacement: None };
+        assert!(Race::against(&grouping(Fitness::MeanHinge), &[&parent[..], &[unknown]].concat()).is_none());
+    }
+}
