@@ -108,7 +108,7 @@ impl Fitness {
         (of(0), of(1))
     }
 
-    /// Whether it is nothing but the mean of what answers are [worth](Self::worth), both groups weighing the same.
+    /// Whether it is nothing but the mean of what answers are worth, both groups weighing the same.
     pub fn is_mean(self) -> bool {
         matches!(self, Fitness::MeanClipped | Fitness::MeanHinge)
     }
