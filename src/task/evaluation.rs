@@ -138,6 +138,11 @@ struct Lives {
     verdict: Option<Evaluation>,
 }
 
+/// Walked, under the first images: there may be such that are not known between others.
+fn walked(known: Vec<Option<f64>>) -> Outcome {
+    Outcome::Walked(known.into_iter().map_while(|d| d).collect())
+}
+
 /// Rows by which the start is raised under an image.
 fn rows(raised: &[u32], image: usize) -> u32 {
     raised.get(image).copied().unwrap_or(0)
@@ -233,9 +238,7 @@ impl<'a> Candidate<'a> {
                 let mut rollout = Rollout::new(&self.lattice, self.physics, self.protocol);
                 for image in self.images {
                     lived.add(rollout.show(image, |_| ()));
-                    let is_over =
-                        self.drops_out(&lived.displacements) || self.is_settled(&lived.displacements);
-                    if lived.unstable.is_some() || is_over {
+                    if lived.unstable.is_some() || self.outcome(&lived.displacements).is_some() {
                         break;
                     }
                 }
@@ -249,19 +252,16 @@ impl<'a> Candidate<'a> {
         }
     }
 
-    /// Whether a robot with these displacements, in the order of showing, is not shown the rest, or not let in.
-    fn drops_out(&self, displacements: &[Option<f64>]) -> bool {
-        let is_given_up =
-            self.job.given_up.as_ref().is_some_and(|given_up| given_up(&self.known(displacements)));
-        is_given_up
-            || self.early_stop
-                && displacements.len() < self.order.len()
-                && !(self.job.may_win)(&self.known(displacements))
-    }
-
-    /// Whether displacements, in the order of showing, settle the fitness.
-    fn is_settled(&self, displacements: &[Option<f64>]) -> bool {
-        self.job.settled.as_ref().is_some_and(|settled| settled(&self.known(displacements)))
+    /// How it ends for a robot with these displacements, in the order of showing, whatever the rest may be; `None` if that matters.
+    fn outcome(&self, displacements: &[Option<f64>]) -> Option<Outcome> {
+        let Job { may_win, settled, given_up, .. } = self.job;
+        let known = self.known(displacements);
+        if settled.as_ref().is_some_and(|settled| settled(&known)) {
+            return Some(walked(known));
+        }
+        let is_lost = || self.early_stop && displacements.len() < self.order.len() && !may_win(&known);
+        let is_given_up = given_up.as_ref().is_some_and(|given_up| given_up(&known));
+        (is_given_up || is_lost()).then_some(Outcome::Stopped)
     }
 
     /// Displacement per image, as far as known from the first showings.
@@ -272,8 +272,6 @@ impl<'a> Candidate<'a> {
     /// Counts the lives that are known, in their order, whichever was done first: every one once, since each takes a look at
     /// all images.
     fn count(&self, lives: &mut Lives) {
-        // (Not of all images: there may be such that are not known between them.)
-        let first = |known: Vec<Option<f64>>| Outcome::Walked(known.into_iter().map_while(|d| d).collect());
         let is_over = |lives: &Lives| {
             // If images before that one settle the fitness, it does not count.
             let is_lost = self.early_stop && lives.unstable.is_some() && self.job.settled.is_none();
@@ -288,20 +286,15 @@ impl<'a> Candidate<'a> {
             for displacement in life.displacements {
                 lives.displacements.push(displacement);
                 let shown = &lives.displacements;
-                let outcome = if displacement.is_some() && self.is_settled(shown) {
-                    first(self.known(shown))
-                } else if displacement.is_some() && self.drops_out(shown) {
-                    Outcome::Stopped
-                } else {
-                    continue;
-                };
-                lives.verdict = Some(self.ended(outcome, shown.len()));
-                return;
+                if let Some(outcome) = displacement.and_then(|_| self.outcome(shown)) {
+                    lives.verdict = Some(self.ended(outcome, shown.len()));
+                    return;
+                }
             }
             lives.unstable = lives.unstable.or(life.unstable);
         }
         let shown = &lives.displacements;
-        let outcome = lives.unstable.map_or_else(|| first(self.known(shown)), Outcome::Unstable);
+        let outcome = lives.unstable.map_or_else(|| walked(self.known(shown)), Outcome::Unstable);
         lives.verdict = Some(self.ended(outcome, shown.len()));
     }
 

@@ -4,9 +4,9 @@
 //! does beside its parent on the same images says much after a few dozen, but not for sure: this is no lossless saving.
 
 use super::direction::{Assignment, Direction};
-use super::fitness::{Fitness, margins, weights};
+use super::fitness::Fitness;
 use super::grouping::{Group, Grouping};
-use super::score::{Answer, of_split};
+use super::score::{Answer, of_split, weighed};
 
 /// Fewest images of a task that tell.
 const FEWEST: usize = 16;
@@ -51,20 +51,15 @@ impl Race {
             return None;
         }
         let lanes = (0..).zip(grouping.tasks()).flat_map(|(task, split)| {
+            let weighed = weighed(split, parent);
             let (right, left) = fitness.of_assignments(of_split(split, parent));
-            let (_, weights) = weights(margins(of_split(split, parent)));
             [(Direction::Right, right), (Direction::Left, left)].map(|(a, reached)| {
-                let counted = |(number, answer): (usize, &Answer)| {
-                    let group = split.group(answer.class)?;
+                let image = |&(number, group, weight): &(usize, Group, f64)| {
                     let right = Assignment { a }.margin(group, 1.0);
-                    let worth = fitness.worth(right * answer.displacement?);
-                    Some(Image { number, right, weight: weights[usize::from(group == Group::B)], worth })
+                    let worth = fitness.worth(right * parent[number].displacement?);
+                    Some(Image { number, right, weight, worth })
                 };
-                Lane {
-                    task,
-                    fitness: reached,
-                    images: parent.iter().enumerate().filter_map(counted).collect(),
-                }
+                Lane { task, fitness: reached, images: weighed.iter().filter_map(image).collect() }
             })
         });
         Some(Race { fitness, lanes: lanes.collect() })

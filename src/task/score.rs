@@ -6,7 +6,7 @@
 //! (d = 0 counts as wrong, with margin 0), and the fitness of some of the images bounds that of all from above.
 
 use super::direction::Assignment;
-use super::fitness::{Fitness, better};
+use super::fitness::{Fitness, better, margins, weights};
 use super::grouping::{Group, Grouping, Split};
 
 /// How a robot answered an image.
@@ -38,6 +38,16 @@ pub(super) fn of_split(
     answers: &[Answer],
 ) -> impl Iterator<Item = (Group, Option<f64>)> + Clone {
     answers.iter().filter_map(|answer| Some((split.group(answer.class)?, answer.displacement)))
+}
+
+/// Of each answer that counts its number, its group, and what it weighs in a mean: both groups weigh the same.
+pub(super) fn weighed(split: &Split, answers: &[Answer]) -> Vec<(usize, Group, f64)> {
+    let (_, weights) = weights(margins(of_split(split, answers)));
+    let weighed = |(number, answer): (usize, &Answer)| {
+        let group = split.group(answer.class)?;
+        Some((number, group, weights[usize::from(group == Group::B)]))
+    };
+    answers.iter().enumerate().filter_map(weighed).collect()
 }
 
 impl Grouping {

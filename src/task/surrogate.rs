@@ -6,9 +6,9 @@
 
 use super::direction::Assignment;
 use super::fitness::{Fitness, WRONG};
-use super::grouping::{Group, Split};
+use super::grouping::Split;
 use super::influences::{Influences, alike};
-use super::score::Answer;
+use super::score::{Answer, weighed};
 use crate::base::Grid;
 use crate::body::{Body, Material};
 
@@ -72,12 +72,11 @@ impl<'a> Surrogate<'a> {
         let of_sensors: Vec<f64> = sensors.iter().map(|(place, _)| influence[*place]).collect();
 
         let a_right = Assignment::from_training(split, fitness, answers);
-        let groups = || answers.iter().map(|answer| split.group(answer.class));
-        let count = |group| groups().filter(|g| *g == Some(group)).count().max(1) as f64;
-        let weights = [1.0 / count(Group::A), 1.0 / count(Group::B)];
-        let images = (stimuli.iter().zip(answers).zip(groups()))
-            .filter_map(|((stimulus, answer), group)| {
-                let group = group?;
+        let weighed = weighed(split, answers);
+        let half = weighed.len() as f64 / 2.0;
+        let images = (weighed.into_iter())
+            .filter_map(|(number, group, weight)| {
+                let (stimulus, answer) = (stimuli.get(number)?, &answers[number]);
                 let terms = |((x, m), w): ((f64, &f64), &f64)| (x - m) * w;
                 let model =
                     || mean + seen(stimulus).into_iter().zip(&means).zip(&of_sensors).map(terms).sum::<f64>();
@@ -85,7 +84,7 @@ impl<'a> Surrogate<'a> {
                     stimulus,
                     right: a_right.margin(group, 1.0),
                     displacement: answer.displacement.unwrap_or_else(model),
-                    weight: weights[usize::from(group == Group::B)],
+                    weight: weight / half,
                 })
             })
             .collect();
