@@ -131,7 +131,12 @@ impl Genome {
         if params.voxel_mutations == 0.0 || rng.unit() >= params.voxel_mutations {
             return self.with_mutated_network(spec, params, rng);
         }
-        self.with_voxels_changed(spec, params, rng, promise)
+        let described = self.cppn.express(spec.height, spec.width)?;
+        let voxels = self.edits.apply(&described);
+        if !voxels.cells().iter().any(|material| params.voxel_scope.contains(*material)) {
+            return self.with_mutated_network(spec, params, rng);
+        }
+        self.with_voxels_changed(&described, spec, params, rng, promise)
     }
 
     fn with_mutated_network(

@@ -1,5 +1,6 @@
 //! [`MutationParams`]: sizes and shares of mutations.
 
+use crate::body::Material;
 use serde::{Deserialize, Deserializer, Serialize};
 
 /// Sizes of mutations: section `[genome]` of a config (paper, section "Genome").
@@ -23,10 +24,36 @@ pub struct MutationParams {
     /// promises most. Default 1; then left out of files.
     #[serde(deserialize_with = "candidates", skip_serializing_if = "is_one")]
     pub voxel_candidates: u16,
-    /// Most voxels of an offspring that change: one of every second, else two of every second, and so on, doubled up to this; with
+    /// Most voxels of an offspring that change: one, two, four and so on, doubled up to this, of as many offspring each; with
     /// several candidates, as long as each promises more than the one before. Default 1; then left out of files.
     #[serde(deserialize_with = "candidates", skip_serializing_if = "is_one")]
     pub voxel_changes: u16,
+    /// Which voxels may change. Default all; then left out of files.
+    #[serde(skip_serializing_if = "VoxelScope::is_all")]
+    pub voxel_scope: VoxelScope,
+}
+
+/// Which voxels mutations of single voxels may change, and into what.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum VoxelScope {
+    /// Any into any other.
+    #[default]
+    All,
+    /// Soft voxels and sensors into one another: what walks stays as it is, and what changes is how it goes with the pixels. A
+    /// body that has none of them has its network mutated.
+    Sensors,
+}
+
+impl VoxelScope {
+    fn is_all(&self) -> bool {
+        *self == VoxelScope::All
+    }
+
+    /// Whether voxels of a material may change, and others become of it.
+    pub(super) fn contains(self, material: Material) -> bool {
+        self == VoxelScope::All || material.is_sensor() || material == Material::Soft
+    }
 }
 
 impl Default for MutationParams {
@@ -38,6 +65,7 @@ impl Default for MutationParams {
             voxel_mutations: 0.0,
             voxel_candidates: 1,
             voxel_changes: 1,
+            voxel_scope: VoxelScope::All,
         }
     }
 }
@@ -96,6 +124,8 @@ mod tests {
                 .contains("0 is out of range; expected a number from 1 to 1000")
         );
         assert!(read(r#"{"voxel_changes": 1001}"#).unwrap_err().contains("1001 is out of range"));
+        assert_eq!(read(r#"{"voxel_scope": "sensors"}"#).unwrap().voxel_scope, VoxelScope::Sensors);
+        assert!(read(r#"{"voxel_scope": "some"}"#).unwrap_err().contains("`all` or `sensors`"));
         assert!(!serde_json::to_string(&MutationParams::default()).unwrap().contains("voxel"));
         assert!(read(r#"{"weight_sgma": 1}"#).unwrap_err().contains("weight_sgma"));
     }

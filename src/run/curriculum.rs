@@ -2,7 +2,7 @@
 
 use super::{Config, Error};
 use crate::genome::MutationParams;
-use crate::genome::params::MAX_CANDIDATES;
+use crate::genome::params::{MAX_CANDIDATES, VoxelScope};
 use crate::task::fitness::Fitness;
 use crate::task::protocol::{Life, Protocol};
 use serde::{Deserialize, Serialize};
@@ -48,6 +48,9 @@ pub struct StageConfig {
     /// Most voxels of an offspring that change. Default `genome.voxel_changes`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub voxel_changes: Option<u16>,
+    /// Which voxels may change. Default `genome.voxel_scope`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub voxel_scope: Option<VoxelScope>,
     /// Rows up to which starts are raised: of each class the first image is shown to a robot that starts as ever, the next to
     /// one that starts a row higher, and so on by turns, so that nobody can live off how it first touches the ground. Fresh
     /// lives only. Default 0.
@@ -148,6 +151,7 @@ impl Config {
             voxel_mutations: stage.voxel_mutations.unwrap_or(self.genome.voxel_mutations),
             voxel_candidates: stage.voxel_candidates.unwrap_or(self.genome.voxel_candidates),
             voxel_changes: stage.voxel_changes.unwrap_or(self.genome.voxel_changes),
+            voxel_scope: stage.voxel_scope.unwrap_or(self.genome.voxel_scope),
             ..self.genome.clone()
         }
     }

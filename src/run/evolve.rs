@@ -225,7 +225,7 @@ impl<'a> Run<'a> {
     fn next_generation(&mut self) -> Result<(), Error> {
         let config = &self.options.config;
         let params = config.mutation_in(self.period);
-        let lessons = Some((&self.training, &self.grouping));
+        let lessons = Some((&self.training, &self.grouping, &config.physics));
         let mutations = Mutations { seed: config.seed, spec: config.body_spec(), params: &params, lessons };
         let proposals = self.search.ask(self.generation);
         let robots: Result<Vec<Robot>, GenomeError> =

@@ -7,6 +7,7 @@ use crate::base::random::{Purpose, stream};
 use crate::body::Body;
 use crate::genome::{BodySpec, Genome, GenomeError, MutationParams};
 use crate::qd::Variation;
+use crate::sim::Physics;
 use crate::task::grouping::Grouping;
 use crate::task::surrogate::Surrogate;
 use std::cell::LazyCell;
@@ -16,8 +17,8 @@ pub(super) struct Mutations<'a> {
     pub seed: u64,
     pub spec: BodySpec,
     pub params: &'a MutationParams,
-    /// What parents were trained on; where there is none, candidates all promise the same.
-    pub lessons: Option<(&'a Training, &'a Grouping)>,
+    /// What parents were trained on, and the physics they lived under; where there is none, candidates all promise the same.
+    pub lessons: Option<(&'a Training, &'a Grouping, &'a Physics)>,
 }
 
 /// A robot that has not lived yet.
@@ -43,10 +44,10 @@ impl Mutations<'_> {
     }
 
     fn surrogate<'b>(&'b self, parent: &'b Robot) -> Option<Surrogate<'b>> {
-        let (training, grouping) = self.lessons?;
+        let (training, grouping, physics) = self.lessons?;
         let split = grouping.tasks().iter().find(|split| split.name() == parent.task)?;
         let answers = training.answers(parent.displacements.iter().copied().map(Some));
-        Surrogate::of(&parent.body, &training.stimuli, &answers, split, grouping.fitness())
+        Surrogate::of(&parent.body, &training.stimuli, &answers, split, grouping.fitness(), physics)
     }
 }
 

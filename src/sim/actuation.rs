@@ -21,6 +21,15 @@ pub(super) fn target(material: Material, control_step: u64, pixel: f64, physics:
     free.clamp(physics.target_min, physics.target_max)
 }
 
+/// Target width of any voxel under a pixel in [0, 1] \[rest widths\]: of a muscle halfway through its swing, of a passive one 1.
+pub fn width(material: Material, pixel: f64, physics: &Physics) -> f64 {
+    if material.is_muscle() {
+        let middle = physics.muscle_low + physics.muscle_swing / 2.0;
+        return middle.clamp(physics.target_min, physics.target_max);
+    }
+    target(material, 0, pixel, physics)
+}
+
 /// Writes the goals of all actuated sides for a control step. `pixels` holds each active voxel's pixel,
 /// `targets` is memory for one number each.
 pub(super) fn set_goals(
@@ -62,6 +71,10 @@ mod tests {
         assert!((both - 2.2).abs() < 1e-15);
         assert_eq!(at(Material::SensorShrink, 7, 0.25), 1.35);
         assert_eq!(at(Material::SensorExpand, 7, 0.25), 0.85);
+        let width = |material, pixel| width(material, pixel, &physics);
+        assert_eq!([Material::MuscleInPhase, Material::MuscleAntiphase].map(|m| width(m, 0.7)), [1.1; 2]);
+        assert_eq!([width(Material::SensorShrink, 0.0), width(Material::SensorExpand, 0.0)], [1.6, 0.6]);
+        assert_eq!([Material::Empty, Material::Rigid, Material::Soft].map(|m| width(m, 1.0)), [1.0; 3]);
         // Values outside the range are clipped, as the published robots' raw pixels were.
         assert_eq!(at(Material::SensorExpand, 0, 255.0), 1.6);
         assert_eq!(at(Material::SensorShrink, 0, 255.0), 0.6);

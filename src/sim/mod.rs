@@ -22,6 +22,7 @@ mod series;
 mod state;
 mod world;
 
+pub use actuation::width;
 pub use energy::Energy;
 pub use lattice::Lattice;
 pub use params::{Physics, PhysicsError};

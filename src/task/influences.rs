@@ -26,7 +26,7 @@ impl Influences {
     /// The influences that are most likely, given what a robot saw and did, if those of near places are alike (regression with a
     /// Gaussian process; Rasmussen & Williams 2006, chapter 2): how near, and how large they may be, is found out by foretelling
     /// some images from the others.
-    pub fn of(shown: &[(Vec<f64>, f64)], sensors: &[((usize, usize), f64)]) -> Option<Self> {
+    pub fn of(shown: &[(Vec<f64>, f64)], sensors: &[(usize, usize)]) -> Option<Self> {
         let count = sensors.len();
         let (mean, means) = means(shown, count)?;
         // nalgebra has no columns of nothing.
@@ -119,8 +119,8 @@ fn product(left: &DMatrix<f64>, right: &DMatrix<f64>) -> DMatrix<f64> {
     result
 }
 
-fn likeness(sensors: &[((usize, usize), f64)], reach: f64) -> DMatrix<f64> {
-    DMatrix::from_fn(sensors.len(), sensors.len(), |i, j| alike(sensors[i].0, sensors[j].0, reach))
+fn likeness(sensors: &[(usize, usize)], reach: f64) -> DMatrix<f64> {
+    DMatrix::from_fn(sensors.len(), sensors.len(), |i, j| alike(sensors[i], sensors[j], reach))
 }
 
 /// How much alike the influences of two places are taken to be: 1 of the same, half that at the reach.

@@ -11,13 +11,14 @@ use super::influences::{Influences, alike};
 use super::score::{Answer, weighed};
 use crate::base::Grid;
 use crate::body::{Body, Material};
+use crate::sim::{Physics, width};
 
 /// A linear model of a robot's displacements.
 #[derive(Clone, Debug)]
 pub struct Surrogate<'a> {
     body: &'a Body,
-    /// By how much a pixel of 1 moves the robot to the right, by place, where there is a sensor that expands; minus that, one that
-    /// shrinks.
+    physics: &'a Physics,
+    /// By how much a voxel that is wider by its rest width moves the robot to the right, by place.
     influence: Grid<f64>,
     fitness: Fitness,
     /// The images that count.
@@ -35,15 +36,6 @@ struct Counted<'a> {
     weight: f64,
 }
 
-/// Which way a voxel's width goes with its pixel.
-fn sense(material: Material) -> f64 {
-    match material {
-        Material::SensorExpand => 1.0,
-        Material::SensorShrink => -1.0,
-        _ => 0.0,
-    }
-}
-
 impl<'a> Surrogate<'a> {
     /// A model of a robot that answered some of the images, in their order, on a task. `None` if it has not answered any.
     pub fn of(
@@ -52,24 +44,24 @@ impl<'a> Surrogate<'a> {
         answers: &[Answer],
         split: &Split,
         fitness: Fitness,
+        physics: &'a Physics,
     ) -> Option<Self> {
         let voxels = body.voxels();
-        let sensors: Vec<((usize, usize), f64)> =
-            voxels.iter().map(|(place, m)| (place, sense(*m))).filter(|(_, sense)| *sense != 0.0).collect();
+        let sensors: Vec<((usize, usize), Material)> =
+            voxels.iter().map(|(place, m)| (place, *m)).filter(|(_, m)| m.is_sensor()).collect();
         let seen = |stimulus: &Grid<f64>| -> Vec<f64> {
-            sensors.iter().map(|&(place, sense)| sense * stimulus.or_default(place)).collect()
+            sensors.iter().map(|&(place, m)| width(m, stimulus.or_default(place), physics)).collect()
         };
         let shown: Vec<(Vec<f64>, f64)> = (stimuli.iter().zip(answers))
             .filter_map(|(stimulus, answer)| Some((seen(stimulus), answer.displacement?)))
             .collect();
-        let Influences { reach, weights, mean, means } = Influences::of(&shown, &sensors)?;
+        let places: Vec<(usize, usize)> = sensors.iter().map(|(place, _)| *place).collect();
+        let Influences { reach, weights, mean, means } = Influences::of(&shown, &places)?;
         let influence = Grid::from_fn(voxels.height(), voxels.width(), |row, column| {
-            let of = |(&(place, _), weight): (&((usize, usize), f64), &f64)| {
-                weight * alike((row, column), place, reach)
-            };
-            sensors.iter().zip(weights.iter()).map(of).sum()
+            let of = |(&place, weight): (&(usize, usize), &f64)| weight * alike((row, column), place, reach);
+            places.iter().zip(weights.iter()).map(of).sum()
         });
-        let of_sensors: Vec<f64> = sensors.iter().map(|(place, _)| influence[*place]).collect();
+        let of_sensors: Vec<f64> = places.iter().map(|place| influence[*place]).collect();
 
         let a_right = Assignment::from_training(split, fitness, answers);
         let weighed = weighed(split, answers);
@@ -88,22 +80,24 @@ impl<'a> Surrogate<'a> {
                 })
             })
             .collect();
-        Some(Surrogate { body, influence, fitness, images })
+        Some(Surrogate { body, physics, influence, fitness, images })
     }
 
-    /// How well a body would do that differs in a few voxels, if nothing else changed but what its sensors see: the mean of its
+    /// How well a body would do that differs in a few voxels, if nothing else changed but how wide its voxels are: the mean of its
     /// answers' worth, both groups weighing the same. An answer whose margin is u times 3 voxel lengths beyond what counts as right
     /// is worth u/(1 + |u|): those that are nearly right, or nearly wrong, matter most, and none ceases to. With
     /// [`Fitness::MeanHinge`] it is worth what it is there.
     pub fn worth(&self, child: &Body) -> f64 {
-        let changes: Vec<((usize, usize), f64)> = (child.voxels().iter())
-            .filter_map(|(place, &material)| {
-                let change = (sense(material) - sense(self.body.voxels()[place])) * self.influence[place];
-                (change != 0.0).then_some((place, change))
-            })
+        let changes: Vec<((usize, usize), Material, Material)> = (child.voxels().iter())
+            .map(|(place, &to)| (place, self.body.voxels()[place], to))
+            .filter(|(_, from, to)| from != to)
             .collect();
+        let wider = |stimulus: &Grid<f64>, &(place, from, to): &((usize, usize), Material, Material)| {
+            let width = |material| width(material, stimulus.or_default(place), self.physics);
+            (width(to) - width(from)) * self.influence[place]
+        };
         let worth = |&Counted { stimulus, right, displacement, weight }: &Counted| {
-            let change: f64 = changes.iter().map(|&(place, each)| each * stimulus.or_default(place)).sum();
+            let change: f64 = changes.iter().map(|change| wider(stimulus, change)).sum();
             let margin = right * (displacement + change);
             if self.fitness == Fitness::MeanHinge {
                 return weight * self.fitness.worth(margin);
@@ -120,6 +114,9 @@ mod tests {
     use super::*;
     use crate::base::random::{Purpose, stream};
     use crate::task::grouping::Grouping;
+    use std::sync::LazyLock;
+
+    static PHYSICS: LazyLock<Physics> = LazyLock::new(Physics::default);
 
     /// A sensor of each kind, apart from each other, and a muscle.
     fn body() -> Body {
@@ -153,7 +150,7 @@ mod tests {
     }
 
     fn surrogate<'a>(body: &'a Body, stimuli: &'a [Grid<f64>], known: usize) -> Option<Surrogate<'a>> {
-        Surrogate::of(body, stimuli, &answers(stimuli, known), &split(), Fitness::RightThenMin)
+        Surrogate::of(body, stimuli, &answers(stimuli, known), &split(), Fitness::RightThenMin, &PHYSICS)
     }
 
     #[test]
@@ -192,20 +189,21 @@ mod tests {
     fn with_hinged_answers_a_change_promises_what_the_fitness_would_gain() {
         let (body, stimuli) = (body(), stimuli(200));
         let answers = answers(&stimuli, 200);
-        let model = Surrogate::of(&body, &stimuli, &answers, &split(), Fitness::MeanHinge).unwrap();
+        let model = Surrogate::of(&body, &stimuli, &answers, &split(), Fitness::MeanHinge, &PHYSICS).unwrap();
         let grouping = Grouping::two_groups(&[0], &[1]).unwrap().with_fitness(Fitness::MeanHinge);
         let gain = |text: &str| model.worth(&text.parse::<Body>().unwrap()) - model.worth(&body);
-        let fitness = |of_last: f64| {
+        let fitness = |always: f64, of_last: f64| {
             let walked = |(answer, stimulus): (&Answer, &Grid<f64>)| Answer {
-                displacement: answer.displacement.map(|d| d + of_last * stimulus[(2, 4)]),
+                displacement: answer.displacement.map(|d| d + always + of_last * stimulus[(2, 4)]),
                 ..*answer
             };
             let answers: Vec<Answer> = answers.iter().zip(&stimuli).map(walked).collect();
             grouping.score(&answers).fitness
         };
-        // Without the last sensor, and with it turned round.
-        assert!((gain("50003/00000/20000") - (fitness(6.0) - fitness(0.0))).abs() < 0.03);
-        assert!((gain("50003/00000/20005") - (fitness(12.0) - fitness(0.0))).abs() < 0.06);
+        // Without the last sensor, and with it turned round: on a dark pixel, too, it is then wider than it was, by 0.4 or 1.
+        let now = fitness(0.0, 0.0);
+        assert!((gain("50003/00000/20000") - (fitness(-2.4, 6.0) - now)).abs() < 0.03);
+        assert!((gain("50003/00000/20005") - (fitness(-6.0, 12.0) - now)).abs() < 0.06);
         assert!(gain("50003/00000/20000") > 0.02);
     }
 
@@ -233,7 +231,7 @@ mod tests {
                 displacement: Some(if i % 6 == 0 { -1e9 } else { 1e9 }),
             })
             .collect();
-        let model = Surrogate::of(&body, &stimuli, &answers, &split, Fitness::Min).unwrap();
+        let model = Surrogate::of(&body, &stimuli, &answers, &split, Fitness::Min, &PHYSICS).unwrap();
         assert_eq!(model.images.len(), 45);
         // Everything right, by far; of three classes with as many images each.
         assert!((model.worth(&body) - 1.0).abs() < 1e-6);
