@@ -161,7 +161,7 @@ fn what_follows_the_fifth_wrong_answer_is_not_shown_and_changes_nothing() {
 #[test]
 fn a_race_shows_less_and_is_as_exact_as_any_run() {
     let sandbox = Sandbox::new();
-    let stage = "[[stage]]\nimages_per_class = 24\nfitness = \"mean_hinge\"\nkeep = 6\nvoxel_mutations = 0.5\nraised_starts = 1\n";
+    let stage = "[[stage]]\nimages_per_class = 24\nfitness = \"mean_hinge\"\nkeep = 6\nvoxel_mutations = 0.5\nvoxel_candidates = 8\nvoxel_changes = 4\nvoxel_scope = \"sensors\"\nraised_starts = 1\n";
     // Long enough lives for robots to differ.
     let base = TINY
         .replace("control_steps = 20", "control_steps = 100")
