@@ -22,6 +22,7 @@ use crate::task::evaluation::{Job, MayWin, Outcome, evaluate};
 use crate::task::grouping::Grouping;
 use crate::task::race::Race;
 use rayon::prelude::*;
+use std::iter::repeat;
 use std::mem::{replace, take};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -254,7 +255,7 @@ impl<'a> Run<'a> {
     fn evaluate(&mut self, robots: Vec<(u64, Option<usize>, Robot)>) -> Result<(), Error> {
         let config = &self.options.config;
         let Training { stimuli, raised, protocol, .. } = &self.training;
-        let floors = self.floors();
+        let floors = Floors::of(self.search.archive(), &self.grouping, config.keep(self.period));
         let jobs = robots.iter().map(|(_, parent, robot)| self.job(*parent, robot, &floors));
         let jobs: Vec<Job> = jobs.collect();
         let evaluations = evaluate(&jobs, stimuli, raised, &config.physics, protocol, config.savings);
@@ -283,10 +284,6 @@ impl<'a> Run<'a> {
         Ok(())
     }
 
-    fn floors(&self) -> Floors {
-        Floors::of(self.search.archive(), &self.grouping, self.options.config.keep(self.period))
-    }
-
     /// Coordinates of the cell of a robot that performs a task.
     fn cell(&self, mut bins: Vec<usize>, task: usize) -> Vec<usize> {
         bins.extend((self.grouping.tasks().len() > 1).then_some(task));
@@ -294,22 +291,24 @@ impl<'a> Run<'a> {
     }
 
     fn job<'b>(&'b self, parent: Option<usize>, robot: &'b Robot, floors: &'b Floors) -> Job<'b> {
-        let archive = self.search.archive();
-        let parent = parent.and_then(|cell| archive.get(cell)).map(|elite| &elite.solution.displacements);
+        let (archive, training, grouping) = (self.search.archive(), &self.training, &self.grouping);
+        let answers = parent
+            .and_then(|cell| archive.get(cell))
+            .map(|elite| training.answers(elite.solution.displacements.iter().copied().map(Some)));
         let bins = robot.bins();
-        let to_beat: Vec<Option<f64>> = (0..self.grouping.tasks().len())
+        let to_beat: Vec<Option<f64>> = (0..grouping.tasks().len())
             .map(|task| {
                 let cell = self.space.index(&self.cell(bins.clone(), task));
                 floors.to_beat(task, cell.and_then(|cell| archive.objective(cell)))
             })
             .collect();
-        let (training, grouping, beaten) = (&self.training, &self.grouping, to_beat.clone());
+        let beaten = to_beat.clone();
         let may_win = move |known: &[Option<f64>]| {
             grouping.can_still_win(&training.answers(known.iter().copied()), |task| beaten[task])
         };
-        let answers = parent.map(|d| training.answers(d.iter().copied().map(Some)));
-        let rival = answers.as_ref().filter(|_| self.options.config.race(self.period));
-        let race = rival.and_then(|rival| Race::against(grouping, rival));
+        // Who has no parent races against one who stands still, whose answers are worth nothing: it is told by its own.
+        let rival = || answers.clone().unwrap_or_else(|| training.answers(repeat(Some(0.0))));
+        let race = self.options.config.race(self.period).then(|| Race::against(grouping, &rival())).flatten();
         // Who races is shown the images in their order, else it would begin with what its parent did worst by bad luck.
         let order = answers.filter(|_| race.is_none()).map_or_else(Vec::new, |a| grouping.hardest_first(&a));
         let given_up = race.map(|race| {

@@ -43,7 +43,8 @@ struct Image {
 }
 
 impl Race {
-    /// Against a parent with these answers. `None` if its fitness is not a [mean](Fitness::is_mean), or not all of them are
+    /// Against a parent with these answers; who has none is told by its own answers alone beside one who always stands still, since
+    /// that is worth 0. `None` if its fitness is not a [mean](Fitness::is_mean), or not all of them are
     /// known.
     pub fn against(grouping: &Grouping, parent: &[Answer]) -> Option<Self> {
         let fitness = grouping.fitness();
@@ -157,6 +158,22 @@ mod tests {
         // Better the other way round is better.
         let mirrored: Vec<_> = known(&answers(3, 6.0)).into_iter().map(|d| d.map(|d| -d)).collect();
         assert!(!race.is_left_behind(&mirrored, |_| Some(to_beat)));
+    }
+
+    #[test]
+    fn beside_one_who_stands_still_it_is_told_by_what_it_did_whether_it_is_good_enough() {
+        let stood = |answer: &Answer| Answer { displacement: Some(0.0), ..*answer };
+        let still: Vec<Answer> = answers(1, 0.0).iter().map(stood).collect();
+        for fitness in [Fitness::MeanHinge, Fitness::MeanClipped] {
+            let race = Race::against(&grouping(fitness), &still).unwrap();
+            let known = known(&answers(2, 4.0));
+            // Worth 0.4 on average.
+            assert!(
+                race.is_left_behind(&known, |_| Some(0.6)) && !race.is_left_behind(&known, |_| Some(0.35))
+            );
+            assert!(race.is_left_behind(&known[..FEWEST], |_| Some(0.9)));
+            assert!(!race.is_left_behind(&known[..FEWEST - 1], |_| Some(0.9)));
+        }
     }
 
     #[test]
