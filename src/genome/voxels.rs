@@ -4,7 +4,6 @@ use super::params::VoxelScope;
 use super::{BodySpec, Edits, Genome, GenomeError, MAX_MUTATIONS, MutationParams};
 use crate::base::random::Stream;
 use crate::body::{Body, Material};
-use std::iter;
 
 impl Genome {
     /// A copy with as many voxels changed as is drawn ([`MutationParams::voxel_changes`]), each of them chosen among as many
@@ -23,10 +22,8 @@ impl Genome {
         // Nothing is drawn where there is nothing to choose.
         let more = if is_choice { rng.below(usize::from(params.voxel_candidates)) } else { 0 };
         let most_changes = usize::from(params.voxel_changes);
-        let sizes: Vec<usize> =
-            iter::successors(Some(1), |size| (*size < most_changes).then(|| most_changes.min(2 * size)))
-                .collect();
-        let changes = if sizes.len() > 1 { sizes[rng.below(sizes.len())] } else { 1 };
+        let doublings = most_changes.next_power_of_two().ilog2() as usize;
+        let changes = if doublings > 0 { most_changes.min(1 << rng.below(doublings + 1)) } else { 1 };
         let chosen = |edits: &Edits, rng: &mut Stream| -> Result<_, GenomeError> {
             let mut best = one_voxel_changed(edits, described, spec, scope, rng)?;
             let mut most = promise(&best.1);

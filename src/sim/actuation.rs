@@ -6,28 +6,29 @@ use crate::body::Material;
 
 /// Target width of an active voxel at a control step \[rest widths\]; `pixel` in [0, 1] matters to sensors only.
 pub(super) fn target(material: Material, control_step: u64, pixel: f64, physics: &Physics) -> f64 {
+    let phase = match material {
+        Material::MuscleInPhase => 0.0,
+        Material::MuscleAntiphase => physics.antiphase,
+        _ => return width(material, pixel, physics),
+    };
     let cycle = u64::from(physics.cycle_steps);
     // The period is one step short of the cycle: the sine's first and last values are equal.
     let angle = std::f64::consts::TAU * (control_step % cycle) as f64 / (cycle - 1) as f64;
-    let muscle =
-        |phase: f64| physics.muscle_low + physics.muscle_swing * (libm::sin(phase + angle) + 1.0) / 2.0;
-    let free = match material {
-        Material::MuscleInPhase => muscle(0.0),
-        Material::MuscleAntiphase => muscle(physics.antiphase),
-        Material::SensorShrink => physics.sensor_shrink_dark - physics.sensor_swing * pixel,
-        Material::SensorExpand => physics.sensor_expand_dark + physics.sensor_swing * pixel,
-        Material::Empty | Material::Rigid | Material::Soft => 1.0,
-    };
+    let free = physics.muscle_low + physics.muscle_swing * (libm::sin(phase + angle) + 1.0) / 2.0;
     free.clamp(physics.target_min, physics.target_max)
 }
 
 /// Target width of any voxel under a pixel in [0, 1] \[rest widths\]: of a muscle halfway through its swing, of a passive one 1.
 pub fn width(material: Material, pixel: f64, physics: &Physics) -> f64 {
-    if material.is_muscle() {
-        let middle = physics.muscle_low + physics.muscle_swing / 2.0;
-        return middle.clamp(physics.target_min, physics.target_max);
-    }
-    target(material, 0, pixel, physics)
+    let free = match material {
+        Material::MuscleInPhase | Material::MuscleAntiphase => {
+            physics.muscle_low + physics.muscle_swing / 2.0
+        }
+        Material::SensorShrink => physics.sensor_shrink_dark - physics.sensor_swing * pixel,
+        Material::SensorExpand => physics.sensor_expand_dark + physics.sensor_swing * pixel,
+        Material::Empty | Material::Rigid | Material::Soft => 1.0,
+    };
+    free.clamp(physics.target_min, physics.target_max)
 }
 
 /// Writes the goals of all actuated sides for a control step. `pixels` holds each active voxel's pixel,
