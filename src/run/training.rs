@@ -111,27 +111,31 @@ impl Training {
             let drawn = dataset.draw(Split::Train, &classes, per_class, config.seed, number);
             drawn.map_err(|error| refuse(key, error))
         };
-        match (config.drawn_per_class(period), &config.data.train_images) {
+        let drawn = match (config.drawn_per_class(period), &config.data.train_images) {
             (Some(per_class), _) => {
                 let key = |key: &str| format!("stage {}: {key}", period.stage + 1);
-                let Some(pool) = config.pool(period) else {
-                    let drawn = draw(&key("images_per_class"), per_class, period.number())?;
-                    // The last wrong answer is not to come while one class is shown.
-                    let takes_turns = config.fitness_in(period).last_wrong().is_some();
-                    return Ok(if takes_turns { by_turns(drawn, per_class) } else { drawn });
-                };
-                let pool = draw(&key("pool"), pool, period.number())?;
-                let label = |&index: &usize| {
-                    dataset.label(Split::Train, index).map_err(|error| refuse(&key("pool"), error))
-                };
-                let labels = pool.iter().map(label).collect::<Result<Vec<u8>, Error>>()?;
-                let stimulus = |&index: &usize| see(config, dataset, Split::Train, index);
-                let stimuli = pool.iter().map(stimulus).collect::<Result<Vec<_>, Error>>()?;
-                Ok(hardest(&labels, &stimuli, per_class).into_iter().map(|number| pool[number]).collect())
+                match config.pool(period) {
+                    None => draw(&key("images_per_class"), per_class, period.number())?,
+                    Some(pool) => {
+                        let pool = draw(&key("pool"), pool, period.number())?;
+                        let label = |&index: &usize| {
+                            let label = dataset.label(Split::Train, index);
+                            label.map_err(|error| refuse(&key("pool"), error))
+                        };
+                        let labels = pool.iter().map(label).collect::<Result<Vec<u8>, Error>>()?;
+                        let stimulus = |&index: &usize| see(config, dataset, Split::Train, index);
+                        let stimuli = pool.iter().map(stimulus).collect::<Result<Vec<_>, Error>>()?;
+                        hardest(&labels, &stimuli, per_class).into_iter().map(|number| pool[number]).collect()
+                    }
+                }
             }
-            (None, Some(indices)) => Ok(indices.clone()),
-            (None, None) => draw("data.images_per_class", config.data.images_per_class, 0),
-        }
+            (None, Some(indices)) => return Ok(indices.clone()),
+            (None, None) => draw("data.images_per_class", config.data.images_per_class, 0)?,
+        };
+        // Where the first images decide whether others are shown, they are not to be of one class.
+        let takes_turns = config.fitness_in(period).last_wrong().is_some() || config.race(period);
+        let per_class = drawn.len() / classes.len().max(1);
+        Ok(if takes_turns { by_turns(drawn, per_class) } else { drawn })
     }
 
     /// The training images of a period.
@@ -199,6 +203,35 @@ fn by_turns(drawn: Vec<usize>, per_class: usize) -> Vec<usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Labels of the training images of a config with this section `[data]` and this stage, and those images in ascending order.
+    fn drawn(data: &str, stage: &str) -> (Vec<u8>, Vec<usize>) {
+        let text = format!(
+            "[task]\ngroups = [[3], [0, 1]]\n[data]\ndataset = \"builtin\"\n{data}\n[[stage]]\n{stage}"
+        );
+        let config = Config::parse(&text, "a.toml", &[]).unwrap();
+        let training = Training::load(&config, None).unwrap();
+        let mut indices: Vec<usize> = training.images.iter().map(|image| image.index).collect();
+        indices.sort_unstable();
+        (training.images.iter().map(|image| image.label).collect(), indices)
+    }
+
+    #[test]
+    fn classes_take_turns_where_the_first_images_decide_whether_others_are_shown() {
+        let (two, pool) = ("images_per_class = 2", "images_per_class = 2\npool = 5");
+        for (data, images) in [("", two), ("", pool), (two, "")] {
+            let plain = drawn(data, &format!("{images}\nfitness = \"mean_hinge\""));
+            assert_eq!(plain.0, [3, 3, 0, 0, 1, 1]);
+            for fitness in ["\"mean_hinge\"\nrace = true", "\"until_fifth_wrong\""] {
+                let by_turns = drawn(data, &format!("{images}\nfitness = {fitness}"));
+                // The same images.
+                assert_eq!(by_turns, (vec![3, 0, 1, 3, 0, 1], plain.1.clone()), "{data} {images} {fitness}");
+            }
+        }
+        // Images that are named come as they are named.
+        let named = drawn("train_images = [3, 0, 10, 1]", "fitness = \"until_fifth_wrong\"");
+        assert_eq!(named.0, [3, 0, 0, 1]);
+    }
 
     #[test]
     fn starts_are_raised_by_turns_within_each_class() {
