@@ -11,6 +11,7 @@ use morphcog::run::curriculum::Period;
 use morphcog::run::evolve::{Observer, Options, Progress, evolve};
 use morphcog::run::folder::{IfExists, RunFolder};
 use morphcog::run::metrics::Totals;
+use morphcog::run::relatives::Relatives;
 use morphcog::run::start::StartRef;
 use morphcog::run::training::Training;
 use morphcog::run::{archive::RunFile, bench};
@@ -115,7 +116,8 @@ fn bookkeeping(criterion: &mut Criterion) {
     for i in 0..600_000_u128 {
         known_bodies.insert((i * 0x9E37_79B9_7F4A_7C15_F39C_C060_5CED_C834).to_le_bytes());
     }
-    let checkpoint = Checkpoint { run, totals: Totals::default(), known_bodies };
+    let checkpoint =
+        Checkpoint { run, totals: Totals::default(), known_bodies, relatives: Relatives::default() };
     let mut group = criterion.benchmark_group("bookkeeping");
     group.sample_size(10);
     group.bench_function("an offspring and its body", |bencher| {

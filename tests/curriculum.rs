@@ -21,13 +21,13 @@ use std::time::{Duration, Instant};
 
 /// Three stages in twelve generations: the second with shorter lives; the last with three draws of images, the hardest of
 /// three times as many, with the four fittest elites at the beginning of each, half of the offspring changed in up to four voxels, each
-/// chosen among several, and every second start raised.
+/// chosen among several by what three relatives did, too, and every second start raised.
 fn staged() -> String {
     let stages = "\n[[stage]]\ngenerations = 4\n\
         [[stage]]\ngenerations = 3\nimages_per_class = 2\nfitness = \"mean_clipped\"\n\
         control_steps = 15\n\
         [[stage]]\nimages_per_class = 3\npool = 9\nfitness = \"right_then_margin\"\nredraw = 2\nkeep = 4\n\
-        voxel_mutations = 0.5\nvoxel_candidates = 8\nvoxel_changes = 4\nraised_starts = 1\n";
+        voxel_mutations = 0.5\nvoxel_candidates = 8\nvoxel_changes = 4\nvoxel_relatives = 3\nraised_starts = 1\n";
     format!("{TINY}{stages}")
 }
 
@@ -161,12 +161,14 @@ fn what_follows_the_fifth_wrong_answer_is_not_shown_and_changes_nothing() {
 #[test]
 fn a_race_shows_less_and_is_as_exact_as_any_run() {
     let sandbox = Sandbox::new();
-    let stage = "[[stage]]\nimages_per_class = 24\nfitness = \"mean_hinge\"\nkeep = 6\nvoxel_mutations = 0.5\nvoxel_candidates = 8\nvoxel_changes = 4\nvoxel_scope = \"sensors\"\nraised_starts = 1\n";
+    let stage = "[[stage]]\nimages_per_class = 24\nfitness = \"mean_hinge\"\nkeep = 6\nvoxel_mutations = 0.5\nvoxel_candidates = 8\nvoxel_changes = 4\nvoxel_scope = \"sensors\"\nvoxel_relatives = 6\nraised_starts = 1\n";
     // Long enough lives for robots to differ.
     let base = TINY
         .replace("control_steps = 20", "control_steps = 100")
         .replace("generations = 12", "generations = 14");
-    sandbox.write("plain.toml", format!("{base}\n[[stage]]\ngenerations = 6\n{stage}"));
+    // With relatives all is saved that can be, whatever the config says.
+    let plain = stage.replace("voxel_relatives = 6\n", "");
+    sandbox.write("plain.toml", format!("{base}\n[[stage]]\ngenerations = 6\n{plain}"));
     sandbox.write("race.toml", format!("{base}\n[[stage]]\ngenerations = 6\n{stage}race = true\n"));
     let run = |options: &str| {
         sandbox.run(&format!("evolve -q {options} --force")).ended(0, &[]);
@@ -185,6 +187,7 @@ fn a_race_shows_less_and_is_as_exact_as_any_run() {
         metrics.lines().last().and_then(|line| line.split(',').nth(11)).unwrap().parse().unwrap()
     };
     assert!(stopped("plain") == 0 && stopped("race") > 0 && !plain.elites.is_empty());
+    assert!(sandbox.read("race/checkpoint.json").contains("\"relatives\":[{\"body\""));
     for options in [
         "--threads 1",
         "--threads 3",

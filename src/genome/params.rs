@@ -28,6 +28,10 @@ pub struct MutationParams {
     /// several candidates, as long as each promises more than the one before. Default 1; then left out of files.
     #[serde(deserialize_with = "candidates", skip_serializing_if = "is_one")]
     pub voxel_changes: u16,
+    /// Most relatives, of other bodies with the same gait, whose lives tell what the candidates promise besides the parent's own.
+    /// Default 0; then left out of files.
+    #[serde(deserialize_with = "relatives", skip_serializing_if = "is_none")]
+    pub voxel_relatives: u16,
     /// Which voxels may change. Default all; then left out of files.
     #[serde(skip_serializing_if = "VoxelScope::is_all")]
     pub voxel_scope: VoxelScope,
@@ -65,6 +69,7 @@ impl Default for MutationParams {
             voxel_mutations: 0.0,
             voxel_candidates: 1,
             voxel_changes: 1,
+            voxel_relatives: 0,
             voxel_scope: VoxelScope::All,
         }
     }
@@ -74,6 +79,10 @@ fn is_zero(value: &f64) -> bool {
     *value == 0.0
 }
 
+fn is_none(value: &u16) -> bool {
+    *value == 0
+}
+
 fn is_one(value: &u16) -> bool {
     *value == 1
 }
@@ -81,12 +90,23 @@ fn is_one(value: &u16) -> bool {
 /// Most candidates that make sense: on 14 × 14 voxels, there are 1176 mutations of one.
 pub const MAX_CANDIDATES: u16 = 1000;
 
+/// Most relatives: fitting a model to the lives of more takes longer than a life.
+pub const MAX_RELATIVES: u16 = 100;
+
 fn candidates<'de, D: Deserializer<'de>>(deserializer: D) -> Result<u16, D::Error> {
+    number(deserializer, 1, MAX_CANDIDATES)
+}
+
+fn relatives<'de, D: Deserializer<'de>>(deserializer: D) -> Result<u16, D::Error> {
+    number(deserializer, 0, MAX_RELATIVES)
+}
+
+fn number<'de, D: Deserializer<'de>>(deserializer: D, least: u16, most: u16) -> Result<u16, D::Error> {
     let value = u16::deserialize(deserializer)?;
-    if (1..=MAX_CANDIDATES).contains(&value) {
+    if (least..=most).contains(&value) {
         return Ok(value);
     }
-    let text = format!("{value} is out of range; expected a number from 1 to {MAX_CANDIDATES}");
+    let text = format!("{value} is out of range; expected a number from {least} to {most}");
     Err(serde::de::Error::custom(text))
 }
 
@@ -124,6 +144,7 @@ mod tests {
                 .contains("0 is out of range; expected a number from 1 to 1000")
         );
         assert!(read(r#"{"voxel_changes": 1001}"#).unwrap_err().contains("1001 is out of range"));
+        assert!(read(r#"{"voxel_relatives": 101}"#).unwrap_err().contains("expected a number from 0 to 100"));
         assert_eq!(read(r#"{"voxel_scope": "sensors"}"#).unwrap().voxel_scope, VoxelScope::Sensors);
         assert!(read(r#"{"voxel_scope": "some"}"#).unwrap_err().contains("`all` or `sensors`"));
         assert!(!serde_json::to_string(&MutationParams::default()).unwrap().contains("voxel"));

@@ -296,7 +296,7 @@ fn live(setting: &Setting, measured: bool) -> Option<(Vec<f64>, Energy)> {
     let savings = Savings { early_stop: false, ..Savings::default() };
     match evaluate(&[job], stimuli, &[], physics, protocol, savings).pop()?.outcome {
         Outcome::Walked(displacements) => Some((displacements, Energy::default())),
-        Outcome::Unstable(_) | Outcome::Stopped => None,
+        Outcome::Unstable(_) | Outcome::Stopped(_) => None,
     }
 }
 

@@ -2,6 +2,7 @@
 
 use super::archive::RunFile;
 use super::metrics::Totals;
+use super::relatives::Relatives;
 use super::{Error, toml_text};
 use crate::base::files::{sync_folder, write_atomically};
 use crate::base::hash::sha256_hex;
@@ -23,6 +24,9 @@ pub struct Checkpoint {
     pub totals: Totals,
     /// Bodies evaluated so far.
     pub known_bodies: KnownBodies,
+    /// What robots did that a [surrogate](crate::task::surrogate) learns from.
+    #[serde(default, skip_serializing_if = "Relatives::is_empty")]
+    pub relatives: Relatives,
 }
 
 /// Content keys of bodies. In files one text of 32 hexadecimal digits each, in ascending order.
@@ -134,6 +138,7 @@ mod tests {
             run,
             totals: Totals { evaluations: 20 * generations, ..Totals::default() },
             known_bodies,
+            relatives: Relatives::default(),
         }
     }
 

@@ -2,7 +2,8 @@
 
 use super::{Config, Error};
 use crate::genome::MutationParams;
-use crate::genome::params::{MAX_CANDIDATES, VoxelScope};
+use crate::genome::params::{MAX_CANDIDATES, MAX_RELATIVES, VoxelScope};
+use crate::task::evaluation::Savings;
 use crate::task::fitness::Fitness;
 use crate::task::protocol::{Life, Protocol};
 use serde::{Deserialize, Serialize};
@@ -48,6 +49,9 @@ pub struct StageConfig {
     /// Most voxels of an offspring that change. Default `genome.voxel_changes`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub voxel_changes: Option<u16>,
+    /// Most relatives whose lives tell what changes promise. Default `genome.voxel_relatives`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub voxel_relatives: Option<u16>,
     /// Which voxels may change. Default `genome.voxel_scope`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub voxel_scope: Option<VoxelScope>,
@@ -144,6 +148,16 @@ impl Config {
         self.stage.get(period.stage)?.keep
     }
 
+    /// What is saved in a period. Whom one parent left behind in a race, another might not: nobody is evaluated twice. What
+    /// relatives tell of is what was shown to them: it is the same whatever the savings, because all are on.
+    pub fn savings_in(&self, period: Period) -> Savings {
+        let known_bodies = self.savings.known_bodies || self.race(period);
+        match self.mutation_in(period).voxel_relatives {
+            0 => Savings { known_bodies, ..self.savings },
+            _ => Savings::default(),
+        }
+    }
+
     /// How genomes mutate in a period.
     pub fn mutation_in(&self, period: Period) -> MutationParams {
         let stage = self.stage.get(period.stage).copied().unwrap_or_default();
@@ -151,6 +165,7 @@ impl Config {
             voxel_mutations: stage.voxel_mutations.unwrap_or(self.genome.voxel_mutations),
             voxel_candidates: stage.voxel_candidates.unwrap_or(self.genome.voxel_candidates),
             voxel_changes: stage.voxel_changes.unwrap_or(self.genome.voxel_changes),
+            voxel_relatives: stage.voxel_relatives.unwrap_or(self.genome.voxel_relatives),
             voxel_scope: stage.voxel_scope.unwrap_or(self.genome.voxel_scope),
             ..self.genome.clone()
         }
@@ -196,14 +211,15 @@ impl Config {
                 let text = "race: expected fitness = \"mean_clipped\" or \"mean_hinge\": how far an offspring is behind is told by a mean";
                 return refuse(number, text.to_string());
             }
-            let counts =
-                [("voxel_candidates", stage.voxel_candidates), ("voxel_changes", stage.voxel_changes)];
-            for (key, count) in counts {
-                if let Some(count) = count.filter(|count| !(1..=MAX_CANDIDATES).contains(count)) {
-                    return refuse(
-                        number,
-                        format!("{key} = {count}: expected a number from 1 to {MAX_CANDIDATES}"),
-                    );
+            let counts = [
+                ("voxel_candidates", stage.voxel_candidates, 1, MAX_CANDIDATES),
+                ("voxel_changes", stage.voxel_changes, 1, MAX_CANDIDATES),
+                ("voxel_relatives", stage.voxel_relatives, 0, MAX_RELATIVES),
+            ];
+            for (key, count, least, most) in counts {
+                if let Some(count) = count.filter(|count| !(least..=most).contains(count)) {
+                    let text = format!("{key} = {count}: expected a number from {least} to {most}");
+                    return refuse(number, text);
                 }
             }
             let drawing = [
@@ -297,6 +313,10 @@ mod tests {
             (
                 "[[stage]]\nvoxel_changes = 1001",
                 "stage 1: voxel_changes = 1001: expected a number from 1 to 1000",
+            ),
+            (
+                "[[stage]]\nvoxel_relatives = 101",
+                "stage 1: voxel_relatives = 101: expected a number from 0 to 100",
             ),
             (
                 "[[stage]]\nrace = true",

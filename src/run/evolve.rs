@@ -1,5 +1,6 @@
 //! `morphcog evolve`: MAP-Elites over bodies, resumable, the same bits however it is run.
 
+mod judging;
 mod saving;
 
 use super::archive::{Dimensions, Robot};
@@ -8,21 +9,21 @@ use super::curriculum::Period;
 use super::folder::{self, IfExists, RunFolder};
 use super::keep::Floors;
 use super::metrics::{Metrics, Totals};
-use super::robust::{Scored, settled, with_perturbed_lives};
+use super::relatives::Relatives;
+use super::robust::{Scored, with_perturbed_lives};
 pub use super::session::{Finished, Observer, Options, Progress};
 use super::start::{Start, StartRef};
 use super::training::{Training, load_dataset};
-use super::variation::Mutations;
+use super::variation::{Lessons, Mutations};
 use super::{Error, resume};
 use crate::base::files::write_atomically;
+use crate::body::Body;
 use crate::genome::GenomeError;
-use crate::qd::{Archive, ArchiveStats, DescriptorSpace, Evaluated, MapElites};
+use crate::qd::{Archive, ArchiveStats, DescriptorSpace, MapElites};
 use crate::task::dataset::{Dataset, Split};
-use crate::task::evaluation::{Job, MayWin, Outcome, evaluate};
+use crate::task::evaluation::{Job, Outcome, evaluate};
 use crate::task::grouping::Grouping;
-use crate::task::race::Race;
 use rayon::prelude::*;
-use std::iter::repeat;
 use std::mem::{replace, take};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -88,6 +89,7 @@ struct Run<'a> {
     dimensions: Dimensions,
     search: MapElites<Robot>,
     known: KnownBodies,
+    relatives: Relatives,
     totals: Totals,
     /// The archive it started from.
     origin: Option<StartRef>,
@@ -104,11 +106,11 @@ impl<'a> Run<'a> {
         saved: Option<Checkpoint>,
     ) -> Result<Self, Error> {
         let config = &options.config;
-        let (archive, known, totals, generation, origin) = match saved {
-            Some(Checkpoint { run, totals, known_bodies }) => {
-                (run.archive()?, known_bodies, totals, run.generations, run.start)
+        let (archive, known, relatives, totals, generation, origin) = match saved {
+            Some(Checkpoint { run, totals, known_bodies, relatives }) => {
+                (run.archive()?, known_bodies, relatives, totals, run.generations, run.start)
             }
-            None => (Archive::new(), KnownBodies::default(), Totals::default(), 0, None),
+            None => Default::default(),
         };
         let latest = generation.saturating_sub(1);
         let period = config.period(latest);
@@ -125,6 +127,7 @@ impl<'a> Run<'a> {
             grouping,
             search: MapElites::new(config.seed, config.map_elites.clone(), archive),
             known,
+            relatives,
             totals,
             origin,
             generation,
@@ -206,6 +209,7 @@ impl<'a> Run<'a> {
             replace(&mut self.grouping, grouping),
             replace(&mut self.search, search),
             take(&mut self.known),
+            take(&mut self.relatives),
             self.totals,
         );
         elites.iter().for_each(|robot| _ = self.known.insert(robot.body.key()));
@@ -214,7 +218,15 @@ impl<'a> Run<'a> {
         let mut elites = (0..).zip(elites).map(|(number, robot)| (number, None, robot)).peekable();
         while elites.peek().is_some() {
             if stop.load(Ordering::Relaxed) {
-                (self.period, self.training, self.grouping, self.search, self.known, self.totals) = before;
+                (
+                    self.period,
+                    self.training,
+                    self.grouping,
+                    self.search,
+                    self.known,
+                    self.relatives,
+                    self.totals,
+                ) = before;
                 return Ok(false);
             }
             self.evaluate(elites.by_ref().take(at_once).collect())?;
@@ -226,7 +238,12 @@ impl<'a> Run<'a> {
     fn next_generation(&mut self) -> Result<(), Error> {
         let config = &self.options.config;
         let params = config.mutation_in(self.period);
-        let lessons = Some((&self.training, &self.grouping, &config.physics));
+        let lessons = Some(Lessons {
+            training: &self.training,
+            grouping: &self.grouping,
+            physics: &config.physics,
+            relatives: &self.relatives,
+        });
         let mutations = Mutations { seed: config.seed, spec: config.body_spec(), params: &params, lessons };
         let proposals = self.search.ask(self.generation);
         let robots: Result<Vec<Robot>, GenomeError> =
@@ -234,8 +251,7 @@ impl<'a> Run<'a> {
         let robots = robots.map_err(|error| Error::input(format!("body: {error}")))?;
         self.totals.evaluations += robots.len() as u64;
 
-        // Whom one parent left behind, another might not: where there is a race nobody is evaluated twice, saving or not.
-        let saves_known = config.savings.known_bodies || config.race(self.period);
+        let saves_known = config.savings_in(self.period).known_bodies;
         let (images, mut fresh) = (self.training.stimuli.len() as u64, Vec::new());
         for (proposal, robot) in proposals.iter().zip(robots) {
             let is_new = self.known.insert(robot.body.key());
@@ -246,6 +262,8 @@ impl<'a> Run<'a> {
             }
         }
         self.evaluate(fresh)?;
+        let bodies: Vec<&Body> = self.search.archive().elites().map(|elite| &elite.solution.body).collect();
+        self.relatives.keep(&bodies, usize::from(params.voxel_relatives));
         self.generation += 1;
         Ok(())
     }
@@ -258,23 +276,30 @@ impl<'a> Run<'a> {
         let floors = Floors::of(self.search.archive(), &self.grouping, config.keep(self.period));
         let jobs = robots.iter().map(|(_, parent, robot)| self.job(*parent, robot, &floors));
         let jobs: Vec<Job> = jobs.collect();
-        let evaluations = evaluate(&jobs, stimuli, raised, &config.physics, protocol, config.savings);
+        let savings = config.savings_in(self.period);
+        let evaluations = evaluate(&jobs, stimuli, raised, &config.physics, protocol, savings);
         let scored = if config.robust(self.period) {
-            with_perturbed_lives(config, &self.training, &self.grouping, &jobs, evaluations)
+            with_perturbed_lives(config, &self.training, &self.grouping, &jobs, evaluations, savings)
         } else {
             evaluations.into_iter().map(Scored::from).collect()
         };
         drop(jobs);
 
         let mut told = Vec::new();
+        let relatives = usize::from(config.mutation_in(self.period).voxel_relatives);
         for ((child, _, robot), Scored { evaluation, at_most }) in robots.into_iter().zip(scored) {
             self.totals.count(&evaluation);
+            if relatives > 0
+                && let Some(known) = evaluation.outcome.known()
+            {
+                self.relatives.add(&robot.body, known);
+            }
             match evaluation.outcome {
                 Outcome::Walked(displacements) => {
                     told.extend(self.scored(child, robot, displacements, at_most, &floors))
                 }
                 Outcome::Unstable(_) => self.totals.unstable += 1,
-                Outcome::Stopped => {}
+                Outcome::Stopped(_) => {}
             }
         }
         self.search.tell(told).map_err(|error| Error::other(error.to_string()))?;
@@ -282,68 +307,5 @@ impl<'a> Run<'a> {
             self.search.retain_fittest(keep, |robot| robot.task.clone());
         }
         Ok(())
-    }
-
-    /// Coordinates of the cell of a robot that performs a task.
-    fn cell(&self, mut bins: Vec<usize>, task: usize) -> Vec<usize> {
-        bins.extend((self.grouping.tasks().len() > 1).then_some(task));
-        bins
-    }
-
-    fn job<'b>(&'b self, parent: Option<usize>, robot: &'b Robot, floors: &'b Floors) -> Job<'b> {
-        let (archive, training, grouping) = (self.search.archive(), &self.training, &self.grouping);
-        let answers = parent
-            .and_then(|cell| archive.get(cell))
-            .map(|elite| training.answers(elite.solution.displacements.iter().copied().map(Some)));
-        let bins = robot.bins();
-        let to_beat: Vec<Option<f64>> = (0..grouping.tasks().len())
-            .map(|task| {
-                let cell = self.space.index(&self.cell(bins.clone(), task));
-                floors.to_beat(task, cell.and_then(|cell| archive.objective(cell)))
-            })
-            .collect();
-        let beaten = to_beat.clone();
-        let may_win = move |known: &[Option<f64>]| {
-            grouping.can_still_win(&training.answers(known.iter().copied()), |task| beaten[task])
-        };
-        // Who has no parent races against one who stands still, whose answers are worth nothing: it is told by its own.
-        let rival = || answers.clone().unwrap_or_else(|| training.answers(repeat(Some(0.0))));
-        let race = self.options.config.race(self.period).then(|| Race::against(grouping, &rival())).flatten();
-        // Who races is shown the images in their order, else it would begin with what its parent did worst by bad luck.
-        let order = answers.filter(|_| race.is_none()).map_or_else(Vec::new, |a| grouping.hardest_first(&a));
-        let given_up = race.map(|race| {
-            Box::new(move |known: &[Option<f64>]| race.is_left_behind(known, |task| to_beat[task]))
-                as Box<MayWin>
-        });
-        Job {
-            body: &robot.body,
-            order,
-            may_win: Box::new(may_win),
-            settled: settled(training, grouping),
-            given_up,
-        }
-    }
-
-    /// A robot as it is told to the archive; nothing if a stage that keeps only the fittest does not let it in.
-    fn scored(
-        &self,
-        child: u64,
-        robot: Robot,
-        mut displacements: Vec<f64>,
-        at_most: f64,
-        floors: &Floors,
-    ) -> Option<Evaluated<Robot>> {
-        let answers = self.training.answers(displacements.iter().copied().map(Some));
-        // More may be known, but not always.
-        displacements.truncate(self.grouping.settled_by(&answers).unwrap_or(displacements.len()));
-        let score = self.grouping.score(&answers);
-        let coordinates = self.cell(robot.bins(), score.task);
-        // The coordinates are bins of this very space.
-        let cell = self.space.index(&coordinates).unwrap_or_default();
-        let task = self.grouping.tasks()[score.task].name();
-        let objective = score.fitness.min(at_most);
-        let solution = Robot { cell: coordinates, task, objective, displacements, ..robot };
-        let is_in = floors.to_beat(score.task, None).is_none_or(|floor| objective > floor);
-        is_in.then_some(Evaluated { child, cell, objective, solution })
     }
 }

@@ -25,6 +25,7 @@ mod physical;
 pub mod plan;
 pub mod plot;
 pub mod published;
+pub mod relatives;
 pub mod replay;
 pub mod report;
 pub mod reproduce;

@@ -57,12 +57,13 @@ pub(super) fn with_perturbed_lives(
     grouping: &Grouping,
     jobs: &[Job],
     evaluations: Vec<Evaluation>,
+    savings: Savings,
 ) -> Vec<Scored> {
     let mut scored: Vec<Scored> = evaluations.into_iter().map(Scored::from).collect();
     for perturbation in Perturbation::of_evolution() {
         let open: Vec<(usize, usize)> = (0..jobs.len())
             .filter_map(|index| {
-                may_win(config, grouping, training, &jobs[index], &scored[index]).map(|t| (index, t))
+                may_win(savings, grouping, training, &jobs[index], &scored[index]).map(|t| (index, t))
             })
             .collect();
         let Some(&(first, _)) = open.first() else { break };
@@ -71,7 +72,7 @@ pub(super) fn with_perturbed_lives(
             perturbation.apply(&setting(config, training, jobs[first].body));
         let lives: Vec<Job> =
             open.iter().map(|&(index, _)| all_of(jobs[index].body, training, grouping)).collect();
-        let savings = Savings { early_stop: false, ..config.savings };
+        let savings = Savings { early_stop: false, ..savings };
         for (&(index, task), life) in
             open.iter().zip(evaluate(&lives, &stimuli, &training.raised, &physics, &protocol, savings))
         {
@@ -92,7 +93,7 @@ pub(super) fn with_perturbed_lives(
 
 /// The task of a robot that walked and is not beaten yet.
 fn may_win(
-    config: &Config,
+    savings: Savings,
     grouping: &Grouping,
     training: &Training,
     job: &Job,
@@ -100,7 +101,7 @@ fn may_win(
 ) -> Option<usize> {
     let Outcome::Walked(displacements) = &scored.evaluation.outcome else { return None };
     let known: Vec<Option<f64>> = displacements.iter().copied().map(Some).collect();
-    let wins = !config.savings.early_stop || (job.may_win)(&known);
+    let wins = !savings.early_stop || (job.may_win)(&known);
     wins.then(|| grouping.score(&training.answers(known)).task)
 }
 

@@ -2,6 +2,7 @@
 
 use super::Error;
 use super::archive::Robot;
+use super::relatives::Relatives;
 use super::training::Training;
 use crate::base::random::{Purpose, stream};
 use crate::body::Body;
@@ -17,8 +18,21 @@ pub(super) struct Mutations<'a> {
     pub seed: u64,
     pub spec: BodySpec,
     pub params: &'a MutationParams,
-    /// What parents were trained on, and the physics they lived under; where there is none, candidates all promise the same.
-    pub lessons: Option<(&'a Training, &'a Grouping, &'a Physics)>,
+    /// Where there are none, candidates all promise the same.
+    pub lessons: Option<Lessons<'a>>,
+}
+
+/// What tells how parents answer.
+#[derive(Clone, Copy)]
+pub(super) struct Lessons<'a> {
+    /// What they were trained on.
+    pub training: &'a Training,
+    /// On what tasks.
+    pub grouping: &'a Grouping,
+    /// The physics they lived under.
+    pub physics: &'a Physics,
+    /// Who else did.
+    pub relatives: &'a Relatives,
 }
 
 /// A robot that has not lived yet.
@@ -44,10 +58,20 @@ impl Mutations<'_> {
     }
 
     fn surrogate<'b>(&'b self, parent: &'b Robot) -> Option<Surrogate<'b>> {
-        let (training, grouping, physics) = self.lessons?;
+        let Lessons { training, grouping, physics, relatives } = self.lessons?;
         let split = grouping.tasks().iter().find(|split| split.name() == parent.task)?;
         let answers = training.answers(parent.displacements.iter().copied().map(Some));
-        Surrogate::of(&parent.body, &training.stimuli, &answers, split, grouping.fitness(), physics)
+        let most = usize::from(self.params.voxel_relatives);
+        let relatives = relatives.of(&parent.body, &training.stimuli, most);
+        Surrogate::of(
+            &parent.body,
+            &training.stimuli,
+            &answers,
+            &relatives,
+            split,
+            grouping.fitness(),
+            physics,
+        )
     }
 }
 

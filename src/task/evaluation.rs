@@ -39,8 +39,20 @@ pub enum Outcome {
     Walked(Vec<f64>),
     /// A life became unstable: no fitness.
     Unstable(Unstable),
-    /// Stopped because it could not get into the archive any more, or was [given up](Job::given_up).
-    Stopped,
+    /// Stopped because it could not get into the archive any more, or was [given up](Job::given_up); with the displacement under
+    /// every image, as far as known.
+    Stopped(Vec<Option<f64>>),
+}
+
+impl Outcome {
+    /// The displacement under every image, as far as known; `None` if a life became unstable.
+    pub fn known(&self) -> Option<Vec<Option<f64>>> {
+        match self {
+            Outcome::Walked(displacements) => Some(displacements.iter().copied().map(Some).collect()),
+            Outcome::Stopped(known) => Some(known.clone()),
+            Outcome::Unstable(_) => None,
+        }
+    }
 }
 
 /// An outcome and the simulation it took. A *showing* is one image shown to one robot: a fresh life, or one
@@ -261,7 +273,7 @@ impl<'a> Candidate<'a> {
         }
         let is_lost = || self.early_stop && displacements.len() < self.order.len() && !may_win(&known);
         let is_given_up = given_up.as_ref().is_some_and(|given_up| given_up(&known));
-        (is_given_up || is_lost()).then_some(Outcome::Stopped)
+        (is_given_up || is_lost()).then_some(Outcome::Stopped(known))
     }
 
     /// Displacement per image, as far as known from the first showings.

@@ -71,7 +71,7 @@ fn every_image_is_simulated_shared_or_stopped_in_every_outcome() {
             for patience in [0, 1, 2, 5] {
                 let may_win = move |known: &[Option<f64>]| known.iter().flatten().count() <= patience;
                 let evaluation = run(rows, life, savings, order, Box::new(may_win));
-                let is_stopped = evaluation.outcome == Outcome::Stopped;
+                let is_stopped = matches!(evaluation.outcome, Outcome::Stopped(_));
                 assert!(!is_stopped || savings.early_stop && patience < 5, "{evaluation:?}");
                 assert_eq!(matches!(evaluation.outcome, Outcome::Walked(_)), rows == &CALM && !is_stopped);
             }
@@ -107,7 +107,11 @@ fn fresh_lives_follow_the_order_and_stop_when_nothing_can_be_won() {
         known[0].is_none()
     };
     let evaluation = run(&CALM, Life::Fresh, Savings::default(), &[3, 4], Box::new(may_win));
-    assert_eq!(evaluation, Evaluation { outcome: Outcome::Stopped, simulated: 2, shared: 2, stopped: 1 });
+    let all = run(&CALM, Life::Fresh, Savings::default(), &[], Box::new(|_| true)).outcome.known();
+    let mut known = all.unwrap_or_default();
+    known[2] = None;
+    let outcome = Outcome::Stopped(known);
+    assert_eq!(evaluation, Evaluation { outcome, simulated: 2, shared: 2, stopped: 1 });
 }
 
 #[test]
@@ -196,7 +200,7 @@ fn what_is_not_needed_is_not_simulated_and_cannot_spoil_what_is() {
                         assert_eq!(first[..2], all[..2]);
                     }
                     Outcome::Unstable(_) => assert!(rows == &WILD && needed == 3),
-                    Outcome::Stopped => panic!("{evaluation:?}"),
+                    Outcome::Stopped(_) => panic!("{evaluation:?}"),
                 }
                 if order.is_empty() && rows == &CALM {
                     assert_eq!(evaluation.simulated, needed as u64);

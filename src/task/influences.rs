@@ -11,47 +11,53 @@ const CHARGES: [f64; 4] = [1.0, 8.0, 64.0, 512.0];
 /// Every so manieth image is foretold from the others. (Classes often take turns, and are two or four: no fold is to be of one.)
 const FOLDS: usize = 5;
 
-/// Displacements as a mean and, for each sensor, a part in proportion to what it sees beyond its own mean.
+/// For how many images counts at most by how much all answers of a relative lie beside the robot's: they have one cause.
+const SHIFT: f64 = 4.0;
+
+/// How wide each sensor of a robot was under some images, and how far it walked.
+pub type Shown = Vec<(Vec<f64>, f64)>;
+
+/// A displacement beyond the mean, and how much wider than on average each sensor was.
+type Row = (DVector<f64>, f64);
+
+/// Displacements as a mean and, for each sensor, a part in proportion to how much wider it is than on average.
 pub struct Influences {
     /// Over which they are taken to be alike \[voxels\].
     pub reach: f64,
     /// Of the sensors' likeness to a place, what makes its influence.
     pub weights: Vec<f64>,
-    /// The mean displacement, and of each sensor that of what it saw.
+    /// The mean displacement, and of each sensor the mean width.
     pub mean: f64,
     pub means: Vec<f64>,
 }
 
 impl Influences {
-    /// The influences that are most likely, given what a robot saw and did, if those of near places are alike (regression with a
-    /// Gaussian process; Rasmussen & Williams 2006, chapter 2): how near, and how large they may be, is found out by foretelling
-    /// some images from the others.
-    pub fn of(shown: &[(Vec<f64>, f64)], sensors: &[(usize, usize)]) -> Option<Self> {
+    /// The influences that are most likely, given what a robot and `relatives` of it saw and did, if those of near places are alike
+    /// (regression with a Gaussian process; Rasmussen & Williams 2006, chapter 2): how near, and how large they may be, is found
+    /// out by foretelling some images from the others. `sensors` are the places where the robot, or one of the relatives, has one.
+    pub fn of(own: &Shown, relatives: &[Shown], sensors: &[(usize, usize)]) -> Option<Self> {
         let count = sensors.len();
-        let (mean, means) = means(shown, count)?;
+        let (mean, means) = means(own, count)?;
         // nalgebra has no columns of nothing.
         if count == 0 {
             return Some(Influences { reach: REACHES[0], weights: Vec::new(), mean, means });
         }
-        let centred: Vec<(DVector<f64>, f64)> = (shown.iter())
-            .map(|(seen, d)| (DVector::from_fn(count, |i, _| seen[i] - means[i]), d - mean))
-            .collect();
-        let folds: Vec<Moments> =
-            (0..FOLDS).map(|fold| Moments::of(centred.iter().skip(fold).step_by(FOLDS), count)).collect();
-        let all = folds.iter().fold(Moments::of([].iter(), count), |sum, fold| sum.plus(fold, 1.0));
+        let folds = folds(own, relatives, (mean, &means));
+        let moments: Vec<Moments> = folds.iter().map(|fold| Moments::of(fold, count)).collect();
+        let all = moments.iter().fold(Moments::of(&[], count), |sum, fold| sum.plus(fold, 1.0));
         let mut best = (f64::INFINITY, REACHES[0], CHARGES[0]);
         for reach in REACHES {
             let likeness = likeness(sensors, reach);
             let mut errors = CHARGES.map(|charge| (0.0, reach, charge));
-            for (number, fold) in folds.iter().enumerate() {
-                let others = all.plus(fold, -1.0);
+            for (fold, left_out) in folds.iter().zip(&moments) {
+                let others = all.plus(left_out, -1.0);
                 let system = product(&others.matrix, &likeness);
                 for (error, _, charge) in &mut errors {
                     let weights = charged(&system, *charge, &others.vector)?;
                     let influence = product(&likeness, &weights);
-                    let missed = |(seen, d): &(DVector<f64>, f64)| d - seen.dot(&influence.column(0));
-                    let squared = |image| missed(image) * missed(image);
-                    *error += centred.iter().skip(number).step_by(FOLDS).map(squared).sum::<f64>();
+                    let missed = |(seen, d): &Row| d - seen.dot(&influence.column(0));
+                    let squared = |row| missed(row) * missed(row);
+                    *error += fold.iter().map(squared).sum::<f64>();
                 }
             }
             best = errors.into_iter().fold(best, |best, next| if next.0 < best.0 { next } else { best });
@@ -62,7 +68,28 @@ impl Influences {
     }
 }
 
-/// The mean displacement, and that of what each sensor saw; `None` of no images.
+/// What is to be explained, in parts of which each is foretold from the others: of every image how the answer differs from the mean of
+/// that body's, and of every relative how that mean differs from the robot's.
+fn folds(own: &Shown, relatives: &[Shown], (mean, of_own): (f64, &[f64])) -> Vec<Vec<Row>> {
+    let count = of_own.len();
+    let mut folds = vec![Vec::new(); FOLDS];
+    for (body, shown) in std::iter::once(own).chain(relatives).enumerate() {
+        let Some((of_all, of_each)) = means(shown, count) else { continue };
+        for (image, (seen, displacement)) in shown.iter().enumerate() {
+            let wider = DVector::from_fn(count, |i, _| seen[i] - of_each[i]);
+            folds[image % FOLDS].push((wider, displacement - of_all));
+        }
+        if body > 0 {
+            let images = shown.len() as f64;
+            let weight = (SHIFT * images / (SHIFT + images)).sqrt();
+            let wider = DVector::from_fn(count, |i, _| weight * (of_each[i] - of_own[i]));
+            folds[body % FOLDS].push((wider, weight * (of_all - mean)));
+        }
+    }
+    folds
+}
+
+/// The mean displacement, and each sensor's mean width; `None` of no images.
 fn means(shown: &[(Vec<f64>, f64)], count: usize) -> Option<(f64, Vec<f64>)> {
     let (mut sum, mut sums) = (0.0, vec![0.0; count]);
     for (seen, displacement) in shown {
@@ -73,7 +100,7 @@ fn means(shown: &[(Vec<f64>, f64)], count: usize) -> Option<(f64, Vec<f64>)> {
     (number > 0.0).then(|| (sum / number, sums.into_iter().map(|sum| sum / number).collect()))
 }
 
-/// Sums over images, of products of what sensors saw with each other, and with the displacement.
+/// Sums over rows, of products of widths with each other, and with the displacement.
 struct Moments {
     matrix: DMatrix<f64>,
     /// One column.
@@ -81,9 +108,9 @@ struct Moments {
 }
 
 impl Moments {
-    fn of<'b>(images: impl Iterator<Item = &'b (DVector<f64>, f64)>, count: usize) -> Self {
+    fn of(rows: &[Row], count: usize) -> Self {
         let (mut matrix, mut vector) = (DMatrix::zeros(count, count), DMatrix::zeros(count, 1));
-        for (seen, displacement) in images {
+        for (seen, displacement) in rows {
             vector.column_mut(0).axpy(*displacement, seen, 1.0);
             for (mut column, x) in matrix.column_iter_mut().zip(seen.iter()) {
                 column.axpy(*x, seen, 1.0);

@@ -7,11 +7,22 @@
 use super::direction::Assignment;
 use super::fitness::{Fitness, WRONG};
 use super::grouping::Split;
-use super::influences::{Influences, alike};
+use super::influences::{Influences, Shown, alike};
 use super::score::{Answer, weighed};
 use crate::base::Grid;
 use crate::body::{Body, Material};
 use crate::sim::{Physics, width};
+
+/// What another robot was shown, and did.
+#[derive(Clone, Copy, Debug)]
+pub struct Relative<'a> {
+    /// Its body, which walks as the robot's.
+    pub body: &'a Body,
+    /// The images, as its sensors saw them.
+    pub stimuli: &'a [Grid<f64>],
+    /// The displacement under each, as far as known, voxel lengths; the last may be missing.
+    pub displacements: &'a [Option<f64>],
+}
 
 /// A linear model of a robot's displacements.
 #[derive(Clone, Debug)]
@@ -37,26 +48,42 @@ struct Counted<'a> {
 }
 
 impl<'a> Surrogate<'a> {
-    /// A model of a robot that answered some of the images, in their order, on a task. `None` if it has not answered any.
+    /// A model of a robot that answered some of the images, in their order, on a task; `relatives` tell more of what a place does.
+    /// `None` if it has not answered any.
     pub fn of(
         body: &'a Body,
         stimuli: &'a [Grid<f64>],
         answers: &[Answer],
+        relatives: &[Relative],
         split: &Split,
         fitness: Fitness,
         physics: &'a Physics,
     ) -> Option<Self> {
         let voxels = body.voxels();
-        let sensors: Vec<((usize, usize), Material)> =
-            voxels.iter().map(|(place, m)| (place, *m)).filter(|(_, m)| m.is_sensor()).collect();
-        let seen = |stimulus: &Grid<f64>| -> Vec<f64> {
-            sensors.iter().map(|&(place, m)| width(m, stimulus.or_default(place), physics)).collect()
+        let known: Vec<Option<f64>> = answers.iter().map(|answer| answer.displacement).collect();
+        let own = Relative { body, stimuli, displacements: &known };
+        let is_sensor = |place| {
+            let mut all = std::iter::once(&own).chain(relatives);
+            all.any(|robot| robot.body.voxels()[place].is_sensor())
         };
-        let shown: Vec<(Vec<f64>, f64)> = (stimuli.iter().zip(answers))
-            .filter_map(|(stimulus, answer)| Some((seen(stimulus), answer.displacement?)))
-            .collect();
-        let places: Vec<(usize, usize)> = sensors.iter().map(|(place, _)| *place).collect();
-        let Influences { reach, weights, mean, means } = Influences::of(&shown, &places)?;
+        let places: Vec<(usize, usize)> =
+            voxels.iter().map(|(place, _)| place).filter(|place| is_sensor(*place)).collect();
+        let seen_by = |body: &Body, stimulus: &Grid<f64>| -> Vec<f64> {
+            let width =
+                |&place: &(usize, usize)| width(body.voxels()[place], stimulus.or_default(place), physics);
+            places.iter().map(width).collect()
+        };
+        let seen = |stimulus: &Grid<f64>| seen_by(body, stimulus);
+        let shown = |robot: &Relative| -> Shown {
+            (robot.stimuli.iter().zip(robot.displacements))
+                .filter_map(|(stimulus, displacement)| {
+                    Some((seen_by(robot.body, stimulus), (*displacement)?))
+                })
+                .collect()
+        };
+        let of_relatives: Vec<Shown> = relatives.iter().map(shown).collect();
+        let Influences { reach, weights, mean, means } =
+            Influences::of(&shown(&own), &of_relatives, &places)?;
         let influence = Grid::from_fn(voxels.height(), voxels.width(), |row, column| {
             let of = |(&place, weight): (&(usize, usize), &f64)| weight * alike((row, column), place, reach);
             places.iter().zip(weights.iter()).map(of).sum()
@@ -150,7 +177,7 @@ mod tests {
     }
 
     fn surrogate<'a>(body: &'a Body, stimuli: &'a [Grid<f64>], known: usize) -> Option<Surrogate<'a>> {
-        Surrogate::of(body, stimuli, &answers(stimuli, known), &split(), Fitness::RightThenMin, &PHYSICS)
+        Surrogate::of(body, stimuli, &answers(stimuli, known), &[], &split(), Fitness::RightThenMin, &PHYSICS)
     }
 
     #[test]
@@ -189,7 +216,8 @@ mod tests {
     fn with_hinged_answers_a_change_promises_what_the_fitness_would_gain() {
         let (body, stimuli) = (body(), stimuli(200));
         let answers = answers(&stimuli, 200);
-        let model = Surrogate::of(&body, &stimuli, &answers, &split(), Fitness::MeanHinge, &PHYSICS).unwrap();
+        let model =
+            Surrogate::of(&body, &stimuli, &answers, &[], &split(), Fitness::MeanHinge, &PHYSICS).unwrap();
         let grouping = Grouping::two_groups(&[0], &[1]).unwrap().with_fitness(Fitness::MeanHinge);
         let gain = |text: &str| model.worth(&text.parse::<Body>().unwrap()) - model.worth(&body);
         let fitness = |always: f64, of_last: f64| {
@@ -222,6 +250,40 @@ mod tests {
     }
 
     #[test]
+    fn what_relatives_did_tells_what_a_place_does_where_the_robot_has_no_sensor() {
+        let (body, stimuli) = (body(), stimuli(200));
+        let answers = answers(&stimuli, 200);
+        // There another 3 voxel lengths to the left for each rest width, and it sets out from elsewhere: a cause of its own.
+        let other: Body = "50003/00000/20606".parse().unwrap();
+        let farther = |(answer, stimulus): (&Answer, &Grid<f64>)| {
+            let wide = width(Material::SensorExpand, stimulus[(2, 2)], &PHYSICS) - 1.0;
+            answer.displacement.map(|d| d - 3.0 * wide + 7.0)
+        };
+        let displacements: Vec<Option<f64>> = answers.iter().zip(&stimuli).map(farther).collect();
+        let relative = |shown: usize| Relative {
+            body: &other,
+            stimuli: &stimuli,
+            displacements: &displacements[..shown],
+        };
+        let influences = |relatives: &[Relative]| {
+            let (split, fitness) = (split(), Fitness::MeanHinge);
+            let model = Surrogate::of(&body, &stimuli, &answers, relatives, &split, fitness, &PHYSICS);
+            [(2, 2), (0, 0), (2, 4)].map(|place| model.as_ref().unwrap().influence[place])
+        };
+        let (alone, taught) = (influences(&[]), influences(&[relative(200)]));
+        assert!((alone[0] + 3.0).abs() > 1.0 && (taught[0] + 3.0).abs() < 0.5, "{alone:?} {taught:?}");
+        assert!((taught[1] - alone[1]).abs() < 0.5 && (taught[2] - alone[2]).abs() < 0.5);
+        // Who was shown less tells less, and who was shown nothing, nothing.
+        let hardly = influences(&[relative(6)]);
+        assert!(
+            (alone[0] + 3.0).abs() > (hardly[0] + 3.0).abs()
+                && (hardly[0] + 3.0).abs() > (taught[0] + 3.0).abs()
+        );
+        let nothing = influences(&[relative(0)]);
+        assert!(nothing.iter().zip(&alone).all(|(a, b)| (a - b).abs() < 0.5), "{nothing:?} {alone:?}");
+    }
+
+    #[test]
     fn groups_weigh_the_same_and_other_classes_do_not_count() {
         let (body, stimuli) = (body(), stimuli(90));
         let split = Grouping::two_groups(&[0], &[1, 2]).unwrap().tasks()[0].clone();
@@ -231,7 +293,7 @@ mod tests {
                 displacement: Some(if i % 6 == 0 { -1e9 } else { 1e9 }),
             })
             .collect();
-        let model = Surrogate::of(&body, &stimuli, &answers, &split, Fitness::Min, &PHYSICS).unwrap();
+        let model = Surrogate::of(&body, &stimuli, &answers, &[], &split, Fitness::Min, &PHYSICS).unwrap();
         assert_eq!(model.images.len(), 45);
         // Everything right, by far; of three classes with as many images each.
         assert!((model.worth(&body) - 1.0).abs() < 1e-6);

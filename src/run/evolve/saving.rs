@@ -11,7 +11,8 @@ impl Run<'_> {
     /// Writes checkpoint, `run.json` and `elites.csv`.
     pub(super) fn save(&self, folder: &RunFolder) -> Result<RunFile, Error> {
         let run = self.file();
-        let checkpoint = Checkpoint { run, totals: self.totals(), known_bodies: self.known.clone() };
+        let (known_bodies, relatives) = (self.known.clone(), self.relatives.clone());
+        let checkpoint = Checkpoint { run, totals: self.totals(), known_bodies, relatives };
         checkpoint::write(folder.path(), &checkpoint)?;
         let run = checkpoint.run;
         let csv = run.to_csv().map_err(|error| Error::other(error.to_string()))?;

@@ -1,0 +1,76 @@
+//! What a robot must reach to be let into the archive, and what it reached.
+
+use super::Run;
+use crate::qd::Evaluated;
+use crate::run::archive::Robot;
+use crate::run::keep::Floors;
+use crate::run::robust::settled;
+use crate::task::evaluation::{Job, MayWin};
+use crate::task::race::Race;
+use std::iter::repeat;
+
+impl Run<'_> {
+    /// Coordinates of the cell of a robot that performs a task.
+    fn cell(&self, mut bins: Vec<usize>, task: usize) -> Vec<usize> {
+        bins.extend((self.grouping.tasks().len() > 1).then_some(task));
+        bins
+    }
+
+    /// How a robot is to be evaluated; `parent` is the cell of its parent.
+    pub(super) fn job<'b>(&'b self, parent: Option<usize>, robot: &'b Robot, floors: &'b Floors) -> Job<'b> {
+        let (archive, training, grouping) = (self.search.archive(), &self.training, &self.grouping);
+        let answers = parent
+            .and_then(|cell| archive.get(cell))
+            .map(|elite| training.answers(elite.solution.displacements.iter().copied().map(Some)));
+        let bins = robot.bins();
+        let to_beat: Vec<Option<f64>> = (0..grouping.tasks().len())
+            .map(|task| {
+                let cell = self.space.index(&self.cell(bins.clone(), task));
+                floors.to_beat(task, cell.and_then(|cell| archive.objective(cell)))
+            })
+            .collect();
+        let beaten = to_beat.clone();
+        let may_win = move |known: &[Option<f64>]| {
+            grouping.can_still_win(&training.answers(known.iter().copied()), |task| beaten[task])
+        };
+        // Who has no parent races against one who stands still, whose answers are worth nothing: it is told by its own.
+        let rival = || answers.clone().unwrap_or_else(|| training.answers(repeat(Some(0.0))));
+        let race = self.options.config.race(self.period).then(|| Race::against(grouping, &rival())).flatten();
+        // Who races is shown the images in their order, else it would begin with what its parent did worst by bad luck.
+        let order = answers.filter(|_| race.is_none()).map_or_else(Vec::new, |a| grouping.hardest_first(&a));
+        let given_up = race.map(|race| {
+            Box::new(move |known: &[Option<f64>]| race.is_left_behind(known, |task| to_beat[task]))
+                as Box<MayWin>
+        });
+        Job {
+            body: &robot.body,
+            order,
+            may_win: Box::new(may_win),
+            settled: settled(training, grouping),
+            given_up,
+        }
+    }
+
+    /// A robot as it is told to the archive; nothing if a stage that keeps only the fittest does not let it in.
+    pub(super) fn scored(
+        &self,
+        child: u64,
+        robot: Robot,
+        mut displacements: Vec<f64>,
+        at_most: f64,
+        floors: &Floors,
+    ) -> Option<Evaluated<Robot>> {
+        let answers = self.training.answers(displacements.iter().copied().map(Some));
+        // More may be known, but not always.
+        displacements.truncate(self.grouping.settled_by(&answers).unwrap_or(displacements.len()));
+        let score = self.grouping.score(&answers);
+        let coordinates = self.cell(robot.bins(), score.task);
+        // The coordinates are bins of this very space.
+        let cell = self.space.index(&coordinates).unwrap_or_default();
+        let task = self.grouping.tasks()[score.task].name();
+        let objective = score.fitness.min(at_most);
+        let solution = Robot { cell: coordinates, task, objective, displacements, ..robot };
+        let is_in = floors.to_beat(score.task, None).is_none_or(|floor| objective > floor);
+        is_in.then_some(Evaluated { child, cell, objective, solution })
+    }
+}
