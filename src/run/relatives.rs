@@ -66,7 +66,8 @@ impl Relatives {
 /// Whether bodies differ in nothing but where they have which sensors in place of soft voxels: what makes them walk is the same.
 fn have_one_gait(a: &Body, b: &Body) -> bool {
     let blind = |material: &Material| if material.is_sensor() { Material::Soft } else { *material };
-    a.voxels().cells().iter().map(blind).eq(b.voxels().cells().iter().map(blind))
+    let (a, b) = (a.voxels(), b.voxels());
+    a.height() == b.height() && a.cells().iter().map(blind).eq(b.cells().iter().map(blind))
 }
 
 #[cfg(test)]
@@ -101,6 +102,7 @@ mod tests {
         // Nobody is a relative of itself.
         assert_eq!(numbers(&relatives, "333/262", 9), [4.0, 0.0]);
         assert_eq!(numbers(&relatives, "333/155", 9), [3.0, 1.0]);
+        assert!(numbers(&relatives, "333522", 9).is_empty());
         assert!(numbers(&relatives, "334/522", 9).is_empty() && numbers(&relatives, "333/555", 0).is_empty());
         let stimuli = [];
         assert_eq!(
