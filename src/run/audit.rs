@@ -168,13 +168,15 @@ fn open(options: &Options) -> Result<Opened, Error> {
             let run = &source.run;
             check_out(&options.out, path)?;
             let training = training_of(run, options)?;
-            // A stage may have shown images for another time than the protocol, which is what is judged.
-            let is_known = run.protocol() == run.config.protocol && training.images == run.training_images;
+            // A stage may have shown images otherwise than the protocol says, which is what is judged.
+            let is_known = run.follows_protocol() && training.images == run.training_images;
             let subject = |robot: &Robot| Subject {
                 id: robot.id.clone(),
                 task: robot.task.clone(),
                 body: robot.body.clone(),
-                known: is_known.then(|| robot.displacements.clone()),
+                // Those after the fifth wrong answer are not.
+                known: (is_known && robot.displacements.len() == training.images.len())
+                    .then(|| robot.displacements.clone()),
             };
             let mut subjects: Vec<Subject> = Vec::new();
             for chosen in options.robots.of(std::slice::from_ref(&source), options.seed)? {
