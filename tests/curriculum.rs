@@ -207,8 +207,8 @@ fn elites_stand_in_the_archive_with_what_they_do_on_the_last_images() {
     let sandbox = sandbox();
     sandbox.run("evolve -q -c run.toml -o run").ended(0, &[]);
     let run: RunFile = sandbox.run_file("run");
-    assert_eq!((run.training_images.len(), run.fitness()), (6, Fitness::RightThenMargin));
-    let grouping = run.config.grouping().unwrap().with_fitness(run.fitness());
+    assert_eq!((run.training_images.len(), run.criterion().fitness), (6, Fitness::RightThenMargin));
+    let grouping = run.config.grouping().unwrap().with_fitness(run.criterion());
     for robot in &run.elites {
         assert_eq!(grouping.score(&run.answers(robot)).fitness, robot.objective, "{}", robot.id);
     }

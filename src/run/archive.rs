@@ -8,7 +8,7 @@ use crate::body::{Body, VoxelCounts};
 use crate::genome::Genome;
 use crate::qd::descriptor::{count_bin, possible_cells};
 use crate::qd::{Archive, ArchiveStats, DescriptorSpace, Elite};
-use crate::task::fitness::Fitness;
+use crate::task::fitness::Criterion;
 use crate::task::protocol::Protocol;
 use crate::task::score::Answer;
 use serde::{Deserialize, Serialize};
@@ -188,7 +188,7 @@ impl RunFile {
                 return refuse("there is no such cell in the archive");
             }
             let needed =
-                self.config.grouping()?.with_fitness(self.fitness()).settled_by(&self.answers(robot));
+                self.config.grouping()?.with_fitness(self.criterion()).settled_by(&self.answers(robot));
             if robot.displacements.len() != needed.unwrap_or(self.training_images.len()) {
                 return refuse("it has not one displacement per training image that it has to be shown");
             }
@@ -202,8 +202,8 @@ impl RunFile {
     }
 
     /// How its elites' answers were judged.
-    pub fn fitness(&self) -> Fitness {
-        self.config.fitness(self.latest())
+    pub fn criterion(&self) -> Criterion {
+        self.config.criterion(self.latest())
     }
 
     /// How its elites were shown images.

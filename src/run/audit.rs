@@ -12,7 +12,7 @@ use crate::body::Body;
 use crate::sim::{Energy, Lattice};
 use crate::task::dataset::Split;
 use crate::task::evaluation::{Job, Outcome, Savings, evaluate};
-use crate::task::fitness::Fitness;
+use crate::task::fitness::{Criterion, Fitness};
 use crate::task::grouping::Grouping;
 use crate::task::perturbation::{Perturbation, Setting};
 use crate::task::rollout::walk;
@@ -134,7 +134,7 @@ pub fn audit(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> R
     Ok(Finished { file, asked, stopped: false })
 }
 
-type Opened = (Config, Fitness, Training, Vec<Subject>, Vec<String>, AuditFile);
+type Opened = (Config, Criterion, Training, Vec<Subject>, Vec<String>, AuditFile);
 
 /// Config, fitness, images, the robots asked for, the ids of all there are in order, and an empty file.
 fn open(options: &Options) -> Result<Opened, Error> {
@@ -161,7 +161,7 @@ fn open(options: &Options) -> Result<Opened, Error> {
             let subjects = all.into_iter().filter(|robot| is_asked(&robot.name)).map(subject).collect();
             let sha = sha256_hex(gallery::TEXT.as_bytes());
             let file = AuditFile::new("gallery", sha, order.len(), &options.criteria);
-            Ok((config, Fitness::Min, training, subjects, order, file))
+            Ok((config, Fitness::Min.into(), training, subjects, order, file))
         }
         Source::Archive(path) => {
             let source = robots::Source::read(path)?;
@@ -186,7 +186,7 @@ fn open(options: &Options) -> Result<Opened, Error> {
             }
             let order: Vec<String> = run.elites.iter().map(|robot| robot.id.clone()).collect();
             let file = AuditFile::new(&run.name, fingerprint(run), order.len(), &options.criteria);
-            Ok((run.config.clone(), run.fitness(), training, subjects, order, file))
+            Ok((run.config.clone(), run.criterion(), training, subjects, order, file))
         }
     }
 }
@@ -244,7 +244,7 @@ impl Trial {
         let split = split.unwrap_or(&self.grouping.tasks()[0]);
         let behaviour = Behaviour::new(
             &self.criteria,
-            (split, self.grouping.fitness()),
+            (split, self.grouping.criterion()),
             &classes,
             displacements.clone().unwrap_or(still),
         );

@@ -260,6 +260,9 @@ impl Config {
                 "no more than there are voxels",
             );
         }
+        if self.evaluation.enough == 0 {
+            return refuse("evaluation.enough", "0".to_string(), "1 or more (voxel lengths)");
+        }
         if self.validation.images < validation::LEAST {
             let expected = format!("{} or more", validation::LEAST);
             return refuse("validation.images", self.validation.images.to_string(), &expected);

@@ -4,7 +4,7 @@ use super::{Config, Error};
 use crate::genome::MutationParams;
 use crate::genome::params::{MAX_CANDIDATES, MAX_RELATIVES, VoxelScope};
 use crate::task::evaluation::Savings;
-use crate::task::fitness::Fitness;
+use crate::task::fitness::{Criterion, Fitness};
 use crate::task::protocol::{Life, Protocol};
 use serde::{Deserialize, Serialize};
 
@@ -25,6 +25,9 @@ pub struct StageConfig {
     /// How answers to several images are judged together. Default `evaluation.fitness`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fitness: Option<Fitness>,
+    /// Where fitness is a mean, the margin at which an answer is as good as can be \[voxel lengths\]. Default `evaluation.enough`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub enough: Option<u16>,
     /// After every so many generations other images are drawn and all elites evaluated anew, so that no luck stays in the
     /// archive. Default: never.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -97,15 +100,18 @@ impl Config {
         Period { stage: 0, draw: 0 }
     }
 
-    /// How answers are judged in a generation (from 0).
-    pub fn fitness(&self, generation: u64) -> Fitness {
-        self.fitness_in(self.period(generation))
+    /// What answers are judged by in a generation (from 0).
+    pub fn criterion(&self, generation: u64) -> Criterion {
+        self.criterion_in(self.period(generation))
     }
 
-    /// How answers are judged in a period.
-    pub fn fitness_in(&self, period: Period) -> Fitness {
-        let stage = self.stage.get(period.stage);
-        stage.and_then(|stage| stage.fitness).unwrap_or(self.evaluation.fitness)
+    /// What answers are judged by in a period.
+    pub fn criterion_in(&self, period: Period) -> Criterion {
+        let stage = self.stage.get(period.stage).copied().unwrap_or_default();
+        Criterion {
+            fitness: stage.fitness.unwrap_or(self.evaluation.fitness),
+            enough: stage.enough.unwrap_or(self.evaluation.enough),
+        }
     }
 
     /// Whether perturbed lives count in a period.
@@ -195,6 +201,7 @@ impl Config {
                 ("redraw", stage.redraw == Some(0)),
                 ("control_steps", stage.control_steps == Some(0)),
                 ("keep", stage.keep == Some(0)),
+                ("enough", stage.enough == Some(0)),
             ];
             if let Some((key, _)) = zeros.iter().find(|(_, is_zero)| *is_zero) {
                 return refuse(number, format!("{key} = 0: expected 1 or more"));
@@ -206,8 +213,12 @@ impl Config {
                 let text = "raised_starts: expected protocol.life = \"fresh\": a sequential life starts once";
                 return refuse(number, text.to_string());
             }
-            let fitness = self.fitness_in(Period { stage: number, draw: 0 });
-            if stage.race == Some(true) && !fitness.is_mean() {
+            let criterion = self.criterion_in(Period { stage: number, draw: 0 });
+            if stage.enough.is_some() && !criterion.is_mean() {
+                let text = "enough: expected fitness = \"mean_clipped\" or \"mean_hinge\"";
+                return refuse(number, text.to_string());
+            }
+            if stage.race == Some(true) && !criterion.is_mean() {
                 let text = "race: expected fitness = \"mean_clipped\" or \"mean_hinge\": how far an offspring is behind is told by a mean";
                 return refuse(number, text.to_string());
             }
@@ -269,16 +280,31 @@ mod tests {
             [(0, 0), (0, 0), (1, 0), (1, 0), (1, 1), (1, 2), (2, 0), (2, 0)]
         );
         let fitness = [Fitness::Min, Fitness::MeanClipped, Fitness::RightThenMargin];
-        assert_eq!([9, 10, 30].map(|generation| config.fitness(generation)), fitness);
+        assert_eq!([9, 10, 30].map(|generation| config.criterion(generation).fitness), fitness);
         assert_eq!([9, 10, 30].map(|g| config.drawn_per_class(config.period(g))), [None, Some(4), Some(8)]);
         assert_ne!(config.period(10).number(), config.period(18).number());
+    }
+
+    #[test]
+    fn a_stage_may_say_how_far_is_enough() {
+        let stages = "[evaluation]\nfitness = 'mean_hinge'\nenough = 25\n[[stage]]\ngenerations = 1\n[[stage]]\nenough = 40";
+        let enough = |config: &Config| [0, 1].map(|generation| config.criterion(generation).enough);
+        let said = config(stages).unwrap();
+        assert_eq!(enough(&said), [25, 40]);
+        assert_eq!(enough(&Config::parse(&said.to_toml(), "again.toml", &[]).unwrap()), [25, 40]);
+        let unsaid = config("[[stage]]\nfitness = 'mean_hinge'").unwrap();
+        assert_eq!(enough(&unsaid), [10, 10]);
+        assert!(!unsaid.to_toml().contains("enough"));
     }
 
     #[test]
     fn without_stages_there_is_one_period() {
         let config = config("").unwrap();
         assert_eq!(config.period(12_345), Period { stage: 0, draw: 0 });
-        assert_eq!((config.fitness(9), config.drawn_per_class(config.period(9))), (Fitness::Min, None));
+        assert_eq!(
+            (config.criterion(9).fitness, config.drawn_per_class(config.period(9))),
+            (Fitness::Min, None)
+        );
     }
 
     #[test]
@@ -322,6 +348,12 @@ mod tests {
                 "[[stage]]\nrace = true",
                 "stage 1: race: expected fitness = \"mean_clipped\" or \"mean_hinge\"",
             ),
+            ("[[stage]]\nfitness = 'mean_hinge'\nenough = 0", "stage 1: enough = 0"),
+            (
+                "[[stage]]\nenough = 20",
+                "stage 1: enough: expected fitness = \"mean_clipped\" or \"mean_hinge\"",
+            ),
+            ("[evaluation]\nenough = 0", "evaluation.enough = 0: expected 1 or more"),
             ("[[stage]]\npool = 5", "stage 1: pool: expected images_per_class"),
             ("[[stage]]\nimages_per_class = 8\npool = 7", "stage 1: pool = 7: expected images_per_class, 8"),
         ] {

@@ -149,7 +149,7 @@ pub(super) struct Trial<'a> {
 impl RobotReport {
     pub(super) fn new(trial: &Trial, displacements: Vec<Option<f64>>, simulated: usize) -> Self {
         let Trial { run, robot, split, images, threshold } = *trial;
-        let assignment = Assignment::from_training(split, run.fitness(), &run.answers(robot));
+        let assignment = Assignment::from_training(split, run.criterion(), &run.answers(robot));
         let is_right = |(image, displacement): (&ImageRef, &Option<f64>)| {
             let (group, displacement) = (split.group(image.label), *displacement);
             group.zip(displacement).is_some_and(|(g, d)| assignment.is_right(g, d, threshold))

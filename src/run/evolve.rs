@@ -114,7 +114,7 @@ impl<'a> Run<'a> {
         };
         let latest = generation.saturating_sub(1);
         let period = config.period(latest);
-        let grouping = config.grouping()?.with_fitness(config.fitness(latest));
+        let grouping = config.grouping()?.with_fitness(config.criterion(latest));
         let training =
             if period == config.period(0) { first } else { Training::of(config, dataset, period)? };
         Ok(Run {
@@ -197,7 +197,7 @@ impl<'a> Run<'a> {
     fn begin(&mut self, period: Period, mut elites: Vec<Robot>, stop: &AtomicBool) -> Result<bool, Error> {
         let config = &self.options.config;
         let training = Training::of(config, self.dataset, period)?;
-        let grouping = config.grouping()?.with_fitness(config.fitness(self.generation));
+        let grouping = config.grouping()?.with_fitness(config.criterion(self.generation));
         if config.keep(period).is_some() {
             // The fitter ones first: of those who come after, most are told early that they cannot stay.
             elites.sort_by(|a, b| b.objective.total_cmp(&a.objective));

@@ -8,13 +8,13 @@ use super::Config;
 use super::training::Training;
 use crate::body::Body;
 use crate::task::evaluation::{Evaluation, Job, MayWin, Outcome, Savings, evaluate};
-use crate::task::fitness::Fitness;
+use crate::task::fitness::{ENOUGH, Fitness};
 use crate::task::grouping::Grouping;
 use crate::task::perturbation::{Perturbation, Setting};
 use serde::{Deserialize, Serialize};
 
 /// How robots are evaluated: section `[evaluation]`.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct EvaluationConfig {
     /// Fitness is that of the worst of a few perturbed lives, the unchanged one included. Default false.
@@ -22,10 +22,24 @@ pub struct EvaluationConfig {
     /// How answers to several images are judged together. Default the smallest margin, the paper's.
     #[serde(skip_serializing_if = "is_min")]
     pub fitness: Fitness,
+    /// Where fitness is a mean, the margin at which an answer is as good as can be \[voxel lengths\]. Default 10; then left out of
+    /// files.
+    #[serde(skip_serializing_if = "is_ten")]
+    pub enough: u16,
 }
 
 fn is_min(fitness: &Fitness) -> bool {
     *fitness == Fitness::Min
+}
+
+fn is_ten(enough: &u16) -> bool {
+    *enough == ENOUGH
+}
+
+impl Default for EvaluationConfig {
+    fn default() -> Self {
+        EvaluationConfig { robust: false, fitness: Fitness::default(), enough: ENOUGH }
+    }
 }
 
 impl EvaluationConfig {
@@ -119,7 +133,7 @@ fn all_of<'a>(body: &'a Body, training: &'a Training, grouping: &'a Grouping) ->
 pub(super) fn settled<'a>(training: &'a Training, grouping: &'a Grouping) -> Option<Box<MayWin<'a>>> {
     let is_settled =
         move |known: &[Option<f64>]| grouping.is_settled(&training.answers(known.iter().copied()));
-    grouping.fitness().last_wrong().map(|_| Box::new(is_settled) as Box<MayWin>)
+    grouping.criterion().last_wrong().map(|_| Box::new(is_settled) as Box<MayWin>)
 }
 
 fn setting(config: &Config, training: &Training, body: &Body) -> Setting {

@@ -133,7 +133,7 @@ impl Training {
             (None, None) => draw("data.images_per_class", config.data.images_per_class, 0)?,
         };
         // Where the first images decide whether others are shown, they are not to be of one class.
-        let takes_turns = config.fitness_in(period).last_wrong().is_some() || config.race(period);
+        let takes_turns = config.criterion_in(period).last_wrong().is_some() || config.race(period);
         let per_class = drawn.len() / classes.len().max(1);
         Ok(if takes_turns { by_turns(drawn, per_class) } else { drawn })
     }

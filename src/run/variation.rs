@@ -69,7 +69,7 @@ impl Mutations<'_> {
             &answers,
             &relatives,
             split,
-            grouping.fitness(),
+            grouping.criterion(),
             physics,
         )
     }

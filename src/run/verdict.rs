@@ -3,7 +3,7 @@
 use super::Error;
 use super::toml_text;
 use crate::task::direction::{Assignment, Direction};
-use crate::task::fitness::Fitness;
+use crate::task::fitness::Criterion;
 use crate::task::grouping::{Group, Split};
 use crate::task::perturbation::{Kind, Sizes};
 use crate::task::score::Answer;
@@ -144,13 +144,13 @@ impl<'a> Behaviour<'a> {
     /// Of a robot that performs a task, judged by some fitness, and answers these classes with these displacements.
     pub fn new(
         criteria: &'a Criteria,
-        (split, fitness): (&Split, Fitness),
+        (split, criterion): (&Split, Criterion),
         classes: &[u8],
         plain: Vec<f64>,
     ) -> Self {
         let answer = |(&class, &d): (&u8, &f64)| Answer { class, displacement: Some(d) };
         let answers: Vec<_> = classes.iter().zip(&plain).map(answer).collect();
-        let assignment = Assignment::from_training(split, fitness, &answers);
+        let assignment = Assignment::from_training(split, criterion, &answers);
         let right = |group| assignment.expected(group) == Direction::Right;
         let rightward: Vec<Option<bool>> =
             classes.iter().map(|&class| split.group(class).map(right)).collect();
@@ -240,12 +240,13 @@ fn towards(rightward: Option<bool>, displacement: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::task::fitness::Fitness;
     use crate::task::grouping::Grouping;
 
     fn judged(lives: &[(Kind, [f64; 2])]) -> (Verdict, String) {
         let criteria = Criteria::default();
         let split = Grouping::two_groups(&[0], &[1]).unwrap().tasks()[0].clone();
-        let behaviour = Behaviour::new(&criteria, (&split, Fitness::Min), &[0, 1], vec![-10.0, 12.0]);
+        let behaviour = Behaviour::new(&criteria, (&split, Fitness::Min.into()), &[0, 1], vec![-10.0, 12.0]);
         let life = |(kind, d): &(Kind, [f64; 2])| behaviour.compare(String::new(), *kind, Some(d.to_vec()));
         behaviour.judge(&lives.iter().map(life).collect::<Vec<_>>())
     }
@@ -274,7 +275,7 @@ mod tests {
     fn a_walk_persists_by_direction_threshold_and_distance() {
         let criteria = Criteria::default();
         let split = Grouping::two_groups(&[0], &[1]).unwrap().tasks()[0].clone();
-        let behaviour = Behaviour::new(&criteria, (&split, Fitness::Min), &[0, 1], vec![-10.0, 12.0]);
+        let behaviour = Behaviour::new(&criteria, (&split, Fitness::Min.into()), &[0, 1], vec![-10.0, 12.0]);
         let compare = |d: Option<[f64; 2]>| behaviour.compare("x".into(), Kind::Start, d.map(Vec::from));
         assert!(compare(Some([-9.0, 30.0])).persists);
         // Just below the threshold that makes an answer.
@@ -293,13 +294,14 @@ mod tests {
         let criteria = Criteria::default();
         let splits = Grouping::all_splits(&[0, 1, 2, 3], false).unwrap();
         let split = &splits.tasks()[0];
-        let flaw =
-            |d: [f64; 4]| Behaviour::new(&criteria, (split, Fitness::Min), &[0, 1, 2, 3], d.to_vec()).flaw;
+        let flaw = |d: [f64; 4]| {
+            Behaviour::new(&criteria, (split, Fitness::Min.into()), &[0, 1, 2, 3], d.to_vec()).flaw
+        };
         assert_eq!(split.name(), "0|123");
         assert_eq!(flaw([5.0, -4.0, -9.0, -2.0]), None);
         assert_eq!(flaw([5.0, -4.0, -1.0, -2.0]).unwrap(), "answers 2 of 4 training images");
         assert_eq!(flaw([2.0, -4.0, -9.0, -8.0]).unwrap(), "no walk of more than 3 voxels for 0");
-        let still = Behaviour::new(&criteria, (split, Fitness::Min), &[0, 1, 2, 3], vec![0.0; 4]);
+        let still = Behaviour::new(&criteria, (split, Fitness::Min.into()), &[0, 1, 2, 3], vec![0.0; 4]);
         assert_eq!(still.judge(&[]).0, Verdict::NotAWalker);
     }
 

@@ -3,9 +3,9 @@
 use super::grouping::Group;
 use serde::{Deserialize, Serialize};
 
-/// Displacement at which an answer is as good as can be, for [`Fitness::MeanClipped`] and [`Fitness::MeanHinge`]; and half as good as can be, for
-/// the tie-breaks of [`Fitness::RightThenMargin`] and [`Fitness::RightThenMin`] \[voxel lengths\].
-const ENOUGH: f64 = 10.0;
+/// Displacement at which an answer is as good as can be, if nothing else is said, for [`Fitness::MeanClipped`] and
+/// [`Fitness::MeanHinge`]; and half as good as can be, for the tie-breaks of the others \[voxel lengths\].
+pub const ENOUGH: u16 = 10;
 
 /// Displacements up to this are wrong, as in the paper's test \[voxel lengths\].
 pub(super) const WRONG: f64 = 3.0;
@@ -26,10 +26,10 @@ pub enum Fitness {
     /// the best that is in reach.
     #[default]
     Min,
-    /// The mean of the margins, each divided by ten voxel lengths and clipped to −1 … 1.
+    /// The mean of the margins, each divided by ten voxel lengths (or what else is [`enough`](Criterion::enough)) and clipped to
+    /// −1 … 1.
     MeanClipped,
-    /// The mean of the margins, each divided by ten voxel lengths, but never more than 1 (hinge loss; Cortes & Vapnik 1995):
-    /// the farther an answer leads astray, the more it costs, so that a robot which knows three classes and walks the wrong way
+    /// The mean of the margins, each divided by as much, but never more than 1 (hinge loss; Cortes & Vapnik 1995): the farther an answer leads astray, the more it costs, so that a robot which knows three classes and walks the wrong way
     /// for all of the fourth is drawn away from there.
     MeanHinge,
     /// How many images are answered right, by more than three voxel lengths; and, between 0 and the worth of an image, the
@@ -50,10 +50,25 @@ pub enum Fitness {
 /// The two ways to assign sides to groups: group A is to walk right, or left.
 pub(super) type Assignments = (f64, f64);
 
-impl Fitness {
+/// What answers are judged by.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Criterion {
+    /// How they become one number.
+    pub fitness: Fitness,
+    /// In a mean, the margin at which an answer is as good as can be \[voxel lengths\], above 0.
+    pub enough: u16,
+}
+
+impl From<Fitness> for Criterion {
+    fn from(fitness: Fitness) -> Self {
+        Criterion { fitness, enough: ENOUGH }
+    }
+}
+
+impl Criterion {
     /// Wrong answers after which nothing counts; `None` where all images do.
     pub fn last_wrong(self) -> Option<u16> {
-        match self {
+        match self.fitness {
             Fitness::UntilFifthWrong => Some(5),
             Fitness::UntilTwentiethWrong => Some(20),
             _ => None,
@@ -67,7 +82,7 @@ impl Fitness {
         answers: impl Iterator<Item = (Group, Option<f64>)> + Clone,
     ) -> Assignments {
         let margins = margins(answers);
-        if self == Fitness::Min {
+        if self.fitness == Fitness::Min {
             let nothing = (f64::INFINITY, f64::INFINITY);
             let known = margins.filter_map(|(_, m)| m);
             return known.fold(nothing, |(right, left), m| (smaller(right, m), smaller(left, -m)));
@@ -98,7 +113,7 @@ impl Fitness {
         let of = |way: usize| {
             let mean = sums[way] / all as f64;
             let right = weights[0] * counts[way][0] as f64 + weights[1] * counts[way][1] as f64;
-            let fitness = match self {
+            let fitness = match self.fitness {
                 Fitness::RightThenMargin => right + image * mean,
                 Fitness::RightThenMin => right + image * least[way],
                 _ => mean,
@@ -110,14 +125,15 @@ impl Fitness {
 
     /// Whether it is nothing but the mean of what answers are worth, both groups weighing the same.
     pub fn is_mean(self) -> bool {
-        matches!(self, Fitness::MeanClipped | Fitness::MeanHinge)
+        matches!(self.fitness, Fitness::MeanClipped | Fitness::MeanHinge)
     }
 
     /// What an answer with this margin is worth, at most 1, in the mean that the fitness is, or that breaks its ties.
     pub(super) fn worth(self, margin: f64) -> f64 {
-        match self {
-            Fitness::MeanClipped => (margin / ENOUGH).clamp(-1.0, 1.0),
-            Fitness::MeanHinge => smaller(1.0, margin / ENOUGH),
+        let share = margin / f64::from(self.enough);
+        match self.fitness {
+            Fitness::MeanClipped => share.clamp(-1.0, 1.0),
+            Fitness::MeanHinge => smaller(1.0, share),
             _ => grown(margin),
         }
     }
@@ -178,7 +194,7 @@ fn run(
 
 /// A margin as a number between 0 and 1 that never stops growing: 1/2 for standing still.
 fn grown(margin: f64) -> f64 {
-    (1.0 + margin / (margin.abs() + ENOUGH)) / 2.0
+    (1.0 + margin / (margin.abs() + f64::from(ENOUGH))) / 2.0
 }
 
 /// The smaller, or what is not a number: an answer that is none must never be overlooked.
@@ -208,7 +224,7 @@ mod tests {
     ];
 
     fn fitness(kind: Fitness, answers: &[(Group, f64)]) -> f64 {
-        better(kind.of_assignments(answers.iter().map(|&(group, d)| (group, Some(d)))))
+        better(Criterion::from(kind).of_assignments(answers.iter().map(|&(group, d)| (group, Some(d)))))
     }
 
     #[test]
@@ -231,6 +247,23 @@ mod tests {
         let clipped = |answers: &[(Group, f64)]| fitness(Fitness::MeanClipped, answers);
         assert!(clipped(&three) > clipped(&four));
         assert!(mean(&[(A, f64::NAN), (B, -9.0)]).is_nan());
+    }
+
+    #[test]
+    fn how_far_is_enough_is_a_matter_of_the_criterion() {
+        let mean = |fitness, enough, answers: &[(Group, f64)]| {
+            let known = answers.iter().map(|&(group, d)| (group, Some(d)));
+            better(Criterion { fitness, enough }.of_assignments(known))
+        };
+        let answers = [(A, 30.0), (A, -10.0), (B, -10.0), (B, -80.0)];
+        assert_eq!(mean(Fitness::MeanHinge, 40, &answers), (0.75 - 0.25 + 0.25 + 1.0) / 4.0);
+        assert_eq!(mean(Fitness::MeanClipped, 40, &answers), mean(Fitness::MeanHinge, 40, &answers));
+        assert_eq!(mean(Fitness::MeanHinge, 5, &answers), (1.0 - 2.0 + 1.0 + 1.0) / 4.0);
+        assert_eq!(mean(Fitness::MeanClipped, 5, &answers), 0.5);
+        // Of two robots that are as often right, the one that walks farther.
+        let (short, long) = ([(A, 12.0), (B, -12.0)], [(A, 36.0), (B, -36.0)]);
+        assert_eq!(mean(Fitness::MeanHinge, ENOUGH, &short), mean(Fitness::MeanHinge, ENOUGH, &long));
+        assert!(mean(Fitness::MeanHinge, 40, &short) < mean(Fitness::MeanHinge, 40, &long));
     }
 
     #[test]
@@ -271,7 +304,8 @@ mod tests {
         // The worst image known says at once how good a robot can become.
         let to_come = (0..40).flat_map(|_| [(A, None), (B, None)]);
         let known = [(A, Some(10.0)), (B, Some(-30.0))].into_iter();
-        let bound = better(Fitness::RightThenMin.of_assignments(known.chain(to_come)));
+        let right = Criterion::from(Fitness::RightThenMin);
+        let bound = better(right.of_assignments(known.chain(to_come)));
         assert!((82.75..82.75 + 1e-6).contains(&bound), "{bound}");
     }
 
@@ -300,15 +334,20 @@ mod tests {
 
     #[test]
     fn what_comes_after_the_fifth_wrong_answer_is_known_not_to_count() {
-        let settled =
-            |answers: &[(Group, Option<f64>)]| Fitness::UntilFifthWrong.is_settled(answers.iter().copied());
+        let settled = |answers: &[(Group, Option<f64>)]| {
+            Criterion::from(Fitness::UntilFifthWrong).is_settled(answers.iter().copied())
+        };
         // Neither way right: both assignments are over after five.
         let (stood, to_come) = ([(A, Some(0.0)), (B, Some(0.0))], [(A, None), (B, None)]);
         assert!(settled(&[stood, stood, stood, to_come].concat()));
         assert!(!settled(&[stood, stood, to_come, to_come].concat()));
         // Something is missing before.
         assert!(!settled(&[stood, to_come, stood, stood].concat()));
-        assert!(MANY[..4].iter().all(|kind| !kind.is_settled([stood, stood, stood].concat().into_iter())));
+        assert!(
+            MANY[..4]
+                .iter()
+                .all(|&kind| !Criterion::from(kind).is_settled([stood, stood, stood].concat().into_iter()))
+        );
     }
 
     fn mean_of_nan() -> f64 {
@@ -326,10 +365,11 @@ mod tests {
             let all = answers.iter().map(|&(a, d, _)| (if a { A } else { B }, Some(d)));
             let known = answers.iter().map(|&(a, d, known)| (if a { A } else { B }, known.then_some(d)));
             for kind in MANY {
-                let fitness = kind.of_assignments(all.clone());
-                let bound = kind.of_assignments(known.clone());
+                let criterion = Criterion::from(kind);
+                let fitness = criterion.of_assignments(all.clone());
+                let bound = criterion.of_assignments(known.clone());
                 prop_assert!(bound.0 >= fitness.0 && bound.1 >= fitness.1, "{kind:?}");
-                if kind.is_settled(known.clone()) {
+                if criterion.is_settled(known.clone()) {
                     prop_assert_eq!(bound, fitness);
                 }
             }

@@ -4,7 +4,7 @@
 //! does beside its parent on the same images says much after a few dozen, but not for sure: this is no lossless saving.
 
 use super::direction::{Assignment, Direction};
-use super::fitness::Fitness;
+use super::fitness::Criterion;
 use super::grouping::{Group, Grouping};
 use super::score::{Answer, of_split, weighed};
 
@@ -19,7 +19,7 @@ const DOUBT: f64 = 0.05;
 
 /// A parent to be raced against.
 pub struct Race {
-    fitness: Fitness,
+    criterion: Criterion,
     /// Of every task both assignments of sides to groups.
     lanes: Vec<Lane>,
 }
@@ -44,26 +44,26 @@ struct Image {
 
 impl Race {
     /// Against a parent with these answers; who has none is told by its own answers alone beside one who always stands still, since
-    /// that is worth 0. `None` if its fitness is not a [mean](Fitness::is_mean), or not all of them are
+    /// that is worth 0. `None` if its fitness is not a [mean](Criterion::is_mean), or not all of them are
     /// known.
     pub fn against(grouping: &Grouping, parent: &[Answer]) -> Option<Self> {
-        let fitness = grouping.fitness();
-        if !fitness.is_mean() || parent.iter().any(|answer| answer.displacement.is_none()) {
+        let criterion = grouping.criterion();
+        if !criterion.is_mean() || parent.iter().any(|answer| answer.displacement.is_none()) {
             return None;
         }
         let lanes = (0..).zip(grouping.tasks()).flat_map(|(task, split)| {
             let weighed = weighed(split, parent);
-            let (right, left) = fitness.of_assignments(of_split(split, parent));
+            let (right, left) = criterion.of_assignments(of_split(split, parent));
             [(Direction::Right, right), (Direction::Left, left)].map(|(a, reached)| {
                 let image = |&(number, group, weight): &(usize, Group, f64)| {
                     let right = Assignment { a }.margin(group, 1.0);
-                    let worth = fitness.worth(right * parent[number].displacement?);
+                    let worth = criterion.worth(right * parent[number].displacement?);
                     Some(Image { number, right, weight, worth })
                 };
                 Lane { task, fitness: reached, images: weighed.iter().filter_map(image).collect() }
             })
         });
-        Some(Race { fitness, lanes: lanes.collect() })
+        Some(Race { criterion, lanes: lanes.collect() })
     }
 
     /// Whether an offspring with these displacements so far, an image each, fell behind on the first of them, or on more but not
@@ -78,7 +78,7 @@ impl Race {
         let (mut sum, mut squares, all) = (0.0, 0.0, lane.images.len() as f64);
         for (shown, image) in (1..lane.images.len()).zip(&lane.images) {
             let Some(displacement) = known.get(image.number).copied().flatten() else { return false };
-            let gain = image.weight * (self.fitness.worth(image.right * displacement) - image.worth);
+            let gain = image.weight * (self.criterion.worth(image.right * displacement) - image.worth);
             sum += gain;
             squares += gain * gain;
             if shown < FEWEST {
@@ -101,6 +101,7 @@ impl Race {
 mod tests {
     use super::*;
     use crate::base::random::{Purpose, stream};
+    use crate::task::fitness::Fitness;
 
     const IMAGES: usize = 200;
 

@@ -6,7 +6,7 @@
 //! (d = 0 counts as wrong, with margin 0), and the fitness of some of the images bounds that of all from above.
 
 use super::direction::Assignment;
-use super::fitness::{Fitness, better, margins, weights};
+use super::fitness::{Criterion, Fitness, better, margins, weights};
 use super::grouping::{Group, Grouping, Split};
 
 /// How a robot answered an image.
@@ -30,7 +30,7 @@ pub struct Score {
 /// Fitness on two groups, in voxel lengths: of both assignments of directions to groups the better one's smallest
 /// margin. Infinite without answers, not a number if an answer is none; never −0.
 pub fn two_group_fitness(answers: &[(Group, f64)]) -> f64 {
-    better(Fitness::Min.of_assignments(answers.iter().map(|&(group, d)| (group, Some(d)))))
+    better(Criterion::from(Fitness::Min).of_assignments(answers.iter().map(|&(group, d)| (group, Some(d)))))
 }
 
 pub(super) fn of_split(
@@ -54,13 +54,13 @@ impl Grouping {
     /// Fitness on a task, or, while some images have not been shown, an **upper bound** of it. Images of classes in neither
     /// of its groups do not count.
     pub fn fitness_on(&self, split: &Split, answers: &[Answer]) -> f64 {
-        better(self.fitness().of_assignments(of_split(split, answers)))
+        better(self.criterion().of_assignments(of_split(split, answers)))
     }
 
     /// Whether the fitness on every task is known, whatever comes after the displacements known so far: with
     /// [`Fitness::last_wrong`] before all images are shown.
     pub fn is_settled(&self, answers: &[Answer]) -> bool {
-        self.tasks().iter().all(|split| self.fitness().is_settled(of_split(split, answers)))
+        self.tasks().iter().all(|split| self.criterion().is_settled(of_split(split, answers)))
     }
 
     /// How many of the first answers [settle](Self::is_settled) the fitness; `None` if not even all that are known do.
@@ -100,7 +100,7 @@ impl Grouping {
             let Score { task, fitness } = self.score(answers);
             return wins(task, fitness);
         }
-        let never_negative = self.fitness() == Fitness::Min && self.never_negative(answers);
+        let never_negative = self.criterion().fitness == Fitness::Min && self.never_negative(answers);
         self.tasks().iter().enumerate().any(|(task, split)| {
             let bound = self.fitness_on(split, answers);
             let possible = bound >= 0.0 || !never_negative;
@@ -112,7 +112,7 @@ impl Grouping {
     /// walks one way is right on all of a group. Images of classes in neither group, or not shown, are left out.
     pub fn hardest_first(&self, answers: &[Answer]) -> Vec<usize> {
         let split = &self.tasks()[self.score(answers).task];
-        let assignment = Assignment::from_training(split, self.fitness(), answers);
+        let assignment = Assignment::from_training(split, self.criterion(), answers);
         let mut margins: Vec<(f64, Group, usize)> = (answers.iter().zip(0..))
             .filter_map(|(answer, image)| {
                 let group = split.group(answer.class)?;

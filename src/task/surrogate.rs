@@ -5,7 +5,7 @@
 //! with one number per sensor explains 85 to 93 % (five robots trained on hundreds of zeros and ones; images it was not fitted to).
 
 use super::direction::Assignment;
-use super::fitness::{Fitness, WRONG};
+use super::fitness::{Criterion, Fitness, WRONG};
 use super::grouping::Split;
 use super::influences::{Influences, Shown, alike};
 use super::score::{Answer, weighed};
@@ -31,7 +31,7 @@ pub struct Surrogate<'a> {
     physics: &'a Physics,
     /// By how much a voxel that is wider by its rest width moves the robot to the right, by place.
     influence: Grid<f64>,
-    fitness: Fitness,
+    criterion: Criterion,
     /// The images that count.
     images: Vec<Counted<'a>>,
 }
@@ -56,7 +56,7 @@ impl<'a> Surrogate<'a> {
         answers: &[Answer],
         relatives: &[Relative],
         split: &Split,
-        fitness: Fitness,
+        criterion: impl Into<Criterion>,
         physics: &'a Physics,
     ) -> Option<Self> {
         let voxels = body.voxels();
@@ -90,7 +90,8 @@ impl<'a> Surrogate<'a> {
         });
         let of_sensors: Vec<f64> = places.iter().map(|place| influence[*place]).collect();
 
-        let a_right = Assignment::from_training(split, fitness, answers);
+        let criterion = criterion.into();
+        let a_right = Assignment::from_training(split, criterion, answers);
         let weighed = weighed(split, answers);
         let half = weighed.len() as f64 / 2.0;
         let images = (weighed.into_iter())
@@ -107,7 +108,7 @@ impl<'a> Surrogate<'a> {
                 })
             })
             .collect();
-        Some(Surrogate { body, physics, influence, fitness, images })
+        Some(Surrogate { body, physics, influence, criterion, images })
     }
 
     /// How well a body would do that differs in a few voxels, if nothing else changed but how wide its voxels are: the mean of its
@@ -126,8 +127,8 @@ impl<'a> Surrogate<'a> {
         let worth = |&Counted { stimulus, right, displacement, weight }: &Counted| {
             let change: f64 = changes.iter().map(|change| wider(stimulus, change)).sum();
             let margin = right * (displacement + change);
-            if self.fitness == Fitness::MeanHinge {
-                return weight * self.fitness.worth(margin);
+            if self.criterion.fitness == Fitness::MeanHinge {
+                return weight * self.criterion.worth(margin);
             }
             let excess = margin - WRONG;
             weight * excess / (excess.abs() + WRONG)

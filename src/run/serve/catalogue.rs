@@ -176,7 +176,7 @@ fn archive(path: &Path, notes: &mut Vec<String>) -> Result<Collection, Error> {
     let grouping = run.config.grouping()?;
     let judge = |robot: &Robot| {
         let split = grouping.tasks().iter().find(|split| split.name() == robot.task)?;
-        Judge::of(split, Assignment::from_training(split, run.fitness(), &run.answers(robot)))
+        Judge::of(split, Assignment::from_training(split, run.criterion(), &run.answers(robot)))
     };
     let audited = |robot: &Robot| {
         let found = audit.as_ref()?.robot(&robot.id)?;

@@ -2,7 +2,7 @@
 
 use crate::run::eval_file::Mean;
 use crate::run::report::Dossier;
-use crate::task::fitness::Fitness;
+use crate::task::fitness::{Criterion, Fitness};
 use crate::task::protocol::Life;
 use crate::task::stimulus::Encoding;
 use crate::view::html::escape;
@@ -49,15 +49,23 @@ pub(super) fn methods(dossier: &Dossier) -> String {
         Life::Fresh => "a life of its own from the initial state",
         Life::Sequential => "one continuous life for all images",
     };
-    let fitness = match run.fitness() {
+    let Criterion { fitness, enough } = run.criterion();
+    let of_means;
+    let fitness = match fitness {
         Fitness::Min => {
             "the smallest distance walked towards the right side, or minus the largest one towards the wrong side"
         }
         Fitness::MeanClipped => {
-            "the mean distance walked towards the right side, clipped at ten voxel lengths, both groups weighing the same"
+            of_means = format!(
+                "the mean distance walked towards the right side, clipped at {enough} voxel lengths, both groups weighing the same"
+            );
+            &of_means
         }
         Fitness::MeanHinge => {
-            "the mean distance walked towards the right side, of each answer at most ten voxel lengths, both groups weighing the same"
+            of_means = format!(
+                "the mean distance walked towards the right side, of each answer at most {enough} voxel lengths, both groups weighing the same"
+            );
+            &of_means
         }
         Fitness::RightThenMargin => {
             "the number of images answered right, both groups weighing the same, ties broken by how far it walked"
