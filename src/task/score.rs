@@ -58,7 +58,7 @@ impl Grouping {
     }
 
     /// Whether the fitness on every task is known, whatever comes after the displacements known so far: with
-    /// [`Fitness::last_wrong`] before all images are shown.
+    /// [`Criterion::last_wrong`] before all images are shown.
     pub fn is_settled(&self, answers: &[Answer]) -> bool {
         self.tasks().iter().all(|split| self.criterion().is_settled(of_split(split, answers)))
     }
