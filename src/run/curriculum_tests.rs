@@ -1,0 +1,92 @@
+use super::*;
+use crate::run::config::BUILT_IN;
+
+fn config(stages: &str) -> Result<Config, Error> {
+    Config::parse(&format!("{}\n{stages}", BUILT_IN[0].1), "stages.toml", &[])
+}
+
+#[test]
+fn stages_follow_each_other_and_the_last_lasts() {
+    let config = config(
+        "[[stage]]\ngenerations = 10\n[[stage]]\ngenerations = 20\nimages_per_class = 4\nfitness = 'mean_clipped'\n\
+         redraw = 8\n[[stage]]\nimages_per_class = 8\nfitness = 'right_then_margin'",
+    )
+    .unwrap();
+    let at = |generation| {
+        let Period { stage, draw } = config.period(generation);
+        (stage, draw)
+    };
+    assert_eq!(
+        [0, 9, 10, 17, 18, 29, 30, 10_000].map(at),
+        [(0, 0), (0, 0), (1, 0), (1, 0), (1, 1), (1, 2), (2, 0), (2, 0)]
+    );
+    let fitness = [Fitness::Min, Fitness::MeanClipped, Fitness::RightThenMargin];
+    assert_eq!([9, 10, 30].map(|generation| config.criterion(generation).fitness), fitness);
+    assert_eq!([9, 10, 30].map(|g| config.drawn_per_class(config.period(g))), [None, Some(4), Some(8)]);
+    assert_ne!(config.period(10).number(), config.period(18).number());
+}
+
+#[test]
+fn a_stage_may_say_how_far_is_enough() {
+    let stages = "[evaluation]\nfitness = 'mean_hinge'\nenough = 25\n[[stage]]\ngenerations = 1\n[[stage]]\nenough = 40";
+    let enough = |config: &Config| [0, 1].map(|generation| config.criterion(generation).enough);
+    let said = config(stages).unwrap();
+    assert_eq!(enough(&said), [25, 40]);
+    assert_eq!(enough(&Config::parse(&said.to_toml(), "again.toml", &[]).unwrap()), [25, 40]);
+    let unsaid = config("[[stage]]\nfitness = 'mean_hinge'").unwrap();
+    assert_eq!(enough(&unsaid), [10, 10]);
+    assert!(!unsaid.to_toml().contains("enough"));
+}
+
+#[test]
+fn without_stages_there_is_one_period() {
+    let config = config("").unwrap();
+    assert_eq!(config.period(12_345), Period { stage: 0, draw: 0 });
+    assert_eq!((config.criterion(9).fitness, config.drawn_per_class(config.period(9))), (Fitness::Min, None));
+}
+
+#[test]
+fn starts_are_raised_in_fresh_lives_only() {
+    let with = |life: &str, stages: &str| {
+        let life = format!("protocol.life={life}");
+        Config::parse(&format!("{}\n{stages}", BUILT_IN[0].1), "stages.toml", &[life])
+    };
+    let sequential = with("sequential", "[[stage]]\nraised_starts = 2").unwrap_err();
+    let text = sequential.to_string();
+    assert!(text.contains("stage 1: raised_starts: expected protocol.life = \"fresh\""), "{text}");
+    let fresh = with("fresh", "[[stage]]\nraised_starts = 2\ngenerations = 1\n[[stage]]").unwrap();
+    assert_eq!([0, 1].map(|generation| fresh.raised_starts(fresh.period(generation))), [2, 0]);
+}
+
+#[test]
+fn stages_that_cannot_be_are_refused() {
+    for (stages, expected) in [
+        ("[[stage]]\nimages_per_class = 2\n[[stage]]", "stage 1: expected generations"),
+        ("[[stage]]\ngenerations = 0", "stage 1: generations = 0"),
+        ("[[stage]]\nimages_per_class = 0", "stage 1: images_per_class = 0"),
+        ("[[stage]]\nredraw = 5", "stage 1: redraw: expected images_per_class"),
+        ("[[stage]]\nimages_per_class = 2\nredraw = 0", "stage 1: redraw = 0"),
+        ("[[stage]]\nvoxel_mutations = 1.5", "stage 1: voxel_mutations = 1.5: expected a number from 0 to 1"),
+        (
+            "[[stage]]\nvoxel_candidates = 0",
+            "stage 1: voxel_candidates = 0: expected a number from 1 to 1000",
+        ),
+        (
+            "[[stage]]\nvoxel_changes = 1001",
+            "stage 1: voxel_changes = 1001: expected a number from 1 to 1000",
+        ),
+        (
+            "[[stage]]\nvoxel_relatives = 101",
+            "stage 1: voxel_relatives = 101: expected a number from 0 to 100",
+        ),
+        ("[[stage]]\nrace = true", "stage 1: race: expected fitness = \"mean_clipped\" or \"mean_hinge\""),
+        ("[[stage]]\nfitness = 'mean_hinge'\nenough = 0", "stage 1: enough = 0"),
+        ("[[stage]]\nenough = 20", "stage 1: enough: expected fitness = \"mean_clipped\" or \"mean_hinge\""),
+        ("[evaluation]\nenough = 0", "evaluation.enough = 0: expected 1 or more"),
+        ("[[stage]]\npool = 5", "stage 1: pool: expected images_per_class"),
+        ("[[stage]]\nimages_per_class = 8\npool = 7", "stage 1: pool = 7: expected images_per_class, 8"),
+    ] {
+        let error = config(stages).unwrap_err().to_string();
+        assert!(error.contains(expected), "{error}");
+    }
+}
