@@ -10,6 +10,9 @@ use crate::task::score::Answer;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
+/// Balanced accuracy of who always walks the same way.
+const CHANCE: f64 = 0.5;
+
 /// What an audit does and how it judges; keys of `--criteria FILE` and `--set`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -19,7 +22,7 @@ pub struct Criteria {
     /// In a changed life a walk the right way that is longer than this is an answer still \[voxel lengths\]: else whoever
     /// walks just beyond the threshold would be called an exploiter for a hair's breadth. Default 1.5.
     pub least_walk: f64,
-    /// A walker answers at least this share of its training images right (and one of each group). Default 0.75.
+    /// A walker answers at least this share of its training images, right or wrong. Default 0.75.
     pub least_answered: f64,
     /// A life persists if at least this share of the images answered right still is. Default 0.9.
     pub least_kept: f64,
@@ -93,7 +96,7 @@ pub enum Verdict {
     Fragile,
     /// The world may change, but not how it is computed or how images are shown: it lives off that.
     Exploits,
-    /// It does not answer its training images to begin with.
+    /// It does not answer its training images to begin with, or no better than who always walks the same way.
     NotAWalker,
 }
 
@@ -154,18 +157,27 @@ impl<'a> Behaviour<'a> {
         let right = |group| assignment.expected(group) == Direction::Right;
         let rightward: Vec<Option<bool>> =
             classes.iter().map(|&class| split.group(class).map(right)).collect();
+        let asked: Vec<usize> = (0..plain.len()).filter(|&image| rightward[image].is_some()).collect();
         let is_right = |&image: &usize| towards(rightward[image], plain[image]) > criteria.threshold;
-        let answered: Vec<usize> = (0..plain.len()).filter(is_right).collect();
-        let silent = [Group::A, Group::B].into_iter().find(|&group| {
-            let of_group = |image: &usize| split.group(classes[*image]) == Some(group);
-            !split.classes(group).is_empty() && !answered.iter().any(of_group)
-        });
-        let asked = rightward.iter().flatten().count();
-        let flaw = if let Some(group) = silent {
-            let classes: Vec<String> = split.classes(group).iter().map(u8::to_string).collect();
+        let answered: Vec<usize> = asked.iter().copied().filter(is_right).collect();
+        // Who is right on half of them is a walker, too, if it walks: how much it knows is for a test to say.
+        let walked = asked.iter().filter(|&&image| plain[image].abs() > criteria.threshold).count();
+        let groups = [Group::A, Group::B].into_iter().filter(|&group| !split.classes(group).is_empty());
+        let shares: Vec<(Group, f64)> = groups
+            .map(|group| {
+                let count =
+                    |of: &[usize]| of.iter().filter(|&&i| split.group(classes[i]) == Some(group)).count();
+                (group, count(&answered) as f64 / count(&asked).max(1) as f64)
+            })
+            .collect();
+        let balanced = shares.iter().map(|(_, share)| share).sum::<f64>() / shares.len().max(1) as f64;
+        let flaw = if let Some((group, _)) = shares.iter().find(|(_, share)| *share == 0.0) {
+            let classes: Vec<String> = split.classes(*group).iter().map(u8::to_string).collect();
             Some(format!("no walk of more than {} voxels for {}", criteria.threshold, classes.join(", ")))
-        } else if (answered.len() as f64) < criteria.least_answered * asked as f64 {
-            Some(format!("answers {} of {asked} training images", answered.len()))
+        } else if (walked as f64) < criteria.least_answered * asked.len() as f64 {
+            Some(format!("answers {walked} of {} training images", asked.len()))
+        } else if balanced <= CHANCE {
+            Some(format!("answers {:.0} % of its training images right, balanced", 100.0 * balanced))
         } else {
             None
         };
@@ -301,6 +313,17 @@ mod tests {
         assert_eq!(flaw([5.0, -4.0, -9.0, -2.0]), None);
         assert_eq!(flaw([5.0, -4.0, -1.0, -2.0]).unwrap(), "answers 2 of 4 training images");
         assert_eq!(flaw([2.0, -4.0, -9.0, -8.0]).unwrap(), "no walk of more than 3 voxels for 0");
+        // Knowing little is no flaw of a walk, knowing nothing is.
+        assert_eq!(flaw([9.0, -8.0, 4.0, 4.0]), None);
+        let flaw = |d: &[f64], classes: &[u8]| {
+            Behaviour::new(&criteria, (split, Fitness::MeanHinge.into()), classes, d.to_vec()).flaw
+        };
+        assert_eq!(flaw(&[5.0, -4.0, -9.0, -8.0, -8.0], &[0, 0, 1, 2, 3]), None);
+        let halves = [5.0, -5.0, -4.0, 4.0];
+        assert_eq!(
+            flaw(&halves, &[0, 0, 1, 2]).unwrap(),
+            "answers 50 % of its training images right, balanced"
+        );
         let still = Behaviour::new(&criteria, (split, Fitness::Min.into()), &[0, 1, 2, 3], vec![0.0; 4]);
         assert_eq!(still.judge(&[]).0, Verdict::NotAWalker);
     }
