@@ -3,9 +3,12 @@
 mod common;
 
 use common::program::{Sandbox, TINY};
+use morphcog::run::audit::{Observer, Options, Source};
 use morphcog::run::audit_file::AuditFile;
+use morphcog::run::robots::Selection;
 use morphcog::run::verdict::Verdict;
 use std::collections::BTreeSet;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 /// What tiny robots in short lives can be held to, so that some are physical and some are not.
 const MILD: &str = "--set threshold=0 --set least_walk=0 --set least_kept=0.5 --set least_distance=0 --set perturbations.time_step=[2] --set perturbations.raised=[] --set perturbations.least_sensors=1";
@@ -194,4 +197,48 @@ fn what_cannot_be_audited_is_refused_with_what_to_do() {
     audit("--criteria own.toml").ended(3, &["threshold"]);
     sandbox.run("audit --archive none.json").ended(3, &["none.json"]);
     sandbox.run("replay --robot XFJPI --physical-only").ended(2, &["--physical-only"]);
+}
+
+/// Stops an audit when it is half done.
+struct Impatient {
+    lives: AtomicU64,
+    stop: AtomicBool,
+}
+
+impl Observer for Impatient {
+    fn started(&self, _: usize, lives: usize) {
+        self.lives.store(lives as u64, Ordering::Relaxed);
+    }
+    fn progress(&self, done: u64) {
+        self.stop.fetch_or(2 * done > self.lives.load(Ordering::Relaxed), Ordering::Relaxed);
+    }
+    fn warning(&self, text: &str) {
+        panic!("{text}");
+    }
+}
+
+#[test]
+fn what_a_stopped_audit_was_done_with_is_kept() {
+    let sandbox = evolved();
+    audit(&sandbox, "");
+    let whole = verdicts(&sandbox);
+    std::fs::remove_file(sandbox.path("run/audit.json")).unwrap();
+    let impatient = Impatient { lives: AtomicU64::new(0), stop: AtomicBool::new(false) };
+    let options = Options {
+        source: Source::Archive(sandbox.path("run/run.json")),
+        robots: Selection::All,
+        seed: 1,
+        criteria: whole.criteria.clone(),
+        data: None,
+        out: sandbox.path("run/audit.json"),
+        threads: Some(1),
+    };
+    let ended = morphcog::run::audit::audit(&options, &impatient.stop, &impatient).unwrap();
+    assert!(ended.stopped);
+    let kept = verdicts(&sandbox);
+    let (some, all) = (kept.robots.len(), whole.robots.len());
+    assert!(0 < some && some < all, "{some} of {all}");
+    assert!(kept.robots.iter().all(|robot| whole.robots.contains(robot)));
+    audit(&sandbox, "");
+    assert_eq!(verdicts(&sandbox), whole);
 }

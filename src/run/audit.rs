@@ -113,22 +113,23 @@ pub fn audit(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> R
     let pool = pool.map_err(|error| Error::other(format!("no threads: {error}")))?;
     let done = AtomicU64::new(0);
     for batch in open.chunks(BATCH) {
-        let found: Option<Vec<RobotAudit>> = pool.install(|| {
+        let found: Vec<Option<RobotAudit>> = pool.install(|| {
             batch.par_iter().map(|subject| trial.robot(subject, stop, &done, observer)).collect()
         });
-        let Some(found) = found else {
-            file.write(&options.out)?;
-            return Ok(Finished { file, asked, stopped: true });
-        };
+        let stopped = found.iter().any(Option::is_none);
         for (subject, found) in batch.iter().zip(&found) {
-            if subject.known.is_some() && subject.known != found.displacements {
+            let walked = found.as_ref().map(|found| &found.displacements);
+            if subject.known.is_some() && walked.is_some_and(|walked| *walked != subject.known) {
                 let text = "walks otherwise here than its run says: another version of the program made that";
                 observer.warning(&format!("{}: {text}", subject.id));
             }
         }
-        file.robots.extend(found);
+        file.robots.extend(found.into_iter().flatten());
         file.robots.sort_by_key(|robot| order.iter().position(|id| *id == robot.id));
         file.write(&options.out)?;
+        if stopped {
+            return Ok(Finished { file, asked, stopped });
+        }
     }
     file.write(&options.out)?;
     Ok(Finished { file, asked, stopped: false })
