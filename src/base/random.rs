@@ -33,6 +33,8 @@ pub enum Purpose {
     Networks = 23,
     /// Images that a network's training waits on.
     Waiting = 24,
+    /// Which pixels of training images are inverted.
+    InvertedPixels = 25,
 }
 
 /// One stream of random numbers.

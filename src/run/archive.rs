@@ -216,10 +216,12 @@ impl RunFile {
         answers(&self.training_images, robot.displacements.iter().copied().map(Some))
     }
 
-    /// Whether its displacements are those of lives as the config's protocol has them: of no other length, from no raised starts.
+    /// Whether its displacements are those of lives as the config's protocol has them: of no other length, from no raised starts,
+    /// without inverted pixels.
     pub fn follows_protocol(&self) -> bool {
-        let raised = self.config.raised_starts(self.config.period(self.latest()));
-        raised == 0 && self.protocol() == self.config.protocol
+        let period = self.config.period(self.latest());
+        let changed = self.config.raised_starts(period) > 0 || self.config.inverted_pixels(period) > 0;
+        !changed && self.protocol() == self.config.protocol
     }
 
     /// The last generation done, from 0.

@@ -63,6 +63,9 @@ pub struct StageConfig {
     /// lives only. Default 0.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub raised_starts: Option<u32>,
+    /// Pixels that are inverted in each training image, others in each, so that nobody can live off a single one. Default 0.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub inverted_pixels: Option<usize>,
     /// Offspring that fall behind their parent on the images so far are not shown the rest: not lossless. Only where fitness is a
     /// mean. Default: not.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -144,6 +147,11 @@ impl Config {
         self.stage.get(period.stage).and_then(|stage| stage.raised_starts).unwrap_or(0)
     }
 
+    /// Pixels that are inverted in each training image of a period.
+    pub fn inverted_pixels(&self, period: Period) -> usize {
+        self.stage.get(period.stage).and_then(|stage| stage.inverted_pixels).unwrap_or(0)
+    }
+
     /// Whether offspring are raced against their parents in a period.
     pub fn race(&self, period: Period) -> bool {
         self.stage.get(period.stage).and_then(|stage| stage.race).unwrap_or(false)
@@ -212,6 +220,11 @@ impl Config {
             if stage.raised_starts.is_some_and(|rows| rows > 0) && self.protocol.life == Life::Sequential {
                 let text = "raised_starts: expected protocol.life = \"fresh\": a sequential life starts once";
                 return refuse(number, text.to_string());
+            }
+            let pixels = self.body.height * self.body.width;
+            if let Some(inverted) = stage.inverted_pixels.filter(|&inverted| inverted > pixels) {
+                let text = format!("inverted_pixels = {inverted}: expected a number from 0 to {pixels}");
+                return refuse(number, text);
             }
             let criterion = self.criterion_in(Period { stage: number, draw: 0 });
             if stage.enough.is_some() && !criterion.is_mean() {

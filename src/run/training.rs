@@ -5,6 +5,7 @@ use super::curriculum::Period;
 use super::hardest::hardest;
 use super::{Config, Error};
 use crate::base::Grid;
+use crate::base::random::{Purpose, Stream, stream};
 use crate::task::dataset::{BUILTIN, Dataset, DatasetError, Split};
 use crate::task::files::places;
 use crate::task::protocol::Protocol;
@@ -155,7 +156,12 @@ impl Training {
                     format!("data.train_images: image {index} shows a {label}, expected one of {classes:?}");
                 return Err(Error::input(text).hint("see [task] for the classes".to_string()));
             }
-            stimuli.push(see(config, dataset, Split::Train, index)?);
+            let mut stimulus = see(config, dataset, Split::Train, index)?;
+            // Others in every image and every period.
+            let mut random =
+                stream(config.seed, Purpose::InvertedPixels, period.number(), images.len() as u64);
+            invert(&mut stimulus, config.inverted_pixels(period), &mut random);
+            stimuli.push(stimulus);
             images.push(ImageRef { index, label });
         }
         if let Some(class) = classes.iter().find(|&&class| images.iter().all(|image| image.label != class)) {
@@ -195,6 +201,15 @@ fn raised(images: &[ImageRef], most: u32) -> Vec<u32> {
     images.iter().map(row).collect()
 }
 
+/// Inverts so many pixels of what sensors see.
+fn invert(stimulus: &mut Grid<f64>, count: usize, random: &mut Stream) {
+    let (height, width) = (stimulus.height(), stimulus.width());
+    for place in random.sample(height * width, count) {
+        let pixel = &mut stimulus[(place / width, place % width)];
+        *pixel = 1.0 - *pixel;
+    }
+}
+
 /// Images of one class after the other, as drawn, so that the classes take turns.
 fn by_turns(drawn: Vec<usize>, per_class: usize) -> Vec<usize> {
     (0..per_class).flat_map(|turn| drawn.iter().skip(turn).step_by(per_class).copied()).collect()
@@ -231,6 +246,38 @@ mod tests {
         // Images that are named come as they are named.
         let named = drawn("train_images = [3, 0, 10, 1]", "fitness = \"until_fifth_wrong\"");
         assert_eq!(named.0, [3, 0, 0, 1]);
+    }
+
+    #[test]
+    fn so_many_pixels_of_each_image_are_inverted_others_in_each_and_in_each_draw() {
+        let seen = |inverted: &str, draw: u64| {
+            let stage = format!("[[stage]]\nimages_per_class = 4\nredraw = 1\n{inverted}");
+            let text = format!("[task]\ngroups = [[3], [0]]\n[data]\ndataset = \"builtin\"\n{stage}");
+            let config = Config::parse(&text, "a.toml", &[]).unwrap();
+            let dataset = load_dataset(&config, None, &[Split::Train]).unwrap();
+            let training = Training::of(&config, &dataset, Period { stage: 0, draw }).unwrap();
+            (training.images, training.stimuli)
+        };
+        let changed = |draw: u64| -> Vec<Vec<(usize, usize)>> {
+            let (plain, noisy) = (seen("", draw), seen("inverted_pixels = 3", draw));
+            assert_eq!(plain.0, noisy.0, "the same images");
+            let pairs = plain.1.iter().zip(&noisy.1);
+            let places = pairs.map(|(plain, noisy)| {
+                let changed = plain.iter().filter(|(place, pixel)| noisy[*place] != **pixel);
+                changed
+                    .map(|(place, pixel)| {
+                        assert_eq!(noisy[place], 1.0 - pixel);
+                        place
+                    })
+                    .collect()
+            });
+            places.collect()
+        };
+        let (first, second) = (changed(0), changed(1));
+        assert!(first.len() == 8 && first.iter().chain(&second).all(|places| places.len() == 3), "{first:?}");
+        assert!(first.windows(2).any(|two| two[0] != two[1]) && first != second);
+        assert_eq!(first, changed(0));
+        assert_eq!(seen("", 0), seen("inverted_pixels = 0", 0));
     }
 
     #[test]
