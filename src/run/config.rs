@@ -28,8 +28,8 @@ pub const BUILT_IN: [(&str, &str); 8] = [
     ("four_digit.toml", include_str!("../../configs/four_digit.toml")),
     ("four_digit_published.toml", include_str!("../../configs/four_digit_published.toml")),
     ("zero_one_curriculum.toml", include_str!("../../configs/zero_one_curriculum.toml")),
+    ("walkers.toml", include_str!("../../configs/walkers.toml")),
     ("four_digit_curriculum.toml", include_str!("../../configs/four_digit_curriculum.toml")),
-    ("four_digit_task.toml", include_str!("../../configs/four_digit_task.toml")),
 ];
 
 /// Largest seed: TOML's numbers are signed.
