@@ -83,6 +83,10 @@ fn stages_that_cannot_be_are_refused() {
         ("[[stage]]\nfitness = 'mean_hinge'\nenough = 0", "stage 1: enough = 0"),
         ("[[stage]]\nenough = 20", "stage 1: enough: expected fitness = \"mean_clipped\" or \"mean_hinge\""),
         ("[evaluation]\nenough = 0", "evaluation.enough = 0: expected 1 or more"),
+        (
+            "[[stage]]\ninverted_pixels = 9999",
+            "stage 1: inverted_pixels = 9999: expected a number from 0 to 49",
+        ),
         ("[[stage]]\npool = 5", "stage 1: pool: expected images_per_class"),
         ("[[stage]]\nimages_per_class = 8\npool = 7", "stage 1: pool = 7: expected images_per_class, 8"),
     ] {
