@@ -160,8 +160,9 @@ impl<'a> Behaviour<'a> {
         let asked: Vec<usize> = (0..plain.len()).filter(|&image| rightward[image].is_some()).collect();
         let is_right = |&image: &usize| towards(rightward[image], plain[image]) > criteria.threshold;
         let answered: Vec<usize> = asked.iter().copied().filter(is_right).collect();
-        // Who is right on half of them is a walker, too, if it walks: how much it knows is for a test to say.
-        let walked = asked.iter().filter(|&&image| plain[image].abs() > criteria.threshold).count();
+        // Who is wrong on many is a walker all the same, if it walks: how much it knows is for a test to say.
+        let walks = |&&image: &&usize| Direction::of(plain[image], criteria.threshold).is_some();
+        let walked = asked.iter().filter(walks).count();
         let groups = [Group::A, Group::B].into_iter().filter(|&group| !split.classes(group).is_empty());
         let shares: Vec<(Group, f64)> = groups
             .map(|group| {
