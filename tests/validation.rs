@@ -5,8 +5,8 @@ mod common;
 use common::program::{Sandbox, TINY};
 use morphcog::run::audit_file::AuditFile;
 use morphcog::run::eval_file::EvalFile;
+use morphcog::run::held_out::images;
 use morphcog::run::training::{Training, load_dataset};
-use morphcog::run::validation::images;
 use morphcog::task::dataset::Split;
 
 /// A run with redrawn images, so that it was trained on more than it ends with.
@@ -43,6 +43,26 @@ fn validation_images_are_of_the_training_split_and_were_never_trained_on() {
     // Classes take turns: a round on the first of them is fair, too.
     assert_eq!(drawn[..20].iter().filter(|image| image.label == 0).count(), 10);
     assert!(images(&run, &dataset, 10 * most).is_err());
+}
+
+#[test]
+fn images_that_the_hardest_were_chosen_among_are_not_for_validation() {
+    // What is left of them is easier than images are.
+    let sandbox = Sandbox::new();
+    let stages = "\n[[stage]]\ngenerations = 1\n[[stage]]\nimages_per_class = 3\npool = 40\n";
+    sandbox.write("run.toml", format!("{TINY}{stages}"));
+    sandbox.run("evolve -q -c run.toml -o run -g 2").ended(0, &[]);
+    let run = sandbox.run_file("run");
+    let dataset = load_dataset(&run.config, None, &[Split::Train]).unwrap();
+    let period = run.config.period(1);
+    let pool = Training::drawn(&run.config, &dataset, period).unwrap();
+    let hardest = Training::indices(&run.config, &dataset, period).unwrap();
+    assert!(pool.len() == 80 && hardest.len() == 6 && hardest.iter().all(|image| pool.contains(image)));
+    let of_class =
+        |class| dataset.indices_of(Split::Train, class).iter().filter(|i| !pool.contains(i)).count();
+    let most = 2 * (of_class(0).min(of_class(1)) - 1);
+    let drawn = images(&run, &dataset, most).unwrap();
+    assert!(drawn.iter().all(|image| !pool.contains(&image.index)));
 }
 
 #[test]
@@ -105,6 +125,20 @@ fn too_few_or_too_many_validation_images_are_refused() {
     };
     with("--validation 10").ended(2, &["--validation 10", "40"]);
     with("--validation 1000000").ended(3, &["--validation 1000000", "ask for at most"]);
+}
+
+#[test]
+fn a_run_that_will_leave_too_few_of_them_is_refused_before_it_begins() {
+    let sandbox = Sandbox::new();
+    // 40 images of each class; 30 of each are drawn twice, and 30 again after two generations.
+    let few = TINY.replace("[data]\n", "[data]\nbuiltin = { train_per_class = 40 }\n");
+    let stage = "\n[[stage]]\nimages_per_class = 30\nredraw = 2\n[validation]\nimages = 40\n";
+    sandbox.write("run.toml", format!("{few}{stage}best = 1\n"));
+    let refused = ["validation.images = 40", "20 images of class", "ask for at most", "validation.best"];
+    sandbox.run("evolve -q -c run.toml -o run").ended(3, &refused);
+    assert!(!sandbox.path("run").exists());
+    // Who does not choose any needs none.
+    sandbox.run("evolve -q -c run.toml -o run -g 1 --set validation.best=0").ended(0, &[]);
 }
 
 #[test]

@@ -15,7 +15,7 @@ pub use super::session::{Finished, Observer, Options, Progress};
 use super::start::{Start, StartRef};
 use super::training::{Training, load_dataset};
 use super::variation::{Lessons, Mutations};
-use super::{Error, resume};
+use super::{Error, held_out, resume};
 use crate::base::files::write_atomically;
 use crate::body::Body;
 use crate::genome::GenomeError;
@@ -54,6 +54,9 @@ pub fn evolve(
     // A run that goes on may have begun, and then has its elites: that is not known before its folder is open.
     let may_have_begun = resumes && options.out.exists();
     let start = if may_have_begun { None } else { Start::read(config, &dataset)? };
+    if !may_have_begun {
+        held_out::check(config, start.as_ref().map(|start| &start.origin), &dataset)?;
+    }
     let folder = RunFolder::open(&options.out, options.if_exists)?;
     let saved = match resumes {
         true => resume::saved(&folder, config, &dataset, |text| observer.warning(&text))?,

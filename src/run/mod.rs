@@ -19,6 +19,7 @@ pub mod evolve;
 pub mod folder;
 pub mod gallery;
 mod hardest;
+pub mod held_out;
 mod keep;
 pub mod metrics;
 mod physical;

@@ -3,7 +3,7 @@
 use super::archive::{Robot, RunFile};
 use super::audit_file::fingerprint;
 use super::config::BodyConfig;
-use super::validation::trained_on;
+use super::held_out::trained_on;
 use super::{Config, Error};
 use crate::task::dataset::{Dataset, Split};
 use serde::{Deserialize, Serialize};
@@ -37,7 +37,8 @@ pub struct StartRef {
     pub generations: u64,
     /// SHA-256 of its content.
     pub sha256: String,
-    /// Indices of the images that its robots were ever trained on, if they are of the same data: not for validation.
+    /// Indices of the images that its robots were ever trained on, or that those were chosen among, if they are of the same data:
+    /// not for validation.
     pub trained_on: Vec<usize>,
 }
 

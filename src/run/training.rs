@@ -101,41 +101,47 @@ impl Training {
         Training::of(config, &load_dataset(config, data, &[Split::Train])?, config.period(0))
     }
 
-    /// Indices of the training images of a period.
+    /// Indices of the images among which those of a period are chosen; without a choice, of its training images.
     ///
     /// # Errors
     /// If a class has not as many images as are to be drawn.
+    pub fn drawn(config: &Config, dataset: &Dataset, period: Period) -> Result<Vec<usize>, Error> {
+        let key = |key: &str| format!("stage {}: {key}", period.stage + 1);
+        let (key, per_class, number) = match (config.drawn_per_class(period), config.pool(period)) {
+            (Some(_), Some(pool)) => (key("pool"), pool, period.number()),
+            (Some(per_class), None) => (key("images_per_class"), per_class, period.number()),
+            (None, _) => match &config.data.train_images {
+                Some(indices) => return Ok(indices.clone()),
+                None => ("data.images_per_class".to_string(), config.data.images_per_class, 0),
+            },
+        };
+        dataset
+            .draw(Split::Train, &config.classes(), per_class, config.seed, number)
+            .map_err(|error| Error::input(format!("{key}: {error}")))
+    }
+
+    /// Indices of the training images of a period.
+    ///
+    /// # Errors
+    /// As [`Training::drawn`].
     pub fn indices(config: &Config, dataset: &Dataset, period: Period) -> Result<Vec<usize>, Error> {
-        let classes = config.classes();
-        let refuse = |key: &str, error: DatasetError| Error::input(format!("{key}: {error}"));
-        let draw = |key: &str, per_class, number| {
-            let drawn = dataset.draw(Split::Train, &classes, per_class, config.seed, number);
-            drawn.map_err(|error| refuse(key, error))
-        };
-        let drawn = match (config.drawn_per_class(period), &config.data.train_images) {
-            (Some(per_class), _) => {
-                let key = |key: &str| format!("stage {}: {key}", period.stage + 1);
-                match config.pool(period) {
-                    None => draw(&key("images_per_class"), per_class, period.number())?,
-                    Some(pool) => {
-                        let pool = draw(&key("pool"), pool, period.number())?;
-                        let label = |&index: &usize| {
-                            let label = dataset.label(Split::Train, index);
-                            label.map_err(|error| refuse(&key("pool"), error))
-                        };
-                        let labels = pool.iter().map(label).collect::<Result<Vec<u8>, Error>>()?;
-                        let stimulus = |&index: &usize| see(config, dataset, Split::Train, index);
-                        let stimuli = pool.iter().map(stimulus).collect::<Result<Vec<_>, Error>>()?;
-                        hardest(&labels, &stimuli, per_class).into_iter().map(|number| pool[number]).collect()
-                    }
-                }
-            }
-            (None, Some(indices)) => return Ok(indices.clone()),
-            (None, None) => draw("data.images_per_class", config.data.images_per_class, 0)?,
-        };
+        let mut drawn = Training::drawn(config, dataset, period)?;
+        let per_class = config.drawn_per_class(period);
+        if let (Some(per_class), Some(_)) = (per_class, config.pool(period)) {
+            let label = |&index: &usize| dataset.label(Split::Train, index);
+            let labels = drawn.iter().map(label).collect::<Result<Vec<u8>, DatasetError>>();
+            let labels =
+                labels.map_err(|error| Error::input(format!("stage {}: pool: {error}", period.stage + 1)))?;
+            let stimulus = |&index: &usize| see(config, dataset, Split::Train, index);
+            let stimuli = drawn.iter().map(stimulus).collect::<Result<Vec<_>, Error>>()?;
+            drawn = hardest(&labels, &stimuli, per_class).into_iter().map(|number| drawn[number]).collect();
+        }
+        if per_class.is_none() && config.data.train_images.is_some() {
+            return Ok(drawn);
+        }
         // Where the first images decide whether others are shown, they are not to be of one class.
         let takes_turns = config.criterion_in(period).last_wrong().is_some() || config.race(period);
-        let per_class = drawn.len() / classes.len().max(1);
+        let per_class = drawn.len() / config.classes().len().max(1);
         Ok(if takes_turns { by_turns(drawn, per_class) } else { drawn })
     }
 

@@ -1,24 +1,23 @@
 //! Choosing robots by their answers to images that are neither training nor test images.
 //!
-//! Validation images are drawn from the training split, by the run's seed; none of them is one that the run was ever
-//! trained on. Robots are screened in rounds: all on a tenth of the images, the better third of each task on three
+//! Which images, says [`held_out`](super::held_out). Robots are screened in rounds: all on a tenth of the images, the better third of each task on three
 //! tenths, the better tenth on all. Results are kept beside the run.
 
 use super::archive::{Robot, RunFile};
 use super::audit_file::fingerprint;
 use super::eval::{self, Observer, Walker};
 use super::eval_file::{RobotReport, Trial};
+use super::held_out::images;
 use super::physical::first_physical;
 use super::robots::{Chosen, Selection, Source};
-use super::training::{ImageRef, Training, load_dataset, see};
+use super::training::{ImageRef, load_dataset, see};
 use super::{Config, Error};
 use crate::base::files::{read_text, write_atomically};
 use crate::base::hash::sha256_hex;
-use crate::base::random::{Purpose, stream};
 use crate::task::dataset::{Dataset, Split};
 use crate::task::grouping::{self, Grouping};
 use serde::{Deserialize, Serialize};
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, AtomicU64};
 
@@ -94,49 +93,6 @@ struct ValidationFile {
     key: String,
     /// The best of each task, best first.
     robots: Vec<Validated>,
-}
-
-/// Indices of all images that a run was trained on so far, in any of its periods, and before where it started from.
-pub(super) fn trained_on(run: &RunFile, dataset: &Dataset) -> Result<BTreeSet<usize>, Error> {
-    let mut seen: BTreeSet<usize> = run.training_images.iter().map(|image| image.index).collect();
-    seen.extend(run.start.iter().flat_map(|start| &start.trained_on));
-    let mut latest = None;
-    for period in (0..run.generations).map(|generation| run.config.period(generation)) {
-        if latest != Some(period) {
-            seen.extend(Training::indices(&run.config, dataset, period)?);
-            latest = Some(period);
-        }
-    }
-    Ok(seen)
-}
-
-/// `count` validation images, evenly divided between the classes, which take turns: so are the first of them.
-///
-/// # Errors
-/// If there are not enough images.
-pub fn images(run: &RunFile, dataset: &Dataset, count: usize) -> Result<Vec<ImageRef>, Error> {
-    let classes = run.config.classes();
-    let trained = trained_on(run, dataset)?;
-    let per_class = count.div_ceil(classes.len().max(1));
-    let mut drawn: Vec<Vec<ImageRef>> = Vec::new();
-    for &label in &classes {
-        let all = dataset.indices_of(Split::Train, label).iter().copied();
-        let free: Vec<usize> = all.filter(|index| !trained.contains(index)).collect();
-        if free.len() < per_class {
-            let text = format!(
-                "--validation {count}: expected {per_class} images of class {label} that the run was not \
-                trained on, found {}",
-                free.len()
-            );
-            return Err(Error::input(text).hint(format!("ask for at most {}", free.len() * classes.len())));
-        }
-        let picked =
-            stream(run.config.seed, Purpose::Validation, 0, u64::from(label)).sample(free.len(), per_class);
-        drawn.push(picked.into_iter().map(|i| ImageRef { index: free[i], label }).collect());
-    }
-    let turns =
-        (0..per_class).flat_map(|turn| drawn.iter().filter_map(move |class| class.get(turn).copied()));
-    Ok(turns.take(count).collect())
 }
 
 /// Which robots of a run are to be chosen.
