@@ -1,7 +1,7 @@
 //! Which of many images are hard to tell from another class: what a stage's `pool` chooses by.
 //!
 //! Bodies that know 99 % of all images are right on a few dozen random ones, which then no longer tell the good from the
-//! better. Most of what they get wrong lies where the classes meet (docs/paper.md, "More training images").
+//! better. Most of what they get wrong lies where the classes meet (docs/experiments.md).
 
 use crate::base::Grid;
 use rayon::prelude::*;
