@@ -136,6 +136,8 @@ fn a_run_that_will_leave_too_few_of_them_is_refused_before_it_begins() {
     sandbox.write("run.toml", format!("{few}{stage}best = 1\n"));
     let refused = ["validation.images = 40", "20 images of class", "ask for at most", "validation.best"];
     sandbox.run("evolve -q -c run.toml -o run").ended(3, &refused);
+    // However many generations: images run out soon.
+    sandbox.run("evolve -q -c run.toml -o run -g 4000000000").ended(3, &refused);
     assert!(!sandbox.path("run").exists());
     // Who does not choose any needs none.
     sandbox.run("evolve -q -c run.toml -o run -g 1 --set validation.best=0").ended(0, &[]);

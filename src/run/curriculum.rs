@@ -7,6 +7,7 @@ use crate::task::evaluation::Savings;
 use crate::task::fitness::{Criterion, Fitness};
 use crate::task::protocol::{Life, Protocol};
 use serde::{Deserialize, Serialize};
+use std::iter::successors;
 
 /// A stage: table `[[stage]]`. It starts with the archive of the stage before it, evaluated anew.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -91,16 +92,31 @@ impl Period {
 impl Config {
     /// The period that a generation (from 0) belongs to.
     pub fn period(&self, generation: u64) -> Period {
+        self.period_and_next(generation).0
+    }
+
+    /// The periods that the first generations belong to, in their order.
+    pub fn periods(&self, generations: u64) -> impl Iterator<Item = Period> {
+        let firsts = successors(Some(0), |&first| Some(self.period_and_next(first).1));
+        firsts.take_while(move |&first| first < generations).map(|first| self.period(first))
+    }
+
+    /// The period that a generation belongs to, and the first generation of the next one.
+    fn period_and_next(&self, generation: u64) -> (Period, u64) {
         let mut begin = 0;
         for (stage, config) in self.stage.iter().enumerate() {
-            let end = begin + config.generations.unwrap_or(u64::MAX - begin);
-            if generation < end || stage + 1 == self.stage.len() {
-                let draw = config.redraw.map_or(0, |every| (generation - begin) / every.max(1));
-                return Period { stage, draw };
+            let is_last = stage + 1 == self.stage.len();
+            let lasts = config.generations.filter(|_| !is_last).unwrap_or(u64::MAX - begin);
+            let end = begin + lasts;
+            if generation < end || is_last {
+                let Some(every) = config.redraw else { return (Period { stage, draw: 0 }, end) };
+                let draw = (generation - begin) / every.max(1);
+                let next = begin.saturating_add((draw + 1).saturating_mul(every.max(1)));
+                return (Period { stage, draw }, next.min(end));
             }
             begin = end;
         }
-        Period { stage: 0, draw: 0 }
+        (Period { stage: 0, draw: 0 }, u64::MAX)
     }
 
     /// What answers are judged by in a generation (from 0).

@@ -24,6 +24,13 @@ fn stages_follow_each_other_and_the_last_lasts() {
     assert_eq!([9, 10, 30].map(|generation| config.criterion(generation).fitness), fitness);
     assert_eq!([9, 10, 30].map(|g| config.drawn_per_class(config.period(g))), [None, Some(4), Some(8)]);
     assert_ne!(config.period(10).number(), config.period(18).number());
+    // All of them, however many generations they last.
+    for generations in [1, 10, 11, 18, 19, 26, 27, 30, 31, 1000] {
+        let mut periods: Vec<Period> = (0..generations).map(|generation| config.period(generation)).collect();
+        periods.dedup();
+        assert_eq!(config.periods(generations).collect::<Vec<_>>(), periods, "{generations}");
+    }
+    assert_eq!(config.periods(u64::MAX).count(), 5);
 }
 
 #[test]

@@ -13,34 +13,24 @@ use std::collections::BTreeSet;
 /// Indices of all images that a run was trained on so far, in any of its periods, and before where it started from. With those
 /// that hardest ones were chosen among: what is left of these is easier than images are.
 pub(super) fn trained_on(run: &RunFile, dataset: &Dataset) -> Result<BTreeSet<usize>, Error> {
-    let mut seen = looked_at(&run.config, run.start.as_ref(), run.generations, dataset)?;
+    let mut seen = before(run.start.as_ref());
     seen.extend(run.training_images.iter().map(|image| image.index));
-    Ok(seen)
-}
-
-/// The same of a run of so many generations.
-fn looked_at(
-    config: &Config,
-    start: Option<&StartRef>,
-    generations: u64,
-    dataset: &Dataset,
-) -> Result<BTreeSet<usize>, Error> {
-    let mut seen: BTreeSet<usize> = start.iter().flat_map(|start| &start.trained_on).copied().collect();
-    let mut latest = None;
-    for period in (0..generations).map(|generation| config.period(generation)) {
-        if latest != Some(period) {
-            seen.extend(Training::drawn(config, dataset, period)?);
-            latest = Some(period);
-        }
+    for period in run.config.periods(run.generations) {
+        seen.extend(Training::drawn(&run.config, dataset, period)?);
     }
     Ok(seen)
 }
 
-/// Of each class the images that were not looked at.
-fn left(config: &Config, looked_at: &BTreeSet<usize>, dataset: &Dataset) -> Vec<Vec<ImageRef>> {
+/// What robots were trained on where a run started from.
+fn before(start: Option<&StartRef>) -> BTreeSet<usize> {
+    start.iter().flat_map(|start| &start.trained_on).copied().collect()
+}
+
+/// Of each class the images that are not among those seen.
+fn left(config: &Config, seen: &BTreeSet<usize>, dataset: &Dataset) -> Vec<Vec<ImageRef>> {
     let of_class = |&label: &u8| {
         let all = dataset.indices_of(Split::Train, label).iter();
-        let free = all.filter(|&index| !looked_at.contains(index));
+        let free = all.filter(|&index| !seen.contains(index));
         free.map(|&index| ImageRef { index, label }).collect()
     };
     config.classes().iter().map(of_class).collect()
@@ -81,9 +71,14 @@ pub(super) fn check(config: &Config, start: Option<&StartRef>, dataset: &Dataset
     if best == 0 {
         return Ok(());
     }
-    let left = left(config, &looked_at(config, start, config.generations, dataset)?, dataset);
     let or = ", train on fewer (images_per_class, pool, redraw), or choose none (validation.best = 0)";
-    per_class(config, &left, "validation.images =", images, or).map(drop)
+    let mut seen = before(start);
+    // One after the other: who draws without end runs out of images soon.
+    for period in config.periods(config.generations) {
+        seen.extend(Training::drawn(config, dataset, period)?);
+        per_class(config, &left(config, &seen, dataset), "validation.images =", images, or)?;
+    }
+    Ok(())
 }
 
 /// `count` validation images, evenly divided between the classes, which take turns: so are the first of them.
