@@ -130,7 +130,7 @@ fn too_few_or_too_many_validation_images_are_refused() {
 #[test]
 fn a_run_that_will_leave_too_few_of_them_is_refused_before_it_begins() {
     let sandbox = Sandbox::new();
-    // 40 images of each class; 30 of each are drawn twice, and 30 again after two generations.
+    // The first draw takes 30 of the 40 images of each class, and leaves 10 where 20 are asked for.
     let few = TINY.replace("[data]\n", "[data]\nbuiltin = { train_per_class = 40 }\n");
     let stage = "\n[[stage]]\nimages_per_class = 30\nredraw = 2\n[validation]\nimages = 40\n";
     sandbox.write("run.toml", format!("{few}{stage}best = 1\n"));

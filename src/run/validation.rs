@@ -1,7 +1,7 @@
 //! Choosing robots by their answers to images that are neither training nor test images.
 //!
-//! Which images, says [`held_out`](super::held_out). Robots are screened in rounds: all on a tenth of the images, the better third of each task on three
-//! tenths, the better tenth on all. Results are kept beside the run.
+//! [`held_out`](super::held_out) says which images. Robots are screened in rounds: all on a tenth of them, the better third
+//! of each task on three tenths, the better tenth on all. Results are kept beside the run.
 
 use super::archive::{Robot, RunFile};
 use super::audit_file::fingerprint;
