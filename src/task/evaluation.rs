@@ -83,8 +83,8 @@ pub struct Job<'a> {
     pub may_win: Box<MayWin<'a>>,
     /// Whether its fitness is known, whatever its other displacements: they are then not simulated. Without it all are.
     pub settled: Option<Box<MayWin<'a>>>,
-    /// Whether it is given up, going by the images up to the first whose displacement is not known, and no others: so that it does
-    /// not matter which are shown first, or are one life.
+    /// Whether it is given up, going by the images in some order up to the first whose displacement is not known, and no others: so
+    /// that it does not matter which are shown first, or are one life.
     pub given_up: Option<Box<MayWin<'a>>>,
 }
 

@@ -20,6 +20,8 @@ const DOUBT: f64 = 0.05;
 /// A parent to be raced against.
 pub struct Race {
     criterion: Criterion,
+    /// In which order the images are to be shown: those first whose answers could be better than the parent's.
+    order: Vec<usize>,
     /// Of every task both assignments of sides to groups.
     lanes: Vec<Lane>,
 }
@@ -29,7 +31,7 @@ struct Lane {
     task: usize,
     /// The parent's fitness.
     fitness: f64,
-    /// What counts, in the images' order.
+    /// What counts, in the order of showing.
     images: Vec<Image>,
 }
 
@@ -40,6 +42,52 @@ struct Image {
     weight: f64,
     /// What the parent's answer is worth.
     worth: f64,
+}
+
+impl Image {
+    /// Whether an answer can be worth more than the parent's.
+    fn is_open(&self) -> bool {
+        self.worth < 1.0
+    }
+
+    /// The most that can be gained on it.
+    fn most(&self) -> f64 {
+        self.weight * (1.0 - self.worth)
+    }
+}
+
+/// What an offspring gained so far on images of a kind, and what there is to come of them.
+#[derive(Default)]
+struct Gains {
+    shown: usize,
+    sum: f64,
+    squares: f64,
+    to_come: f64,
+    /// The most that can be gained on what is to come.
+    most: f64,
+}
+
+impl Gains {
+    fn add(&mut self, gain: f64, most: f64) {
+        self.sum += gain;
+        self.squares += gain * gain;
+        self.shown += 1;
+        self.to_come -= 1.0;
+        self.most -= most;
+    }
+
+    /// On all of them, if it goes on as it began or somewhat better, but not better than can be.
+    fn in_the_end(&self) -> f64 {
+        if self.shown < FEWEST {
+            return self.sum + self.most;
+        }
+        let shown = self.shown as f64;
+        let mean = self.sum / shown;
+        let variance = self.squares / shown - mean * mean + DOUBT * DOUBT;
+        // Of those shown nothing is left to chance.
+        let error = (variance / shown * (shown + self.to_come) / self.to_come.max(1.0)).sqrt();
+        self.sum + (self.to_come * (mean + ERRORS * error)).min(self.most)
+    }
 }
 
 impl Race {
@@ -63,11 +111,25 @@ impl Race {
                 Lane { task, fitness: reached, images: weighed.iter().filter_map(image).collect() }
             })
         });
-        Some(Race { criterion, lanes: lanes.collect() })
+        let mut lanes: Vec<Lane> = lanes.collect();
+        let own = lanes.iter().reduce(|best, lane| if lane.fitness > best.fitness { lane } else { best })?;
+        let mut is_open = vec![false; parent.len()];
+        own.images.iter().for_each(|image| is_open[image.number] = image.is_open());
+        let mut order: Vec<usize> = (0..parent.len()).collect();
+        // Stable: the classes keep taking turns.
+        order.sort_by_key(|&number| !is_open[number]);
+        lanes.iter_mut().for_each(|lane| lane.images.sort_by_key(|image| !is_open[image.number]));
+        Some(Race { criterion, order, lanes })
     }
 
-    /// Whether an offspring with these displacements so far, an image each, fell behind on the first of them, or on more but not
-    /// all: whether, if it goes on beside its parent as it began, it will not exceed what is `to_beat` of any task.
+    /// In which order the images are to be shown: those first on which the parent can be beaten, each kind in their order.
+    pub fn order(&self) -> &[usize] {
+        &self.order
+    }
+
+    /// Whether an offspring with these displacements so far, an image each, fell behind on the first that are [shown](Self::order),
+    /// or on more but not all: whether, if it goes on beside its parent as it began, it will not exceed what is `to_beat` of any
+    /// task. On images where nobody can beat the parent it is believed to do as well until it was shown some.
     pub fn is_left_behind(&self, known: &[Option<f64>], to_beat: impl Fn(usize) -> Option<f64>) -> bool {
         self.lanes
             .iter()
@@ -75,21 +137,20 @@ impl Race {
     }
 
     fn is_behind(&self, lane: &Lane, known: &[Option<f64>], to_beat: f64) -> bool {
-        let (mut sum, mut squares, all) = (0.0, 0.0, lane.images.len() as f64);
-        for (shown, image) in (1..lane.images.len()).zip(&lane.images) {
+        let all = lane.images.len() as f64;
+        let (mut open, mut full) = (Gains::default(), Gains::default());
+        for image in &lane.images {
+            let gains = if image.is_open() { &mut open } else { &mut full };
+            gains.to_come += 1.0;
+            gains.most += image.most();
+        }
+        for image in lane.images.iter().take(lane.images.len().saturating_sub(1)) {
             let Some(displacement) = known.get(image.number).copied().flatten() else { return false };
             let gain = image.weight * (self.criterion.worth(image.right * displacement) - image.worth);
-            sum += gain;
-            squares += gain * gain;
-            if shown < FEWEST {
-                continue;
-            }
-            let shown = shown as f64;
-            let mean = sum / shown;
-            let variance = squares / shown - mean * mean + DOUBT * DOUBT;
-            // Of those shown nothing is left to chance.
-            let error = (variance / shown * (1.0 - shown / all)).sqrt();
-            if lane.fitness + mean + ERRORS * error <= to_beat {
+            let gains = if image.is_open() { &mut open } else { &mut full };
+            gains.add(gain, image.most());
+            let is_told = open.shown + full.shown >= FEWEST;
+            if is_told && lane.fitness + (open.in_the_end() + full.in_the_end()) / all <= to_beat {
                 return true;
             }
         }
@@ -175,6 +236,42 @@ mod tests {
             assert!(race.is_left_behind(&known[..FEWEST], |_| Some(0.9)));
             assert!(!race.is_left_behind(&known[..FEWEST - 1], |_| Some(0.9)));
         }
+    }
+
+    #[test]
+    fn what_can_be_won_is_shown_first_and_who_does_not_win_there_is_told_by_it() {
+        let grouping = grouping(Fitness::MeanClipped);
+        // Far enough on all but thirty images, on which it is half as good as can be.
+        let parent: Vec<Answer> = (answers(1, 15.0).into_iter().enumerate())
+            .map(|(number, answer)| match number % 20 {
+                3 | 8 | 14 => {
+                    Answer { displacement: answer.displacement.map(|d| d.signum() * 5.0), ..answer }
+                }
+                _ => answer,
+            })
+            .collect();
+        let race = Race::against(&grouping, &parent).unwrap();
+        assert!(race.order()[..30].iter().all(|number| matches!(number % 20, 3 | 8 | 14)));
+        assert!(race.order()[..30].is_sorted() && race.order()[30..].is_sorted());
+        let to_beat = grouping.score(&parent).fitness;
+        // After how many images in that order it is left behind who answers as its parent, but for so much on those thirty, and on
+        // the others.
+        let told_after = |open: f64, full: f64| {
+            let mut known = vec![None; IMAGES];
+            let after = |&shown: &usize| {
+                let number = race.order()[shown];
+                let change = if shown < 30 { open } else { full };
+                let displacement = parent[number].displacement.unwrap();
+                known[number] = Some(displacement + change * displacement.signum());
+                race.is_left_behind(&known, |_| Some(to_beat))
+            };
+            (0..IMAGES).find(after).map(|last| last + 1)
+        };
+        assert_eq!(told_after(-2.0, 0.0), Some(16));
+        assert!(told_after(0.0, 0.0).is_some_and(|shown| shown <= 30));
+        assert_eq!(told_after(1.0, 0.0), None);
+        // What it wins there it loses elsewhere.
+        assert!(told_after(1.0, -8.0).is_some_and(|shown| (38..46).contains(&shown)));
     }
 
     #[test]

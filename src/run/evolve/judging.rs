@@ -36,8 +36,11 @@ impl Run<'_> {
         // Who has no parent races against one who stands still, whose answers are worth nothing: it is told by its own.
         let rival = || answers.clone().unwrap_or_else(|| training.answers(repeat(Some(0.0))));
         let race = self.options.config.race(self.period).then(|| Race::against(grouping, &rival())).flatten();
-        // Who races is shown the images in their order, else it would begin with what its parent did worst by bad luck.
-        let order = answers.filter(|_| race.is_none()).map_or_else(Vec::new, |a| grouping.hardest_first(&a));
+        // Who races is not shown first what its parent did worst, else it would begin with what that did badly by chance.
+        let order = match &race {
+            Some(race) => race.order().to_vec(),
+            None => answers.map_or_else(Vec::new, |answers| grouping.hardest_first(&answers)),
+        };
         let given_up = race.map(|race| {
             Box::new(move |known: &[Option<f64>]| race.is_left_behind(known, |task| to_beat[task]))
                 as Box<MayWin>
