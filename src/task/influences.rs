@@ -11,13 +11,17 @@ const CHARGES: [f64; 4] = [1.0, 8.0, 64.0, 512.0];
 /// Every so manieth image is foretold from the others. (Classes often take turns, and are two or four: no fold is to be of one.)
 const FOLDS: usize = 5;
 
+/// For how many images of its own counts one that a robot and a relative were both shown. What the model leaves unexplained of the
+/// robot's answer it leaves of the relative's, too, so that their difference is known better than either.
+const PAIR: f64 = 4.0;
+
 /// For how many images counts at most by how much all answers of a relative lie beside the robot's: they have one cause.
-const SHIFT: f64 = 4.0;
+const SHIFT: f64 = 64.0;
 
-/// How wide each sensor of a robot was under some images, and how far it walked.
-pub type Shown = Vec<(Vec<f64>, f64)>;
+/// How wide each sensor of a robot was under an image, and how far it walked; `None` if it was not shown it.
+pub type Shown = Vec<Option<(Vec<f64>, f64)>>;
 
-/// A displacement beyond the mean, and how much wider than on average each sensor was.
+/// What is to be explained of a displacement, and of each sensor how much wider it was.
 type Row = (DVector<f64>, f64);
 
 /// Displacements as a mean and, for each sensor, a part in proportion to how much wider it is than on average.
@@ -37,12 +41,13 @@ impl Influences {
     /// out by foretelling some images from the others. `sensors` are the places where the robot, or one of the relatives, has one.
     pub fn of(own: &Shown, relatives: &[Shown], sensors: &[(usize, usize)]) -> Option<Self> {
         let count = sensors.len();
-        let (mean, means) = means(own, count)?;
+        let of_own = || own.iter().flatten().map(|(seen, d)| (seen.as_slice(), *d));
+        let (mean, means) = means(of_own(), count)?;
         // nalgebra has no columns of nothing.
         if count == 0 {
             return Some(Influences { reach: REACHES[0], weights: Vec::new(), mean, means });
         }
-        let folds = folds(own, relatives, (mean, &means));
+        let folds = folds(own, relatives, count);
         let moments: Vec<Moments> = folds.iter().map(|fold| Moments::of(fold, count)).collect();
         let all = moments.iter().fold(Moments::of(&[], count), |sum, fold| sum.plus(fold, 1.0));
         let mut best = (f64::INFINITY, REACHES[0], CHARGES[0]);
@@ -68,35 +73,47 @@ impl Influences {
     }
 }
 
-/// What is to be explained, in parts of which each is foretold from the others: of every image how the answer differs from the mean of
-/// that body's, and of every relative how that mean differs from the robot's.
-fn folds(own: &Shown, relatives: &[Shown], (mean, of_own): (f64, &[f64])) -> Vec<Vec<Row>> {
-    let count = of_own.len();
+/// What is to be explained, in parts of which each is foretold from the others: of every image how the robot's answer differs from its
+/// mean; and of every relative how its answers to the images that both were shown differ from the robot's, on average, and each from
+/// that.
+fn folds(own: &Shown, relatives: &[Shown], count: usize) -> Vec<Vec<Row>> {
     let mut folds = vec![Vec::new(); FOLDS];
-    for (body, shown) in std::iter::once(own).chain(relatives).enumerate() {
-        let Some((of_all, of_each)) = means(shown, count) else { continue };
-        for (image, (seen, displacement)) in shown.iter().enumerate() {
-            let wider = DVector::from_fn(count, |i, _| seen[i] - of_each[i]);
-            folds[image % FOLDS].push((wider, displacement - of_all));
+    let mut add = |rows: Vec<(usize, Vec<f64>, f64)>, weight: f64| {
+        let (mean, means) = means(rows.iter().map(|(_, wider, d)| (wider.as_slice(), *d)), count)?;
+        for (image, wider, displacement) in &rows {
+            let wider = DVector::from_fn(count, |i, _| weight * (wider[i] - means[i]));
+            folds[image % FOLDS].push((wider, weight * (displacement - mean)));
         }
-        if body > 0 {
-            let images = shown.len() as f64;
+        Some((mean, means, rows.len() as f64))
+    };
+    let own_rows = own.iter().enumerate().filter_map(|(image, shown)| {
+        let (seen, displacement) = shown.as_ref()?;
+        Some((image, seen.clone(), *displacement))
+    });
+    add(own_rows.collect(), 1.0);
+    let mut shifts = Vec::new();
+    for (number, relative) in relatives.iter().enumerate() {
+        let pairs = own.iter().zip(relative).enumerate().filter_map(|(image, (own, shown))| {
+            let ((of_own, own), (seen, displacement)) = (own.as_ref()?, shown.as_ref()?);
+            Some((image, seen.iter().zip(of_own).map(|(x, own)| x - own).collect(), displacement - own))
+        });
+        if let Some((mean, means, images)) = add(pairs.collect(), PAIR.sqrt()) {
             let weight = (SHIFT * images / (SHIFT + images)).sqrt();
-            let wider = DVector::from_fn(count, |i, _| weight * (of_each[i] - of_own[i]));
-            folds[body % FOLDS].push((wider, weight * (of_all - mean)));
+            shifts.push((number, (DVector::from_fn(count, |i, _| weight * means[i]), weight * mean)));
         }
     }
+    shifts.into_iter().for_each(|(number, shift)| folds[number % FOLDS].push(shift));
     folds
 }
 
 /// The mean displacement, and each sensor's mean width; `None` of no images.
-fn means(shown: &[(Vec<f64>, f64)], count: usize) -> Option<(f64, Vec<f64>)> {
-    let (mut sum, mut sums) = (0.0, vec![0.0; count]);
+fn means<'a>(shown: impl Iterator<Item = (&'a [f64], f64)>, count: usize) -> Option<(f64, Vec<f64>)> {
+    let (mut number, mut sum, mut sums) = (0.0, 0.0, vec![0.0; count]);
     for (seen, displacement) in shown {
+        number += 1.0;
         sum += displacement;
         sums.iter_mut().zip(seen).for_each(|(sum, x)| *sum += x);
     }
-    let number = shown.len() as f64;
     (number > 0.0).then(|| (sum / number, sums.into_iter().map(|sum| sum / number).collect()))
 }
 

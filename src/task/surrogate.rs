@@ -18,7 +18,7 @@ use crate::sim::{Physics, width};
 pub struct Relative<'a> {
     /// Its body, which walks as the robot's.
     pub body: &'a Body,
-    /// The images, as its sensors saw them.
+    /// The robot's images, as this one's sensors saw them.
     pub stimuli: &'a [Grid<f64>],
     /// The displacement under each, as far as known, voxel lengths; the last may be missing.
     pub displacements: &'a [Option<f64>],
@@ -76,9 +76,7 @@ impl<'a> Surrogate<'a> {
         let seen = |stimulus: &Grid<f64>| seen_by(body, stimulus);
         let shown = |robot: &Relative| -> Shown {
             (robot.stimuli.iter().zip(robot.displacements))
-                .filter_map(|(stimulus, displacement)| {
-                    Some((seen_by(robot.body, stimulus), (*displacement)?))
-                })
+                .map(|(stimulus, displacement)| Some((seen_by(robot.body, stimulus), (*displacement)?)))
                 .collect()
         };
         let of_relatives: Vec<Shown> = relatives.iter().map(shown).collect();
@@ -282,6 +280,32 @@ mod tests {
         );
         let nothing = influences(&[relative(0)]);
         assert!(nothing.iter().zip(&alone).all(|(a, b)| (a - b).abs() < 0.5), "{nothing:?} {alone:?}");
+    }
+
+    #[test]
+    fn what_is_no_sensors_doing_is_told_apart_by_relatives_shown_the_same_images_even_the_worst_only() {
+        let (body, stimuli) = (body(), stimuli(200));
+        // What nothing explains moves robot and relative alike, by as much as the sensors do.
+        let mut random = stream(2, Purpose::Images, 0, 0);
+        let unexplained: Vec<f64> = stimuli.iter().map(|_| 16.0 * random.unit() - 8.0).collect();
+        let mut answers = answers(&stimuli, 200);
+        (answers.iter_mut().zip(&unexplained)).for_each(|(answer, u)| {
+            answer.displacement = answer.displacement.map(|d| d + u);
+        });
+        let other: Body = "50003/00000/20606".parse().unwrap();
+        let worst = |number: &usize| unexplained[*number] < -4.0;
+        let displacements: Vec<Option<f64>> = (0..200)
+            .map(|number| {
+                let wide = width(Material::SensorExpand, stimuli[number][(2, 2)], &PHYSICS) - 1.0;
+                answers[number].displacement.filter(|_| worst(&number)).map(|d| d - 3.0 * wide)
+            })
+            .collect();
+        assert!((30..70).contains(&displacements.iter().flatten().count()));
+        let relative = Relative { body: &other, stimuli: &stimuli, displacements: &displacements };
+        let model =
+            Surrogate::of(&body, &stimuli, &answers, &[relative], &split(), Fitness::MeanHinge, &PHYSICS);
+        let influence = model.unwrap().influence[(2, 2)];
+        assert!((influence + 3.0).abs() < 0.7, "{influence}");
     }
 
     #[test]
