@@ -1,7 +1,6 @@
 //! [`Relatives`]: what robots of the same gait did, whether they entered the archive or not, for the
 //! [surrogate](crate::task::surrogate) to learn from.
 
-use crate::base::Grid;
 use crate::body::{Body, Material};
 use crate::task::surrogate::Relative;
 use serde::{Deserialize, Serialize};
@@ -27,11 +26,10 @@ impl Relatives {
         self.0.push(Lived { body: body.clone(), displacements });
     }
 
-    /// The last of them with the same gait as a body, but other than that, up to `most`, the latest first; `stimuli` are the
-    /// training images.
-    pub fn of<'a>(&'a self, body: &Body, stimuli: &'a [Grid<f64>], most: usize) -> Vec<Relative<'a>> {
+    /// The last of them with the same gait as a body, but other than that, up to `most`, the latest first.
+    pub fn of<'a>(&'a self, body: &Body, most: usize) -> Vec<Relative<'a>> {
         let is_relative = |lived: &&Lived| lived.body != *body && have_one_gait(&lived.body, body);
-        let relative = |Lived { body, displacements }: &'a Lived| Relative { body, stimuli, displacements };
+        let relative = |Lived { body, displacements }: &'a Lived| Relative { body, displacements };
         self.0.iter().rev().filter(is_relative).take(most).map(relative).collect()
     }
 
@@ -89,8 +87,7 @@ mod tests {
     }
 
     fn numbers(relatives: &Relatives, of: &str, most: usize) -> Vec<f64> {
-        let stimuli = [Grid::from_fn(2, 3, |_, _| 1.0)];
-        let relatives = relatives.of(&body(of), &stimuli, most);
+        let relatives = relatives.of(&body(of), most);
         relatives.iter().map(|relative| relative.displacements[0].unwrap()).collect()
     }
 
@@ -104,11 +101,7 @@ mod tests {
         assert_eq!(numbers(&relatives, "333/155", 9), [3.0, 1.0]);
         assert!(numbers(&relatives, "333522", 9).is_empty());
         assert!(numbers(&relatives, "334/522", 9).is_empty() && numbers(&relatives, "333/555", 0).is_empty());
-        let stimuli = [];
-        assert_eq!(
-            relatives.of(&body("333/555"), &stimuli, 1)[0].displacements,
-            [Some(4.0), None, Some(0.5)]
-        );
+        assert_eq!(relatives.of(&body("333/555"), 1)[0].displacements, [Some(4.0), None, Some(0.5)]);
     }
 
     #[test]

@@ -62,7 +62,7 @@ impl Mutations<'_> {
         let split = grouping.tasks().iter().find(|split| split.name() == parent.task)?;
         let answers = training.answers(parent.displacements.iter().copied().map(Some));
         let most = usize::from(self.params.voxel_relatives);
-        let relatives = relatives.of(&parent.body, &training.stimuli, most);
+        let relatives = relatives.of(&parent.body, most);
         Surrogate::of(
             &parent.body,
             &training.stimuli,

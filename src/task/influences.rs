@@ -41,13 +41,11 @@ impl Influences {
     /// out by foretelling some images from the others. `sensors` are the places where the robot, or one of the relatives, has one.
     pub fn of(own: &Shown, relatives: &[Shown], sensors: &[(usize, usize)]) -> Option<Self> {
         let count = sensors.len();
-        let of_own = || own.iter().flatten().map(|(seen, d)| (seen.as_slice(), *d));
-        let (mean, means) = means(of_own(), count)?;
+        let (folds, mean, means) = folds(own, relatives, count)?;
         // nalgebra has no columns of nothing.
         if count == 0 {
             return Some(Influences { reach: REACHES[0], weights: Vec::new(), mean, means });
         }
-        let folds = folds(own, relatives, count);
         let moments: Vec<Moments> = folds.iter().map(|fold| Moments::of(fold, count)).collect();
         let all = moments.iter().fold(Moments::of(&[], count), |sum, fold| sum.plus(fold, 1.0));
         let mut best = (f64::INFINITY, REACHES[0], CHARGES[0]);
@@ -75,8 +73,8 @@ impl Influences {
 
 /// What is to be explained, in parts of which each is foretold from the others: of every image how the robot's answer differs from its
 /// mean; and of every relative how its answers to the images that both were shown differ from the robot's, on average, and each from
-/// that.
-fn folds(own: &Shown, relatives: &[Shown], count: usize) -> Vec<Vec<Row>> {
+/// that. With the robot's mean displacement, and of each sensor the mean width; `None` if it was not shown any.
+fn folds(own: &Shown, relatives: &[Shown], count: usize) -> Option<(Vec<Vec<Row>>, f64, Vec<f64>)> {
     let mut folds = vec![Vec::new(); FOLDS];
     let mut add = |rows: Vec<(usize, Vec<f64>, f64)>, weight: f64| {
         let (mean, means) = means(rows.iter().map(|(_, wider, d)| (wider.as_slice(), *d)), count)?;
@@ -90,20 +88,20 @@ fn folds(own: &Shown, relatives: &[Shown], count: usize) -> Vec<Vec<Row>> {
         let (seen, displacement) = shown.as_ref()?;
         Some((image, seen.clone(), *displacement))
     });
-    add(own_rows.collect(), 1.0);
+    let (mean, means, _) = add(own_rows.collect(), 1.0)?;
     let mut shifts = Vec::new();
     for (number, relative) in relatives.iter().enumerate() {
         let pairs = own.iter().zip(relative).enumerate().filter_map(|(image, (own, shown))| {
             let ((of_own, own), (seen, displacement)) = (own.as_ref()?, shown.as_ref()?);
             Some((image, seen.iter().zip(of_own).map(|(x, own)| x - own).collect(), displacement - own))
         });
-        if let Some((mean, means, images)) = add(pairs.collect(), PAIR.sqrt()) {
+        if let Some((beside, wider, images)) = add(pairs.collect(), PAIR.sqrt()) {
             let weight = (SHIFT * images / (SHIFT + images)).sqrt();
-            shifts.push((number, (DVector::from_fn(count, |i, _| weight * means[i]), weight * mean)));
+            shifts.push((number, (DVector::from_fn(count, |i, _| weight * wider[i]), weight * beside)));
         }
     }
     shifts.into_iter().for_each(|(number, shift)| folds[number % FOLDS].push(shift));
-    folds
+    Some((folds, mean, means))
 }
 
 /// The mean displacement, and each sensor's mean width; `None` of no images.

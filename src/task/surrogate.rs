@@ -13,13 +13,11 @@ use crate::base::Grid;
 use crate::body::{Body, Material};
 use crate::sim::{Physics, width};
 
-/// What another robot was shown, and did.
+/// What another robot did that was shown the same images.
 #[derive(Clone, Copy, Debug)]
 pub struct Relative<'a> {
     /// Its body, which walks as the robot's.
     pub body: &'a Body,
-    /// The robot's images, as this one's sensors saw them.
-    pub stimuli: &'a [Grid<f64>],
     /// The displacement under each, as far as known, voxel lengths; the last may be missing.
     pub displacements: &'a [Option<f64>],
 }
@@ -61,7 +59,7 @@ impl<'a> Surrogate<'a> {
     ) -> Option<Self> {
         let voxels = body.voxels();
         let known: Vec<Option<f64>> = answers.iter().map(|answer| answer.displacement).collect();
-        let own = Relative { body, stimuli, displacements: &known };
+        let own = Relative { body, displacements: &known };
         let is_sensor = |place| {
             let mut all = std::iter::once(&own).chain(relatives);
             all.any(|robot| robot.body.voxels()[place].is_sensor())
@@ -75,7 +73,7 @@ impl<'a> Surrogate<'a> {
         };
         let seen = |stimulus: &Grid<f64>| seen_by(body, stimulus);
         let shown = |robot: &Relative| -> Shown {
-            (robot.stimuli.iter().zip(robot.displacements))
+            (stimuli.iter().zip(robot.displacements))
                 .map(|(stimulus, displacement)| Some((seen_by(robot.body, stimulus), (*displacement)?)))
                 .collect()
         };
@@ -259,11 +257,7 @@ mod tests {
             answer.displacement.map(|d| d - 3.0 * wide + 7.0)
         };
         let displacements: Vec<Option<f64>> = answers.iter().zip(&stimuli).map(farther).collect();
-        let relative = |shown: usize| Relative {
-            body: &other,
-            stimuli: &stimuli,
-            displacements: &displacements[..shown],
-        };
+        let relative = |shown: usize| Relative { body: &other, displacements: &displacements[..shown] };
         let influences = |relatives: &[Relative]| {
             let (split, fitness) = (split(), Fitness::MeanHinge);
             let model = Surrogate::of(&body, &stimuli, &answers, relatives, &split, fitness, &PHYSICS);
@@ -301,7 +295,7 @@ mod tests {
                 };
                 let displacements: Vec<Option<f64>> = (0..200).map(walked).collect();
                 assert!((30..=100).contains(&displacements.iter().flatten().count()));
-                let relative = Relative { body: &other, stimuli: &stimuli, displacements: &displacements };
+                let relative = Relative { body: &other, displacements: &displacements };
                 let (split, fitness) = (split(), Fitness::MeanHinge);
                 let model = Surrogate::of(&body, &stimuli, &answers, &[relative], &split, fitness, &PHYSICS);
                 model.unwrap().influence[(2, 2)]
