@@ -3,12 +3,15 @@
 use super::checkpoint::{self, Checkpoint};
 use super::config::{CheckpointConfig, DataConfig};
 use super::folder::{RUN_JSON, RunFolder};
+use super::start::Start;
 use super::training::Training;
 use super::{Config, Error};
 use crate::task::dataset::Dataset;
 use crate::task::evaluation::Savings;
 use std::collections::BTreeMap;
 
+/// The key of the archive that a run starts from.
+const START: &str = "start.archive";
 const ANEW: &str = "start the run anew with --force";
 
 /// What to go on from; `None` if there is no run in the folder yet. A broken newest checkpoint is passed over, and said
@@ -39,7 +42,16 @@ pub(super) fn saved(
 /// Whether a saved run can be gone on with under a config: all that its results depend on must be the same.
 fn compatible(saved: &Checkpoint, config: &Config, dataset: &Dataset) -> Result<(), Error> {
     let hint = || format!("resume with the config it was started with, or {ANEW}");
-    let (theirs, ours) = (keys(&saved.run.config), keys(config));
+    let (mut theirs, ours) = (keys(&saved.run.config), keys(config));
+    if let (Some(origin), Some(_), true) =
+        (&saved.run.start, &config.start.archive, config.start != saved.run.config.start)
+    {
+        // The archive it started from may lie elsewhere by now; what counts is what is in it.
+        let named = Start::read(config, dataset)?.map(|start| start.origin.sha256);
+        if named.as_ref() == Some(&origin.sha256) {
+            theirs.extend(ours.get_key_value(START).map(|(key, value)| (key.clone(), value.clone())));
+        }
+    }
     let value = |keys: &Keys, key: &str| keys.get(key).map_or("not set".to_string(), ToString::to_string);
     if let Some(key) = theirs.keys().chain(ours.keys()).find(|key| theirs.get(*key) != ours.get(*key)) {
         let (theirs, ours) = (value(&theirs, key), value(&ours, key));
