@@ -15,6 +15,7 @@ use morphcog::task::dataset::Split;
 use morphcog::task::fitness::Fitness;
 use morphcog::task::protocol::Protocol;
 use morphcog::task::rollout::walk;
+use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -263,6 +264,29 @@ fn a_stage_starts_with_the_fittest_it_keeps_on_its_own_images() {
     kept.retain(|robot| robot.generation < 7);
     kept.sort_by(|a, b| b.objective.total_cmp(&a.objective));
     assert_eq!(kept, fittest);
+}
+
+#[test]
+fn a_stage_starts_with_the_fittest_of_the_stage_before_and_no_others() {
+    let sandbox = sandbox();
+    let elites = |name: &str, text: String, generations: u64| {
+        sandbox.write("run.toml", text);
+        sandbox.run(&format!("evolve -q -c run.toml -o {name} -g {generations}")).ended(0, &[]);
+        sandbox.run_file(name).elites
+    };
+    // Nobody is born in the third stage's first generation: no parents, and a newcomer that can be told by its age.
+    let lonely = staged().replace("parents = 8", "parents = 0\nnewcomers = 1").replace("keep = 4", "");
+    let mut before = elites("before", lonely.clone(), 7);
+    let all = elites("all", lonely.clone(), 8);
+    let few = elites("few", lonely.replace("pool = 9", "pool = 9\nstart_with = 2"), 8);
+    before.sort_by(|a, b| b.objective.total_cmp(&a.objective));
+    let ids = |robots: &[Robot]| {
+        let old = robots.iter().filter(|robot| robot.generation < 7);
+        old.map(|robot| robot.id.clone()).collect::<BTreeSet<String>>()
+    };
+    let (fittest, of_all) = (ids(&before[..2]), ids(&all));
+    assert_eq!(ids(&few), of_all.intersection(&fittest).cloned().collect());
+    assert!(of_all.len() > 2 && !ids(&few).is_empty(), "{of_all:?}");
 }
 
 #[test]

@@ -51,6 +51,15 @@ fn a_run_begins_with_the_elites_of_another_evaluated_on_its_own_task() {
     assert!(new.iter().all(|robot| robot.parent.as_deref().is_some_and(|parent| ids.contains(parent))));
     assert!(run.elites.iter().all(|robot| robot.generation == 0 && robot.task == "0|1"));
     assert!(run.elites.iter().all(|robot| robot.displacements.len() == 4 && robot.cell.len() == 3));
+    // The fittest of each of its tasks, if no more are asked for.
+    let few = sandbox.read("run.toml").replacen("generations = 4", "generations = 4\nstart_with = 2", 1);
+    sandbox.write("few.toml", few);
+    let tasks: BTreeSet<&str> = other.elites.iter().map(|robot| robot.task.as_str()).collect();
+    let of_task = |task: &str| other.elites.iter().filter(|robot| robot.task == task).count();
+    let beginners: usize = tasks.iter().map(|task| of_task(task).min(2)).sum();
+    assert!(tasks.len() > 1 && beginners < count);
+    let words = format!("starting from {beginners} elites of other");
+    sandbox.run("evolve -c few.toml -o few -g 1").ended(0, &[&words]);
     // Neither savings nor threads change how it begins.
     sandbox.run("evolve -q -c run.toml -o without --set savings.early_stop=false --set savings.known_bodies=false --threads 3 -g 1").ended(0, &[]);
     assert_eq!(sandbox.run_file("without").elites, run.elites);

@@ -37,6 +37,10 @@ pub struct StageConfig {
     /// right way usually does so from the start.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub control_steps: Option<u32>,
+    /// Elites of each task of the stage before, or of the archive that the run starts from, that are evaluated when the stage
+    /// begins: those who were fittest there. Default: all.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub start_with: Option<usize>,
     /// Elites of each task that stay in the archive: the fittest, at any time. Who is not among them is not let in, and can
     /// be told early. Default: all.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -173,6 +177,11 @@ impl Config {
         self.stage.get(period.stage).and_then(|stage| stage.race).unwrap_or(false)
     }
 
+    /// Elites of each task of before, the fittest, with which a period begins; `None`: all. When images are drawn anew, all stay.
+    pub fn start_with(&self, period: Period) -> Option<usize> {
+        self.stage.get(period.stage)?.start_with.filter(|_| period.draw == 0)
+    }
+
     /// Elites of each task that stay in the archive in a period; `None`: all.
     pub fn keep(&self, period: Period) -> Option<usize> {
         self.stage.get(period.stage)?.keep
@@ -224,6 +233,7 @@ impl Config {
                 ("images_per_class", stage.images_per_class == Some(0)),
                 ("redraw", stage.redraw == Some(0)),
                 ("control_steps", stage.control_steps == Some(0)),
+                ("start_with", stage.start_with == Some(0)),
                 ("keep", stage.keep == Some(0)),
                 ("enough", stage.enough == Some(0)),
             ];
