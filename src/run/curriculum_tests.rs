@@ -94,6 +94,7 @@ fn stages_that_cannot_be_are_refused() {
             "[[stage]]\ninverted_pixels = 9999",
             "stage 1: inverted_pixels = 9999: expected a number from 0 to 49",
         ),
+        ("[[stage]]\nstart_with = 0", "stage 1: start_with = 0: expected 1 or more"),
         ("[[stage]]\npool = 5", "stage 1: pool: expected images_per_class"),
         ("[[stage]]\nimages_per_class = 8\npool = 7", "stage 1: pool = 7: expected images_per_class, 8"),
     ] {
