@@ -117,13 +117,15 @@ fn it_goes_on_to_the_same_bytes_and_needs_the_other_run_only_to_begin() {
     // The same archive elsewhere is the same start; another one is another run.
     let set = "--set start.archive=\"elsewhere/run.json\"";
     sandbox.run(&format!("evolve -q -c run.toml -o part1 -g 13 --resume {set}")).ended(0, &[]);
-    sandbox.run(&format!("evolve -q -c run.toml -o part4 -g 13 --resume")).ended(0, &[]);
+    sandbox.run("evolve -q -c run.toml -o part4 -g 13 --resume").ended(0, &[]);
     assert_eq!(sandbox.run_file("part1").elites, sandbox.run_file("part4").elites);
     let another = "--set start.archive=\"whole/run.json\"";
     let words = ["start.archive", "other/run.json", "whole/run.json"];
     sandbox.run(&format!("evolve -q -c run.toml -o whole -g 13 --resume {another}")).ended(3, &words);
     let none = "--set start.archive=\"other/run.json\"";
-    sandbox.run(&format!("evolve -q -c run.toml -o part1 -g 14 --resume {none}")).ended(3, &["start.archive"]);
+    sandbox
+        .run(&format!("evolve -q -c run.toml -o part1 -g 14 --resume {none}"))
+        .ended(3, &["start.archive"]);
     assert_eq!(result("whole"), result("part7"));
     sandbox.run(&format!("evolve -q -c run.toml -o moved {set}")).ended(0, &[]);
     let (moved, whole) = (sandbox.run_file("moved"), sandbox.run_file("whole"));
