@@ -7,7 +7,7 @@ use super::archive::{Dimensions, Robot};
 use super::checkpoint::{Checkpoint, KnownBodies};
 use super::curriculum::Period;
 use super::folder::{self, IfExists, RunFolder};
-use super::keep::{Floors, who_begins};
+use super::keep::Floors;
 use super::metrics::{Metrics, Totals};
 use super::relatives::Relatives;
 use super::robust::{Scored, with_perturbed_lives};
@@ -165,7 +165,6 @@ impl<'a> Run<'a> {
         let every = Duration::try_from_secs_f64(config.checkpoint.seconds).unwrap_or(Duration::MAX);
         let mut saved = Instant::now();
         if let Some(Start { origin, robots }) = start {
-            let robots = who_begins(config, self.period, robots);
             observer.starting_from(&origin, robots.len());
             self.origin = Some(origin);
             if !self.begin(self.period, robots, stop)? {
@@ -177,8 +176,12 @@ impl<'a> Run<'a> {
             let period = config.period(self.generation);
             if period != self.period {
                 // In the order of their cells: of equals that now share a cell the first stays.
-                let elites = self.search.archive().elites().map(|elite| elite.solution.clone()).collect();
-                if !self.begin(period, who_begins(config, period, elites), stop)? {
+                let mut before = self.search.archive().clone();
+                if let Some(most) = config.start_with(period) {
+                    before.retain_fittest(most, |robot| robot.task.clone());
+                }
+                let elites = before.elites().map(|elite| elite.solution.clone()).collect();
+                if !self.begin(period, elites, stop)? {
                     break;
                 }
                 observer.period(period, &self.training, &self.progress());
@@ -198,10 +201,14 @@ impl<'a> Run<'a> {
 
     /// Begins a period: other images, perhaps another fitness, and elites of before evaluated anew. Whether that was done:
     /// if stopped meanwhile, nothing has changed.
-    fn begin(&mut self, period: Period, elites: Vec<Robot>, stop: &AtomicBool) -> Result<bool, Error> {
+    fn begin(&mut self, period: Period, mut elites: Vec<Robot>, stop: &AtomicBool) -> Result<bool, Error> {
         let config = &self.options.config;
         let training = Training::of(config, self.dataset, period)?;
         let grouping = config.grouping()?.with_fitness(config.criterion(self.generation));
+        if config.keep(period).is_some() {
+            // The fitter ones first: of those who come after, most are told early that they cannot stay.
+            elites.sort_by(|a, b| b.objective.total_cmp(&a.objective));
+        }
         let search = MapElites::new(config.seed, config.map_elites.clone(), Archive::new());
         let before = (
             replace(&mut self.period, period),

@@ -1,12 +1,8 @@
-//! Who a stage begins with (`start_with`), and [`Floors`]: what a robot must exceed to be in the archive at all, where a stage keeps
-//! only the fittest (`keep`).
+//! [`Floors`]: what a robot must exceed to be in the archive at all, where a stage keeps only the fittest (`keep`).
 
-use super::Config;
 use super::archive::Robot;
-use super::curriculum::Period;
 use crate::qd::Archive;
 use crate::task::grouping::Grouping;
-use std::collections::BTreeMap;
 
 /// By task the fitness of the last elite that a stage keeps; none while it keeps all, or has fewer.
 ///
@@ -25,20 +21,4 @@ impl Floors {
     pub fn to_beat(&self, task: usize, in_cell: Option<f64>) -> Option<f64> {
         in_cell.into_iter().chain(self.0.get(task).copied().flatten()).reduce(f64::max)
     }
-}
-
-/// Of the elites of before, those that a period begins with, in the order in which they are evaluated.
-pub(super) fn who_begins(config: &Config, period: Period, mut elites: Vec<Robot>) -> Vec<Robot> {
-    let most = config.start_with(period);
-    if config.keep(period).or(most).is_some() {
-        // The fitter ones first: of those who come after, most are told early that they cannot stay.
-        elites.sort_by(|a, b| b.objective.total_cmp(&a.objective));
-    }
-    let mut before = BTreeMap::<String, usize>::new();
-    elites.retain(|robot| {
-        let before = before.entry(robot.task.clone()).or_default();
-        *before += 1;
-        most.is_none_or(|most| *before <= most)
-    });
-    elites
 }

@@ -42,18 +42,11 @@ pub(super) fn saved(
 /// Whether a saved run can be gone on with under a config: all that its results depend on must be the same.
 fn compatible(saved: &Checkpoint, config: &Config, dataset: &Dataset) -> Result<(), Error> {
     let hint = || format!("resume with the config it was started with, or {ANEW}");
-    let (mut theirs, ours) = (keys(&saved.run.config), keys(config));
-    if let (Some(origin), Some(_), true) =
-        (&saved.run.start, &config.start.archive, config.start != saved.run.config.start)
-    {
-        // The archive it started from may lie elsewhere by now; what counts is what is in it.
-        let named = Start::read(config, dataset)?.map(|start| start.origin.sha256);
-        if named.as_ref() == Some(&origin.sha256) {
-            theirs.extend(ours.get_key_value(START).map(|(key, value)| (key.clone(), value.clone())));
-        }
-    }
+    let (theirs, ours) = (keys(&saved.run.config), keys(config));
+    let is_same_start = is_same_start(saved, config, dataset)?;
+    let differs = |key: &&String| theirs.get(*key) != ours.get(*key) && !(is_same_start && *key == START);
     let value = |keys: &Keys, key: &str| keys.get(key).map_or("not set".to_string(), ToString::to_string);
-    if let Some(key) = theirs.keys().chain(ours.keys()).find(|key| theirs.get(*key) != ours.get(*key)) {
+    if let Some(key) = theirs.keys().chain(ours.keys()).find(differs) {
         let (theirs, ours) = (value(&theirs, key), value(&ours, key));
         let text = format!("the run in this folder has another config: {key} = {theirs} there, {ours} now");
         return Err(Error::input(text).hint(hint()));
@@ -70,6 +63,17 @@ fn compatible(saved: &Checkpoint, config: &Config, dataset: &Dataset) -> Result<
         return Err(Error::input(text).hint(format!("ask for {done} or more, or {ANEW}")));
     }
     Ok(())
+}
+
+/// Whether a run started from the archive that a config names by another path: it may lie elsewhere by now, and what counts is what
+/// is in it.
+fn is_same_start(saved: &Checkpoint, config: &Config, dataset: &Dataset) -> Result<bool, Error> {
+    match (&saved.run.start, &config.start.archive) {
+        (Some(origin), Some(_)) if config.start != saved.run.config.start => {
+            Ok(Start::read(config, dataset)?.is_some_and(|start| start.origin.sha256 == origin.sha256))
+        }
+        _ => Ok(false),
+    }
 }
 
 type Keys = BTreeMap<String, toml::Value>;

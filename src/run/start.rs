@@ -45,7 +45,7 @@ pub struct StartRef {
 /// An archive to start from.
 pub(super) struct Start {
     pub origin: StartRef,
-    /// Its elites in the order of their cells, as individuals of no generation of this run.
+    /// Its elites with which the first stage begins, in the order of their cells, as individuals of no generation of this run.
     pub robots: Vec<Robot>,
 }
 
@@ -81,13 +81,18 @@ impl Start {
         let same_data =
             dataset.fingerprint(Split::Train).is_some_and(|sha256| sha256 == run.dataset.train_sha256);
         let trained_on = if same_data { trained_on(&run, dataset)? } else { BTreeSet::new() };
+        let mut archive = run.archive().map_err(|error| error.within("start.archive"))?;
+        if let Some(most) = config.start_with(config.period(0)) {
+            archive.retain_fittest(most, |robot| robot.task.clone());
+        }
         let origin = StartRef {
             sha256: fingerprint(&run),
             name: run.name,
             generations: run.generations,
             trained_on: trained_on.into_iter().collect(),
         };
-        let robots = run.elites.into_iter().map(|robot| Robot { generation: 0, ..robot }).collect();
+        let robots =
+            archive.elites().map(|elite| Robot { generation: 0, ..elite.solution.clone() }).collect();
         Ok(Some(Start { origin, robots }))
     }
 }
