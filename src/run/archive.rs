@@ -217,10 +217,12 @@ impl RunFile {
     }
 
     /// Whether its displacements are those of lives as the config's protocol has them: of no other length, from no raised starts,
-    /// without inverted pixels.
+    /// with the length limits, without inverted pixels.
     pub fn follows_protocol(&self) -> bool {
         let period = self.config.period(self.latest());
-        let changed = self.config.raised_starts(period) > 0 || self.config.inverted_pixels(period) > 0;
+        let changed = self.config.raised_starts(period) > 0
+            || self.config.without_limits(period)
+            || self.config.inverted_pixels(period) > 0;
         !changed && self.protocol() == self.config.protocol
     }
 

@@ -208,9 +208,9 @@ fn training_of(run: &RunFile, options: &Options) -> Result<Training, Error> {
     });
     let see = |image: &super::training::ImageRef| see(&run.config, &dataset, Split::Train, image.index);
     let (dataset, stimuli) = (run.dataset.clone(), images.iter().map(see).collect::<Result<Vec<_>, Error>>());
-    // As in a test, every life starts in the same place, however the robot was trained.
-    let raised = Vec::new();
-    Ok(Training { dataset, images, stimuli: stimuli?, raised, protocol: run.config.protocol.clone() })
+    // As in a test, every life is lived under the same conditions, however the robot was trained.
+    let conditions = Vec::new();
+    Ok(Training { dataset, images, stimuli: stimuli?, conditions, protocol: run.config.protocol.clone() })
 }
 
 impl Trial {

@@ -21,7 +21,7 @@ fn trial(height: usize, width: usize, physics: Physics) -> Trial {
             dataset,
             images,
             stimuli,
-            raised: Vec::new(),
+            conditions: Vec::new(),
             protocol: config.protocol.clone(),
         },
         criteria,

@@ -68,6 +68,10 @@ pub struct StageConfig {
     /// lives only. Default 0.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub raised_starts: Option<u32>,
+    /// Of each class every other image is shown to a robot without length limits, so that nobody can live off what they do to
+    /// springs. Fresh lives only. Default: none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub without_limits: Option<bool>,
     /// Pixels that are inverted in each training image, others in each, so that nobody can live off a single one. Default 0.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub inverted_pixels: Option<usize>,
@@ -167,6 +171,11 @@ impl Config {
         self.stage.get(period.stage).and_then(|stage| stage.raised_starts).unwrap_or(0)
     }
 
+    /// Whether every other image is shown to robots without length limits in a period.
+    pub fn without_limits(&self, period: Period) -> bool {
+        self.stage.get(period.stage).and_then(|stage| stage.without_limits).unwrap_or(false)
+    }
+
     /// Pixels that are inverted in each training image of a period.
     pub fn inverted_pixels(&self, period: Period) -> usize {
         self.stage.get(period.stage).and_then(|stage| stage.inverted_pixels).unwrap_or(0)
@@ -243,9 +252,16 @@ impl Config {
             if let Some(share) = stage.voxel_mutations.filter(|share| !(0.0..=1.0).contains(share)) {
                 return refuse(number, format!("voxel_mutations = {share}: expected a number from 0 to 1"));
             }
-            if stage.raised_starts.is_some_and(|rows| rows > 0) && self.protocol.life == Life::Sequential {
-                let text = "raised_starts: expected protocol.life = \"fresh\": a sequential life starts once";
-                return refuse(number, text.to_string());
+            let by_turns = [
+                ("raised_starts", stage.raised_starts.is_some_and(|rows| rows > 0)),
+                ("without_limits", stage.without_limits == Some(true)),
+            ];
+            if let Some((key, _)) = by_turns.iter().find(|(_, is_wanted)| *is_wanted)
+                && self.protocol.life == Life::Sequential
+            {
+                let text =
+                    format!("{key}: expected protocol.life = \"fresh\": a sequential life is one life");
+                return refuse(number, text);
             }
             let pixels = self.body.height * self.body.width;
             if let Some(inverted) = stage.inverted_pixels.filter(|&inverted| inverted > pixels) {

@@ -53,16 +53,22 @@ fn without_stages_there_is_one_period() {
 }
 
 #[test]
-fn starts_are_raised_in_fresh_lives_only() {
+fn starts_are_raised_and_limits_removed_in_fresh_lives_only() {
     let with = |life: &str, stages: &str| {
         let life = format!("protocol.life={life}");
         Config::parse(&format!("{}\n{stages}", BUILT_IN[0].1), "stages.toml", &[life])
     };
-    let sequential = with("sequential", "[[stage]]\nraised_starts = 2").unwrap_err();
-    let text = sequential.to_string();
-    assert!(text.contains("stage 1: raised_starts: expected protocol.life = \"fresh\""), "{text}");
-    let fresh = with("fresh", "[[stage]]\nraised_starts = 2\ngenerations = 1\n[[stage]]").unwrap();
-    assert_eq!([0, 1].map(|generation| fresh.raised_starts(fresh.period(generation))), [2, 0]);
+    for key in ["raised_starts = 2", "without_limits = true"] {
+        let text = with("sequential", &format!("[[stage]]\n{key}")).unwrap_err().to_string();
+        let name = key.split(' ').next().unwrap();
+        assert!(text.contains(&format!("stage 1: {name}: expected protocol.life = \"fresh\"")), "{text}");
+    }
+    with("sequential", "[[stage]]\nraised_starts = 0\nwithout_limits = false").unwrap();
+    let stages = "[[stage]]\nraised_starts = 2\nwithout_limits = true\ngenerations = 1\n[[stage]]";
+    let fresh = with("fresh", stages).unwrap();
+    let periods = [0, 1].map(|generation| fresh.period(generation));
+    assert_eq!(periods.map(|period| fresh.raised_starts(period)), [2, 0]);
+    assert_eq!(periods.map(|period| fresh.without_limits(period)), [true, false]);
 }
 
 #[test]

@@ -279,12 +279,12 @@ impl<'a> Run<'a> {
     /// and are fit enough.
     fn evaluate(&mut self, robots: Vec<(u64, Option<usize>, Robot)>) -> Result<(), Error> {
         let config = &self.options.config;
-        let Training { stimuli, raised, protocol, .. } = &self.training;
+        let Training { stimuli, conditions, protocol, .. } = &self.training;
         let floors = Floors::of(self.search.archive(), &self.grouping, config.keep(self.period));
         let jobs = robots.iter().map(|(_, parent, robot)| self.job(*parent, robot, &floors));
         let jobs: Vec<Job> = jobs.collect();
         let savings = config.savings_in(self.period);
-        let evaluations = evaluate(&jobs, stimuli, raised, &config.physics, protocol, savings);
+        let evaluations = evaluate(&jobs, stimuli, conditions, &config.physics, protocol, savings);
         let scored = if config.robust(self.period) {
             with_perturbed_lives(config, &self.training, &self.grouping, &jobs, evaluations, savings)
         } else {

@@ -88,7 +88,7 @@ pub(super) fn with_perturbed_lives(
             open.iter().map(|&(index, _)| all_of(jobs[index].body, training, grouping)).collect();
         let savings = Savings { early_stop: false, ..savings };
         for (&(index, task), life) in
-            open.iter().zip(evaluate(&lives, &stimuli, &training.raised, &physics, &protocol, savings))
+            open.iter().zip(evaluate(&lives, &stimuli, &training.conditions, &physics, &protocol, savings))
         {
             let robot = &mut scored[index];
             robot.evaluation.simulated += life.simulated;

@@ -6,6 +6,7 @@ use super::hardest::hardest;
 use super::{Config, Error};
 use crate::base::Grid;
 use crate::base::random::{Purpose, Stream, stream};
+use crate::task::condition::Condition;
 use crate::task::dataset::{BUILTIN, Dataset, DatasetError, Split};
 use crate::task::files::places;
 use crate::task::protocol::Protocol;
@@ -41,8 +42,8 @@ pub struct Training {
     pub images: Vec<ImageRef>,
     /// What the sensors see of each: H × W in [0, 1].
     pub stimuli: Vec<Grid<f64>>,
-    /// By how many rows the start is raised under each, in a fresh life.
-    pub raised: Vec<u32>,
+    /// Under what each is shown, in a fresh life.
+    pub conditions: Vec<Condition>,
     /// How they are shown.
     pub protocol: Protocol,
 }
@@ -177,8 +178,10 @@ impl Training {
         }
         let train_sha256 = dataset.fingerprint(Split::Train).unwrap_or_default();
         let dataset = DatasetRef { name: dataset.name().to_string(), train_sha256 };
-        let raised = raised(&images, config.raised_starts(period));
-        Ok(Training { dataset, images, stimuli, raised, protocol: config.protocol_in(period) })
+        let classes = images.iter().map(|image| image.label);
+        let conditions =
+            Condition::by_turns(classes, config.raised_starts(period), config.without_limits(period));
+        Ok(Training { dataset, images, stimuli, conditions, protocol: config.protocol_in(period) })
     }
 
     /// The answers that displacements under the images are, in their order; those that are missing are still to come.
@@ -194,17 +197,6 @@ pub(super) fn answers(
 ) -> Vec<Answer> {
     let all = displacements.into_iter().chain(std::iter::repeat(None));
     images.iter().zip(all).map(|(image, displacement)| Answer { class: image.label, displacement }).collect()
-}
-
-/// Rows from 0 up to `most` by turns, within each class for itself.
-fn raised(images: &[ImageRef], most: u32) -> Vec<u32> {
-    let mut turns = [0_u64; u8::MAX as usize + 1];
-    let row = |image: &ImageRef| {
-        let turn = &mut turns[usize::from(image.label)];
-        *turn += 1;
-        ((*turn - 1) % (u64::from(most) + 1)) as u32
-    };
-    images.iter().map(row).collect()
 }
 
 /// Inverts so many pixels of what sensors see.
@@ -284,14 +276,5 @@ mod tests {
         assert!(first.windows(2).any(|two| two[0] != two[1]) && first != second);
         assert_eq!(first, changed(0));
         assert_eq!(seen("", 0), seen("inverted_pixels = 0", 0));
-    }
-
-    #[test]
-    fn starts_are_raised_by_turns_within_each_class() {
-        let image = |label| ImageRef { index: 0, label };
-        let images = [0, 1, 0, 1, 0, 1, 0, 7].map(image);
-        assert_eq!(raised(&images, 2), [0, 0, 1, 1, 2, 2, 0, 0]);
-        assert_eq!(raised(&images, 0), [0; 8]);
-        assert_eq!(raised(&[image(0), image(0)], u32::MAX), [0, 1]);
     }
 }

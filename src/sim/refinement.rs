@@ -52,6 +52,17 @@ impl Physics {
             ..self.clone()
         }
     }
+
+    /// Length limits of soft and active voxels beyond every goal of their springs, so that none is held at a limit against its
+    /// goal, and given energy there.
+    #[must_use]
+    pub fn without_limits(&self) -> Self {
+        Physics {
+            limit_low: self.limit_low.min(self.target_min),
+            limit_high: self.limit_high.max(self.target_max),
+            ..self.clone()
+        }
+    }
 }
 
 #[cfg(test)]

@@ -1,5 +1,6 @@
 //! Evaluation of many robots at once, in parallel over robots and images, and what can be saved without loss.
 
+use super::condition::Condition;
 use super::protocol::{Life, Protocol};
 use super::rollout::{Rollout, fresh_life, same_to_sensors};
 use crate::base::Grid;
@@ -88,8 +89,8 @@ pub struct Job<'a> {
     pub given_up: Option<Box<MayWin<'a>>>,
 }
 
-/// Evaluates jobs, each on all images; results in the jobs' order, the same on any number of threads. In a fresh life under an
-/// image the start is `raised` by so many rows; those that are missing are 0.
+/// Evaluates jobs, each on all images; results in the jobs' order, the same on any number of threads. Fresh lives are lived under the
+/// images' `conditions`; those that are missing are the default.
 ///
 /// All lives of all jobs are one list of work: first every robot's first image, then every second one, and so on, large
 /// bodies first so that no core waits long at the end. A life whose robot has dropped out by then is passed over. One
@@ -97,12 +98,14 @@ pub struct Job<'a> {
 pub fn evaluate(
     jobs: &[Job],
     images: &[Grid<f64>],
-    raised: &[u32],
+    conditions: &[Condition],
     physics: &Physics,
     protocol: &Protocol,
     savings: Savings,
 ) -> Vec<Evaluation> {
-    let candidate = |job| Candidate::new(job, images, raised, physics, protocol, savings);
+    let without_limits = physics.without_limits();
+    let setup = Setup { images, conditions, physics, without_limits: &without_limits, protocol };
+    let candidate = |job| Candidate::new(job, setup, savings);
     let candidates: Vec<Candidate> = jobs.iter().map(candidate).collect();
     let mut work: Vec<(usize, &Candidate)> = candidates
         .iter()
@@ -155,18 +158,38 @@ fn walked(known: Vec<Option<f64>>) -> Outcome {
     Outcome::Walked(known.into_iter().map_while(|d| d).collect())
 }
 
-/// Rows by which the start is raised under an image.
-fn rows(raised: &[u32], image: usize) -> u32 {
-    raised.get(image).copied().unwrap_or(0)
+/// What all jobs have in common.
+#[derive(Clone, Copy)]
+struct Setup<'a> {
+    images: &'a [Grid<f64>],
+    conditions: &'a [Condition],
+    physics: &'a Physics,
+    /// The same without length limits.
+    without_limits: &'a Physics,
+    protocol: &'a Protocol,
+}
+
+impl Setup<'_> {
+    fn condition(&self, image: usize) -> Condition {
+        self.conditions.get(image).copied().unwrap_or_default()
+    }
+
+    /// A fresh life under an image and its condition.
+    fn fresh_life(&self, lattice: &Lattice, image: usize) -> Result<f64, Unstable> {
+        let Condition { raised, without_limits } = self.condition(image);
+        let start_row = self.protocol.start_row.saturating_add(raised);
+        let protocol = Protocol { start_row, ..self.protocol.clone() };
+        let physics = if without_limits { self.without_limits } else { self.physics };
+        let displacement = fresh_life(lattice, physics, &protocol, &self.images[image]);
+        // A body that needs a stop, as any material has one, is not refused for that.
+        if without_limits { displacement.or(Ok(0.0)) } else { displacement }
+    }
 }
 
 /// A job being done.
 struct Candidate<'a> {
     job: &'a Job<'a>,
-    images: &'a [Grid<f64>],
-    raised: &'a [u32],
-    physics: &'a Physics,
-    protocol: &'a Protocol,
+    setup: Setup<'a>,
     early_stop: bool,
     lattice: Lattice,
     /// The images that need showing, in order.
@@ -179,22 +202,16 @@ struct Candidate<'a> {
 }
 
 impl<'a> Candidate<'a> {
-    fn new(
-        job: &'a Job<'a>,
-        images: &'a [Grid<f64>],
-        raised: &'a [u32],
-        physics: &'a Physics,
-        protocol: &'a Protocol,
-        savings: Savings,
-    ) -> Self {
+    fn new(job: &'a Job<'a>, setup: Setup<'a>, savings: Savings) -> Self {
+        let Setup { images, physics, protocol, .. } = setup;
         let all: Vec<usize> = (0..images.len()).collect();
         let is_fresh = protocol.life == Life::Fresh;
         let same_as = match is_fresh && savings.shared_lives {
             true => {
-                // Another start is another life.
+                // Under another condition it is another life.
                 let mut first = HashMap::new();
                 let same = same_to_sensors(job.body, &images.iter().collect::<Vec<_>>());
-                let lives = same.into_iter().zip(all.iter().map(|&image| rows(raised, image)));
+                let lives = same.into_iter().zip(all.iter().map(|&image| setup.condition(image)));
                 lives.zip(&all).map(|(life, &image)| *first.entry(life).or_insert(image)).collect()
             }
             false => all.clone(),
@@ -211,10 +228,7 @@ impl<'a> Candidate<'a> {
         let lives = if is_fresh { order.len() } else { 1 };
         Candidate {
             job,
-            images,
-            raised,
-            physics,
-            protocol,
+            setup,
             early_stop: savings.early_stop,
             lattice: Lattice::new(job.body, physics),
             order,
@@ -239,16 +253,11 @@ impl<'a> Candidate<'a> {
             return;
         }
         let mut lived = Lived { displacements: Vec::new(), unstable: None };
-        match self.protocol.life {
-            Life::Fresh => {
-                let image = self.order[place];
-                let start_row = self.protocol.start_row.saturating_add(rows(self.raised, image));
-                let protocol = Protocol { start_row, ..self.protocol.clone() };
-                lived.add(fresh_life(&self.lattice, self.physics, &protocol, &self.images[image]));
-            }
+        match self.setup.protocol.life {
+            Life::Fresh => lived.add(self.setup.fresh_life(&self.lattice, self.order[place])),
             Life::Sequential => {
-                let mut rollout = Rollout::new(&self.lattice, self.physics, self.protocol);
-                for image in self.images {
+                let mut rollout = Rollout::new(&self.lattice, self.setup.physics, self.setup.protocol);
+                for image in self.setup.images {
                     lived.add(rollout.show(image, |_| ()));
                     if lived.unstable.is_some() || self.outcome(&lived.displacements).is_some() {
                         break;
@@ -312,7 +321,7 @@ impl<'a> Candidate<'a> {
 
     fn ended(&self, outcome: Outcome, simulated: usize) -> Evaluation {
         let stopped = self.places.iter().filter(|place| **place >= simulated).count() as u64;
-        let (all, simulated) = (self.images.len() as u64, simulated as u64);
+        let (all, simulated) = (self.setup.images.len() as u64, simulated as u64);
         Evaluation { outcome, simulated, shared: all - simulated - stopped, stopped }
     }
 

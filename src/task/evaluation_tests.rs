@@ -151,6 +151,8 @@ fn a_raised_start_is_another_life_even_under_the_same_image() {
     assert!(expected[1] != expected[3] && expected[0] != expected[4], "{expected:?}");
     for savings in all_savings() {
         let evaluated = |raised: &[u32]| {
+            let condition = |&raised: &u32| Condition { raised, ..Condition::default() };
+            let conditions: Vec<Condition> = raised.iter().map(condition).collect();
             let job = Job {
                 body: &body,
                 order: Vec::new(),
@@ -158,13 +160,51 @@ fn a_raised_start_is_another_life_even_under_the_same_image() {
                 settled: None,
                 given_up: None,
             };
-            evaluate(&[job], &images, raised, &physics, &protocol, savings).remove(0)
+            evaluate(&[job], &images, &conditions, &physics, &protocol, savings).remove(0)
         };
         let evaluation = evaluated(&raised);
         assert_eq!((evaluation.outcome, evaluation.simulated), (Outcome::Walked(expected.to_vec()), 5));
         let lives = if savings.shared_lives { 4 } else { 5 };
         assert_eq!(evaluated(&[1, 0, 1, 2, 1]).simulated, lives);
     }
+}
+
+#[test]
+fn a_life_without_limits_is_another_life_and_leads_nowhere_where_it_becomes_unstable() {
+    let protocol = Protocol { life: Life::Fresh, control_steps: 30, ..Protocol::default() };
+    let images = images(&WILD);
+    let evaluated = |physics: &Physics, without_limits: &[bool]| {
+        let condition = |&without_limits: &bool| Condition { without_limits, ..Condition::default() };
+        let conditions: Vec<Condition> = without_limits.iter().map(condition).collect();
+        let body = body();
+        let may_win = Box::new(|_: &[Option<f64>]| true);
+        let job = Job { body: &body, order: Vec::new(), may_win, settled: None, given_up: None };
+        evaluate(&[job], &images, &conditions, physics, &protocol, Savings::default()).remove(0)
+    };
+    // A sensor at rest is as far below its goal as tight limits keep it.
+    let tight = Physics { limit_high: 1.02, limit_low: 0.98, ..physics() };
+    let expected = |physics: &Physics, image: usize| {
+        fresh_life(&Lattice::new(&body(), physics), physics, &protocol, &images[image])
+    };
+    let calm = Physics { blow_up_extent: 1.0, ..tight.clone() };
+    let mixed = [true, false, false, true, true];
+    let evaluation = evaluated(&calm, &mixed);
+    let free = calm.without_limits();
+    let alone: Vec<f64> = mixed
+        .iter()
+        .enumerate()
+        .map(|(image, &off)| expected(if off { &free } else { &calm }, image).unwrap())
+        .collect();
+    // Images 1 and 3, and 2 and 4, show the sensors the same, but not under the same condition.
+    assert!(alone[1] != alone[3] && alone[2] != alone[4], "{alone:?}");
+    assert_eq!((evaluation.outcome, evaluation.simulated), (Outcome::Walked(alone), 5));
+
+    // Without them it grows wider than it may: that is no reason to refuse it, but no way either.
+    assert!(expected(&tight, 2).is_ok() && expected(&tight.without_limits(), 2).is_err());
+    let evaluation = evaluated(&tight, &[false, false, true, false, false]);
+    let Outcome::Walked(walked) = evaluation.outcome else { panic!("{:?}", evaluation.outcome) };
+    assert_eq!(walked[2], 0.0);
+    assert_eq!(walked[1], expected(&tight, 1).unwrap());
 }
 
 #[test]

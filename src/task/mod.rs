@@ -2,6 +2,7 @@
 
 pub mod baselines;
 pub mod builtin;
+pub mod condition;
 pub mod dataset;
 pub mod direction;
 pub mod evaluation;

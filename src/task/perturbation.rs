@@ -201,10 +201,7 @@ impl Perturbation {
                 changed.stimuli = setting.stimuli.iter().map(Grid::mirrored).collect();
             }
             Kind::TimeStep => changed.physics = physics.refined(self.amount as u32),
-            Kind::LengthLimits if self.amount == OUT_OF_REACH => {
-                changed.physics.limit_low = physics.limit_low.min(physics.target_min);
-                changed.physics.limit_high = physics.limit_high.max(physics.target_max);
-            }
+            Kind::LengthLimits if self.amount == OUT_OF_REACH => changed.physics = physics.without_limits(),
             Kind::LengthLimits => changed.physics = physics.with_slower_limits(1.0 / self.amount),
             Kind::SelfContact => changed.physics.self_contact_weight *= self.amount,
             Kind::Order => changed.stimuli.reverse(),
