@@ -68,8 +68,8 @@ pub struct StageConfig {
     /// lives only. Default 0.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub raised_starts: Option<u32>,
-    /// Of each class every other image is shown to a robot without length limits, so that nobody can live off what they do to
-    /// springs. Fresh lives only. Default: none.
+    /// Half of each class's images are shown to a robot without length limits: after each round of raised starts another one, so
+    /// that nobody can live off what limits do to springs. Fresh lives only. Default: none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub without_limits: Option<bool>,
     /// Pixels that are inverted in each training image, others in each, so that nobody can live off a single one. Default 0.
@@ -171,7 +171,7 @@ impl Config {
         self.stage.get(period.stage).and_then(|stage| stage.raised_starts).unwrap_or(0)
     }
 
-    /// Whether every other image is shown to robots without length limits in a period.
+    /// Whether half of the images are shown to robots without length limits in a period.
     pub fn without_limits(&self, period: Period) -> bool {
         self.stage.get(period.stage).and_then(|stage| stage.without_limits).unwrap_or(false)
     }

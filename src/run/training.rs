@@ -247,6 +247,21 @@ mod tests {
     }
 
     #[test]
+    fn images_are_shown_under_the_conditions_of_their_stage() {
+        let conditions = |stage: &str| {
+            let text = format!(
+                "[task]\ngroups = [[3], [0]]\n[data]\ndataset = \"builtin\"\n[[stage]]\n{stage}\nimages_per_class = 4"
+            );
+            Training::load(&Config::parse(&text, "a.toml", &[]).unwrap(), None).unwrap().conditions
+        };
+        assert_eq!(conditions(""), [Condition::default(); 8]);
+        let every = [(0, false), (1, false), (0, true), (1, true)];
+        let every = every.map(|(raised, without_limits)| Condition { raised, without_limits });
+        // Images of one class after the other.
+        assert_eq!(conditions("raised_starts = 1\nwithout_limits = true"), [every, every].concat());
+    }
+
+    #[test]
     fn so_many_pixels_of_each_image_are_inverted_others_in_each_and_in_each_draw() {
         let seen = |inverted: &str, draw: u64| {
             let stage = format!("[[stage]]\nimages_per_class = 4\nredraw = 1\n{inverted}");
