@@ -12,8 +12,9 @@ use crate::base::lanes::InstructionSet;
 use crate::run::capacity_file::CapacityFile;
 use crate::run::data::catalogue::Catalogue;
 use crate::run::data::fetch::{FetchOptions, fetch};
-use crate::run::eval_file::EVAL_JSON;
+use crate::run::eval_file::{EVAL_JSON, EVAL_VALIDATION_JSON};
 use crate::run::folder::IfExists;
+use crate::run::held_out::HeldOut;
 use crate::run::plan::{PAPER_TOML, Plan};
 use crate::run::robots::Selection;
 use crate::run::{
@@ -150,9 +151,13 @@ fn run_eval(args: EvalArgs, console: &Console) -> Result<(), Error> {
         true => vec![folder::newest_run()?],
         false => args.archive,
     };
+    let name = match args.split {
+        HeldOut::Test => EVAL_JSON,
+        HeldOut::Validation => EVAL_VALIDATION_JSON,
+    };
     let beside = || match of_gallery {
-        true => Path::new("gallery-eval.json").to_path_buf(),
-        false => folder::above(&archives).join(EVAL_JSON),
+        true => Path::new(&format!("gallery-{name}")).to_path_buf(),
+        false => folder::above(&archives).join(name),
     };
     let out = args.out.unwrap_or_else(beside);
     let robots = match &args.robots {
@@ -162,6 +167,7 @@ fn run_eval(args: EvalArgs, console: &Console) -> Result<(), Error> {
     let options = eval::Options {
         robots: robots.physical(args.physical_only),
         images: args.images as usize,
+        split: args.split,
         validation: args.validation.map(|images| images as usize),
         seed: args.seed,
         threshold: args.threshold,

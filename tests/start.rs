@@ -90,9 +90,9 @@ fn images_that_the_other_run_was_trained_on_are_not_for_validation() {
         all.filter(|index| !start.contains(index) && !own.contains(index)).count()
     };
     let most = 2 * free(0).min(free(1));
-    let drawn = images(&run, &dataset, most).unwrap();
+    let drawn = images(&[&run], &dataset, "--images", most).unwrap();
     assert!(drawn.iter().all(|image| !start.contains(&image.index) && !own.contains(&image.index)));
-    assert!(images(&run, &dataset, most + 2).is_err());
+    assert!(images(&[&run], &dataset, "--images", most + 2).is_err());
 }
 
 #[test]

@@ -5,7 +5,7 @@ mod common;
 use common::program::{Sandbox, TINY};
 use morphcog::run::audit_file::AuditFile;
 use morphcog::run::eval_file::EvalFile;
-use morphcog::run::held_out::images;
+use morphcog::run::held_out::{HeldOut, images};
 use morphcog::run::training::{Training, load_dataset};
 use morphcog::task::dataset::Split;
 
@@ -36,13 +36,13 @@ fn validation_images_are_of_the_training_split_and_were_never_trained_on() {
     let of_class =
         |class| dataset.indices_of(Split::Train, class).iter().filter(|i| !trained.contains(i)).count();
     let most = 2 * of_class(0).min(of_class(1));
-    let drawn = images(&run, &dataset, most).unwrap();
+    let drawn = images(&[&run], &dataset, "--images", most).unwrap();
     assert_eq!(drawn.len(), most);
     assert!(drawn.iter().all(|image| !trained.contains(&image.index)));
     assert!(drawn.iter().all(|image| dataset.label(Split::Train, image.index).unwrap() == image.label));
     // Classes take turns: a round on the first of them is fair, too.
     assert_eq!(drawn[..20].iter().filter(|image| image.label == 0).count(), 10);
-    assert!(images(&run, &dataset, 10 * most).is_err());
+    assert!(images(&[&run], &dataset, "--images", 10 * most).is_err());
 }
 
 #[test]
@@ -61,7 +61,7 @@ fn images_that_the_hardest_were_chosen_among_are_not_for_validation() {
     let of_class =
         |class| dataset.indices_of(Split::Train, class).iter().filter(|i| !pool.contains(i)).count();
     let most = 2 * (of_class(0).min(of_class(1)) - 1);
-    let drawn = images(&run, &dataset, most).unwrap();
+    let drawn = images(&[&run], &dataset, "--images", most).unwrap();
     assert!(drawn.iter().all(|image| !pool.contains(&image.index)));
 }
 
@@ -85,6 +85,50 @@ fn the_best_on_validation_images_are_found_the_same_every_time_and_kept() {
     assert_eq!(eval(&sandbox, "--robots best-validation:3 --validation 60"), first);
     // Selected otherwise, a robot has no such figure.
     assert!(eval(&sandbox, "--robots top:2").robots.iter().all(|robot| robot.validation.is_none()));
+}
+
+#[test]
+fn robots_are_compared_on_validation_images_without_a_look_at_the_test_images() {
+    let sandbox = sandbox();
+    let run = sandbox.run_file("run");
+    let dataset = load_dataset(&run.config, None, &[Split::Train]).unwrap();
+    let command = "eval --archive run/run.json --cycles 1 --split validation";
+    let said = sandbox
+        .run(&format!("{command} --images 60 --robots best-validation:3 --validation 60"))
+        .ended(0, &[]);
+    assert!(said.out.contains("60 builtin validation images"), "{}", said.out);
+    assert!(!said.out.contains("the paper"), "{}", said.out);
+    // An evaluation on test images is not replaced.
+    assert!(!sandbox.path("run/eval.json").exists());
+    let report = EvalFile::read(&sandbox.path("run/eval-validation.json")).unwrap();
+    assert_eq!(report.split, HeldOut::Validation);
+    assert_eq!(report.images, images(&[&run], &dataset, "--images", 60).unwrap());
+    for robot in &report.robots {
+        // The same images, so the same answers.
+        let selected = robot.validation.as_ref().unwrap();
+        assert_eq!((robot.right, robot.balanced_accuracy), (selected.right, selected.balanced_accuracy));
+    }
+    // Robots of two runs: on images that neither was trained on.
+    sandbox.write("other.toml", sandbox.read("run.toml").replace("seed = 3", "seed = 2"));
+    sandbox.run("evolve -q -c other.toml -o other").ended(0, &[]);
+    let other = sandbox.run_file("other");
+    assert_ne!(other.config.seed, run.config.seed);
+    let both = "eval -q --archive run/run.json other/run.json --cycles 1 --split validation --images 60 --robots top:1";
+    sandbox.run(both).ended(0, &[]);
+    let report = EvalFile::read(&sandbox.path("eval-validation.json")).unwrap();
+    assert_eq!(report.images.len(), 60);
+    for run in [&run, &other] {
+        for period in run.config.periods(run.generations) {
+            let trained = Training::drawn(&run.config, &dataset, period).unwrap();
+            assert!(report.images.iter().all(|image| !trained.contains(&image.index)));
+        }
+    }
+    // What cannot be.
+    sandbox.run(&format!("{command} --images 1000000")).ended(3, &["--images 1000000", "ask for at most"]);
+    sandbox.run("eval --archive run/run.json --split train").ended(2, &["expected test or validation"]);
+    sandbox
+        .run("capacity --eval run/eval-validation.json")
+        .ended(3, &["expected an evaluation on test images"]);
 }
 
 #[test]

@@ -7,6 +7,7 @@ use super::report::{self, ReportArgs};
 use super::reproduce::{self, ReproduceArgs};
 use super::serve::{self, ServeArgs};
 use crate::run::eval;
+use crate::run::held_out::HeldOut;
 use crate::run::replay::Shown;
 use crate::run::robots::Selection;
 use crate::task::dataset::BUILTIN;
@@ -193,9 +194,13 @@ pub(super) struct EvalArgs {
     /// The run.json, or those of several runs of the same task (default: the newest under runs/).
     #[arg(short, long, value_name = "FILE", num_args = 1..)]
     pub(super) archive: Vec<PathBuf>,
-    /// Test images in all, evenly divided between the classes.
+    /// Images in all, evenly divided between the classes.
     #[arg(short = 'n', long, default_value_t = 1000, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pub(super) images: u32,
+    /// Which images: test, or validation (of the training split, neither trained on nor chosen from), to compare robots by
+    /// and leave the test images unseen.
+    #[arg(long, default_value_t = HeldOut::Test, value_name = "SPLIT")]
+    pub(super) split: HeldOut,
     /// all, top:N or random:N (of each task), best-validation:N (the best of each run and task on validation images,
     /// drawn from the training split), or ids (or beginnings of ids) separated by commas; without --archive also gallery,
     /// or names of published robots.
@@ -219,7 +224,7 @@ pub(super) struct EvalArgs {
     /// Folder with the images.
     #[arg(long, value_name = "DIR")]
     pub(super) data: Option<PathBuf>,
-    /// Result file; a CSV goes beside it (default: eval.json beside run.json, or above several).
+    /// Result file; a CSV goes beside it (default: eval.json, or eval-validation.json, beside run.json, or above several)
     #[arg(short, long, value_name = "FILE")]
     pub(super) out: Option<PathBuf>,
     /// Threads (default: one per core).

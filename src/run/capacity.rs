@@ -4,6 +4,7 @@ use super::capacity_config::CapacityConfig;
 use super::capacity_file::{CapacityFile, Curve, FORMAT, FORMAT_VERSION, Point, TaskCapacity};
 use super::capacity_images::{Images, Task};
 use super::eval_file::{EvalFile, RobotReport};
+use super::held_out::HeldOut;
 use super::statistics::standard_deviation;
 use super::trainings::Trainings;
 use super::{Error, audit_file::AuditFile, eval};
@@ -57,6 +58,11 @@ pub fn capacity(
         let text = format!("{name}: expected \"setting\": an earlier version wrote it");
         return Err(Error::input(text).hint("run morphcog eval again".to_string()));
     };
+    if report.split != HeldOut::Test {
+        let text =
+            format!("{name}: expected an evaluation on test images, found one on {} images", report.split);
+        return Err(Error::input(text).hint("morphcog eval --split test".to_string()));
+    }
     if report.stopped {
         observer.warning(&format!("{name}: the evaluation was stopped before its last robot"));
     }

@@ -1,16 +1,17 @@
 //! `morphcog eval`: how well robots do on held-out images (paper, "Generalization test").
 
 use super::archive::Robot;
-use super::eval_file::{Baselines, EvalFile, RobotReport, Trial};
+use super::eval_file::{EvalFile, RobotReport, Trial};
+use super::eval_images::Shown;
+use super::held_out::HeldOut;
 use super::robots::{Chosen, Selection, Source};
-use super::training::{ImageRef, load_dataset, see};
+use super::training::load_dataset;
 use super::validation::{self, Validated};
 use super::{Config, Error, folder::RunFolder, gallery};
 use crate::base::Grid;
 use crate::base::files::{check_writable, write_atomically};
 use crate::sim::Lattice;
-use crate::task::baselines::{Labelled, best_pixel, larger_group, nearest_training_image};
-use crate::task::dataset::{Dataset, Split};
+use crate::task::dataset::Split;
 use crate::task::grouping::{self, Grouping};
 use crate::task::protocol::{Life, Protocol};
 use crate::task::rollout::{fresh_life, same_to_sensors};
@@ -18,9 +19,6 @@ use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-
-/// Training images per class on which the single-pixel baseline is chosen.
-const PIXEL_IMAGES_PER_CLASS: usize = 500;
 
 /// Displacements up to this count as wrong in the paper's test \[voxel lengths\].
 pub const THRESHOLD: f64 = 3.0;
@@ -34,8 +32,10 @@ pub struct Options {
     pub archives: Vec<PathBuf>,
     /// Which of its robots.
     pub robots: Selection,
-    /// Test images in all, evenly divided between the classes.
+    /// Images in all, evenly divided between the classes.
     pub images: usize,
+    /// Which images.
+    pub split: HeldOut,
     /// Validation images in all, for a selection by them; `None`: as the config says.
     pub validation: Option<usize>,
     /// Seed of what is drawn: images, and robots with `random:N`.
@@ -62,12 +62,6 @@ pub trait Observer: Sync {
     fn progress(&self, done: u64);
     /// Something the user should know.
     fn warning(&self, text: &str);
-}
-
-/// The images of a test and how robots see them.
-struct Test {
-    images: Vec<ImageRef>,
-    stimuli: Vec<Grid<f64>>,
 }
 
 /// Evaluates robots; results are written after every robot, so that stopping keeps what is finished.
@@ -108,11 +102,12 @@ pub fn eval(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Re
         let (count, id) = (unskilled.len(), &chosen.robot.id);
         observer.warning(&format!("{count} robots ({id} …) walk the same way for every class; left out"));
     }
-    let test = test_images(config, &dataset, options)?;
+    let shown = Shown::draw(&sources, &dataset, options)?;
     let test_sha256 = dataset.fingerprint(Split::Test).unwrap_or_default();
     let steps = control_steps(config, options.cycles);
-    let mut report = EvalFile::new(&sources, options, steps, &test.images, test_sha256);
-    report.baselines = baselines(&sources, &grouping, &dataset, &test, &robots, options.seed)?;
+    let mut report = EvalFile::new(&sources, options, steps, &shown.images, test_sha256);
+    let splits = robots.iter().filter_map(|chosen| task_of(&grouping, chosen.robot));
+    report.baselines = shown.baselines(&sources, splits, &dataset, options)?;
     let pool = pool(options.threads)?;
     let walker =
         || Walker { config, control_steps: steps, pool: &pool, stop, observer, done: AtomicU64::new(0) };
@@ -136,18 +131,18 @@ pub fn eval(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Re
             best.into_iter().unzip()
         }
     };
-    observer.started(robots.len(), test.images.len());
+    observer.started(robots.len(), shown.images.len());
     let walker = walker();
     let mut scores = scores.into_iter();
     let mut left = robots.len();
     report.stopped = left > 0;
     for Chosen { source, robot } in robots {
         let Some(split) = task_of(&grouping, robot) else { continue };
-        let Some((displacements, simulated)) = walker.lives(robot, &test.stimuli) else { break };
+        let Some((displacements, simulated)) = walker.lives(robot, &shown.stimuli) else { break };
         left -= 1;
         report.stopped = left > 0;
         let run = &sources[source].run;
-        let trial = Trial { run, robot, split, images: &test.images, threshold: options.threshold };
+        let trial = Trial { run, robot, split, images: &shown.images, threshold: options.threshold };
         let (validation, of_trial) = (scores.next(), RobotReport::new(&trial, displacements, simulated));
         report.robots.push(RobotReport { run: source, validation, ..of_trial });
         report.conclude();
@@ -224,30 +219,6 @@ fn write(options: &Options, report: &EvalFile) -> Result<(), Error> {
     Ok(())
 }
 
-/// `count` test images, evenly divided between the classes; the first classes get what is left over.
-fn test_images(config: &Config, dataset: &Dataset, options: &Options) -> Result<Test, Error> {
-    let classes = config.classes();
-    if options.images < classes.len() {
-        let (asked, least) = (options.images, classes.len());
-        return Err(Error::usage(format!("--images {asked}: expected {least} or more, one of each class")));
-    }
-    let mut test = Test { images: Vec::new(), stimuli: Vec::new() };
-    for (place, &class) in classes.iter().enumerate() {
-        let count = options.images / classes.len() + usize::from(place < options.images % classes.len());
-        let drawn = dataset.draw(Split::Test, &[class], count, options.seed, 0);
-        let drawn = drawn.map_err(|error| {
-            let most = classes.iter().map(|&c| dataset.indices_of(Split::Test, c).len()).min().unwrap_or(0);
-            let hint = format!("ask for at most --images {}", most * classes.len());
-            Error::input(error.to_string()).hint(hint)
-        })?;
-        for index in drawn {
-            test.stimuli.push(see(config, dataset, Split::Test, index)?);
-            test.images.push(ImageRef { index, label: class });
-        }
-    }
-    Ok(test)
-}
-
 /// Shows images to robots.
 pub(super) struct Walker<'a> {
     pub config: &'a Config,
@@ -290,57 +261,4 @@ impl Walker<'_> {
         let lives = lives?;
         Some((same_as.iter().map(|first| lives.get(first).copied().flatten()).collect(), lives.len()))
     }
-}
-
-fn view(list: &[(Grid<f64>, u8)]) -> Vec<Labelled<'_>> {
-    list.iter().map(|(stimulus, class)| Labelled { stimulus, class: *class }).collect()
-}
-
-/// The baselines of every task that the robots perform.
-fn baselines(
-    sources: &[Source],
-    grouping: &Grouping,
-    dataset: &Dataset,
-    test: &Test,
-    robots: &[Chosen],
-    seed: u64,
-) -> Result<BTreeMap<String, Baselines>, Error> {
-    let Some(config) = sources.first().map(|source| &source.run.config) else { return Ok(BTreeMap::new()) };
-    let classes = config.classes();
-    let labelled = |images: &[ImageRef]| -> Result<Vec<(Grid<f64>, u8)>, Error> {
-        images
-            .iter()
-            .map(|image| Ok((see(config, dataset, Split::Train, image.index)?, image.label)))
-            .collect()
-    };
-    let mut choice = Vec::new();
-    for &class in &classes {
-        let count = dataset.indices_of(Split::Train, class).len().min(PIXEL_IMAGES_PER_CLASS);
-        let drawn = dataset.draw(Split::Train, &[class], count, seed, 0);
-        let drawn = drawn.map_err(|error| Error::input(error.to_string()))?;
-        choice.extend(drawn.into_iter().map(|index| ImageRef { index, label: class }));
-    }
-    let choice = labelled(&choice)?;
-    let templates: Result<Vec<_>, Error> =
-        sources.iter().map(|source| labelled(&source.run.training_images)).collect();
-    let templates = templates?;
-    let tested = test.stimuli.iter().zip(&test.images);
-    let tested: Vec<Labelled> =
-        tested.map(|(stimulus, image)| Labelled { stimulus, class: image.label }).collect();
-    let mut all = BTreeMap::new();
-    for split in robots.iter().filter_map(|chosen| task_of(grouping, chosen.robot)) {
-        if all.contains_key(&split.name()) {
-            continue;
-        }
-        let rule = best_pixel(split, &view(&choice));
-        let nearest = |of_run: &Vec<_>| nearest_training_image(split, &view(of_run), &tested);
-        let baselines = Baselines {
-            larger_group: larger_group(split, &tested),
-            best_single_pixel: rule.map_or(0.0, |rule| rule.accuracy(split, &tested)),
-            pixel: rule.map_or([0, 0], |rule| [rule.row, rule.column]),
-            nearest_training_image: templates.iter().map(nearest).sum::<f64>() / templates.len() as f64,
-        };
-        all.insert(split.name(), baselines);
-    }
-    Ok(all)
 }

@@ -2,6 +2,7 @@
 
 use super::archive::{Robot, RunFile};
 use super::eval::Options;
+use super::held_out::HeldOut;
 use super::robots::{Selection, Source};
 use super::setting::{RunRef, Setting};
 use super::statistics::{bootstrap, standard_deviation, wilson};
@@ -22,6 +23,8 @@ pub const FORMAT_VERSION: u32 = 1;
 
 /// Its name beside `run.json`.
 pub const EVAL_JSON: &str = "eval.json";
+/// The name of one on validation images.
+pub const EVAL_VALIDATION_JSON: &str = "eval-validation.json";
 
 /// The content of `eval.json`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -48,6 +51,9 @@ pub struct EvalFile {
     pub dataset: String,
     /// SHA-256 of its test split.
     pub test_sha256: String,
+    /// Which images: those of the test split, or validation images.
+    #[serde(default, skip_serializing_if = "HeldOut::is_default")]
+    pub split: HeldOut,
     /// Seed of what was drawn.
     pub seed: u64,
     /// Control steps per image, each a fresh life.
@@ -56,7 +62,7 @@ pub struct EvalFile {
     pub threshold: f64,
     /// Whether it ended before the last robot, by a signal or otherwise.
     pub stopped: bool,
-    /// The test images.
+    /// The images.
     pub images: Vec<ImageRef>,
     /// By task: what takes no body at all.
     pub baselines: BTreeMap<String, Baselines>,
@@ -216,6 +222,7 @@ impl EvalFile {
             selected: options.robots.describe(),
             dataset: first.map_or(String::new(), |run| run.dataset.name.clone()),
             test_sha256,
+            split: options.split,
             seed: options.seed,
             control_steps,
             threshold: options.threshold,
@@ -254,8 +261,8 @@ impl EvalFile {
             }
             _ => false,
         };
-        let same = (self.seed, self.images.len(), self.threshold)
-            == (options.seed, options.images, options.threshold);
+        let same = (self.seed, self.split, self.images.len(), self.threshold)
+            == (options.seed, options.split, options.images, options.threshold);
         !self.stopped && self.runs == runs && same && same_robots
     }
 

@@ -1,5 +1,5 @@
-//! Validation images: those of the training split that a run neither is trained on nor chooses its training images among, drawn
-//! by its seed.
+//! Images that robots are not trained on: those of the test split, and validation images. The latter are those of the training
+//! split that a run neither is trained on nor chooses its training images among, drawn by its seed.
 
 use super::archive::RunFile;
 use super::start::StartRef;
@@ -8,7 +8,45 @@ use super::validation::ValidationConfig;
 use super::{Config, Error};
 use crate::base::random::{Purpose, stream};
 use crate::task::dataset::{Dataset, Split};
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
+use std::fmt;
+use std::str::FromStr;
+
+/// Which images that robots are not trained on.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum HeldOut {
+    /// Those of the test split, which nothing should be chosen by.
+    #[default]
+    Test,
+    /// Validation images.
+    Validation,
+}
+
+impl HeldOut {
+    /// Whether a file needs not say it.
+    pub(super) fn is_default(&self) -> bool {
+        *self == HeldOut::default()
+    }
+}
+
+impl fmt::Display for HeldOut {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            HeldOut::Test => "test",
+            HeldOut::Validation => "validation",
+        })
+    }
+}
+
+impl FromStr for HeldOut {
+    type Err = String;
+    fn from_str(text: &str) -> Result<Self, String> {
+        let found = [HeldOut::Test, HeldOut::Validation].into_iter().find(|split| split.to_string() == text);
+        found.ok_or_else(|| "expected test or validation".to_string())
+    }
+}
 
 /// Indices of all images that a run was trained on so far, in any of its periods, and before where it started from. With those
 /// that hardest ones were chosen among: what is left of these is easier than images are.
@@ -81,23 +119,30 @@ pub(super) fn check(config: &Config, start: Option<&StartRef>, dataset: &Dataset
     Ok(())
 }
 
-/// `count` validation images, evenly divided between the classes, which take turns: so are the first of them.
+/// `count` validation images of some runs of one experiment together, evenly divided between the classes, which take turns: so
+/// are the first of them. Of one run they are always the same, and fewer of them the first of more. `asked` says where so many
+/// were asked for.
 ///
 /// # Errors
 /// If there are not enough images.
-pub fn images(run: &RunFile, dataset: &Dataset, count: usize) -> Result<Vec<ImageRef>, Error> {
-    let left = left(&run.config, &trained_on(run, dataset)?, dataset);
-    let per_class = per_class(&run.config, &left, "--validation", count, "")?;
-    let drawn: Vec<Vec<ImageRef>> = run
-        .config
-        .classes()
-        .iter()
-        .zip(left)
-        .map(|(&label, free)| {
-            let mut random = stream(run.config.seed, Purpose::Validation, 0, u64::from(label));
-            random.sample(free.len(), per_class).into_iter().map(|i| free[i]).collect()
-        })
-        .collect();
+pub fn images(
+    runs: &[&RunFile],
+    dataset: &Dataset,
+    asked: &str,
+    count: usize,
+) -> Result<Vec<ImageRef>, Error> {
+    let Some(config) = runs.first().map(|run| &run.config) else { return Ok(Vec::new()) };
+    let mut seen = BTreeSet::new();
+    for run in runs {
+        seen.extend(trained_on(run, dataset)?);
+    }
+    let left = left(config, &seen, dataset);
+    let per_class = per_class(config, &left, asked, count, "")?;
+    let draw = |(&label, free): (&u8, Vec<ImageRef>)| -> Vec<ImageRef> {
+        let mut random = stream(config.seed, Purpose::Validation, 0, u64::from(label));
+        random.sample(free.len(), per_class).into_iter().map(|i| free[i]).collect()
+    };
+    let drawn: Vec<Vec<ImageRef>> = config.classes().iter().zip(left).map(draw).collect();
     let turns =
         (0..per_class).flat_map(|turn| drawn.iter().filter_map(move |class| class.get(turn).copied()));
     Ok(turns.take(count).collect())

@@ -15,6 +15,7 @@ pub mod data;
 mod error;
 pub mod eval;
 pub mod eval_file;
+mod eval_images;
 pub mod evolve;
 pub mod folder;
 pub mod gallery;

@@ -4,6 +4,7 @@ use super::audit_file::{AUDIT_JSON, AuditFile};
 use super::capacity_file::CapacityFile;
 use super::eval_file::EvalFile;
 use super::folder::{IfExists, RUN_JSON};
+use super::held_out::HeldOut;
 use super::plan::Plan;
 use super::robots::{Chosen, Selection, Source};
 use super::table::{self, Row};
@@ -243,6 +244,7 @@ impl Job<'_> {
             archives: sources.iter().map(|source| source.path.clone()).collect(),
             robots: Selection::Drawn { robots: ids, about },
             images: self.plan.images,
+            split: HeldOut::Test,
             validation: None,
             seed: 1,
             threshold: eval::THRESHOLD,

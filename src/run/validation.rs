@@ -179,7 +179,7 @@ pub(super) fn best<'a>(
     walker: &Walker,
 ) -> Result<Option<Vec<(&'a Robot, Validated)>>, Error> {
     let run = &source.run;
-    let images = images(run, dataset, wanted.images)?;
+    let images = images(&[run], dataset, "--validation", wanted.images)?;
     // Whoever asks for fewer than the run's end has found gets the first of those.
     let searched = &Wanted { count: wanted.count.max(run.config.validation.best), ..*wanted };
     let key = key(run, &robots, searched, &images, walker.control_steps);

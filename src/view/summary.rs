@@ -11,6 +11,7 @@ use crate::run::eval_file::{EvalFile, RobotReport};
 use crate::run::evolve::Finished;
 use crate::run::folder::RUN_JSON;
 use crate::run::gallery::Published;
+use crate::run::held_out::HeldOut;
 use crate::run::published;
 use crate::run::training::ImageRef;
 use crate::run::validation::Validated;
@@ -113,7 +114,7 @@ pub fn evaluation(console: &Console, report: &EvalFile, capacity: Option<&Capaci
     }
     if console.mode() == Mode::Json {
         let done = serde_json::json!({
-            "file": out.display().to_string(), "stopped": report.stopped, "images": report.images.len(),
+            "file": out.display().to_string(), "stopped": report.stopped, "images": report.images.len(), "split": report.split,
             "means": report.means, "baselines": report.baselines,
             "robots": report.robots.iter().map(RobotReport::without_displacements).collect::<Vec<_>>(),
         });
@@ -167,7 +168,9 @@ pub fn evaluation(console: &Console, report: &EvalFile, capacity: Option<&Capaci
     ];
     console.table(&headers, &rows.collect::<Vec<_>>());
     console.line("");
-    if capacity.is_some() || report.means.keys().any(|task| published::row(&report.dataset, task).is_some()) {
+    let is_test = report.split == HeldOut::Test;
+    let as_published = |task: &String| is_test && published::row(&report.dataset, task).is_some();
+    if capacity.is_some() || report.means.keys().any(as_published) {
         let tasks = report.means.iter().map(|(task, mean)| {
             let known = capacity.and_then(|file| file.tasks.iter().find(|known| known.task == *task));
             (task.as_str(), mean.robots, mean.accuracy, known)
@@ -176,14 +179,15 @@ pub fn evaluation(console: &Console, report: &EvalFile, capacity: Option<&Capaci
         console.line("");
     }
     console.line(&format!(
-        "{} {} test images; {}; |d| up to {} voxel lengths is wrong",
+        "{} {} {} images; {}; |d| up to {} voxel lengths is wrong",
         report.images.len(),
         report.dataset,
+        report.split,
         report.selected,
         report.threshold
     ));
     console.line(&format!("wrote {} and {}", out.display(), out.with_extension("csv").display()));
-    if capacity.is_none() {
+    if capacity.is_none() && is_test {
         console.info(&format!("what network are they worth? morphcog capacity --eval {}", out.display()));
     }
 }

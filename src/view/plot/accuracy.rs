@@ -10,12 +10,12 @@ use crate::view::colour;
 /// Robots that have a line of their own with their name; of more, lines are thin and nameless.
 const NAMED: usize = 40;
 
-/// The accuracy of every robot on test images with its 95 % interval, a block per task, with the mean and what takes no
+/// The accuracy of every robot on test or validation images with its 95 % interval, a block per task, with the mean and what takes no
 /// body.
 pub fn accuracy(report: &EvalFile) -> Figure {
     let mut canvas = Canvas::new();
     let of = format!("{}; {}", runs(report), report.selected);
-    let top = heading(&mut canvas, "Accuracy on test images", &of, COLUMN);
+    let top = heading(&mut canvas, &format!("Accuracy on {} images", report.split), &of, COLUMN);
     let named = report.robots.len() <= NAMED;
     let line = if named { 10.5 } else { 3.0 };
     let mut tasks: Vec<&str> = report.robots.iter().map(|robot| robot.task.as_str()).collect();

@@ -5,6 +5,7 @@ use crate::base::lanes::InstructionSet;
 use crate::run::audit_file::AuditFile;
 use crate::run::capacity_file::CapacityFile;
 use crate::run::eval_file::{EvalFile, Mean, RobotReport};
+use crate::run::held_out::HeldOut;
 use crate::run::published;
 use crate::run::report::Dossier;
 use crate::run::verdict::Verdict;
@@ -114,9 +115,10 @@ pub(super) fn about(dossier: &Dossier) -> String {
 /// Accuracies by task and by robot.
 pub(super) fn eval(report: &EvalFile) -> String {
     let mut out = format!(
-        "<p>{} {} test images; {}; a displacement up to {} voxel lengths counts as wrong.</p>\n",
+        "<p>{} {} {} images; {}; a displacement up to {} voxel lengths counts as wrong.</p>\n",
         report.images.len(),
         escape(&report.dataset),
+        report.split,
         escape(&report.selected),
         report.threshold
     );
@@ -128,7 +130,9 @@ pub(super) fn eval(report: &EvalFile) -> String {
             percent(mean.accuracy),
             or_none(mean.standard_deviation, percent),
             or_none(mean.interval, |[low, high]| format!("{}–{}", percent(low), percent(high))),
-            or_none(published::row(&report.dataset, task), |row| format!("{:.1}", row.accuracy)),
+            or_none(published::row(&report.dataset, task).filter(|_| report.split == HeldOut::Test), |row| {
+                format!("{:.1}", row.accuracy)
+            }),
             percent(mean.balanced_accuracy),
             or_none(known, |known| percent(known.larger_group)),
             or_none(known, |known| percent(known.best_single_pixel)),

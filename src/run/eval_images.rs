@@ -1,0 +1,136 @@
+//! The images that `eval` shows, and what takes no body on them.
+
+use super::eval::Options;
+use super::eval_file::Baselines;
+use super::held_out::{self, HeldOut};
+use super::robots::Source;
+use super::training::{ImageRef, see};
+use super::{Config, Error};
+use crate::base::Grid;
+use crate::task::baselines::{Labelled, best_pixel, larger_group, nearest_training_image};
+use crate::task::dataset::{Dataset, Split};
+use crate::task::grouping;
+use std::collections::{BTreeMap, BTreeSet};
+
+/// Training images per class on which the single-pixel baseline is chosen.
+const PIXEL_IMAGES_PER_CLASS: usize = 500;
+
+/// Images, and how robots see them.
+pub(super) struct Shown {
+    /// Test or validation images.
+    pub images: Vec<ImageRef>,
+    /// Of each.
+    pub stimuli: Vec<Grid<f64>>,
+}
+
+impl Shown {
+    /// As many as asked for, evenly divided between the classes; the first classes get what is left over.
+    ///
+    /// # Errors
+    /// If there are not enough images, or not one of each class is asked for.
+    pub fn draw(sources: &[Source], dataset: &Dataset, options: &Options) -> Result<Shown, Error> {
+        let Some(config) = sources.first().map(|source| &source.run.config) else {
+            return Ok(Shown { images: Vec::new(), stimuli: Vec::new() });
+        };
+        let (asked, least) = (options.images, config.classes().len());
+        if asked < least {
+            let text = format!("--images {asked}: expected {least} or more, one of each class");
+            return Err(Error::usage(text));
+        }
+        let (images, split) = match options.split {
+            HeldOut::Test => (test_images(config, dataset, options)?, Split::Test),
+            HeldOut::Validation => {
+                let runs: Vec<_> = sources.iter().map(|source| &source.run).collect();
+                (held_out::images(&runs, dataset, "--images", asked)?, Split::Train)
+            }
+        };
+        let stimuli = images.iter().map(|image| see(config, dataset, split, image.index));
+        Ok(Shown { stimuli: stimuli.collect::<Result<_, _>>()?, images })
+    }
+
+    /// The baselines of each of these tasks.
+    ///
+    /// # Errors
+    /// If an image cannot be drawn or seen.
+    pub fn baselines<'a>(
+        &self,
+        sources: &[Source],
+        tasks: impl Iterator<Item = &'a grouping::Split>,
+        dataset: &Dataset,
+        options: &Options,
+    ) -> Result<BTreeMap<String, Baselines>, Error> {
+        let Some(config) = sources.first().map(|source| &source.run.config) else {
+            return Ok(BTreeMap::new());
+        };
+        let seen = |images: &[ImageRef]| -> Result<Vec<(Grid<f64>, u8)>, Error> {
+            let one = |image: &ImageRef| Ok((see(config, dataset, Split::Train, image.index)?, image.label));
+            images.iter().map(one).collect()
+        };
+        let choice = seen(&self.pixel_images(config, dataset, options)?)?;
+        let of_runs: Result<Vec<_>, Error> =
+            sources.iter().map(|source| seen(&source.run.training_images)).collect();
+        let of_runs = of_runs?;
+        let shown = self.stimuli.iter().zip(&self.images);
+        let shown: Vec<Labelled> =
+            shown.map(|(stimulus, image)| Labelled { stimulus, class: image.label }).collect();
+        let mut all = BTreeMap::new();
+        for task in tasks {
+            if all.contains_key(&task.name()) {
+                continue;
+            }
+            let rule = best_pixel(task, &labelled(&choice));
+            let nearest = |of_run: &Vec<_>| nearest_training_image(task, &labelled(of_run), &shown);
+            let baselines = Baselines {
+                larger_group: larger_group(task, &shown),
+                best_single_pixel: rule.map_or(0.0, |rule| rule.accuracy(task, &shown)),
+                pixel: rule.map_or([0, 0], |rule| [rule.row, rule.column]),
+                nearest_training_image: of_runs.iter().map(nearest).sum::<f64>() / of_runs.len() as f64,
+            };
+            all.insert(task.name(), baselines);
+        }
+        Ok(all)
+    }
+
+    /// Training images to choose a single pixel by; none of those shown.
+    fn pixel_images(
+        &self,
+        config: &Config,
+        dataset: &Dataset,
+        options: &Options,
+    ) -> Result<Vec<ImageRef>, Error> {
+        let shown: BTreeSet<usize> = match options.split {
+            HeldOut::Test => BTreeSet::new(),
+            HeldOut::Validation => self.images.iter().map(|image| image.index).collect(),
+        };
+        let mut choice = Vec::new();
+        for label in config.classes() {
+            let count = dataset.indices_of(Split::Train, label).len().min(PIXEL_IMAGES_PER_CLASS);
+            let drawn = dataset.draw(Split::Train, &[label], count, options.seed, 0);
+            let drawn = drawn.map_err(|error| Error::input(error.to_string()))?;
+            let others = drawn.into_iter().filter(|index| !shown.contains(index));
+            choice.extend(others.map(|index| ImageRef { index, label }));
+        }
+        Ok(choice)
+    }
+}
+
+fn labelled(list: &[(Grid<f64>, u8)]) -> Vec<Labelled<'_>> {
+    list.iter().map(|(stimulus, class)| Labelled { stimulus, class: *class }).collect()
+}
+
+/// Test images, class after class.
+fn test_images(config: &Config, dataset: &Dataset, options: &Options) -> Result<Vec<ImageRef>, Error> {
+    let classes = config.classes();
+    let mut images = Vec::new();
+    for (place, &label) in classes.iter().enumerate() {
+        let count = options.images / classes.len() + usize::from(place < options.images % classes.len());
+        let drawn = dataset.draw(Split::Test, &[label], count, options.seed, 0);
+        let drawn = drawn.map_err(|error| {
+            let most = classes.iter().map(|&c| dataset.indices_of(Split::Test, c).len()).min().unwrap_or(0);
+            let hint = format!("ask for at most --images {}", most * classes.len());
+            Error::input(error.to_string()).hint(hint)
+        })?;
+        images.extend(drawn.into_iter().map(|index| ImageRef { index, label }));
+    }
+    Ok(images)
+}
