@@ -205,7 +205,11 @@ impl Config {
     /// As [`Config::load`].
     pub fn parse(text: &str, name: &str, overrides: &[String]) -> Result<Self, Error> {
         let format = if name.ends_with(".json") { Format::Json } else { Format::Toml };
-        let mut config: Config = toml_text::read(text, format, name)?;
+        let mut config: Config = toml_text::read(text, format, name).map_err(|error| {
+            let is_lacking = error.message.contains("missing field");
+            let hint = "morphcog config zero_one.toml prints a whole one to start your own from".to_string();
+            if is_lacking { error.hint(hint) } else { error }
+        })?;
         for assignment in overrides {
             config = toml_text::set(&config, assignment)?;
         }

@@ -46,7 +46,7 @@ pub fn gallery() -> Result<Vec<Published>, Error> {
         zero_walks: String,
         body: String,
     }
-    let entries: Vec<Entry> = super::toml_text::read_json(TEXT, "gallery.json")?;
+    let entries: Vec<Entry> = super::toml_text::read_json_list(TEXT, "gallery.json")?;
     let robot = |Entry { name, published_fitness, zero_walks, body }: Entry| {
         let body = body.parse().map_err(|error| Error::other(format!("gallery.json: {name}: {error}")))?;
         let zero_walks = if zero_walks == "left" { Direction::Left } else { Direction::Right };

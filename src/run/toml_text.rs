@@ -28,8 +28,22 @@ pub(super) fn read<T: DeserializeOwned>(text: &str, format: Format, name: &str) 
     }
 }
 
-/// Reads a value from JSON; `name` is the file's, for messages.
+/// Reads an object from JSON; `name` is the file's, for messages.
 pub(super) fn read_json<T: DeserializeOwned>(text: &str, name: &str) -> Result<T, Error> {
+    let text = text.trim_start_matches('\u{feff}');
+    // A list would be taken for an object without keys.
+    if !text.trim_start().starts_with('{') {
+        return Err(refused(name, Some(1), "", "expected a JSON object, {…}"));
+    }
+    json(text, name)
+}
+
+/// Reads a list from JSON; `name` is the file's, for messages.
+pub(super) fn read_json_list<T: DeserializeOwned>(text: &str, name: &str) -> Result<Vec<T>, Error> {
+    json(text, name)
+}
+
+fn json<T: DeserializeOwned>(text: &str, name: &str) -> Result<T, Error> {
     let mut reader = serde_json::Deserializer::from_str(text);
     let value = serde_path_to_error::deserialize(&mut reader).map_err(|error| {
         let line = Some(error.inner().line()).filter(|&line| line > 0);
@@ -86,7 +100,9 @@ pub(super) fn load<T: Serialize + DeserializeOwned + Default>(
 
 fn refused(name: &str, line: Option<usize>, key: &str, message: &str) -> Error {
     let line = line.map_or(String::new(), |line| format!(":{line}"));
-    let key = if key.is_empty() || key == "." { String::new() } else { format!("{key}: ") };
+    // A key that is not read to its end is a question mark.
+    let key = key.trim_end_matches(['?', '.']);
+    let key = if key.is_empty() { String::new() } else { format!("{key}: ") };
     Error::input(format!("{name}{line}: {key}{}", spoken(message)))
 }
 
@@ -203,6 +219,15 @@ mod tests {
         assert!(json_error("{\"name\": \"a\"}\n}").starts_with("own.json:2: "));
         assert!(json_error("{\"name\": \"a\"").starts_with("own.json:1: "));
         assert!(json_error("{\"nam\": \"a\"}").contains("nam"));
+        // Cut off, or no object at all: nothing of the reader's own words.
+        assert_eq!(json_error("{"), "own.json:1: EOF while parsing an object");
+        assert_eq!(json_error("{\"name\": \"a\",}"), "own.json:1: trailing comma");
+        for text in ["", " [\"a\"]", "7"] {
+            assert_eq!(json_error(text), "own.json:1: expected a JSON object, {…}");
+        }
+        // As some editors begin their files.
+        assert!(read::<Outer>("\u{feff}{\"name\": \"a\"}", Format::Json, "own.json").is_ok());
+        assert!(read::<Outer>("\u{feff}name = 'a'", Format::Toml, "own.toml").is_ok());
     }
 
     #[test]
