@@ -12,9 +12,7 @@ use crate::base::lanes::InstructionSet;
 use crate::run::capacity_file::CapacityFile;
 use crate::run::data::catalogue::Catalogue;
 use crate::run::data::fetch::{FetchOptions, fetch};
-use crate::run::eval_file::{EVAL_JSON, EVAL_VALIDATION_JSON};
 use crate::run::folder::IfExists;
-use crate::run::held_out::HeldOut;
 use crate::run::plan::{PAPER_TOML, Plan};
 use crate::run::robots::Selection;
 use crate::run::{
@@ -29,7 +27,13 @@ use crate::view::{reporters, summary};
 pub use args::Cli;
 use args::{Command, DataCommand, DatasetArgs, EvalArgs, EvolveArgs, ReplayArgs, SimulateArgs};
 use clap::CommandFactory;
-use std::path::Path;
+use clap::builder::{PathBufValueParser, TypedValueParser};
+use std::path::{Path, PathBuf};
+
+/// Reads the path of a run.json, or of its folder.
+fn run_json() -> impl TypedValueParser<Value = PathBuf> {
+    PathBufValueParser::new().map(folder::run_json)
+}
 
 /// Runs a command.
 ///
@@ -151,10 +155,7 @@ fn run_eval(args: EvalArgs, console: &Console) -> Result<(), Error> {
         true => vec![folder::newest_run()?],
         false => args.archive,
     };
-    let name = match args.split {
-        HeldOut::Test => EVAL_JSON,
-        HeldOut::Validation => EVAL_VALIDATION_JSON,
-    };
+    let name = eval::own_name(args.split);
     let beside = || match of_gallery {
         true => Path::new(&format!("gallery-{name}")).to_path_buf(),
         false => folder::above(&archives).join(name),

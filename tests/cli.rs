@@ -626,6 +626,44 @@ fn the_results_of_an_evaluation_never_overwrite_each_other_or_the_run() {
 }
 
 #[test]
+fn the_results_of_one_command_never_overwrite_those_of_another() {
+    let sandbox = with_run();
+    for name in ["audit", "validation", "capacity", "eval-validation"] {
+        sandbox.write(&format!("run/{name}.json"), "kept");
+        // Nor by the CSV.
+        for ending in ["json", "txt"] {
+            let out = format!("run/{name}.{ending}");
+            let eval = format!("eval -a run/run.json -n 2 --cycles 1 --robots best -o {out}");
+            sandbox.run(&eval).ended(2, &[&out, &format!("{name}.json")]);
+        }
+        assert_eq!(sandbox.read(&format!("run/{name}.json")), "kept");
+    }
+    sandbox.run("audit -a run/run.json -o run/eval.json").ended(2, &["run/eval.json"]);
+    // Elsewhere, and under its own name, it may.
+    for out in ["audit.json", "run/eval.json", "run/mine.json"] {
+        sandbox.run(&format!("eval -q -a run/run.json -n 2 --cycles 1 --robots best -o {out}")).ended(0, &[]);
+    }
+}
+
+#[test]
+fn a_run_may_be_named_by_its_folder() {
+    let sandbox = with_run();
+    for command in [
+        "eval -q -a run -n 2 --cycles 1 --robots best",
+        "audit -q -a run --robots top:1",
+        "replay -q -a run --format gif",
+        "plot accuracy -q -a run -o accuracy.svg",
+        "report -q run --lives 0",
+    ] {
+        sandbox.run(command).ended(0, &[]);
+    }
+    let made = files(&sandbox.path("run"));
+    for name in ["eval.json", "audit.json", "report.html"] {
+        assert!(made.contains_key(name), "{name}: {:?}", made.keys());
+    }
+}
+
+#[test]
 fn an_evaluation_that_cannot_be_written_fails_before_its_first_life() {
     let sandbox = with_run();
     sandbox.write("file", "in the way");
@@ -641,7 +679,13 @@ fn what_an_evaluation_is_asked_for_must_make_sense() {
         sandbox.run(&format!("eval -a run/run.json --cycles 1 {wrong}")).ended(2, &[&wrong[..8]]);
     }
     sandbox.run("eval -a nowhere/run.json").ended(3, &["nowhere/run.json"]);
-    sandbox.run("eval -a run").ended(3, &["run"]);
+    std::fs::create_dir(sandbox.path("empty")).unwrap();
+    sandbox.run("eval -a empty").ended(3, &["empty/run.json"]);
+    // The same robots twice would count twice.
+    sandbox.write("copy.json", sandbox.read("run/run.json"));
+    sandbox
+        .run("eval -a run/run.json copy.json --cycles 1")
+        .ended(2, &["run/run.json", "copy.json", "different"]);
     Sandbox::new().run("eval").ended(3, &["runs/", "hint:", "--archive"]);
 }
 

@@ -128,8 +128,14 @@ fn it_goes_on_to_the_same_bytes_and_needs_the_other_run_only_to_begin() {
         .ended(3, &["start.archive"]);
     assert_eq!(result("whole"), result("part7"));
     sandbox.run(&format!("evolve -q -c run.toml -o moved {set}")).ended(0, &[]);
-    let (moved, whole) = (sandbox.run_file("moved"), sandbox.run_file("whole"));
-    assert_eq!((moved.elites, moved.start), (whole.elites, whole.start));
+    let whole = sandbox.run_file("whole");
+    let moved = sandbox.run_file("moved");
+    assert_eq!((&moved.elites, &moved.start), (&whole.elites, &whole.start));
+    // Or by its folder.
+    let set = "--set start.archive=\"elsewhere\"";
+    sandbox.run(&format!("evolve -q -c run.toml -o by_folder {set}")).ended(0, &[]);
+    let by_folder = sandbox.run_file("by_folder");
+    assert_eq!((&by_folder.elites, &by_folder.start), (&whole.elites, &whole.start));
 }
 
 #[test]

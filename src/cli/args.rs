@@ -5,6 +5,7 @@ use super::capacity::{self, CapacityArgs};
 use super::plot::{self, PlotArgs};
 use super::report::{self, ReportArgs};
 use super::reproduce::{self, ReproduceArgs};
+use super::run_json;
 use super::serve::{self, ServeArgs};
 use crate::run::eval;
 use crate::run::held_out::HeldOut;
@@ -191,8 +192,8 @@ pub(super) struct EvolveArgs {
 
 #[derive(Debug, Args)]
 pub(super) struct EvalArgs {
-    /// The run.json, or those of several runs of the same task (default: the newest under runs/).
-    #[arg(short, long, value_name = "FILE", num_args = 1..)]
+    /// The run.json (or its folder), or those of several runs of the same task (default: the newest under runs/).
+    #[arg(short, long, value_name = "FILE", value_parser = run_json(), num_args = 1..)]
     pub(super) archive: Vec<PathBuf>,
     /// Images in all, evenly divided between the classes.
     #[arg(short = 'n', long, default_value_t = 1000, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
@@ -240,8 +241,8 @@ pub(super) struct ReplayArgs {
     /// Only robots that morphcog audit found physical: "best" is the fittest of them.
     #[arg(long)]
     pub(super) physical_only: bool,
-    /// The run.json (default: the newest under runs/).
-    #[arg(short, long, value_name = "FILE")]
+    /// The run.json, or its folder (default: the newest under runs/).
+    #[arg(short, long, value_name = "FILE", value_parser = run_json())]
     pub(super) archive: Option<PathBuf>,
     /// Images by index, as train:1,test:17 (default: the training images).
     #[arg(short, long, value_delimiter = ',')]

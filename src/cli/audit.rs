@@ -1,5 +1,6 @@
 //! `morphcog audit`: its words, and what it calls.
 
+use super::run_json;
 use crate::run::audit::{self, Options, Source};
 use crate::run::audit_file::AUDIT_JSON;
 use crate::run::robots::Selection;
@@ -24,8 +25,8 @@ then
 
 #[derive(Debug, Args)]
 pub(super) struct AuditArgs {
-    /// A run.json (default: the newest under runs/); may be given several times.
-    #[arg(short, long, value_name = "FILE")]
+    /// A run.json, or its folder (default: the newest under runs/); may be given several times.
+    #[arg(short, long, value_name = "FILE", value_parser = run_json())]
     archive: Vec<PathBuf>,
     /// all, top:N, random:N, best-validation:N (the best of each task on the validation images of the run's config), or ids
     /// (or beginnings of ids) separated by commas; or gallery, or names of published robots.

@@ -1,5 +1,6 @@
 //! `morphcog report`: its words, and what it calls.
 
+use super::run_json;
 use crate::run::report;
 use crate::run::{Error, folder};
 use crate::view::console::Console;
@@ -20,6 +21,7 @@ them together are looked for above their folders.";
 #[derive(Debug, Args)]
 pub(super) struct ReportArgs {
     /// Run folders, or files run.json (default: the newest under runs/).
+    #[arg(value_parser = run_json())]
     runs: Vec<PathBuf>,
     /// Robots that can be watched, the fittest of each run; the more, the fewer frames each has (the page stays below
     /// 20 MB).
@@ -37,10 +39,9 @@ pub(super) struct ReportArgs {
 }
 
 pub(super) fn run(args: ReportArgs, console: &Console) -> Result<(), Error> {
-    let named = |path: PathBuf| if path.is_dir() { path.join(folder::RUN_JSON) } else { path };
     let archives: Vec<PathBuf> = match args.runs.is_empty() {
         true => vec![folder::newest_run()?],
-        false => args.runs.into_iter().map(named).collect(),
+        false => args.runs,
     };
     let out = args.out.unwrap_or_else(|| folder::above(&archives).join("report.html"));
     let gathered =

@@ -1,5 +1,6 @@
 //! `morphcog serve`: its words, and what it calls.
 
+use super::run_json;
 use crate::run::serve::{Options, Service};
 use crate::run::{Error, folder, signals};
 use crate::view::console::Console;
@@ -17,8 +18,8 @@ Only this machine can reach the page. Ctrl-C ends it.";
 
 #[derive(Debug, Args)]
 pub(super) struct ServeArgs {
-    /// A run.json to browse (default: the newest under runs/); may be given several times.
-    #[arg(short, long, value_name = "FILE")]
+    /// A run.json, or its folder, to browse (default: the newest under runs/); may be given several times.
+    #[arg(short, long, value_name = "FILE", value_parser = run_json())]
     archive: Vec<PathBuf>,
     /// Folder with the images.
     #[arg(long, value_name = "DIR")]

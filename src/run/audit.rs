@@ -1,8 +1,8 @@
 //! `morphcog audit`: does a robot's behaviour survive changes that no honest walker should notice?
 
 use super::archive::{Robot, RunFile};
-use super::audit_file::{AuditFile, RobotAudit, fingerprint};
-use super::eval::check_out;
+use super::audit_file::{AUDIT_JSON, AuditFile, RobotAudit, fingerprint};
+use super::folder::check_out;
 use super::robots::{self, Selection};
 use super::training::{Training, load_dataset, see};
 use super::verdict::{Behaviour, Criteria, PerturbedLife};
@@ -142,7 +142,7 @@ fn open(options: &Options) -> Result<Opened, Error> {
     let data = options.data.as_deref();
     match &options.source {
         Source::Gallery => {
-            check_out(&options.out, Path::new(""))?;
+            check_out(&options.out, Path::new(""), AUDIT_JSON)?;
             let config = gallery::config()?;
             let training = Training::load(&config, data)?;
             let all = gallery::gallery()?;
@@ -167,7 +167,7 @@ fn open(options: &Options) -> Result<Opened, Error> {
         Source::Archive(path) => {
             let source = robots::Source::read(path)?;
             let run = &source.run;
-            check_out(&options.out, path)?;
+            check_out(&options.out, path, AUDIT_JSON)?;
             let training = training_of(run, options)?;
             // A stage may have shown images otherwise than the protocol says, which is what is judged.
             let is_known = run.follows_protocol() && training.images == run.training_images;

@@ -1,9 +1,10 @@
 //! `morphcog capacity`: the networks that the robots are worth (paper, "Morphological cognition capacity").
 
 use super::capacity_config::CapacityConfig;
-use super::capacity_file::{CapacityFile, Curve, FORMAT, FORMAT_VERSION, Point, TaskCapacity};
+use super::capacity_file::{CAPACITY_JSON, CapacityFile, Curve, FORMAT, FORMAT_VERSION, Point, TaskCapacity};
 use super::capacity_images::{Images, Task};
 use super::eval_file::{EvalFile, RobotReport};
+use super::folder::check_out;
 use super::held_out::HeldOut;
 use super::statistics::standard_deviation;
 use super::trainings::Trainings;
@@ -75,7 +76,7 @@ pub fn capacity(
         let of = format!("with images of {side} pixels and pooling {pooling:?}").to_lowercase();
         return Err(Error::input(format!("capacity: cnn.kernel = {kernel}: expected up to {most}, {of}")));
     }
-    eval::check_out(&options.out, &options.eval)?;
+    check_out(&options.out, &options.eval, CAPACITY_JSON)?;
     let robots = robots(&report, options)?;
     let images = Images::of(&report, setting, options, observer)?;
     let grouping = setting.task.grouping()?;

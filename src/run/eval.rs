@@ -1,15 +1,16 @@
 //! `morphcog eval`: how well robots do on held-out images (paper, "Generalization test").
 
 use super::archive::Robot;
-use super::eval_file::{EvalFile, RobotReport, Trial};
+use super::audit_file::fingerprint;
+use super::eval_file::{EVAL_JSON, EVAL_VALIDATION_JSON, EvalFile, RobotReport, Trial};
 use super::eval_images::Shown;
 use super::held_out::HeldOut;
 use super::robots::{Chosen, Selection, Source};
 use super::training::load_dataset;
 use super::validation::{self, Validated};
-use super::{Config, Error, folder::RunFolder, gallery};
+use super::{Config, Error, folder::check_out, gallery};
 use crate::base::Grid;
-use crate::base::files::{check_writable, write_atomically};
+use crate::base::files::write_atomically;
 use crate::sim::Lattice;
 use crate::task::dataset::Split;
 use crate::task::grouping::{self, Grouping};
@@ -17,7 +18,7 @@ use crate::task::protocol::{Life, Protocol};
 use crate::task::rollout::{fresh_life, same_to_sensors};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 /// Displacements up to this count as wrong in the paper's test \[voxel lengths\].
@@ -81,9 +82,10 @@ pub fn eval(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Re
     };
     let first = &sources[0];
     for source in &sources {
-        check_out(&options.out, &source.path)?;
+        check_out(&options.out, &source.path, own_name(options.split))?;
         same_setting(first, source)?;
     }
+    different(&sources)?;
     let config = &first.run.config;
     let validated = options.validation.unwrap_or(config.validation.images);
     if options.robots.validated().is_some() && validated < validation::LEAST {
@@ -157,6 +159,28 @@ pub(super) fn pool(threads: Option<usize>) -> Result<rayon::ThreadPool, Error> {
     pool.map_err(|error| Error::other(format!("no threads: {error}")))
 }
 
+/// The name of the results beside a run.json if nobody says otherwise.
+pub fn own_name(split: HeldOut) -> &'static str {
+    match split {
+        HeldOut::Test => EVAL_JSON,
+        HeldOut::Validation => EVAL_VALIDATION_JSON,
+    }
+}
+
+/// Whether all runs are different ones: the same robots twice would be in the means twice.
+fn different(sources: &[Source]) -> Result<(), Error> {
+    let mut known = BTreeMap::new();
+    for source in sources {
+        if let Some(first) = known.insert(fingerprint(&source.run), &source.path) {
+            let (first, path) = (first.display(), source.path.display());
+            return Err(Error::usage(format!(
+                "--archive {first} {path}: expected different runs, these are the same"
+            )));
+        }
+    }
+    Ok(())
+}
+
 /// Whether robots of two runs can be tested together: what they are shown, and where they live, is the same.
 fn same_setting(first: &Source, other: &Source) -> Result<(), Error> {
     let (a, b) = (&first.run.config, &other.run.config);
@@ -187,27 +211,6 @@ pub(super) fn control_steps(config: &Config, cycles: u32) -> u32 {
 /// The recognition task a robot performs; none if it always walks the same way.
 pub(super) fn task_of<'a>(grouping: &'a Grouping, robot: &Robot) -> Option<&'a grouping::Split> {
     grouping.tasks().iter().find(|split| split.name() == robot.task && !split.is_same_way())
-}
-
-/// Whether the results can be written, and overwrite neither each other nor a file of the run.
-pub(super) fn check_out(out: &Path, archive: &Path) -> Result<(), Error> {
-    let refuse = |text: &str| Err(Error::usage(format!("--out {}: {text}", out.display())));
-    let csv = out.with_extension("csv");
-    if csv == *out {
-        return refuse("expected another ending: the CSV beside the results has that name");
-    }
-    let folder_of =
-        |path: &Path| path.parent().and_then(|folder| Path::new(".").join(folder).canonicalize().ok());
-    let same_folder = folder_of(out) == folder_of(archive);
-    for path in [out, csv.as_path()] {
-        let name = path.file_name();
-        let is_of_run = RunFolder::files().iter().any(|own| name == Some(own.as_ref()));
-        if same_folder && (is_of_run || name == archive.file_name()) {
-            return refuse("expected another name: this would overwrite a file of the run");
-        }
-        check_writable(path).map_err(|error| Error::writing(path, &error))?;
-    }
-    Ok(())
 }
 
 fn write(options: &Options, report: &EvalFile) -> Result<(), Error> {

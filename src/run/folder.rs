@@ -1,7 +1,11 @@
 //! A run's folder: made, locked, and never overwritten by accident.
 
+use super::audit_file::AUDIT_JSON;
+use super::capacity_file::CAPACITY_JSON;
+use super::eval_file::{EVAL_JSON, EVAL_VALIDATION_JSON};
+use super::validation::VALIDATION_JSON;
 use super::{Error, checkpoint};
-use crate::base::files::remove_half_written;
+use crate::base::files::{check_writable, remove_half_written};
 use std::fs::{File, TryLockError};
 use std::path::{Path, PathBuf};
 
@@ -14,6 +18,9 @@ pub const ELITES: &str = "elites.csv";
 /// Figures per generation.
 pub const METRICS: &str = "metrics.csv";
 const LOCK: &str = ".lock";
+
+/// What commands find, beside a run.
+const RESULTS: [&str; 5] = [AUDIT_JSON, CAPACITY_JSON, EVAL_JSON, EVAL_VALIDATION_JSON, VALIDATION_JSON];
 
 /// What to do with a folder that holds a run already.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -84,6 +91,43 @@ impl RunFolder {
         let [newest, previous] = checkpoint::NAMES;
         [RUN_JSON, CONFIG, ELITES, METRICS, newest, previous]
     }
+}
+
+/// Whether results can be written to a file, with a CSV beside it, and overwrite neither each other nor what lies beside the run or
+/// result file that they are of: files of the run, or what other commands found, each under the name of its command. `own` is
+/// the name of these results if nobody says otherwise.
+///
+/// # Errors
+/// If not.
+pub(super) fn check_out(out: &Path, of: &Path, own: &str) -> Result<(), Error> {
+    let refuse = |text: &str| Err(Error::usage(format!("--out {}: {text}", out.display())));
+    let csv = out.with_extension("csv");
+    if csv == *out {
+        return refuse("expected another ending: the CSV beside the results has that name");
+    }
+    let folder_of =
+        |path: &Path| path.parent().and_then(|folder| Path::new(".").join(folder).canonicalize().ok());
+    let same_folder = folder_of(out) == folder_of(of);
+    for path in [out, csv.as_path()] {
+        let name = path.file_name();
+        let is_of_run = RunFolder::files().iter().any(|file| name == Some(file.as_ref()));
+        if same_folder && (is_of_run || name == of.file_name()) {
+            return refuse("expected another name: this would overwrite a file of the run");
+        }
+        let is_others = |other: &&&str| **other != own && path.file_stem() == Path::new(other).file_stem();
+        if let Some(other) = RESULTS.iter().find(is_others).filter(|_| same_folder) {
+            return refuse(&format!(
+                "expected another name: this is what {other} and what goes with it are called"
+            ));
+        }
+        check_writable(path).map_err(|error| Error::writing(path, &error))?;
+    }
+    Ok(())
+}
+
+/// The run.json that is meant by its path or its folder's.
+pub fn run_json(path: PathBuf) -> PathBuf {
+    if path.is_dir() { path.join(RUN_JSON) } else { path }
 }
 
 /// The folder of a run.json; of several, the nearest that all of them lie in.

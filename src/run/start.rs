@@ -3,6 +3,7 @@
 use super::archive::{Robot, RunFile};
 use super::audit_file::fingerprint;
 use super::config::BodyConfig;
+use super::folder::run_json;
 use super::held_out::trained_on;
 use super::{Config, Error};
 use crate::task::dataset::{Dataset, Split};
@@ -55,9 +56,9 @@ impl Start {
     /// # Errors
     /// If the file is missing or broken, or its bodies are not what the config asks for.
     pub fn read(config: &Config, dataset: &Dataset) -> Result<Option<Self>, Error> {
-        let Some(path) = &config.start.archive else { return Ok(None) };
+        let Some(path) = config.start.archive.clone().map(run_json) else { return Ok(None) };
         let refuse = |text: String| Error::input(format!("start.archive: {}: {text}", path.display()));
-        let run = RunFile::read(path).map_err(|error| {
+        let run = RunFile::read(&path).map_err(|error| {
             let hint = "the run.json of the run to start from is named with --set start.archive=PATH; make that run first";
             let error = error.within("start.archive");
             if path.exists() { error } else { error.hint(hint.to_string()) }
