@@ -229,7 +229,11 @@ fn a_wrong_config_is_refused_with_file_line_and_key() {
     wrong("own.toml", &TINY.replace("[0, 1]", "[0, 1, 2]"), &["data.train_images", "image 2 shows a 2"]);
     wrong("own.toml", &TINY.replace("[0, 1]", "[0]"), &["data.train_images", "class 1"]);
     wrong("own.toml", &TINY.replace("[0, 1]", "[0, 10000000]"), &["data.train_images", "10000000"]);
-    wrong("own.toml", &TINY.replace("height = 5", "height = 0"), &["own.toml", "body.height = 0", "1 to 64"]);
+    wrong(
+        "own.toml",
+        &TINY.replace("height = 5", "height = 0"),
+        &["own.toml:6: ", "body.height = 0", "1 to 64"],
+    );
     wrong("own.toml", &TINY.replace("control_steps = 20", "control_steps = 0"), &["protocol.control_steps"]);
     wrong("own.toml", &with("time_step = nan"), &["own.toml", "physics.time_step"]);
     wrong("own.toml", &with("time_step = -inf"), &["own.toml", "physics.time_step"]);
@@ -281,7 +285,9 @@ fn a_wrong_set_is_refused_with_2_and_quotes_it() {
         assert!(!sandbox.path("run").exists());
     }
     // Well typed, but not what can be: the config's fault.
-    sandbox.run("evolve -c tiny.toml -o run --set generations=0").ended(3, &["generations = 0"]);
+    sandbox
+        .run("evolve -c tiny.toml -o run --set generations=0")
+        .ended(3, &["--set generations=0: ", "generations = 0"]);
 }
 
 #[test]

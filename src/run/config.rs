@@ -213,7 +213,10 @@ impl Config {
         for assignment in overrides {
             config = toml_text::set(&config, assignment)?;
         }
-        config.validate().map_err(|error| error.within(name))?;
+        config.validate().map_err(|error| {
+            let place = toml_text::place(text, format, name, overrides, &error.message);
+            error.within(&place)
+        })?;
         Ok(config)
     }
 

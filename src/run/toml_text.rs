@@ -132,6 +132,47 @@ fn line_at(text: &str, span: Option<std::ops::Range<usize>>) -> Option<usize> {
     Some(text.get(..span?.start)?.matches('\n').count() + 1)
 }
 
+/// Where that stands which a message about a config begins with, as `body.height = 0: …` or `stage 2: keep = 0: …`: the override that
+/// set it, or file and, in TOML, line.
+pub(super) fn place(text: &str, format: Format, name: &str, overrides: &[String], message: &str) -> String {
+    let key = key_of(message);
+    let is_set = |assignment: &&String| assignment.split_once('=').is_some_and(|(set, _)| set.trim() == key);
+    if let Some(assignment) = overrides.iter().rfind(is_set) {
+        return format!("--set {assignment}");
+    }
+    let line = (format == Format::Toml).then(|| line_of(text, message)).flatten();
+    line.map_or(name.to_string(), |line| format!("{name}:{line}"))
+}
+
+/// The key that a message begins with.
+fn key_of(message: &str) -> &str {
+    message.split([' ', ':']).next().unwrap_or_default()
+}
+
+/// The line of what a message begins with, or of the innermost table around it that the text has.
+fn line_of(text: &str, message: &str) -> Option<usize> {
+    let table = toml::de::DeTable::parse(text).ok()?.into_inner();
+    let stage = message.strip_prefix("stage ").and_then(|rest| rest.split_once(": "));
+    let (mut value, key) = match stage {
+        Some((number, rest)) => {
+            let place = number.parse::<usize>().ok()?.checked_sub(1)?;
+            (table.get("stage")?.get_ref().get(place)?, Some(key_of(rest)))
+        }
+        None => {
+            let (first, rest) = match key_of(message).split_once('.') {
+                Some((first, rest)) => (first, Some(rest)),
+                None => (key_of(message), None),
+            };
+            (table.get(first)?, rest)
+        }
+    };
+    for part in key.iter().flat_map(|key| key.split('.')) {
+        let Some(inner) = value.get_ref().get(part) else { break };
+        value = inner;
+    }
+    line_at(text, Some(value.span()))
+}
+
 /// A copy with one key changed: `map_elites.parents=10`. What follows the sign is read as TOML, and as plain text if
 /// it is none.
 pub(super) fn set<T: Serialize + DeserializeOwned>(config: &T, assignment: &str) -> Result<T, Error> {
@@ -228,6 +269,28 @@ mod tests {
         // As some editors begin their files.
         assert!(read::<Outer>("\u{feff}{\"name\": \"a\"}", Format::Json, "own.json").is_ok());
         assert!(read::<Outer>("\u{feff}name = 'a'", Format::Toml, "own.toml").is_ok());
+    }
+
+    #[test]
+    fn what_cannot_be_is_said_with_the_override_or_the_line_it_stands_on() {
+        let text = "seed = 3\n\n[body]\nwidth = 5\nheight = 0\n\n[[stage]]\nkeep = 1\n\n[[stage]]\n\nkeep = 0\n[task]\n";
+        let place = |message: &str, set: &[&str]| {
+            let set: Vec<String> = set.iter().map(|set| set.to_string()).collect();
+            super::place(text, Format::Toml, "own.toml", &set, message)
+        };
+        assert_eq!(place("seed = 3: expected another", &[]), "own.toml:1");
+        assert_eq!(place("body.height = 0: expected 1", &[]), "own.toml:5");
+        assert_eq!(place("stage 2: keep = 0: expected 1", &[]), "own.toml:12");
+        // Where the key itself is missing, or the whole table is meant.
+        assert_eq!(place("stage 2: expected generations: only", &[]), "own.toml:10");
+        assert_eq!(place("body.depth: expected it", &[]), "own.toml:3");
+        assert_eq!(place("task: expected groups", &[]), "own.toml:13");
+        assert_eq!(place("physics.gravity = 0: expected more", &[]), "own.toml");
+        assert_eq!(place("stage 3: keep = 0", &[]), "own.toml");
+        // What was set last.
+        let set = ["body.height=7", "body.width=5", " body.height = 0"];
+        assert_eq!(place("body.height = 0: expected 1", &set), "--set  body.height = 0");
+        assert_eq!(super::place("{}", Format::Json, "own.json", &[], "seed = 3: expected"), "own.json");
     }
 
     #[test]
