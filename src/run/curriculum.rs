@@ -23,6 +23,9 @@ pub struct StageConfig {
     /// become the training images. Default: no choice.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub pool: Option<usize>,
+    /// The training images are those of the stage before (of its last draw), in place of others. Default: not.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub same_images: Option<bool>,
     /// How answers to several images are judged together. Default `evaluation.fitness`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fitness: Option<Fitness>,
@@ -145,6 +148,17 @@ impl Config {
     pub fn robust(&self, period: Period) -> bool {
         let stage = self.stage.get(period.stage);
         stage.and_then(|stage| stage.robust).unwrap_or(self.evaluation.robust)
+    }
+
+    /// The period whose images are shown in a period: itself, or one of a stage before.
+    pub fn drawn_in(&self, period: Period) -> Period {
+        let before = self.stage.get(..period.stage).unwrap_or_default();
+        let begin: u64 = before.iter().filter_map(|stage| stage.generations).sum();
+        let is_same = self.stage.get(period.stage).is_some_and(|stage| stage.same_images == Some(true));
+        match begin.checked_sub(1).filter(|_| is_same) {
+            Some(last) => self.drawn_in(self.period(last)),
+            None => period,
+        }
     }
 
     /// Training images of each class in a period; `None`: those of the section `[data]`.
@@ -285,6 +299,20 @@ impl Config {
             for (key, count, least, most) in counts {
                 if let Some(count) = count.filter(|count| !(least..=most).contains(count)) {
                     let text = format!("{key} = {count}: expected a number from {least} to {most}");
+                    return refuse(number, text);
+                }
+            }
+            if stage.same_images == Some(true) {
+                if number == 0 {
+                    return refuse(number, "same_images: expected a stage before it".to_string());
+                }
+                let own = [
+                    ("images_per_class", stage.images_per_class.is_some()),
+                    ("pool", stage.pool.is_some()),
+                    ("redraw", stage.redraw.is_some()),
+                ];
+                if let Some((key, _)) = own.iter().find(|(_, given)| *given) {
+                    let text = format!("{key}: expected either same_images or {key}, not both");
                     return refuse(number, text);
                 }
             }

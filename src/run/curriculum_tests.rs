@@ -102,6 +102,11 @@ fn stages_that_cannot_be_are_refused() {
         ),
         ("[[stage]]\nstart_with = 0", "stage 1: start_with = 0: expected 1 or more"),
         ("[[stage]]\npool = 5", "stage 1: pool: expected images_per_class"),
+        ("[[stage]]\nsame_images = true", "stage 1: same_images: expected a stage before it"),
+        (
+            "[[stage]]\ngenerations = 3\n[[stage]]\nsame_images = true\nimages_per_class = 3",
+            "stage 2: images_per_class: expected either same_images or images_per_class, not both",
+        ),
         ("[[stage]]\nimages_per_class = 8\npool = 7", "stage 1: pool = 7: expected images_per_class, 8"),
     ] {
         let error = config(stages).unwrap_err().to_string();

@@ -107,6 +107,7 @@ impl Training {
     /// # Errors
     /// If a class has not as many images as are to be drawn.
     pub fn drawn(config: &Config, dataset: &Dataset, period: Period) -> Result<Vec<usize>, Error> {
+        let period = config.drawn_in(period);
         let key = |key: &str| format!("stage {}: {key}", period.stage + 1);
         let (key, per_class, number) = match (config.drawn_per_class(period), config.pool(period)) {
             (Some(_), Some(pool)) => (key("pool"), pool, period.number()),
@@ -127,8 +128,9 @@ impl Training {
     /// As [`Training::drawn`].
     pub fn indices(config: &Config, dataset: &Dataset, period: Period) -> Result<Vec<usize>, Error> {
         let mut drawn = Training::drawn(config, dataset, period)?;
-        let per_class = config.drawn_per_class(period);
-        if let (Some(per_class), Some(_)) = (per_class, config.pool(period)) {
+        let drawn_in = config.drawn_in(period);
+        let per_class = config.drawn_per_class(drawn_in);
+        if let (Some(per_class), Some(_)) = (per_class, config.pool(drawn_in)) {
             let label = |&index: &usize| dataset.label(Split::Train, index);
             let labels = drawn.iter().map(label).collect::<Result<Vec<u8>, DatasetError>>();
             let labels =
@@ -259,6 +261,25 @@ mod tests {
         let every = every.map(|(raised, without_limits)| Condition { raised, without_limits });
         // Images of one class after the other.
         assert_eq!(conditions("raised_starts = 1\nwithout_limits = true"), [every, every].concat());
+    }
+
+    #[test]
+    fn a_stage_may_show_the_images_of_the_stage_before() {
+        let images = |generation: u64, last: &str| -> Vec<usize> {
+            let stages = "[[stage]]\ngenerations = 5\nimages_per_class = 3\npool = 9\nredraw = 2";
+            let text = format!(
+                "[task]\ngroups = [[3], [0]]\n[data]\ndataset = \"builtin\"\n{stages}\n[[stage]]\ngenerations = 1\n{last}\n[[stage]]\n{last}"
+            );
+            let config = Config::parse(&text, "a.toml", &[]).unwrap();
+            let dataset = load_dataset(&config, None, &[Split::Train]).unwrap();
+            Training::indices(&config, &dataset, config.period(generation)).unwrap()
+        };
+        let same = "same_images = true";
+        // Those of its last draw, and so on.
+        assert_ne!(images(3, same), images(4, same));
+        assert_eq!(images(5, same), images(4, same));
+        assert_eq!(images(6, same), images(4, same));
+        assert_ne!(images(5, "images_per_class = 3\npool = 9"), images(4, same));
     }
 
     #[test]
