@@ -23,9 +23,9 @@ pub struct StageConfig {
     /// become the training images. Default: no choice.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub pool: Option<usize>,
-    /// The training images are those of the stage before (of its last draw), in place of others. Default: not.
+    /// The stage before, from 1, whose images (of its last draw) are the training images once more. Default: others.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub same_images: Option<bool>,
+    pub images_of: Option<usize>,
     /// How answers to several images are judged together. Default `evaluation.fitness`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fitness: Option<Fitness>,
@@ -152,13 +152,10 @@ impl Config {
 
     /// The period whose images are shown in a period: itself, or one of a stage before.
     pub fn drawn_in(&self, period: Period) -> Period {
-        let before = self.stage.get(..period.stage).unwrap_or_default();
-        let begin: u64 = before.iter().filter_map(|stage| stage.generations).sum();
-        let is_same = self.stage.get(period.stage).is_some_and(|stage| stage.same_images == Some(true));
-        match begin.checked_sub(1).filter(|_| is_same) {
-            Some(last) => self.drawn_in(self.period(last)),
-            None => period,
-        }
+        let of = self.stage.get(period.stage).and_then(|stage| stage.images_of);
+        let Some(shown) = of.and_then(|number| self.stage.get(..number)) else { return period };
+        let end: u64 = shown.iter().filter_map(|stage| stage.generations).sum();
+        self.drawn_in(self.period(end.saturating_sub(1)))
     }
 
     /// Training images of each class in a period; `None`: those of the section `[data]`.
@@ -302,9 +299,10 @@ impl Config {
                     return refuse(number, text);
                 }
             }
-            if stage.same_images == Some(true) {
-                if number == 0 {
-                    return refuse(number, "same_images: expected a stage before it".to_string());
+            if let Some(of) = stage.images_of {
+                if !(1..=number).contains(&of) {
+                    let text = format!("images_of = {of}: expected the number of a stage before, from 1");
+                    return refuse(number, text);
                 }
                 let own = [
                     ("images_per_class", stage.images_per_class.is_some()),
@@ -312,7 +310,7 @@ impl Config {
                     ("redraw", stage.redraw.is_some()),
                 ];
                 if let Some((key, _)) = own.iter().find(|(_, given)| *given) {
-                    let text = format!("{key}: expected either same_images or {key}, not both");
+                    let text = format!("{key}: expected either images_of or {key}, not both");
                     return refuse(number, text);
                 }
             }

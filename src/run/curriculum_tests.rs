@@ -102,10 +102,14 @@ fn stages_that_cannot_be_are_refused() {
         ),
         ("[[stage]]\nstart_with = 0", "stage 1: start_with = 0: expected 1 or more"),
         ("[[stage]]\npool = 5", "stage 1: pool: expected images_per_class"),
-        ("[[stage]]\nsame_images = true", "stage 1: same_images: expected a stage before it"),
+        ("[[stage]]\nimages_of = 1", "stage 1: images_of = 1: expected the number of a stage before"),
         (
-            "[[stage]]\ngenerations = 3\n[[stage]]\nsame_images = true\nimages_per_class = 3",
-            "stage 2: images_per_class: expected either same_images or images_per_class, not both",
+            "[[stage]]\ngenerations = 3\n[[stage]]\nimages_of = 0",
+            "stage 2: images_of = 0: expected the number",
+        ),
+        (
+            "[[stage]]\ngenerations = 3\n[[stage]]\nimages_of = 1\nimages_per_class = 3",
+            "stage 2: images_per_class: expected either images_of or images_per_class, not both",
         ),
         ("[[stage]]\nimages_per_class = 8\npool = 7", "stage 1: pool = 7: expected images_per_class, 8"),
     ] {

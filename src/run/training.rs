@@ -264,22 +264,25 @@ mod tests {
     }
 
     #[test]
-    fn a_stage_may_show_the_images_of_the_stage_before() {
-        let images = |generation: u64, last: &str| -> Vec<usize> {
+    fn a_stage_may_show_the_images_of_a_stage_before() {
+        let images = |generation: u64, [second, third]: [&str; 2]| -> Vec<usize> {
             let stages = "[[stage]]\ngenerations = 5\nimages_per_class = 3\npool = 9\nredraw = 2";
             let text = format!(
-                "[task]\ngroups = [[3], [0]]\n[data]\ndataset = \"builtin\"\n{stages}\n[[stage]]\ngenerations = 1\n{last}\n[[stage]]\n{last}"
+                "[task]\ngroups = [[3], [0]]\n[data]\ndataset = \"builtin\"\n{stages}\n[[stage]]\ngenerations = 1\n{second}\n[[stage]]\n{third}"
             );
             let config = Config::parse(&text, "a.toml", &[]).unwrap();
             let dataset = load_dataset(&config, None, &[Split::Train]).unwrap();
             Training::indices(&config, &dataset, config.period(generation)).unwrap()
         };
-        let same = "same_images = true";
-        // Those of its last draw, and so on.
-        assert_ne!(images(3, same), images(4, same));
-        assert_eq!(images(5, same), images(4, same));
-        assert_eq!(images(6, same), images(4, same));
-        assert_ne!(images(5, "images_per_class = 3\npool = 9"), images(4, same));
+        let [others, first, second] = ["images_per_class = 3\npool = 9", "images_of = 1", "images_of = 2"];
+        // Those of its last draw.
+        assert_ne!(images(3, [first, first]), images(4, [first, first]));
+        assert_eq!(images(5, [first, others]), images(4, [first, others]));
+        assert_ne!(images(5, [others, others]), images(4, [others, others]));
+        // Of the stage before the last, or by way of the last.
+        assert_eq!(images(6, [others, first]), images(4, [others, first]));
+        assert_eq!(images(6, [first, second]), images(4, [first, second]));
+        assert_eq!(images(6, [others, second]), images(5, [others, second]));
     }
 
     #[test]
