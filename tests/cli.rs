@@ -645,6 +645,8 @@ fn the_results_of_one_command_never_overwrite_those_of_another() {
         assert_eq!(sandbox.read(&format!("run/{name}.json")), "kept");
     }
     sandbox.run("audit -a run/run.json -o run/eval.json").ended(2, &["run/eval.json"]);
+    let trainings = "run/capacity.trainings.json";
+    sandbox.run(&format!("eval -a run/run.json -n 2 --cycles 1 -o {trainings}")).ended(2, &[trainings]);
     // Elsewhere, and under its own name, it may.
     for out in ["audit.json", "run/eval.json", "run/mine.json"] {
         sandbox.run(&format!("eval -q -a run/run.json -n 2 --cycles 1 --robots best -o {out}")).ended(0, &[]);

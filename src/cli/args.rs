@@ -225,7 +225,7 @@ pub(super) struct EvalArgs {
     /// Folder with the images.
     #[arg(long, value_name = "DIR")]
     pub(super) data: Option<PathBuf>,
-    /// Result file; a CSV goes beside it (default: eval.json, or eval-validation.json, beside run.json, or above several)
+    /// Result file; a CSV goes beside it (default: eval.json, or eval-validation.json, beside run.json, or above several).
     #[arg(short, long, value_name = "FILE")]
     pub(super) out: Option<PathBuf>,
     /// Threads (default: one per core).

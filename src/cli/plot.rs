@@ -31,8 +31,8 @@ Examples:
 pub(super) struct PlotArgs {
     /// What to show: body, spacetime, snapshots, sensitivity, archive, progress, accuracy or capacity.
     kind: Kind,
-    /// A run.json, or its folder (default: the newest under runs/); for accuracy and capacity also an eval.json or capacity.json; may
-    /// be given several times.
+    /// A run.json, or its folder (default: the newest under runs/); for accuracy and capacity also an eval.json or
+    /// capacity.json; may be given several times.
     #[arg(short, long, value_name = "FILE", value_parser = run_json())]
     archive: Vec<PathBuf>,
     /// Id (or the beginning of one), "best", or the name of a published robot; may be given several times.

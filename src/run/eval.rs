@@ -3,7 +3,7 @@
 use super::archive::Robot;
 use super::audit_file::fingerprint;
 use super::eval_file::{EVAL_JSON, EVAL_VALIDATION_JSON, EvalFile, RobotReport, Trial};
-use super::eval_images::Shown;
+use super::eval_images::HeldOutImages;
 use super::held_out::HeldOut;
 use super::robots::{Chosen, Selection, Source};
 use super::training::load_dataset;
@@ -104,12 +104,12 @@ pub fn eval(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Re
         let (count, id) = (unskilled.len(), &chosen.robot.id);
         observer.warning(&format!("{count} robots ({id} …) walk the same way for every class; left out"));
     }
-    let shown = Shown::draw(&sources, &dataset, options)?;
+    let shown = HeldOutImages::draw(config, &sources, &dataset, options)?;
     let test_sha256 = dataset.fingerprint(Split::Test).unwrap_or_default();
     let steps = control_steps(config, options.cycles);
     let mut report = EvalFile::new(&sources, options, steps, &shown.images, test_sha256);
     let splits = robots.iter().filter_map(|chosen| task_of(&grouping, chosen.robot));
-    report.baselines = shown.baselines(&sources, splits, &dataset, options)?;
+    report.baselines = shown.baselines(&sources, splits)?;
     let pool = pool(options.threads)?;
     let walker =
         || Walker { config, control_steps: steps, pool: &pool, stop, observer, done: AtomicU64::new(0) };

@@ -15,23 +15,28 @@ use std::collections::{BTreeMap, BTreeSet};
 /// Training images per class on which the single-pixel baseline is chosen.
 const PIXEL_IMAGES_PER_CLASS: usize = 500;
 
-/// Images, and how robots see them.
-pub(super) struct Shown {
-    /// Test or validation images.
+/// Test or validation images, and how robots see them.
+pub(super) struct HeldOutImages<'a> {
+    config: &'a Config,
+    dataset: &'a Dataset,
+    options: &'a Options,
+    /// The images.
     pub images: Vec<ImageRef>,
     /// Of each.
     pub stimuli: Vec<Grid<f64>>,
 }
 
-impl Shown {
+impl<'a> HeldOutImages<'a> {
     /// As many as asked for, evenly divided between the classes; the first classes get what is left over.
     ///
     /// # Errors
     /// If there are not enough images, or not one of each class is asked for.
-    pub fn draw(sources: &[Source], dataset: &Dataset, options: &Options) -> Result<Shown, Error> {
-        let Some(config) = sources.first().map(|source| &source.run.config) else {
-            return Ok(Shown { images: Vec::new(), stimuli: Vec::new() });
-        };
+    pub fn draw(
+        config: &'a Config,
+        sources: &[Source],
+        dataset: &'a Dataset,
+        options: &'a Options,
+    ) -> Result<Self, Error> {
         let (asked, least) = (options.images, config.classes().len());
         if asked < least {
             let text = format!("--images {asked}: expected {least} or more, one of each class");
@@ -45,31 +50,26 @@ impl Shown {
             }
         };
         let stimuli = images.iter().map(|image| see(config, dataset, split, image.index));
-        Ok(Shown { stimuli: stimuli.collect::<Result<_, _>>()?, images })
+        let stimuli = stimuli.collect::<Result<_, _>>()?;
+        Ok(HeldOutImages { config, dataset, options, images, stimuli })
     }
 
     /// The baselines of each of these tasks.
     ///
     /// # Errors
     /// If an image cannot be drawn or seen.
-    pub fn baselines<'a>(
+    pub fn baselines<'t>(
         &self,
         sources: &[Source],
-        tasks: impl Iterator<Item = &'a grouping::Split>,
-        dataset: &Dataset,
-        options: &Options,
+        tasks: impl Iterator<Item = &'t grouping::Split>,
     ) -> Result<BTreeMap<String, Baselines>, Error> {
-        let Some(config) = sources.first().map(|source| &source.run.config) else {
-            return Ok(BTreeMap::new());
-        };
         let seen = |images: &[ImageRef]| -> Result<Vec<(Grid<f64>, u8)>, Error> {
-            let one = |image: &ImageRef| Ok((see(config, dataset, Split::Train, image.index)?, image.label));
-            images.iter().map(one).collect()
+            let stimulus = |index| see(self.config, self.dataset, Split::Train, index);
+            images.iter().map(|image| Ok((stimulus(image.index)?, image.label))).collect()
         };
-        let choice = seen(&self.pixel_images(config, dataset, options)?)?;
-        let of_runs: Result<Vec<_>, Error> =
-            sources.iter().map(|source| seen(&source.run.training_images)).collect();
-        let of_runs = of_runs?;
+        let choice = seen(&self.pixel_images()?)?;
+        let of_runs = sources.iter().map(|source| seen(&source.run.training_images));
+        let of_runs = of_runs.collect::<Result<Vec<_>, Error>>()?;
         let shown = self.stimuli.iter().zip(&self.images);
         let shown: Vec<Labelled> =
             shown.map(|(stimulus, image)| Labelled { stimulus, class: image.label }).collect();
@@ -92,20 +92,15 @@ impl Shown {
     }
 
     /// Training images to choose a single pixel by; none of those shown.
-    fn pixel_images(
-        &self,
-        config: &Config,
-        dataset: &Dataset,
-        options: &Options,
-    ) -> Result<Vec<ImageRef>, Error> {
-        let shown: BTreeSet<usize> = match options.split {
+    fn pixel_images(&self) -> Result<Vec<ImageRef>, Error> {
+        let shown: BTreeSet<usize> = match self.options.split {
             HeldOut::Test => BTreeSet::new(),
             HeldOut::Validation => self.images.iter().map(|image| image.index).collect(),
         };
         let mut choice = Vec::new();
-        for label in config.classes() {
-            let count = dataset.indices_of(Split::Train, label).len().min(PIXEL_IMAGES_PER_CLASS);
-            let drawn = dataset.draw(Split::Train, &[label], count, options.seed, 0);
+        for label in self.config.classes() {
+            let count = self.dataset.indices_of(Split::Train, label).len().min(PIXEL_IMAGES_PER_CLASS);
+            let drawn = self.dataset.draw(Split::Train, &[label], count, self.options.seed, 0);
             let drawn = drawn.map_err(|error| Error::input(error.to_string()))?;
             let others = drawn.into_iter().filter(|index| !shown.contains(index));
             choice.extend(others.map(|index| ImageRef { index, label }));

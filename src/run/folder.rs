@@ -6,6 +6,7 @@ use super::eval_file::{EVAL_JSON, EVAL_VALIDATION_JSON};
 use super::validation::VALIDATION_JSON;
 use super::{Error, checkpoint};
 use crate::base::files::{check_writable, remove_half_written};
+use std::ffi::OsStr;
 use std::fs::{File, TryLockError};
 use std::path::{Path, PathBuf};
 
@@ -114,7 +115,9 @@ pub(super) fn check_out(out: &Path, of: &Path, own: &str) -> Result<(), Error> {
         if same_folder && (is_of_run || name == of.file_name()) {
             return refuse("expected another name: this would overwrite a file of the run");
         }
-        let is_others = |other: &&&str| **other != own && path.file_stem() == Path::new(other).file_stem();
+        let is_others = |other: &&&str| {
+            **other != own && name.is_some_and(|name| before_dot(name) == before_dot(other.as_ref()))
+        };
         if let Some(other) = RESULTS.iter().find(is_others).filter(|_| same_folder) {
             return refuse(&format!(
                 "expected another name: this is what {other} and what goes with it are called"
@@ -123,6 +126,11 @@ pub(super) fn check_out(out: &Path, of: &Path, own: &str) -> Result<(), Error> {
         check_writable(path).map_err(|error| Error::writing(path, &error))?;
     }
     Ok(())
+}
+
+/// What a file's name says of whose it is: capacity.trainings.json is capacity's, too.
+fn before_dot(name: &OsStr) -> Option<&[u8]> {
+    name.as_encoded_bytes().split(|&byte| byte == b'.').next()
 }
 
 /// The run.json that is meant by its path or its folder's.

@@ -120,7 +120,7 @@ pub(super) fn check(config: &Config, start: Option<&StartRef>, dataset: &Dataset
 }
 
 /// `count` validation images of some runs of one experiment together, evenly divided between the classes, which take turns: so
-/// are the first of them. Of one run they are always the same, and fewer of them the first of more. `asked` says where so many
+/// are the first of them. Of the same runs they are always the same, and fewer of them the first of more. `asked` says where so many
 /// were asked for.
 ///
 /// # Errors

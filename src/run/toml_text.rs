@@ -32,8 +32,9 @@ pub(super) fn read<T: DeserializeOwned>(text: &str, format: Format, name: &str) 
 pub(super) fn read_json<T: DeserializeOwned>(text: &str, name: &str) -> Result<T, Error> {
     let text = text.trim_start_matches('\u{feff}');
     // A list would be taken for an object without keys.
-    if !text.trim_start().starts_with('{') {
-        return Err(refused(name, Some(1), "", "expected a JSON object, {…}"));
+    let begin = text.len() - text.trim_start().len();
+    if !text[begin..].starts_with('{') {
+        return Err(refused(name, line_at(text, Some(begin..begin)), "", "expected a JSON object, {…}"));
     }
     json(text, name)
 }
@@ -136,7 +137,14 @@ fn line_at(text: &str, span: Option<std::ops::Range<usize>>) -> Option<usize> {
 /// set it, or file and, in TOML, line.
 pub(super) fn place(text: &str, format: Format, name: &str, overrides: &[String], message: &str) -> String {
     let key = key_of(message);
-    let is_set = |assignment: &&String| assignment.split_once('=').is_some_and(|(set, _)| set.trim() == key);
+    // The key itself, the table it is of, or a key of the table that is meant.
+    let is_within = |inner: &str, outer: &str| {
+        inner.strip_prefix(outer).is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
+    };
+    let is_set = |assignment: &&String| {
+        let set = assignment.split_once('=').map(|(set, _)| set.trim());
+        set.is_some_and(|set| is_within(set, key) || is_within(key, set))
+    };
     if let Some(assignment) = overrides.iter().rfind(is_set) {
         return format!("--set {assignment}");
     }
@@ -266,6 +274,7 @@ mod tests {
         for text in ["", " [\"a\"]", "7"] {
             assert_eq!(json_error(text), "own.json:1: expected a JSON object, {…}");
         }
+        assert_eq!(json_error("\n\n7"), "own.json:3: expected a JSON object, {…}");
         // As some editors begin their files.
         assert!(read::<Outer>("\u{feff}{\"name\": \"a\"}", Format::Json, "own.json").is_ok());
         assert!(read::<Outer>("\u{feff}name = 'a'", Format::Toml, "own.toml").is_ok());
@@ -290,6 +299,12 @@ mod tests {
         // What was set last.
         let set = ["body.height=7", "body.width=5", " body.height = 0"];
         assert_eq!(place("body.height = 0: expected 1", &set), "--set  body.height = 0");
+        assert_eq!(
+            place("task: expected groups", &["task.groups=[[0], [0]]"]),
+            "--set task.groups=[[0], [0]]"
+        );
+        assert_eq!(place("body.height = 0: expected 1", &["body={height=0}"]), "--set body={height=0}");
+        assert_eq!(place("body.height = 0: expected 1", &["body.heights=7"]), "own.toml:5");
         assert_eq!(super::place("{}", Format::Json, "own.json", &[], "seed = 3: expected"), "own.json");
     }
 
