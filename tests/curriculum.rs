@@ -63,6 +63,44 @@ fn a_curriculum_stopped_after_any_generation_goes_on_to_the_same_bytes() {
     }
 }
 
+#[test]
+fn a_run_goes_on_under_other_stages_that_have_not_begun_to_the_bytes_of_a_run_that_always_had_them() {
+    let sandbox = sandbox();
+    // As in `staged`, in its first stage and what it has of its second; then another third one, and a fourth.
+    let others = |second: u64| {
+        let stages: Vec<String> = staged().split("\n[[stage]]\n").map(String::from).collect();
+        let [base, first, before, _] = &stages[..] else { panic!("{stages:?}") };
+        let before = before.replace("generations = 3", &format!("generations = {second}"));
+        let third = "generations = 2\nimages_per_class = 4\nfitness = \"mean_hinge\"\nrace = true\nkeep = 3";
+        [base, first, &before, third, "images_of = 2\nfitness = \"mean_clipped\"\n"].join("\n[[stage]]\n")
+    };
+    for second in [2, 3, 5] {
+        sandbox.write("others.toml", others(second));
+        sandbox.run("evolve -q -c others.toml -o whole --force").ended(0, &[]);
+        // In the second stage, and (where it has three generations) at its end.
+        for generations in [5, 6, 7] {
+            sandbox.run(&format!("evolve -q -c run.toml -o part --force -g {generations}")).ended(0, &[]);
+            let resumed = sandbox.run("evolve -q -c others.toml -o part --resume");
+            if generations <= 4 + second {
+                resumed.ended(0, &[]);
+                assert_eq!(result(&sandbox, "part"), result(&sandbox, "whole"), "{generations} of {second}");
+                assert_eq!(sandbox.read("part/config.toml"), sandbox.read("whole/config.toml"));
+            } else {
+                let expected = format!("stage 2: generations: expected {} or more", generations - 4);
+                resumed.ended(3, &[&expected, "--force"]);
+            }
+        }
+    }
+    // What has begun is as it was, and no stage that has not.
+    sandbox.run("evolve -q -c run.toml -o part --force -g 5").ended(0, &[]);
+    sandbox.write("first.toml", staged().replacen("generations = 4", "generations = 3", 1));
+    let first = "stage 1: generations = 4 there, 3 now";
+    sandbox.run("evolve -q -c first.toml -o part --resume").ended(3, &[first, "--force"]);
+    sandbox.write("second.toml", staged().replace("control_steps = 15", "control_steps = 15\nrace = true"));
+    let second = "stage 2: race = not set there, true now";
+    sandbox.run("evolve -q -c second.toml -o part --resume").ended(3, &[second, "--force"]);
+}
+
 /// Sets `stop` a moment after a generation, when the next stage has begun to evaluate the archive anew.
 struct Impatient {
     after: u64,

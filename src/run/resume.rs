@@ -1,7 +1,9 @@
-//! Going on with a saved run: only from its own checkpoint, under the same config, on the same images.
+//! Going on with a saved run: only from its own checkpoint, under the same config so far, on the same images. Stages that have not
+//! begun may be others: no result depends on them yet.
 
 use super::checkpoint::{self, Checkpoint};
 use super::config::{CheckpointConfig, DataConfig};
+use super::curriculum::StageConfig;
 use super::folder::{RUN_JSON, RunFolder};
 use super::start::Start;
 use super::training::Training;
@@ -42,7 +44,9 @@ pub(super) fn saved(
 /// Whether a saved run can be gone on with under a config: all that its results depend on must be the same.
 fn compatible(saved: &Checkpoint, config: &Config, dataset: &Dataset) -> Result<(), Error> {
     let hint = || format!("resume with the config it was started with, or {ANEW}");
-    let (theirs, ours) = (keys(&saved.run.config), keys(config));
+    let last = saved.run.generations.saturating_sub(1);
+    let begun = saved.run.config.period(last).stage + 1;
+    let (theirs, ours) = (keys(&saved.run.config, begun), keys(config, begun));
     let is_same_start = is_same_start(saved, config, dataset)?;
     let differs = |key: &&String| theirs.get(*key) != ours.get(*key) && !(is_same_start && *key == START);
     let value = |keys: &Keys, key: &str| keys.get(key).map_or("not set".to_string(), ToString::to_string);
@@ -51,7 +55,13 @@ fn compatible(saved: &Checkpoint, config: &Config, dataset: &Dataset) -> Result<
         let text = format!("the run in this folder has another config: {key} = {theirs} there, {ours} now");
         return Err(Error::input(text).hint(hint()));
     }
-    let training = Training::of(config, dataset, config.period(saved.run.generations.saturating_sub(1)))?;
+    if config.period(last) != saved.run.config.period(last) {
+        let before = config.stage.iter().take(begun - 1).filter_map(|stage| stage.generations).sum::<u64>();
+        let text = format!("stage {begun}: generations: expected {} or more", last + 1 - before);
+        let text = format!("{text}: so many of it have been done in this folder");
+        return Err(Error::input(text).hint(hint()));
+    }
+    let training = Training::of(config, dataset, config.period(last))?;
     if saved.run.dataset != training.dataset || saved.run.training_images != training.images {
         let text =
             "data: the run in this folder was made with other images: the dataset has changed".to_string();
@@ -78,9 +88,11 @@ fn is_same_start(saved: &Checkpoint, config: &Config, dataset: &Dataset) -> Resu
 
 type Keys = BTreeMap<String, toml::Value>;
 
-/// All keys that results depend on, as `map_elites.parents`, with their values.
-fn keys(config: &Config) -> Keys {
+/// All keys that results of the first `begun` stages depend on, as `map_elites.parents` or `stage 2: keep`, with their values. The last
+/// of these stages may last longer, or end.
+fn keys(config: &Config, begun: usize) -> Keys {
     let essence = Config {
+        stage: Vec::new(),
         generations: 1,
         savings: Savings::default(),
         checkpoint: CheckpointConfig::default(),
@@ -90,6 +102,12 @@ fn keys(config: &Config) -> Keys {
     let mut keys = Keys::new();
     // Every field is a number, text, list or table, which TOML has.
     toml::Value::try_from(essence).into_iter().for_each(|root| flatten("", root, &mut keys));
+    for (number, stage) in (1..=begun).zip(&config.stage) {
+        let generations = stage.generations.filter(|_| number < begun);
+        let stage = toml::Value::try_from(StageConfig { generations, ..*stage });
+        let stage = stage.ok().and_then(|stage| stage.as_table().cloned()).unwrap_or_default();
+        keys.extend(stage.into_iter().map(|(key, value)| (format!("stage {number}: {key}"), value)));
+    }
     keys
 }
 
