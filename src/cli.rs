@@ -8,6 +8,7 @@ mod report;
 mod reproduce;
 mod serve;
 
+use crate::base::files::check_writable;
 use crate::base::lanes::InstructionSet;
 use crate::run::capacity_file::CapacityFile;
 use crate::run::data::catalogue::Catalogue;
@@ -100,7 +101,7 @@ fn run_evolve(args: EvolveArgs, console: &Console) -> Result<(), Error> {
     set.extend(args.seed.map(|seed| format!("seed={seed}")));
     set.extend(args.generations.map(|generations| format!("generations={generations}")));
     let config = Config::load(&args.config, &set)?;
-    let name = config::name_of(&args.config);
+    let name = folder::name_of(&args.config);
     let out = args.out.unwrap_or_else(|| Path::new("runs").join(format!("{name}-seed{}", config.seed)));
     let if_exists = match (args.resume, args.force) {
         (true, _) => IfExists::Resume,
@@ -183,7 +184,10 @@ fn run_eval(args: EvalArgs, console: &Console) -> Result<(), Error> {
     let capacity = CapacityFile::of(&report, &options.out);
     summary::evaluation(console, &report, capacity.as_ref(), &options.out);
     if report.stopped {
-        let text = format!("stopped after {} robots; those are saved", report.robots.len());
+        let text = match report.robots.len() {
+            0 => "stopped before the first robot; nothing is written".to_string(),
+            robots => format!("stopped after {robots} robots; those are saved"),
+        };
         return Err(Error::stopped(text));
     }
     Ok(())
@@ -192,6 +196,9 @@ fn run_eval(args: EvalArgs, console: &Console) -> Result<(), Error> {
 fn run_replay(args: ReplayArgs, console: &Console) -> Result<(), Error> {
     let ReplayArgs { robot, physical_only, archive, images, dataset, data, format, out, open, .. } = args;
     let (width, every, fps, look) = (args.width, usize::from(args.every), args.fps, args.look);
+    if let Some(path) = &out {
+        check_writable(path).map_err(|error| Error::writing(path, &error))?;
+    }
     let folder = pictures::folder(archive.as_deref(), &robot)?;
     let replay = replay::replay(&replay::Options { robot, physical_only, archive, images, data, dataset })?;
     let wanted = match &out {
@@ -240,6 +247,10 @@ fn run_data(command: DataCommand, console: &Console) -> Result<(), Error> {
             summary::dataset(console, &found.map_err(|error| Error::input(error.to_string()))?);
         }
         DataCommand::Sheet { dataset: DatasetArgs { dataset, data }, samples, test, out } => {
+            if !out.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("png")) {
+                let text = format!("--out {}: expected a file name that ends in .png", out.display());
+                return Err(Error::usage(text));
+            }
             let split = if test { Split::Test } else { Split::Train };
             let dataset = Dataset::load(&dataset, &given(data.as_deref()), &[split]);
             let dataset = dataset.map_err(|error| Error::input(error.to_string()))?;

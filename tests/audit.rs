@@ -53,8 +53,11 @@ fn verdicts_are_the_same_bytes_on_any_number_of_threads_and_however_often_it_was
         assert_eq!(robot.lives.is_empty(), robot.verdict == Verdict::NotAWalker);
         assert!(robot.lives.iter().all(|life| life.persists) || robot.verdict != Verdict::Physical);
     }
-    // Other criteria are another audit.
-    sandbox.run("audit --archive run/run.json --set threshold=1000").ended(0, &[]);
+    // Other criteria are another audit, which does not replace the one there is.
+    let other = "audit --archive run/run.json --set threshold=1000";
+    sandbox.run(other).ended(3, &["run/audit.json", "other criteria", "--out"]);
+    std::fs::remove_file(sandbox.path("run/audit.json")).unwrap();
+    sandbox.run(other).ended(0, &[]);
     assert!(verdicts(&sandbox).robots.iter().all(|robot| robot.verdict == Verdict::NotAWalker));
 }
 

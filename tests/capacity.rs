@@ -3,8 +3,11 @@
 mod common;
 
 use common::program::{Sandbox, TINY};
+use morphcog::run::capacity::{Observer, Options};
+use morphcog::run::capacity_config::CapacityConfig;
 use morphcog::run::capacity_file::CapacityFile;
 use morphcog::run::eval_file::EvalFile;
+use std::sync::atomic::AtomicBool;
 
 const FEW: &str = "--set trainings=3 --set sizes=[1,4]";
 
@@ -112,6 +115,36 @@ fn what_cannot_be_compared_is_refused() {
     with("--set mlp.rate=1").ended(2, &["mlp.rate"]);
     with("--physical-only").ended(3, &["audit.json", "morphcog audit"]);
     with("-o runs/eval.json").ended(2, &["overwrite"]);
+    let published = sandbox.read("runs/eval.json").replace("\"name\":\"tiny\"", "\"name\":\"gallery\"");
+    sandbox.write("gallery.json", published);
+    sandbox.run("capacity --eval gallery.json --physical-only").ended(2, &["published"]);
     sandbox.run("capacity --eval runs/3/run.json").ended(3, &["morphcog-eval"]);
     sandbox.run("capacity --eval nowhere.json").ended(3, &["nowhere.json"]);
+}
+
+#[test]
+fn what_was_found_stays_if_the_next_search_is_stopped_before_it_finds_anything() {
+    let sandbox = sandbox();
+    capacity(&sandbox, "");
+    let found = sandbox.read("runs/capacity.json");
+    let options = Options {
+        eval: sandbox.path("runs/eval.json"),
+        config: CapacityConfig::load(None, &["seed=2".to_string()]).unwrap(),
+        physical_only: false,
+        data: None,
+        out: sandbox.path("runs/capacity.json"),
+        threads: Some(1),
+    };
+    let stopped = morphcog::run::capacity::capacity(&options, &AtomicBool::new(true), &Silent).unwrap();
+    assert!(stopped.stopped && stopped.tasks.is_empty());
+    assert_eq!(sandbox.read("runs/capacity.json"), found);
+}
+
+/// Says nothing.
+struct Silent;
+
+impl Observer for Silent {
+    fn started(&self, _: u64, _: u64) {}
+    fn progress(&self, _: u64) {}
+    fn warning(&self, _: &str) {}
 }

@@ -89,6 +89,9 @@ fn a_wrong_command_line_ends_with_2() {
         "evolve -c tiny.toml --resume --force",
         "evolve -c tiny.toml --seed -1",
         "evolve -c tiny.toml --seed 18446744073709551616",
+        "evolve -c tiny.toml --seed 9223372036854775808",
+        "data sheet builtin -o sheet.gif",
+        "replay --robot YJTLA --dataset builtin --format html -o walk.gif",
         "evolve -c tiny.toml -g 1.5",
         "evolve -c tiny.toml -q --json",
         "eval --images 0",
@@ -284,7 +287,14 @@ fn a_wrong_set_is_refused_with_2_and_quotes_it() {
         said(command).ended(2, &["--set", words]);
         assert!(!sandbox.path("run").exists());
     }
-    // Well typed, but not what can be: the config's fault.
+    // Well typed, but not what can be: the config's fault. What no file can hold is not taken for the same as anything else.
+    let table: toml::Table =
+        toml::from_str(&TINY.replace("[data]\n", "[data]\nbuiltin = { seed = 77 }\n")).unwrap();
+    let large = serde_json::to_string(&table).unwrap().replace(":77", ":9223372036854775808");
+    sandbox.write("large.json", large);
+    sandbox
+        .run("evolve -c large.json -o run")
+        .ended(3, &["data.builtin.seed = 9223372036854775808", "0 to 9223372036854775807"]);
     sandbox
         .run("evolve -c tiny.toml -o run --set generations=0")
         .ended(3, &["--set generations=0: ", "generations = 0"]);
@@ -393,6 +403,21 @@ fn an_unstable_life_ends_with_4_after_its_rows_and_says_when() {
 }
 
 #[test]
+fn contacts_without_offset_or_stiffness_blow_nothing_up() {
+    let sandbox = Sandbox::new();
+    for physics in
+        ["\"contact_offset\": 0", "\"contact_stiffness\": 0", "\"contact_damping\": 0, \"friction\": 0"]
+    {
+        let body = "[[3, 3, 6], [4, 2, 5]]";
+        sandbox.write(
+            "s.json",
+            format!("{{\"body\": {body}, \"control_steps\": 3, \"physics\": {{{physics}}}}}"),
+        );
+        sandbox.run("simulate s.json").ended(0, &[]);
+    }
+}
+
+#[test]
 fn simulate_switches_stimuli_and_resets_when_asked() {
     let sandbox = Sandbox::new();
     let run = |text: &str| {
@@ -436,6 +461,7 @@ fn a_wrong_scenario_is_refused_with_file_line_and_key() {
         ("{\"body\": [[3]], \"stimuli\": [[[1]]], \"switch_every\": 0}", "switch_every"),
         ("{\"body\": [[3]], \"stimuli\": [[[1]]], \"stimulus\": [[1]], \"switch_every\": 1}", "stimuli"),
         ("{\"body\": [[3]], \"switch_every\": 3}", "switch_every"),
+        ("{\"body\": [[3]], \"physics\": {\"servo_gain\": 0}}", "servo_gain"),
         ("{\"body\": [[3]], \"control_steps\": -3}", "control_steps"),
         ("{\"body\": [[3]], \"control_steps\": 1e3}", "control_steps"),
         ("{\"body\": [[3]], \"start_column\": 9223372036854775807}", "start_column"),
@@ -732,6 +758,7 @@ fn replay_shows_the_images_and_formats_it_is_asked_for() {
     let view = sandbox.run("replay -a run/run.json --format terminal").ended(0, &[]);
     assert!(view.out.lines().count() > 10 && !view.out.contains('\x1b'), "{}", view.out);
     sandbox.run("replay -a run/run.json -i test:99999999").ended(2, &["--images", "99999999"]);
+    sandbox.run("replay -a run/run.json -o nowhere/walk.gif").ended(1, &["nowhere/walk.gif"]);
     sandbox.run("replay -a run/run.json -o walk.avi").ended(2, &["walk.avi", ".gif"]);
     for width in ["0", "1", "4294967295"] {
         sandbox.run(&format!("replay -a run/run.json -o walk.gif --width {width}")).ended(2, &["--width"]);

@@ -70,6 +70,69 @@ fn what_lies_beside_the_run_is_in_it_and_several_runs_go_together() {
 }
 
 #[test]
+fn what_was_found_of_another_state_of_a_run_is_left_out_and_what_was_stopped_is_said() {
+    let sandbox = sandbox();
+    sandbox.run("eval -q --archive runs/3 --images 20 --cycles 1 --robots top:2").ended(0, &[]);
+    let whole = sandbox.read("runs/3/eval.json");
+    sandbox.write("runs/3/eval.json", whole.replace("\"stopped\":false", "\"stopped\":true"));
+    sandbox.run("report runs/3 --lives 0").ended(0, &[]);
+    assert!(sandbox.read("runs/3/report.html").contains("stopped before the last of them"));
+    sandbox.write("runs/3/capacity.json", "{");
+    sandbox.run("evolve -q -c tiny.toml -o runs/3 --resume -g 90").ended(0, &[]);
+    let said =
+        sandbox.run("report runs/3 --lives 0").ended(0, &["eval.json: stale", "capacity.json", "left out"]);
+    assert!(!sandbox.read("runs/3/report.html").contains("Test on held-out images"), "{said:?}");
+    sandbox.run("plot accuracy -a runs/3").ended(3, &["eval.json: stale", "morphcog eval"]);
+    // The file itself, named, is what is meant.
+    sandbox.run("plot accuracy -a runs/3/eval.json -o figure.svg").ended(0, &[]);
+    assert!(sandbox.read("figure.svg").contains("stopped before"));
+}
+
+#[test]
+fn its_commands_make_it_again() {
+    let sandbox = sandbox();
+    let run = "runs/it's 3";
+    std::fs::rename(sandbox.path("runs/3"), sandbox.path(run)).unwrap();
+    let told = |args: &[&str]| common::program::said(sandbox.command(args));
+    told(&["eval", "-q", "-a", run, "--images", "20", "--robots", "top:2"]).ended(0, &[]);
+    told(&["audit", "-q", "-a", run, "--robots", "top:1"]).ended(0, &[]);
+    let eval = format!("{run}/eval.json");
+    told(&[
+        "capacity",
+        "-q",
+        "--eval",
+        &eval,
+        "--clean",
+        "--set",
+        "trainings=2",
+        "--set",
+        "sizes=[1,5]",
+        "--set",
+        "step=2",
+    ])
+    .ended(0, &[]);
+    told(&["report", "-q", run, "--lives", "0"]).ended(0, &[]);
+    let page = sandbox.read(&format!("{run}/report.html"));
+    let commands = between(&page, "<pre>morphcog evolve", "</pre>")[0];
+    let commands = format!("morphcog evolve{commands}").replace("&#39;", "'").replace("&amp;", "&");
+    for line in commands.lines() {
+        let line = line.replace("morphcog", common::program::PROGRAM);
+        let ended =
+            std::process::Command::new("sh").args(["-c", &line]).current_dir(sandbox.path("")).output();
+        let ended = ended.unwrap();
+        assert!(ended.status.success(), "{line}: {}", String::from_utf8_lossy(&ended.stderr));
+    }
+    let again = "again/tiny-seed3";
+    for file in ["run.json", "audit.json", "eval.csv", "capacity.csv"] {
+        assert_eq!(
+            sandbox.read(&format!("{again}/{file}")),
+            sandbox.read(&format!("{run}/{file}")),
+            "{file}"
+        );
+    }
+}
+
+#[test]
 fn what_is_no_run_is_refused() {
     let sandbox = sandbox();
     sandbox.run("report nowhere").ended(3, &["nowhere"]);

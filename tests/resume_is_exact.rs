@@ -380,3 +380,23 @@ fn a_second_sigint_ends_at_once_with_130_and_the_run_can_still_be_resumed() {
     }
     assert_eq!(ended, Some(130));
 }
+
+#[test]
+fn a_first_sigint_after_another_signal_still_lets_the_generation_finish() {
+    let sandbox = Sandbox::tiny();
+    let slow =
+        "--set protocol.control_steps=500 --set savings.known_bodies=false --set savings.early_stop=false";
+    for other in ["USR1", "TERM"] {
+        let run = format!("evolve -c tiny.toml -g 400 {EVERY_GENERATION} {slow} --threads 1 -o {other}");
+        let mut child = sandbox.start(&format!("{run} --json"));
+        let mut events = BufReader::new(child.stdout.take().unwrap());
+        wait_for_generation(&mut events, 1);
+        std::thread::sleep(Duration::from_millis(60));
+        signal(&child, other);
+        std::thread::sleep(Duration::from_millis(25));
+        signal(&child, "INT");
+        events.read_to_string(&mut String::new()).unwrap();
+        assert_eq!(child.wait().unwrap().code(), Some(75), "{other}");
+        assert!(sandbox.run_file(other).generations >= 1);
+    }
+}

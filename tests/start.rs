@@ -158,15 +158,17 @@ fn an_archive_that_cannot_be_started_from_is_refused_before_anything_is_written(
     refused("--set start.archive=3", 2, &["start.archive"]);
 }
 
-/// Sets `stop` before the other run's elites are evaluated.
-struct Hasty<'a>(&'a AtomicBool);
+/// Sets `stop` before the other run's elites are evaluated, or after.
+struct Hasty<'a>(&'a AtomicBool, bool);
 
 impl Observer for Hasty<'_> {
     fn started(&mut self, _: &RunFolder, _: &Training, _: &Progress) {}
     fn starting_from(&mut self, _: &StartRef, _: usize) {
+        self.0.store(!self.1, Ordering::Relaxed);
+    }
+    fn period(&mut self, _: Period, _: &Training, _: &Progress) {
         self.0.store(true, Ordering::Relaxed);
     }
-    fn period(&mut self, _: Period, _: &Training, _: &Progress) {}
     fn generation(&mut self, _: &Progress) {}
     fn warning(&mut self, _: &str) {}
 }
@@ -177,18 +179,23 @@ fn a_run_stopped_while_it_begins_begins_again() {
     let archive = sandbox.path("other/run.json");
     let text = sandbox.read("run.toml").replace("other/run.json", &archive.display().to_string());
     sandbox.write("run.toml", &text);
-    let options = Options {
+    sandbox.run("evolve -q -c run.toml -o whole").ended(0, &[]);
+    let options = |out: &str| Options {
         config: Config::parse(&text, "run.toml", &[]).unwrap(),
         name: "run".to_string(),
-        out: sandbox.path("run"),
+        out: sandbox.path(out),
         if_exists: IfExists::Refuse,
         data: None,
         threads: Some(1),
     };
-    let stop = AtomicBool::new(false);
-    let finished = evolve(&options, &stop, &mut Hasty(&stop)).unwrap();
-    assert_eq!((finished.stopped, finished.run.generations, finished.run.elites.len()), (true, 0, 0));
-    sandbox.run("evolve -q -c run.toml -o run --resume").ended(0, &[]);
-    sandbox.run("evolve -q -c run.toml -o whole").ended(0, &[]);
-    assert_eq!(sandbox.read("run/run.json"), sandbox.read("whole/run.json"));
+    for (out, after) in [("before", false), ("after", true)] {
+        let stop = AtomicBool::new(false);
+        let finished = evolve(&options(out), &stop, &mut Hasty(&stop, after)).unwrap();
+        assert_eq!((finished.stopped, finished.run.generations), (true, 0));
+        assert_eq!(finished.run.elites.is_empty(), !after);
+        sandbox.run(&format!("evolve -q -c run.toml -o {out} --resume")).ended(0, &[]);
+        assert_eq!(sandbox.read(&format!("{out}/run.json")), sandbox.read("whole/run.json"));
+        let metrics = |folder: &str| without_seconds(&sandbox.read(&format!("{folder}/metrics.csv")));
+        assert_eq!(metrics(out), metrics("whole"));
+    }
 }

@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::program::{Sandbox, TINY};
+use common::program::{Sandbox, TINY, files};
 use morphcog::run::audit_file::AuditFile;
 use morphcog::run::eval_file::EvalFile;
 use morphcog::run::held_out::{HeldOut, images};
@@ -102,12 +102,12 @@ fn robots_are_compared_on_validation_images_without_a_look_at_the_test_images() 
     assert!(!sandbox.path("run/eval.json").exists());
     let report = EvalFile::read(&sandbox.path("run/eval-validation.json")).unwrap();
     assert_eq!(report.split, HeldOut::Validation);
-    assert_eq!(report.images, images(&[&run], &dataset, "--images", 60).unwrap());
-    for robot in &report.robots {
-        // The same images, so the same answers.
-        let selected = robot.validation.as_ref().unwrap();
-        assert_eq!((robot.right, robot.balanced_accuracy), (selected.right, selected.balanced_accuracy));
-    }
+    // By what robots were chosen, they are not compared.
+    let selected = images(&[&run], &dataset, "--images", 60).unwrap();
+    assert!(report.images.len() == 60 && report.images.iter().all(|image| !selected.contains(image)));
+    sandbox.run(&format!("{command} --images 60 --robots top:1")).ended(0, &[]);
+    let report = EvalFile::read(&sandbox.path("run/eval-validation.json")).unwrap();
+    assert_eq!(report.images, selected);
     // Robots of two runs: on images that neither was trained on.
     sandbox.write("other.toml", sandbox.read("run.toml").replace("seed = 3", "seed = 2"));
     sandbox.run("evolve -q -c other.toml -o other").ended(0, &[]);
@@ -117,6 +117,10 @@ fn robots_are_compared_on_validation_images_without_a_look_at_the_test_images() 
     sandbox.run(both).ended(0, &[]);
     let report = EvalFile::read(&sandbox.path("eval-validation.json")).unwrap();
     assert_eq!(report.images.len(), 60);
+    let turned = both.replace("run/run.json other/run.json", "other/run.json run/run.json");
+    sandbox.run(&turned).ended(0, &[]);
+    let turned = EvalFile::read(&sandbox.path("eval-validation.json")).unwrap();
+    assert_eq!(turned.images, report.images);
     for run in [&run, &other] {
         for period in run.config.periods(run.generations) {
             let trained = Training::drawn(&run.config, &dataset, period).unwrap();
@@ -169,6 +173,44 @@ fn too_few_or_too_many_validation_images_are_refused() {
     };
     with("--validation 10").ended(2, &["--validation 10", "40"]);
     with("--validation 1000000").ended(3, &["--validation 1000000", "ask for at most"]);
+    sandbox.run("eval --archive run/run.json --validation 60").ended(2, &["--validation", "best-validation"]);
+}
+
+#[test]
+fn a_run_that_goes_on_to_where_too_few_are_left_is_refused_before_it_does() {
+    let sandbox = Sandbox::new();
+    let few = TINY.replace("[data]\n", "[data]\nbuiltin = { train_per_class = 40 }\n");
+    let stage = "\n[[stage]]\nimages_per_class = 10\nredraw = 2\n[validation]\nimages = 40\nbest = 1\n";
+    sandbox.write("run.toml", format!("{few}{stage}"));
+    sandbox.run("evolve -q -c run.toml -o run -g 2").ended(0, &[]);
+    let before = files(&sandbox.path("run"));
+    let on = "evolve -q -c run.toml -o run --resume -g";
+    sandbox.run(&format!("{on} 40")).ended(3, &["validation.images = 40", "validation.best"]);
+    assert_eq!(files(&sandbox.path("run")), before);
+    // Nor is one begun in a folder that is there already.
+    std::fs::create_dir(sandbox.path("empty")).unwrap();
+    sandbox.run("evolve -q -c run.toml -o empty --resume -g 40").ended(3, &["validation.images = 40"]);
+    // What is chosen at the end may be another thing: nothing before depends on it.
+    sandbox.run(&format!("{on} 40 --set validation.best=0")).ended(0, &[]);
+}
+
+#[test]
+fn nothing_is_chosen_by_other_images_of_the_same_number() {
+    let sandbox = Sandbox::new();
+    sandbox.write("run.toml", TINY);
+    sandbox.run("evolve -q -c run.toml -o run").ended(0, &[]);
+    let other = sandbox.read("run/run.json");
+    let sha256 = &sandbox.run_file("run").dataset.train_sha256;
+    sandbox.write("other/run.json", other.replace(sha256.as_str(), &"0".repeat(64)));
+    for options in ["--robots best-validation:1 --validation 60", "--robots top:1 --split validation"] {
+        sandbox
+            .run(&format!("eval --archive other/run.json --images 20 {options}"))
+            .ended(3, &["another SHA-256", "--data"]);
+    }
+    for command in ["replay -a other/run.json -o x.png", "replay -a other -i test:1 -o x.png", "report other"]
+    {
+        sandbox.run(command).ended(3, &["another SHA-256"]);
+    }
 }
 
 #[test]

@@ -7,10 +7,10 @@ use super::report::{self, ReportArgs};
 use super::reproduce::{self, ReproduceArgs};
 use super::run_json;
 use super::serve::{self, ServeArgs};
-use crate::run::eval;
 use crate::run::held_out::HeldOut;
 use crate::run::replay::Shown;
 use crate::run::robots::Selection;
+use crate::run::{config, eval};
 use crate::task::dataset::BUILTIN;
 use crate::view::console::Mode;
 use crate::view::pictures::Format;
@@ -124,7 +124,7 @@ Examples:
     /// The built-in configs: list them, or print one to start your own from.
     #[command(after_help = "Examples:\n  morphcog config\n  morphcog config zero_one.toml > mine.toml")]
     Config {
-        /// Name of a built-in config, or a file: printed with every key resolved.
+        /// Name of a built-in config, or a file: printed with its defaults.
         name: Option<String>,
         /// Change a key before printing.
         #[arg(long, value_name = "KEY=VALUE", requires = "name")]
@@ -165,10 +165,10 @@ pub(super) struct EvolveArgs {
     #[arg(long, value_name = "KEY=VALUE")]
     pub(super) set: Vec<String>,
     /// Seed of all chance.
-    #[arg(long)]
+    #[arg(long, value_parser = clap::value_parser!(u64).range(..=config::MAX_NUMBER))]
     pub(super) seed: Option<u64>,
     /// Number of generations.
-    #[arg(short, long, value_parser = clap::value_parser!(u64).range(1..))]
+    #[arg(short, long, value_parser = clap::value_parser!(u64).range(1..=config::MAX_NUMBER))]
     pub(super) generations: Option<u64>,
     /// Threads (default: one per core); the result does not depend on it.
     #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
@@ -253,8 +253,8 @@ pub(super) struct ReplayArgs {
     /// Folder with the images.
     #[arg(long, value_name = "DIR")]
     pub(super) data: Option<PathBuf>,
-    /// What to make.
-    #[arg(short, long, value_delimiter = ',', default_values_t = [Format::Gif, Format::Html])]
+    /// What to make, separated by commas (default: gif,html).
+    #[arg(short, long, value_delimiter = ',')]
     pub(super) format: Vec<Format>,
     /// File; its ending (.gif, .html, .png) says the format (default: replay-<robot> beside run.json).
     #[arg(short, long, value_name = "FILE")]

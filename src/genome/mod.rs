@@ -136,7 +136,11 @@ impl Genome {
         if !voxels.cells().iter().any(|material| params.voxel_scope.contains(*material)) {
             return self.with_mutated_network(spec, params, rng);
         }
-        self.with_voxels_changed(&described, spec, params, rng, promise)
+        match self.with_voxels_changed(&described, spec, params, rng, promise) {
+            // On a large body with few voxels that may change, not one was hit in all those draws.
+            Err(GenomeError::NoValidBody { .. }) => self.with_mutated_network(spec, params, rng),
+            changed => changed,
+        }
     }
 
     fn with_mutated_network(

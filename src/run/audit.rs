@@ -4,7 +4,7 @@ use super::archive::{Robot, RunFile};
 use super::audit_file::{AUDIT_JSON, AuditFile, RobotAudit, fingerprint};
 use super::folder::check_out;
 use super::robots::{self, Selection};
-use super::training::{Training, load_dataset, see};
+use super::training::{Training, load_dataset_of, see};
 use super::verdict::{Behaviour, Criteria, PerturbedLife};
 use super::{Config, Error, gallery};
 use crate::base::hash::sha256_hex;
@@ -102,6 +102,12 @@ pub fn audit(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> R
     let grouping = config.grouping()?.with_fitness(fitness);
     let trial = Trial { grouping, training, criteria: options.criteria.clone(), config };
     if let Ok(earlier) = AuditFile::read(&options.out) {
+        if earlier.run_sha256 == file.run_sha256 && earlier.criteria != file.criteria {
+            let (out, count) = (options.out.display(), earlier.robots.len());
+            let text = format!("{out}: {count} robots of this run are audited by other criteria");
+            let hint = "write elsewhere with --out, or move that file away".to_string();
+            return Err(Error::input(text).hint(hint));
+        }
         let same = AuditFile { robots: Vec::new(), ..earlier.clone() } == file;
         file.robots = if same { earlier.robots } else { Vec::new() };
     }
@@ -194,11 +200,7 @@ fn open(options: &Options) -> Result<Opened, Error> {
 
 /// The images a run's robots were evolved on, of each class the first few. Of other data, verdicts would mean nothing.
 fn training_of(run: &RunFile, options: &Options) -> Result<Training, Error> {
-    let dataset = load_dataset(&run.config, options.data.as_deref(), &[Split::Train])?;
-    if dataset.fingerprint(Split::Train).unwrap_or_default() != run.dataset.train_sha256 {
-        let text = "the training images here are not those the run was made with (another SHA-256)";
-        return Err(Error::input(text.to_string()).hint("name their folder with --data".to_string()));
-    }
+    let dataset = load_dataset_of(&run.dataset, &run.config, options.data.as_deref(), &[Split::Train])?;
     let mut taken = [0; 256];
     let mut images = run.training_images.clone();
     images.retain(|image| {

@@ -8,7 +8,7 @@ use super::folder::check_out;
 use super::held_out::HeldOut;
 use super::statistics::standard_deviation;
 use super::trainings::Trainings;
-use super::{Error, audit_file::AuditFile, eval};
+use super::{Error, audit_file::AuditFile, eval, gallery};
 use crate::base::files::write_atomically;
 use crate::base::hash::sha256_hex;
 use crate::baseline::{Kind, Pooling, Trained, curve};
@@ -149,7 +149,10 @@ pub fn capacity(
         file.tasks.push(TaskCapacity { task: split.name(), robots: of_task.len(), accuracy, curves });
         write(options, &file)?;
     }
-    write(options, &file)?;
+    // What was found before is better than nothing.
+    if !file.tasks.is_empty() {
+        write(options, &file)?;
+    }
     Ok(file)
 }
 
@@ -186,6 +189,10 @@ fn robots<'a>(report: &'a EvalFile, options: &Options) -> Result<Vec<&'a RobotRe
     }
     if !options.physical_only {
         return Ok(report.robots.iter().collect());
+    }
+    if report.runs.iter().any(|run| run.name == gallery::ALL) {
+        let text = "--physical-only: expected an evaluation of robots of an archive, not of published ones";
+        return Err(Error::usage(text.to_string()).hint("morphcog audit --robots gallery".to_string()));
     }
     let folder = options.eval.parent().unwrap_or(Path::new(""));
     let audits: Result<Vec<_>, Error> =

@@ -32,8 +32,8 @@ pub const BUILT_IN: [(&str, &str); 8] = [
     ("four_digit_curriculum.toml", include_str!("../../configs/four_digit_curriculum.toml")),
 ];
 
-/// Largest seed: TOML's numbers are signed.
-const MAX_SEED: u64 = i64::MAX as u64;
+/// Largest whole number of a config, its seed's, too: TOML's are signed.
+pub const MAX_NUMBER: u64 = i64::MAX as u64;
 
 /// Largest offset of the QD score either way \[voxel lengths\].
 const MAX_OFFSET: f64 = 1e9;
@@ -167,9 +167,25 @@ impl Default for CheckpointConfig {
     }
 }
 
-/// What a run of a config is called: the config's name without folder and ending.
-pub fn name_of(config: &str) -> String {
-    Path::new(config).file_stem().map_or("run".to_string(), |stem| stem.to_string_lossy().into_owned())
+/// A number at or below a place that is too large for a file, with its key.
+fn too_large(place: &str, value: &serde_json::Value) -> Option<(String, u64)> {
+    use serde_json::Value::{Array, Number, Object};
+    let below = |key: &str| match place {
+        "" => key.to_string(),
+        stage if stage.ends_with(':') => format!("{stage} {key}"),
+        section => format!("{section}.{key}"),
+    };
+    match value {
+        Number(number) => {
+            number.as_u64().filter(|&number| number > MAX_NUMBER).map(|number| (place.to_string(), number))
+        }
+        Object(keys) => keys.iter().find_map(|(key, value)| too_large(&below(key), value)),
+        Array(stages) if place == "stage" => {
+            (1..).zip(stages).find_map(|(number, stage)| too_large(&format!("stage {number}:"), stage))
+        }
+        Array(values) => values.iter().find_map(|value| too_large(place, value)),
+        _ => None,
+    }
 }
 
 impl Config {
@@ -250,6 +266,10 @@ impl Config {
         let refuse = |key: &str, found: String, expected: &str| {
             Err(Error::input(format!("{key} = {found}: expected {expected}")))
         };
+        let numbers = serde_json::to_value(self).map_err(|error| Error::input(error.to_string()))?;
+        if let Some((key, number)) = too_large("", &numbers) {
+            return refuse(&key, number.to_string(), &format!("0 to {MAX_NUMBER}"));
+        }
         self.grouping()?;
         self.validate_stages()?;
         self.physics.validate().map_err(|error| Error::input(format!("physics.{error}")))?;
@@ -274,10 +294,7 @@ impl Config {
             let expected = format!("{} or more", validation::LEAST);
             return refuse("validation.images", self.validation.images.to_string(), &expected);
         }
-        if self.seed > MAX_SEED {
-            return refuse("seed", self.seed.to_string(), &format!("0 to {MAX_SEED}"));
-        }
-        if self.generations == 0 || self.generations > MAX_SEED {
+        if self.generations == 0 {
             return refuse("generations", self.generations.to_string(), "1 or more");
         }
         if self.map_elites.parents == 0 && self.map_elites.newcomers == 0 {

@@ -6,7 +6,7 @@ use super::eval_file::{EVAL_JSON, EVAL_VALIDATION_JSON, EvalFile, RobotReport, T
 use super::eval_images::HeldOutImages;
 use super::held_out::HeldOut;
 use super::robots::{Chosen, Selection, Source};
-use super::training::load_dataset;
+use super::training::{load_dataset, load_dataset_of};
 use super::validation::{self, Validated};
 use super::{Config, Error, folder::check_out, gallery};
 use crate::base::Grid;
@@ -87,13 +87,23 @@ pub fn eval(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Re
     }
     different(&sources)?;
     let config = &first.run.config;
+    if options.validation.is_some() && options.robots.validated().is_none() {
+        let text =
+            "--validation: expected with --robots best-validation:N: only those are chosen by such images";
+        return Err(Error::usage(text.to_string()));
+    }
     let validated = options.validation.unwrap_or(config.validation.images);
     if options.robots.validated().is_some() && validated < validation::LEAST {
         let least = validation::LEAST;
         return Err(Error::usage(format!("--validation {validated}: expected {least} or more images")));
     }
     let grouping = config.grouping()?;
-    let dataset = load_dataset(config, options.data.as_deref(), &Split::ALL)?;
+    let data = options.data.as_deref();
+    let dataset = match options.robots.validated().is_some() || options.split == HeldOut::Validation {
+        // Which images are for validation is known by their indices.
+        true => load_dataset_of(&first.run.dataset, config, data, &Split::ALL)?,
+        false => load_dataset(config, data, &Split::ALL)?,
+    };
     if dataset.fingerprint(Split::Train).unwrap_or_default() != first.run.dataset.train_sha256 {
         observer.warning("the training images here are not those the run was made with (another SHA-256)");
     }

@@ -1,9 +1,10 @@
 //! `eval.json` and `eval.csv`: what an evaluation found.
 
 use super::archive::{Robot, RunFile};
+use super::audit_file::fingerprint;
 use super::eval::Options;
 use super::held_out::HeldOut;
-use super::robots::{Selection, Source};
+use super::robots::Source;
 use super::setting::{RunRef, Setting};
 use super::statistics::{bootstrap, standard_deviation, wilson};
 use super::training::ImageRef;
@@ -252,18 +253,33 @@ impl EvalFile {
         self.means = means.collect();
     }
 
-    /// Whether it is what these options would make of these runs, and whole.
-    pub(super) fn is_of(&self, sources: &[Source], options: &Options) -> bool {
-        let runs: Vec<RunRef> = sources.iter().map(|source| RunRef::new(&source.run)).collect();
-        let same_robots = match &options.robots {
-            Selection::Drawn { robots, .. } => {
-                robots.iter().map(|(run, id)| (*run, id)).eq(self.robots.iter().map(|r| (r.run, &r.id)))
+    /// How the robots were selected, for people; if a signal came before the last of them, that, too.
+    pub fn selection(&self) -> String {
+        let stopped = if self.stopped { "; stopped before the last of them" } else { "" };
+        format!("{}{stopped}", self.selected)
+    }
+
+    /// Reads an evaluation of robots of these runs as they are now, and of no others.
+    ///
+    /// # Errors
+    /// As of [`EvalFile::read`]; or that it is about other runs, or another state of them.
+    pub fn of_runs(path: &Path, runs: &[&RunFile]) -> Result<Self, Error> {
+        let file = Self::read(path)?;
+        let now: Vec<String> = runs.iter().map(|run| fingerprint(run)).collect();
+        match file.runs.iter().find(|run| !now.contains(&run.sha256)) {
+            None => Ok(file),
+            Some(run) => {
+                let text = format!(
+                    "{}: stale: it is about another run, or another state of this one ({}, generation {}, SHA-256 of its \
+                    content {}…)",
+                    path.display(),
+                    run.name,
+                    run.generations,
+                    run.sha256.get(..10).unwrap_or_default()
+                );
+                Err(Error::input(text).hint("morphcog eval tests the run as it is now".to_string()))
             }
-            _ => false,
-        };
-        let same = (self.seed, self.split, self.images.len(), self.threshold)
-            == (options.seed, options.split, options.images, options.threshold);
-        !self.stopped && self.runs == runs && same && same_robots
+        }
     }
 
     /// Reads `eval.json`.

@@ -1,8 +1,9 @@
 //! The images that `eval` shows, and what takes no body on them.
 
+use super::archive::RunFile;
 use super::eval::Options;
 use super::eval_file::Baselines;
-use super::held_out::{self, HeldOut};
+use super::held_out::{self, HeldOut, images_besides};
 use super::robots::Source;
 use super::training::{ImageRef, see};
 use super::{Config, Error};
@@ -46,7 +47,8 @@ impl<'a> HeldOutImages<'a> {
             HeldOut::Test => (test_images(config, dataset, options)?, Split::Test),
             HeldOut::Validation => {
                 let runs: Vec<_> = sources.iter().map(|source| &source.run).collect();
-                (held_out::images(&runs, dataset, "--images", asked)?, Split::Train)
+                let besides = chosen_by(config, &runs, dataset, options)?;
+                (images_besides(&besides, &runs, dataset, "--images", asked)?, Split::Train)
             }
         };
         let stimuli = images.iter().map(|image| see(config, dataset, split, image.index));
@@ -111,6 +113,24 @@ impl<'a> HeldOutImages<'a> {
 
 fn labelled(list: &[(Grid<f64>, u8)]) -> Vec<Labelled<'_>> {
     list.iter().map(|(stimulus, class)| Labelled { stimulus, class: *class }).collect()
+}
+
+/// Validation images that robots of each run are chosen by, if they are.
+fn chosen_by(
+    config: &Config,
+    runs: &[&RunFile],
+    dataset: &Dataset,
+    options: &Options,
+) -> Result<BTreeSet<usize>, Error> {
+    let mut all = BTreeSet::new();
+    if options.robots.validated().is_some() {
+        let count = options.validation.unwrap_or(config.validation.images);
+        for run in runs {
+            let of_run = held_out::images(&[run], dataset, "--validation", count)?;
+            all.extend(of_run.into_iter().map(|image| image.index));
+        }
+    }
+    Ok(all)
 }
 
 /// Test images, class after class.

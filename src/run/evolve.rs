@@ -62,13 +62,22 @@ pub fn evolve(
         true => resume::saved(&folder, config, &dataset, |text| observer.warning(&text))?,
         false => None,
     };
-    let begun = saved.as_ref().is_some_and(|saved| saved.run.generations > 0);
-    let start = if may_have_begun && !begun { Start::read(config, &dataset)? } else { start };
+    // One without a generation has counted nothing that counts: its start is evaluated again.
+    let saved = saved.filter(|saved| saved.run.generations > 0);
+    let start = if may_have_begun && saved.is_none() { Start::read(config, &dataset)? } else { start };
+    if may_have_begun {
+        let origin = saved.as_ref().and_then(|saved| saved.run.start.as_ref());
+        held_out::check(config, origin.or(start.as_ref().map(|start| &start.origin)), &dataset)?;
+    }
     let write = |name: &str, content: &[u8]| {
         let path = folder.path().join(name);
         write_atomically(&path, content).map_err(|error| Error::writing(&path, &error))
     };
-    write(folder::CONFIG, config.to_toml().as_bytes())?;
+    // A config that says the same stays as it is, with its comments: it may be what this run was asked for with.
+    let there = super::Config::load(&folder.path().join(folder::CONFIG).to_string_lossy(), &[]);
+    if there.ok().as_ref() != Some(config) {
+        write(folder::CONFIG, config.to_toml().as_bytes())?;
+    }
     let pool = rayon::ThreadPoolBuilder::new().num_threads(options.threads.unwrap_or(0)).build();
     let pool = pool.map_err(|error| Error::other(format!("no threads: {error}")))?;
     let mut run = Run::new(options, &dataset, first, saved)?;

@@ -1,5 +1,6 @@
 //! A run's folder: made, locked, and never overwritten by accident.
 
+use super::archive::RunFile;
 use super::audit_file::AUDIT_JSON;
 use super::capacity_file::CAPACITY_JSON;
 use super::eval_file::{EVAL_JSON, EVAL_VALIDATION_JSON};
@@ -91,6 +92,30 @@ impl RunFolder {
     pub(super) fn files() -> [&'static str; 6] {
         let [newest, previous] = checkpoint::NAMES;
         [RUN_JSON, CONFIG, ELITES, METRICS, newest, previous]
+    }
+}
+
+/// What a run of a config is called: the config's name without folder and ending.
+pub fn name_of(config: &str) -> String {
+    let path = Path::new(config);
+    // The config of a run makes that run again.
+    let beside = path.with_file_name(RUN_JSON);
+    if path.file_name().is_some_and(|name| name == CONFIG)
+        && beside.exists()
+        && let Ok(run) = RunFile::read(&beside)
+    {
+        return run.name;
+    }
+    path.file_stem().map_or("run".to_string(), |stem| stem.to_string_lossy().into_owned())
+}
+
+/// A path as a shell reads it, for commands that people copy.
+pub fn in_shell(path: &Path) -> String {
+    let text = path.display().to_string();
+    let is_plain = |c: char| c.is_alphanumeric() || "_-./:@%+,\\".contains(c);
+    match !text.is_empty() && text.chars().all(is_plain) {
+        true => text,
+        false => format!("'{}'", text.replace('\'', r"'\''")),
     }
 }
 

@@ -82,7 +82,14 @@ pub fn is_meant(selection: &Selection) -> Result<bool, Error> {
         return Ok(true);
     }
     let published: Result<Vec<bool>, Error> = ids.iter().map(|id| Ok(find(id)?.is_some())).collect();
-    Ok(published?.into_iter().all(|is_published| is_published))
+    let published = published?;
+    match published.iter().zip(ids).find(|(is_published, _)| !**is_published) {
+        Some((_, other)) if published.contains(&true) => {
+            let text = format!("there is no published robot {other}");
+            Err(Error::input(text).hint("morphcog gallery lists them".to_string()))
+        }
+        other => Ok(other.is_none()),
+    }
 }
 
 /// The published robots as a run, for a test. Their genomes were not published: each has the empty one, and none of their

@@ -120,8 +120,8 @@ pub(super) fn check(config: &Config, start: Option<&StartRef>, dataset: &Dataset
 }
 
 /// `count` validation images of some runs of one experiment together, evenly divided between the classes, which take turns: so
-/// are the first of them. Of the same runs they are always the same, and fewer of them the first of more. `asked` says where so many
-/// were asked for.
+/// are the first of them. Of the same runs, in whichever order, they are always the same, and fewer of them the first of more. `asked` says
+/// where so many were asked for.
 ///
 /// # Errors
 /// If there are not enough images.
@@ -131,8 +131,23 @@ pub fn images(
     asked: &str,
     count: usize,
 ) -> Result<Vec<ImageRef>, Error> {
-    let Some(config) = runs.first().map(|run| &run.config) else { return Ok(Vec::new()) };
-    let mut seen = BTreeSet::new();
+    images_besides(&BTreeSet::new(), runs, dataset, asked, count)
+}
+
+/// The same, none of these among them.
+///
+/// # Errors
+/// As of [`images`].
+pub(super) fn images_besides(
+    besides: &BTreeSet<usize>,
+    runs: &[&RunFile],
+    dataset: &Dataset,
+    asked: &str,
+    count: usize,
+) -> Result<Vec<ImageRef>, Error> {
+    let first = runs.iter().map(|run| &run.config).min_by_key(|config| config.seed);
+    let Some(config) = first else { return Ok(Vec::new()) };
+    let mut seen = besides.clone();
     for run in runs {
         seen.extend(trained_on(run, dataset)?);
     }

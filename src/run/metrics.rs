@@ -6,7 +6,7 @@ use crate::qd::ArchiveStats;
 use crate::task::evaluation::Evaluation;
 use serde::{Deserialize, Serialize};
 use std::fs::File;
-use std::io::{BufWriter, Write};
+use std::io::{BufWriter, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
 /// What a run has done so far. *Showings* are images shown to robots (fresh lives, or phases of sequential ones).
@@ -59,8 +59,13 @@ impl Metrics {
     /// If it cannot be read or written.
     pub fn open(folder: &Path, generations: u64) -> Result<Self, Error> {
         let path = folder.join("metrics.csv");
-        let old =
-            if generations > 0 { std::fs::read_to_string(&path).unwrap_or_default() } else { String::new() };
+        let old = match std::fs::read(&path) {
+            _ if generations == 0 => String::new(),
+            // What is no text is no whole line, and left out as such.
+            Ok(bytes) => String::from_utf8_lossy(&bytes).into_owned(),
+            Err(error) if error.kind() == ErrorKind::NotFound => String::new(),
+            Err(error) => return Err(Error::reading(&path, &error)),
+        };
         let number = |line: &&str| line.split(',').next().and_then(|first| first.parse::<u64>().ok());
         let whole = old.split_inclusive('\n').filter(|line| line.ends_with('\n')).map(str::trim_end);
         let kept = whole.filter(|line| number(line).is_some_and(|generation| generation < generations));
@@ -165,6 +170,18 @@ mod tests {
         write(folder.path(), 1, 2, 1);
         let columns: Vec<usize> = lines(folder.path()).iter().map(|line| line.split(',').count()).collect();
         assert_eq!(columns, [16; 3]);
+    }
+
+    #[test]
+    fn a_line_that_is_no_text_is_dropped_and_no_other() {
+        let folder = tempfile::tempdir().unwrap();
+        write(folder.path(), 0, 3, 1);
+        let path = folder.path().join("metrics.csv");
+        let mut bytes = std::fs::read(&path).unwrap();
+        bytes.extend(b"abc\xff\n");
+        std::fs::write(&path, bytes).unwrap();
+        write(folder.path(), 3, 4, 1);
+        assert_eq!(lines(folder.path()).len(), 1 + 4);
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! `morphcog replay`: record a robot's life, for the pictures.
 
 use super::robots::{Selection, Source};
-use super::training::{ImageRef, load_dataset, see};
+use super::training::{DatasetRef, ImageRef, load_dataset, load_dataset_of, see};
 use super::{Config, Error, folder, gallery};
 use crate::base::Grid;
 use crate::body::Body;
@@ -145,7 +145,12 @@ pub fn subject(options: &Options) -> Result<Subject, Error> {
     }
     let wanted: Vec<Split> =
         Split::ALL.into_iter().filter(|split| shown.iter().any(|image| image.split == *split)).collect();
-    let dataset = load_dataset(config, options.data.as_deref(), &wanted).map_err(offer)?;
+    let data = options.data.as_deref();
+    let dataset = match found.dataset.as_ref().filter(|own| own.name == config.data.dataset) {
+        Some(own) => load_dataset_of(own, config, data, &wanted),
+        None => load_dataset(config, data, &wanted),
+    };
+    let dataset = dataset.map_err(offer)?;
     let mut images = Vec::new();
     for Shown { split, index } in shown {
         let label =
@@ -177,6 +182,8 @@ pub struct Found {
     pub config: Config,
     /// Its training images, as far as they are known.
     pub training: Vec<ImageRef>,
+    /// What these are of.
+    pub dataset: Option<DatasetRef>,
     /// What a page says about it: words and values.
     pub about: Vec<(String, String)>,
     published: bool,
@@ -212,7 +219,7 @@ pub fn find(options: &Options) -> Result<Found, Error> {
             ("Published fitness".to_string(), format!("{:.2} voxel lengths", robot.fitness)),
         ];
         let (name, body, config) = (robot.name, robot.body, gallery::config()?);
-        return Ok(Found { name, body, config, training: Vec::new(), about, published: true });
+        return Ok(Found { name, body, config, training: Vec::new(), dataset: None, about, published: true });
     }
     let archive = match &options.archive {
         Some(path) => path.clone(),
@@ -245,6 +252,7 @@ pub fn find(options: &Options) -> Result<Found, Error> {
         name,
         body,
         training: run.training_images.clone(),
+        dataset: Some(run.dataset.clone()),
         about,
         published: false,
         config: run.config.clone(),

@@ -5,7 +5,7 @@ use super::audit_file::{AUDIT_JSON, AuditFile};
 use super::capacity_file::{CAPACITY_JSON, CapacityFile};
 use super::eval_file::{EVAL_JSON, EvalFile};
 use super::plot::Progress;
-use super::training::{ImageRef, load_dataset, see};
+use super::training::{ImageRef, load_dataset_of, see};
 use super::{Error, folder};
 use crate::base::Grid;
 use crate::task::dataset::Split;
@@ -44,19 +44,25 @@ pub struct Findings {
 }
 
 impl Findings {
-    /// Those in a folder; verdicts only if they are on a run as it is.
-    fn read(folder: &Path, run: Option<&RunFile>, warn: &dyn Fn(&str)) -> Self {
+    /// Those in a folder that are about these runs as they are; verdicts are on one run.
+    fn read(folder: &Path, runs: &[&RunFile], warn: &dyn Fn(&str)) -> Self {
         let existing = |name: &str| Some(folder.join(name)).filter(|path| path.exists());
         // A report of what can be read is better than none.
         let told = |error: Error| warn(&format!("{error}; left out"));
+        let one = if let [run] = runs { Some(*run) } else { None };
         let audit = existing(AUDIT_JSON)
-            .zip(run)
+            .zip(one)
             .and_then(|(path, run)| AuditFile::of_run(run, &path).map_err(told).ok());
-        Findings {
-            eval: existing(EVAL_JSON).and_then(|path| EvalFile::read(&path).map_err(told).ok()),
-            audit,
-            capacity: existing(CAPACITY_JSON).and_then(|path| CapacityFile::read(&path).map_err(told).ok()),
+        let tested = existing(EVAL_JSON);
+        let eval = tested.clone().and_then(|path| EvalFile::of_runs(&path, runs).map_err(told).ok());
+        let mut capacity = existing(CAPACITY_JSON);
+        if eval.is_none()
+            && let Some(path) = tested.and(capacity.take())
+        {
+            warn(&format!("{}: it is of that {EVAL_JSON}; left out", path.display()));
         }
+        let capacity = capacity.and_then(|path| CapacityFile::read(&path).map_err(told).ok());
+        Findings { eval, audit, capacity }
     }
 }
 
@@ -88,12 +94,15 @@ pub fn gather(
             false => None,
         };
         let images = if with_lives { images(&run, data)? } else { Vec::new() };
-        let findings = Findings::read(folder, Some(&run), warn);
+        let findings = Findings::read(folder, &[&run], warn);
         runs.push(Dossier { path: path.clone(), run, progress, findings, images });
     }
     let together = match archives.len() {
         0 | 1 => Findings::default(),
-        _ => Findings::read(&folder::above(archives), None, warn),
+        _ => {
+            let all: Vec<&RunFile> = runs.iter().map(|dossier| &dossier.run).collect();
+            Findings::read(&folder::above(archives), &all, warn)
+        }
     };
     Ok(Gathered { runs, together })
 }
@@ -104,7 +113,7 @@ fn images(run: &RunFile, data: Option<&Path>) -> Result<Vec<(String, Grid<f64>)>
         None => error.hint("or --lives 0 for a report without moving pictures".to_string()),
         Some(_) => error,
     };
-    let dataset = load_dataset(&run.config, data, &[Split::Train]).map_err(hint)?;
+    let dataset = load_dataset_of(&run.dataset, &run.config, data, &[Split::Train]).map_err(hint)?;
     let mut shown: Vec<ImageRef> = run.training_images.clone();
     if shown.len() > MOST_IMAGES {
         let mut classes = Vec::new();
@@ -183,7 +192,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         std::fs::write(folder.path().join(EVAL_JSON), "{").unwrap();
         let told = std::cell::RefCell::new(Vec::new());
-        let findings = Findings::read(folder.path(), None, &|text| told.borrow_mut().push(text.to_string()));
+        let findings = Findings::read(folder.path(), &[], &|text| told.borrow_mut().push(text.to_string()));
         assert!(findings.eval.is_none() && findings.audit.is_none() && findings.capacity.is_none());
         assert!(told.borrow().len() == 1 && told.borrow()[0].contains("eval.json"), "{told:?}");
     }

@@ -7,9 +7,10 @@ use super::folder::{IfExists, RUN_JSON};
 use super::held_out::HeldOut;
 use super::plan::Plan;
 use super::robots::{Chosen, Selection, Source};
+use super::setting::RunRef;
 use super::table::{self, Row};
 use super::verdict::Verdict;
-use super::{Config, Error, audit, capacity, config, eval, evolve};
+use super::{Config, Error, audit, capacity, eval, evolve, folder};
 use crate::base::random::{Purpose, stream};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -70,11 +71,21 @@ pub fn reproduce(options: &Options, stop: &AtomicBool, observer: &dyn Observer) 
     // All configs first: a slip in the last one would be found out after hours.
     let mut experiments = Vec::new();
     for experiment in &plan.experiment {
-        let name = config::name_of(&experiment.config);
+        let name = folder::name_of(&experiment.config);
         if experiments.iter().any(|(other, _)| *other == name) {
             return Err(Error::input(format!("experiment: {name}: expected once")));
         }
-        experiments.push((name, Config::load(&experiment.config, &experiment.set)?));
+        let config = Config::load(&experiment.config, &experiment.set)?;
+        for &seed in &plan.seeds {
+            Config { seed, ..config.clone() }.validate().map_err(|error| error.within("seeds"))?;
+        }
+        let least = config.classes().len();
+        if plan.images < least {
+            let text =
+                format!("images = {}: expected {least} or more, one of each class of {name}", plan.images);
+            return Err(Error::input(text));
+        }
+        experiments.push((name, config));
     }
     let (mut rows, mut capacities) = (Vec::new(), Vec::new());
     for (name, config) in &experiments {
@@ -254,7 +265,7 @@ impl Job<'_> {
             threads: self.options.threads,
         };
         if let Ok(known) = EvalFile::read(path)
-            && known.is_of(sources, &options)
+            && is_of(&known, sources, &options)
         {
             return Ok(Some(known));
         }
@@ -263,4 +274,18 @@ impl Job<'_> {
         let is_whole = !report.stopped && !self.stop.load(Ordering::Relaxed);
         Ok(is_whole.then_some(report))
     }
+}
+
+/// Whether an evaluation is what these options would make of these runs, and whole.
+fn is_of(known: &EvalFile, sources: &[Source], options: &eval::Options) -> bool {
+    let runs: Vec<RunRef> = sources.iter().map(|source| RunRef::new(&source.run)).collect();
+    let same_robots = match &options.robots {
+        Selection::Drawn { robots, .. } => {
+            robots.iter().map(|(run, id)| (*run, id)).eq(known.robots.iter().map(|r| (r.run, &r.id)))
+        }
+        _ => false,
+    };
+    let same = (known.seed, known.split, known.images.len(), known.threshold)
+        == (options.seed, options.split, options.images, options.threshold);
+    !known.stopped && known.runs == runs && same && same_robots
 }

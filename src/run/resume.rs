@@ -7,6 +7,7 @@ use super::curriculum::StageConfig;
 use super::folder::{RUN_JSON, RunFolder};
 use super::start::Start;
 use super::training::Training;
+use super::validation::ValidationConfig;
 use super::{Config, Error};
 use crate::task::dataset::Dataset;
 use crate::task::evaluation::Savings;
@@ -95,6 +96,8 @@ fn keys(config: &Config, begun: usize) -> Keys {
         stage: Vec::new(),
         generations: 1,
         savings: Savings::default(),
+        // What is chosen at the end changes nothing before.
+        validation: ValidationConfig::default(),
         checkpoint: CheckpointConfig::default(),
         data: DataConfig { dir: None, ..config.data.clone() },
         ..config.clone()

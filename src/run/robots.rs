@@ -154,7 +154,17 @@ impl Selection {
                 };
                 Ok((0..).zip(by_task()).flat_map(draw).collect())
             }
-            Selection::Ids(ids) => ids.iter().map(|id| by_id(&fittest, id)).collect(),
+            Selection::Ids(ids) => {
+                // Whoever is named twice is one robot.
+                let named: Result<Vec<Chosen>, Error> = ids.iter().map(|id| by_id(&fittest, id)).collect();
+                let mut once: Vec<Chosen> = Vec::new();
+                for chosen in named? {
+                    if !once.iter().any(|other| std::ptr::eq(other.robot, chosen.robot)) {
+                        once.push(chosen);
+                    }
+                }
+                Ok(once)
+            }
             Selection::Drawn { robots, .. } => {
                 let of_run = |source: usize| fittest.iter().filter(move |c| c.source == source).copied();
                 let find = |(source, id): &(usize, String)| by_id(&of_run(*source).collect::<Vec<_>>(), id);
@@ -212,6 +222,11 @@ mod tests {
     fn selected(text: &str, seed: u64) -> Result<Vec<String>, Error> {
         let run = source(&[("aa10", 1.0), ("ab20", 3.0), ("b300", 2.0), ("b3ff", 3.0), ("c400", -1.0)]);
         of(text, seed, &[run])
+    }
+
+    #[test]
+    fn a_robot_that_is_named_twice_is_one() {
+        assert_eq!(selected("aa,b300,aa10", 1).unwrap(), ["aa10", "b300"]);
     }
 
     #[test]

@@ -16,8 +16,10 @@ const AT_ONCE: i32 = 130;
 pub fn stop_flag() -> Result<Arc<AtomicBool>, Error> {
     let stop = Arc::new(AtomicBool::new(false));
     let failed = |error: std::io::Error| Error::other(format!("signals cannot be handled: {error}"));
-    // In this order: the first SIGINT finds the flag unset and sets it, the second one finds it set.
-    flag::register_conditional_shutdown(SIGINT, AT_ONCE, Arc::clone(&stop)).map_err(failed)?;
+    // In this order: the first SIGINT finds its flag unset and sets it, the second one finds it set.
+    let interrupted = Arc::new(AtomicBool::new(false));
+    flag::register_conditional_shutdown(SIGINT, AT_ONCE, Arc::clone(&interrupted)).map_err(failed)?;
+    flag::register(SIGINT, interrupted).map_err(failed)?;
     let mut signals = vec![SIGINT, SIGTERM];
     #[cfg(unix)]
     signals.push(signal_hook::consts::SIGUSR1);

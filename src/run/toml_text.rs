@@ -113,6 +113,7 @@ fn spoken(message: &str) -> String {
     let words = [
         ("u8", "a whole number from 0 to 255"),
         ("u16", "a whole number from 0 to 65535"),
+        ("a nonzero u16", "a whole number from 1 to 65535"),
         ("u32", "a whole number from 0 to 4294967295"),
         ("u64", "a whole number from 0"),
         ("usize", "a whole number from 0"),

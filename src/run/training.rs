@@ -69,6 +69,36 @@ pub fn load_data(config: &DataConfig, data: Option<&Path>, wanted: &[Split]) -> 
     Dataset::load(&config.dataset, &given, wanted).map_err(refuse)
 }
 
+/// Loads the dataset that a run was made with. Where only other splits are wanted, it is known by its training images if these are
+/// there.
+///
+/// # Errors
+/// As [`load_dataset`]; or that it is another one: images of the same index would be others.
+pub fn load_dataset_of(
+    run: &DatasetRef,
+    config: &Config,
+    data: Option<&Path>,
+    wanted: &[Split],
+) -> Result<Dataset, Error> {
+    let loaded = load_dataset(config, data, wanted)?;
+    let train = match loaded.fingerprint(Split::Train) {
+        None => {
+            load_dataset(config, data, &[Split::Train]).ok().and_then(|set| set.fingerprint(Split::Train))
+        }
+        known => known,
+    };
+    match train.is_none_or(|train| train == run.train_sha256) {
+        true => Ok(loaded),
+        false => {
+            let text = format!(
+                "{}: the training images here are not those the run was made with (another SHA-256)",
+                run.name
+            );
+            Err(Error::input(text).hint("name their folder with --data".to_string()))
+        }
+    }
+}
+
 /// What a robot of a config sees of an image.
 ///
 /// # Errors

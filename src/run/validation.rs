@@ -10,7 +10,7 @@ use super::eval_file::{RobotReport, Trial};
 use super::held_out::images;
 use super::physical::first_physical;
 use super::robots::{Chosen, Selection, Source};
-use super::training::{ImageRef, load_dataset, see};
+use super::training::{ImageRef, load_dataset_of, see};
 use super::{Config, Error};
 use crate::base::files::{read_text, write_atomically};
 use crate::base::hash::sha256_hex;
@@ -123,7 +123,7 @@ pub fn validate(
     let ValidationConfig { images, best: count } = config.validation;
     let count = options.best.unwrap_or(count);
     let grouping = config.grouping()?;
-    let dataset = load_dataset(config, options.data.as_deref(), &[Split::Train])?;
+    let dataset = load_dataset_of(&source.run.dataset, config, options.data.as_deref(), &[Split::Train])?;
     let pool = eval::pool(options.threads)?;
     let control_steps = eval::control_steps(config, eval::CYCLES);
     let walker = Walker { config, control_steps, pool: &pool, stop, observer, done: AtomicU64::new(0) };
@@ -182,7 +182,8 @@ pub(super) fn best<'a>(
     let images = images(&[run], dataset, "--validation", wanted.images)?;
     // Whoever asks for fewer than the run's end has found gets the first of those.
     let searched = &Wanted { count: wanted.count.max(run.config.validation.best), ..*wanted };
-    let key = key(run, &robots, searched, &images, walker.control_steps);
+    let shown = (dataset.fingerprint(Split::Train).unwrap_or_default(), &images[..]);
+    let key = key(run, &robots, searched, shown, walker.control_steps);
     let path = source.path.with_file_name(VALIDATION_JSON);
     let known = read_text(&path).ok().and_then(|text| serde_json::from_str::<ValidationFile>(&text).ok());
     let by_id = |validated: &Validated| {
@@ -203,25 +204,36 @@ pub(super) fn best<'a>(
     };
     let file = ValidationFile { format: FORMAT.0.to_string(), format_version: FORMAT.1, key, robots: chosen };
     let text = serde_json::to_string(&file).map_err(|error| Error::other(error.to_string()))? + "\n";
-    write_atomically(&path, text.as_bytes()).map_err(|error| Error::writing(&path, &error))?;
+    if let Err(error) = write_atomically(&path, text.as_bytes()) {
+        let error = Error::writing(&path, &error);
+        walker.observer.warning(&format!("{error}; the next time robots are chosen anew"));
+    }
     Ok(Some(first(&file.robots)))
 }
 
 /// Of all that the result depends on.
-fn key(run: &RunFile, robots: &[&Robot], wanted: &Wanted, images: &[ImageRef], control_steps: u32) -> String {
+fn key(
+    run: &RunFile,
+    robots: &[&Robot],
+    wanted: &Wanted,
+    (data, images): (String, &[ImageRef]),
+    control_steps: u32,
+) -> String {
     let ids: Vec<&str> = robots.iter().map(|robot| robot.id.as_str()).collect();
     let images: Vec<usize> = images.iter().map(|image| image.index).collect();
     let Wanted { count, threshold, .. } = wanted;
     sha256_hex(
-        format!("{} {ids:?} {count} {images:?} {threshold} {control_steps}", fingerprint(run)).as_bytes(),
+        format!("{} {data} {ids:?} {count} {images:?} {threshold} {control_steps}", fingerprint(run))
+            .as_bytes(),
     )
 }
 
-/// Robots and images of each round, for some robots of a task of which `count` are wanted.
-fn rounds(robots: usize, count: usize, images: usize) -> [(usize, usize); 3] {
+/// Robots and images of each round, for some robots of a task of which `count` are wanted; of each class, which take turns, an image
+/// or more.
+fn rounds(robots: usize, count: usize, (images, classes): (usize, usize)) -> [(usize, usize); 3] {
     ROUNDS.map(|(of_images, of_robots)| {
         let kept = ((robots as f64 * of_robots).ceil() as usize).max(count).min(robots);
-        (kept, ((images as f64 * of_images).ceil() as usize).min(images))
+        (kept, ((images as f64 * of_images).ceil() as usize).max(classes).min(images))
     })
 }
 
@@ -243,13 +255,14 @@ fn screened(
     };
     let mut tasks = BTreeMap::<&str, Vec<&Robot>>::new();
     robots.iter().for_each(|robot| tasks.entry(&robot.task).or_default().push(robot));
-    let showings = tasks.values().flat_map(|all| rounds(all.len(), count, images.len())).map(|(n, k)| n * k);
+    let of = (images.len(), config.classes().len());
+    let showings = tasks.values().flat_map(|all| rounds(all.len(), count, of)).map(|(n, k)| n * k);
     walker.validating(robots.len(), images.len(), showings.sum::<usize>() as u64);
     let mut chosen = Vec::new();
     for (_, all) in tasks {
         let mut left = all.clone();
         let mut scores = Vec::new();
-        for (keep, shown) in rounds(all.len(), count, images.len()) {
+        for (keep, shown) in rounds(all.len(), count, of) {
             left.truncate(keep);
             scores = Vec::with_capacity(left.len());
             for robot in &left {
@@ -273,4 +286,18 @@ fn screened(
         }));
     }
     Ok(Some(chosen))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_round_shows_every_class_and_the_last_one_all_images() {
+        for of in [(40, 10), (40, 2), (400, 4)] {
+            let rounds = rounds(100, 3, of);
+            assert!(rounds.iter().all(|(_, shown)| *shown >= of.1), "{rounds:?}");
+            assert_eq!((rounds[0].0, rounds[2]), (100, (10, of.0)));
+        }
+    }
 }

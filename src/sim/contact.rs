@@ -64,7 +64,12 @@ fn push(edge: &Edge, velocity: Vector, physics: &Physics) -> Push {
     // The sign of the tangent does not matter: flipping it flips the slip, and tanh is odd.
     let tangent = Vector::new(-n.y, n.x);
     let slip = tangent.dot(&velocity);
-    let grip = physics.friction * force * libm::tanh(slip / (physics.friction_slip * force));
+    // Without a force there is no friction, whatever 0/0 is.
+    let grip = if force > 0.0 {
+        physics.friction * force * libm::tanh(slip / (physics.friction_slip * force))
+    } else {
+        0.0
+    };
     let friction = tangent * grip;
     let on_point = n * (force - physics.contact_damping * n.dot(&velocity)) - friction;
     Push { on_point, normal_force: force, friction }

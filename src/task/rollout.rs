@@ -160,18 +160,20 @@ pub fn record(
         let first_frame = recording.frames.len() - 1;
         rollout.look_at(stimulus);
         let mut unstable = false;
+        let mut displacement = rollout.moved();
         for _ in 0..protocol.control_steps {
             unstable = rollout.step().is_err();
             if unstable {
                 break;
             }
+            displacement = rollout.moved();
             recording.frames.push(rollout.frame());
         }
         recording.phases.push(Phase {
             first_frame,
             stimulus: stimulus.clone(),
             label: label.clone(),
-            displacement: rollout.moved(),
+            displacement,
         });
         if unstable {
             recording.unstable = true;

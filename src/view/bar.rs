@@ -6,6 +6,7 @@ use super::progress::{Pacer, Progress, count_line};
 use indicatif::ProgressBar;
 use serde::Serialize;
 use std::sync::Mutex;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 
 /// A line that is rewritten on a terminal, and repeated from time to time elsewhere.
@@ -72,11 +73,23 @@ pub struct Counter<'c> {
     label: String,
     unit: String,
     line: Line<'c>,
+    begin: AtomicU64,
 }
 
 impl<'c> Counter<'c> {
     pub(super) fn new(console: &'c Console, label: &str, total: u64, unit: &str) -> Self {
-        Counter { label: label.into(), unit: unit.into(), line: Line::new(console, total) }
+        Counter {
+            label: label.into(),
+            unit: unit.into(),
+            line: Line::new(console, total),
+            begin: AtomicU64::new(0),
+        }
+    }
+
+    /// Shows that `known` of the things were done before.
+    pub fn go_on_from(&self, known: u64) {
+        self.begin.store(known, Ordering::Relaxed);
+        self.update(known);
     }
 
     /// Shows that `done` of the things are done (JSON: an event `progress`, as often as a plain line).
@@ -89,7 +102,8 @@ impl<'c> Counter<'c> {
             unit: &'a str,
         }
         let (label, unit, total) = (self.label.as_str(), self.unit.as_str(), self.line.total);
-        self.line.show(done, |seconds| count_line(label, done, total, unit, seconds));
+        let begin = self.begin.load(Ordering::Relaxed);
+        self.line.show(done, |seconds| count_line(label, [begin, done, total], unit, seconds));
         let is_json = self.line.console.mode() == Mode::Json;
         if is_json && self.line.is_due(done, self.line.begin.elapsed().as_secs_f64()) {
             self.line.console.event("progress", &Count { label, done, total, unit });

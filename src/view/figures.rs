@@ -3,6 +3,7 @@
 use super::console::Console;
 use super::plot::{self, Background, Figure};
 use super::{PictureError, write_whole};
+use crate::base::files::check_writable;
 use crate::run::capacity_file::{CAPACITY_JSON, CapacityFile};
 use crate::run::eval_file::{EVAL_JSON, EvalFile};
 use crate::run::plot::Progress;
@@ -121,6 +122,9 @@ pub fn make(console: &Console, wanted: &Wanted) -> Result<Vec<PathBuf>, Error> {
     };
     if count > 1 && wanted.out.is_some() {
         return Err(Error::usage(format!("--out: expected with one figure only, these are {count}")));
+    }
+    if let Some(path) = &wanted.out {
+        check_writable(path).map_err(|error| Error::writing(path, &error))?;
     }
     let mut files = Vec::new();
     let mut write = |made: Made| -> Result<(), Error> {
@@ -242,8 +246,12 @@ fn of_run(kind: Kind, path: &Path) -> Result<Figure, Error> {
     };
     match kind {
         Kind::Accuracy => {
-            let path = result(path, EVAL_JSON);
-            let report = EvalFile::read(&path).map_err(hint)?;
+            let beside = result(path, EVAL_JSON);
+            let report = match beside == *path {
+                true => EvalFile::read(path),
+                false => RunFile::read(path).and_then(|run| EvalFile::of_runs(&beside, &[&run])),
+            };
+            let (report, path) = (report.map_err(hint)?, beside);
             if report.robots.is_empty() {
                 let text = format!("{}: robots: expected at least one, found none", path.display());
                 return Err(hint(Error::input(text)));

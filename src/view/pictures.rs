@@ -41,6 +41,11 @@ impl FromStr for Format {
     }
 }
 
+/// The formats that are asked for; if none is, an animation and a page.
+fn or_default(asked: &[Format]) -> &[Format] {
+    if asked.is_empty() { &[Format::Gif, Format::Html] } else { asked }
+}
+
 /// What to make, and where.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Wanted {
@@ -66,7 +71,7 @@ impl Wanted {
     /// `replay-<name>.<format>` in a folder.
     pub fn beside(folder: &Path, name: &str, formats: &[Format]) -> Self {
         let file = |&format: &Format| (format, folder.join(format!("replay-{name}.{format}")));
-        Wanted { files: formats.iter().map(file).collect(), ..Wanted::default() }
+        Wanted { files: or_default(formats).iter().map(file).collect(), ..Wanted::default() }
     }
 
     /// A file whose ending says the format; without an ending, one file for each of `formats`.
@@ -75,7 +80,10 @@ impl Wanted {
     /// If the ending is none of the formats'.
     pub fn named(path: &Path, formats: &[Format]) -> Result<Self, Error> {
         let files = match path.extension().map(|ending| ending.to_string_lossy().into_owned()) {
-            None => formats.iter().map(|format| (*format, path.with_extension(format.to_string()))).collect(),
+            None => or_default(formats)
+                .iter()
+                .map(|format| (*format, path.with_extension(format.to_string())))
+                .collect(),
             Some(ending) => {
                 let format = Format::from_str(&ending).ok().filter(|format| *format != Format::Terminal);
                 let format = format.ok_or_else(|| {
@@ -84,6 +92,11 @@ impl Wanted {
                         path.display()
                     ))
                 })?;
+                if let Some(other) = formats.iter().find(|asked| **asked != format) {
+                    let text =
+                        format!("--format {other}: expected {format}, as --out {} says", path.display());
+                    return Err(Error::usage(text));
+                }
                 vec![(format, path.to_path_buf())]
             }
         };

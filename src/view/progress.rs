@@ -37,14 +37,15 @@ impl Progress {
 }
 
 /// How far some counted thing is, in one line: images, robots or, with the unit "bytes", megabytes.
-pub fn count_line(label: &str, done: u64, total: u64, unit: &str, seconds: f64) -> String {
-    let end = left(0, done, total, seconds);
+/// `begin` of them were done before.
+pub fn count_line(label: &str, [begin, done, total]: [u64; 3], unit: &str, seconds: f64) -> String {
+    let end = left(begin, done, total, seconds);
     if unit == "bytes" {
         let mega = |bytes: u64| bytes as f64 / 1e6;
         let speed = if seconds > 0.0 { mega(done) / seconds } else { 0.0 };
         return format!("{label} {:.1}/{:.1} MB · {speed:.1} MB/s{end}", mega(done), mega(total));
     }
-    format!("{label} {done}/{total} {unit} · {} {unit}/s{end}", rate(done, seconds))
+    format!("{label} {done}/{total} {unit} · {} {unit}/s{end}", rate(done.saturating_sub(begin), seconds))
 }
 
 fn rate(count: u64, seconds: f64) -> String {
@@ -108,10 +109,16 @@ mod tests {
 
     #[test]
     fn counted_things_have_their_unit() {
-        assert_eq!(count_line("eval", 50, 100, "images", 5.0), "eval 50/100 images · 10 images/s · 5 s left");
-        let line = count_line("train images", 5_000_000, 10_000_000, "bytes", 2.0);
+        assert_eq!(
+            count_line("eval", [0, 50, 100], "images", 5.0),
+            "eval 50/100 images · 10 images/s · 5 s left"
+        );
+        let line = count_line("train images", [0, 5_000_000, 10_000_000], "bytes", 2.0);
         assert_eq!(line, "train images 5.0/10.0 MB · 2.5 MB/s · 2 s left");
-        assert!(count_line("x", 3, 0, "images", 0.0).contains("3/0"));
+        assert!(count_line("x", [0, 3, 0], "images", 0.0).contains("3/0"));
+        // What was known before took no time.
+        assert_eq!(count_line("x", [40, 40, 50], "lives", 1e-9), "x 40/50 lives · 0.0 lives/s");
+        assert_eq!(count_line("x", [40, 45, 50], "lives", 5.0), "x 45/50 lives · 1.0 lives/s · 5 s left");
     }
 
     #[test]

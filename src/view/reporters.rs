@@ -172,7 +172,7 @@ impl capacity::Observer for Capacity<'_> {
         let kept = if known > 0 { format!(" ({known} known from before)") } else { String::new() };
         let label = format!("training {trainings} networks{kept}:");
         let counter = self.counter.get_or_init(|| self.console.counter(&label, trainings, "trainings"));
-        counter.update(known);
+        counter.go_on_from(known);
     }
 
     fn progress(&self, done: u64) {

@@ -9,7 +9,7 @@ use crate::run::data::Found;
 use crate::run::data::fetch::{Fetched, Outcome};
 use crate::run::eval_file::{EvalFile, RobotReport};
 use crate::run::evolve::Finished;
-use crate::run::folder::RUN_JSON;
+use crate::run::folder::{RUN_JSON, in_shell};
 use crate::run::gallery::Published;
 use crate::run::held_out::HeldOut;
 use crate::run::published;
@@ -90,7 +90,7 @@ pub fn evolution(console: &Console, finished: &Finished, out: &Path) {
     let archive = out.join(RUN_JSON);
     console.info(&format!(
         "next: morphcog replay --robot best --archive {0}\n      morphcog eval --archive {0}",
-        archive.display()
+        in_shell(&archive)
     ));
 }
 
@@ -188,7 +188,7 @@ pub fn evaluation(console: &Console, report: &EvalFile, capacity: Option<&Capaci
     ));
     console.line(&format!("wrote {} and {}", out.display(), out.with_extension("csv").display()));
     if capacity.is_none() && is_test {
-        console.info(&format!("what network are they worth? morphcog capacity --eval {}", out.display()));
+        console.info(&format!("what network are they worth? morphcog capacity --eval {}", in_shell(out)));
     }
 }
 

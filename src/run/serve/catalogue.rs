@@ -5,6 +5,7 @@ use super::judge::Judge;
 use crate::body::{Body, VoxelCounts};
 use crate::run::archive::{Robot, RunFile};
 use crate::run::audit_file::{AUDIT_JSON, AuditFile};
+use crate::run::training::DatasetRef;
 use crate::run::{Config, Error, gallery};
 use crate::task::direction::Assignment;
 use serde::Serialize;
@@ -18,6 +19,8 @@ pub struct Collection {
     pub path: Option<PathBuf>,
     /// How its robots were evolved.
     pub config: Config,
+    /// On which data; none: published ones.
+    pub dataset: Option<DatasetRef>,
     /// Generations of the run.
     pub generations: Option<u64>,
     /// Bins of the archive's dimensions muscle, sensor and total.
@@ -163,7 +166,16 @@ fn published() -> Result<Collection, Error> {
     let mut robots: Vec<Entry> = gallery::gallery()?.into_iter().map(entry).collect();
     robots.sort_by(|a, b| b.fitness.total_cmp(&a.fitness));
     let name = "Published with the paper".to_string();
-    Ok(Collection { name, path: None, config, generations: None, bins: Vec::new(), tasks, robots })
+    Ok(Collection {
+        name,
+        path: None,
+        config,
+        dataset: None,
+        generations: None,
+        bins: Vec::new(),
+        tasks,
+        robots,
+    })
 }
 
 fn archive(path: &Path, notes: &mut Vec<String>) -> Result<Collection, Error> {
@@ -201,6 +213,7 @@ fn archive(path: &Path, notes: &mut Vec<String>) -> Result<Collection, Error> {
         generations: Some(run.generations),
         bins: run.dimensions.bins.iter().take(3).copied().collect(),
         tasks: run.dimensions.tasks.clone(),
+        dataset: Some(run.dataset),
         config: run.config,
         robots,
     })

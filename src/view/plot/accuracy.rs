@@ -14,7 +14,7 @@ const NAMED: usize = 40;
 /// body.
 pub fn accuracy(report: &EvalFile) -> Figure {
     let mut canvas = Canvas::new();
-    let of = format!("{}; {}", runs(report), report.selected);
+    let of = format!("{}; {}", runs(report), report.selection());
     let top = heading(&mut canvas, &format!("Accuracy on {} images", report.split), &of, COLUMN);
     let named = report.robots.len() <= NAMED;
     let line = if named { 10.5 } else { 3.0 };

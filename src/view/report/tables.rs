@@ -119,7 +119,7 @@ pub(super) fn eval(report: &EvalFile) -> String {
         report.images.len(),
         escape(&report.dataset),
         report.split,
-        escape(&report.selected),
+        escape(&report.selection()),
         report.threshold
     );
     let row = |(task, mean): (&String, &Mean)| {

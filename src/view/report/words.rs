@@ -1,11 +1,15 @@
 //! The words of a report: its title, a methods paragraph, and the commands that make it again.
 
-use crate::run::eval_file::Mean;
+use crate::run::capacity_config::CapacityConfig;
+use crate::run::capacity_file::CapacityFile;
+use crate::run::eval_file::{EVAL_JSON, Mean};
+use crate::run::folder::{self, in_shell};
 use crate::run::report::Dossier;
 use crate::task::fitness::{Criterion, Fitness};
 use crate::task::protocol::Life;
 use crate::task::stimulus::Encoding;
 use crate::view::html::escape;
+use std::path::Path;
 
 /// A run in short.
 pub(super) fn name(dossier: &Dossier) -> String {
@@ -121,7 +125,7 @@ pub(super) fn methods(dossier: &Dossier) -> String {
             report.split,
             report.threshold,
             report.robots.len(),
-            report.selected,
+            report.selection(),
             means.join(", ")
         );
     }
@@ -137,25 +141,49 @@ pub(super) fn methods(dossier: &Dossier) -> String {
 
 /// The commands that make a run and its tests again.
 pub(super) fn commands(dossier: &Dossier) -> String {
-    let path = dossier.path.display().to_string();
-    let config = dossier.path.with_file_name(crate::run::folder::CONFIG).display().to_string();
-    let mut lines = vec![format!("morphcog evolve --config {config} --out again")];
+    let config = in_shell(&dossier.path.with_file_name(folder::CONFIG));
+    let again = format!("again/{}-seed{}", dossier.run.name, dossier.run.config.seed);
+    let [again, eval] =
+        [again.clone(), format!("{again}/{EVAL_JSON}")].map(|path| in_shell(Path::new(&path)));
+    let mut lines = vec![format!("morphcog evolve --config {config} --out {again}")];
     let found = &dossier.findings;
-    if found.audit.is_some() {
-        lines.push(format!("morphcog audit --archive {path}"));
+    if let Some(audit) = &found.audit {
+        let ids: Vec<&str> = audit.robots.iter().map(|robot| robot.id.as_str()).collect();
+        let some =
+            if ids.len() < audit.elites { format!(" --robots {}", ids.join(",")) } else { String::new() };
+        lines.push(format!("morphcog audit --archive {again}{some}"));
     }
     if let Some(report) = &found.eval {
         let ids: Vec<&str> = report.robots.iter().map(|robot| robot.id.as_str()).collect();
         let (images, seed) = (report.images.len(), report.seed);
         lines.push(format!(
-            "morphcog eval --archive {path} --images {images} --seed {seed} --robots {}",
+            "morphcog eval --archive {again} --images {images} --seed {seed} --robots {}",
             ids.join(",")
         ));
     }
-    if found.capacity.is_some() {
-        lines
-            .push(format!("morphcog capacity --eval {}", dossier.path.with_file_name("eval.json").display()));
+    if let Some(file) = &found.capacity {
+        lines.push(format!("morphcog capacity --eval {eval}{}", settings(file)));
     }
-    lines.push(format!("morphcog report {path}"));
+    lines.push(format!("morphcog report {again}"));
     format!("<pre>{}</pre>\n", escape(&lines.join("\n")))
+}
+
+/// With what a capacity was found, as far as its file tells, where that is not what it is found with if nobody says otherwise.
+fn settings(file: &CapacityFile) -> String {
+    let usual = CapacityConfig::default();
+    let mut text = if file.patience_on == "test" { String::new() } else { " --clean".to_string() };
+    if file.trainings != usual.trainings {
+        text += &format!(" --set trainings={}", file.trainings);
+    }
+    let curves: Vec<_> = file.tasks.iter().flat_map(|task| &task.curves).collect();
+    let sizes: Vec<usize> =
+        curves.iter().flat_map(|curve| curve.points.iter().map(|point| point.size)).collect();
+    let points = curves.first().map_or(&[][..], |curve| &curve.points[..]);
+    if let (Some(least), Some(most)) = (sizes.iter().min(), sizes.iter().max())
+        && !usual.sizes().eq(points.iter().map(|point| point.size))
+    {
+        let step = points.windows(2).next().map_or(1, |two| two[1].size - two[0].size);
+        text += &format!(" --set sizes=[{least},{most}] --set step={step}");
+    }
+    text
 }
