@@ -461,6 +461,7 @@ fn a_wrong_scenario_is_refused_with_file_line_and_key() {
         ("{\"body\": [[3]], \"stimuli\": [[[1]]], \"switch_every\": 0}", "switch_every"),
         ("{\"body\": [[3]], \"stimuli\": [[[1]]], \"stimulus\": [[1]], \"switch_every\": 1}", "stimuli"),
         ("{\"body\": [[3]], \"switch_every\": 3}", "switch_every"),
+        ("{\"body\": [[3]], \"reset_between\": true}", "reset_between"),
         ("{\"body\": [[3]], \"physics\": {\"servo_gain\": 0}}", "servo_gain"),
         ("{\"body\": [[3]], \"control_steps\": -3}", "control_steps"),
         ("{\"body\": [[3]], \"control_steps\": 1e3}", "control_steps"),

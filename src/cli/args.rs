@@ -30,7 +30,7 @@ pub struct Cli {
     /// Results, warnings and errors only.
     #[arg(short, long, global = true, conflicts_with = "json")]
     pub(super) quiet: bool,
-    /// For programs: one JSON object per line on stdout.
+    /// For programs: one JSON object per line on stdout (but for what config, simulate, completions and man print).
     #[arg(long, global = true)]
     pub(super) json: bool,
 }

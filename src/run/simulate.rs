@@ -95,6 +95,9 @@ impl Scenario {
                 return refuse("switch_every: expected 1 or more control steps with stimuli".to_string());
             }
             (_, None, Some(_)) => return refuse("switch_every: expected only with stimuli".to_string()),
+            (_, None, _) if self.reset_between => {
+                return refuse("reset_between: expected only with stimuli".to_string());
+            }
             _ => {}
         }
         for (index, stimulus) in self.stimuli().iter().enumerate() {

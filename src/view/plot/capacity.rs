@@ -65,7 +65,13 @@ fn panel(canvas: &mut Canvas, at: [f64; 2], size: [f64; 2], y: &Axis, task: &Tas
     let largest = sizes().fold(1.0, f64::max);
     let plot = Plot { at, size, x: Axis::exact(0.0, largest + 1.0, 5).whole(), y: y.clone() };
     let (kind, unit) = network(curve);
+    // Where the smallest size is above the robots already, nothing crosses.
+    let is_above = |size: f64| curve.value(size).is_some_and(|fit| fit > task.accuracy + 1e-6);
+    let crossing = curve.capacity.filter(|&size| !is_above(size));
     let found = match curve.capacity {
+        Some(capacity) if crossing.is_none() => {
+            format!("capacity at most {capacity:.0}: the whole fit is above the robots")
+        }
         Some(capacity) => format!("capacity {capacity:.1} {unit}"),
         None => "no capacity: the fit never reaches the robots".to_string(),
     };
@@ -89,7 +95,7 @@ fn panel(canvas: &mut Canvas, at: [f64; 2], size: [f64; 2], y: &Axis, task: &Tas
         }
         let robots = 100.0 * task.accuracy;
         canvas.line(plot.place([plot.x.from, robots]), plot.place([plot.x.to, robots]), ROBOTS);
-        if let Some(capacity) = curve.capacity {
+        if let Some(capacity) = crossing {
             canvas.line(plot.place([capacity, robots]), plot.place([capacity, plot.y.from]), CROSSING);
             canvas.dot(plot.place([capacity, robots]), 2.2, scales::VERMILLION);
         }
@@ -167,6 +173,12 @@ mod tests {
         assert_eq!(svg.matches("capacity 16.8").count(), 4);
         assert!(svg.contains("01|23, CNN") && svg.contains("hidden neurons") && svg.contains("kernels"));
         assert!(capacity(&file(None)).svg().contains("never reaches"));
+        // Robots that know less than any network: nothing is marked where nothing crosses.
+        let mut below = file(Some(1.0));
+        below.tasks.iter_mut().for_each(|task| task.accuracy = 0.3);
+        let below = capacity(&below).svg();
+        assert!(below.contains("capacity at most 1:") && !below.contains("capacity 1.0"));
+        assert_eq!(below.matches("<circle").count(), svg.matches("<circle").count() - 4);
     }
 
     #[test]
