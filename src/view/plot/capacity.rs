@@ -70,7 +70,7 @@ fn panel(canvas: &mut Canvas, at: [f64; 2], size: [f64; 2], y: &Axis, task: &Tas
     let crossing = curve.capacity.filter(|&size| !is_above(size));
     let found = match curve.capacity {
         Some(capacity) if crossing.is_none() => {
-            format!("capacity at most {capacity:.0}: the whole fit is above the robots")
+            format!("capacity at most {capacity:.0}: the fit begins above the robots")
         }
         Some(capacity) => format!("capacity {capacity:.1} {unit}"),
         None => "no capacity: the fit never reaches the robots".to_string(),

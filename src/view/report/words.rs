@@ -182,7 +182,7 @@ fn settings(file: &CapacityFile) -> String {
     if let (Some(least), Some(most)) = (sizes.iter().min(), sizes.iter().max())
         && !usual.sizes().eq(points.iter().map(|point| point.size))
     {
-        let step = points.windows(2).next().map_or(1, |two| two[1].size - two[0].size);
+        let step = points.windows(2).next().map_or(1, |two| two[1].size.saturating_sub(two[0].size).max(1));
         text += &format!(" --set sizes=[{least},{most}] --set step={step}");
     }
     text
