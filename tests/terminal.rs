@@ -119,10 +119,11 @@ fn ctrl_c_ends_a_film_and_the_terminal_is_as_it_was() {
 #[test]
 fn ctrl_c_saves_a_run_that_shows_its_progress() {
     let sandbox = Sandbox::tiny();
-    let mut run = Session::new(&sandbox, "evolve -c tiny.toml --generations 1000000 -o run");
-    // A line that moves: it is written over again and again.
+    let mut run = Session::new(&sandbox, "evolve -c tiny.toml --generations 9999 -o run");
+    // A line that moves: it is written over again and again. How much time is left is known after the first generation.
     run.shows("\r");
-    run.shows("generation");
+    run.shows("generation 0/9999");
+    run.shows(" left");
     run.types("\x03");
     run.shows("--resume");
     run.shows("as before, code=75");
