@@ -8,7 +8,6 @@ mod report;
 mod reproduce;
 mod serve;
 
-use crate::base::files::check_writable;
 use crate::base::lanes::InstructionSet;
 use crate::run::capacity_file::CapacityFile;
 use crate::run::data::catalogue::Catalogue;
@@ -196,15 +195,11 @@ fn run_eval(args: EvalArgs, console: &Console) -> Result<(), Error> {
 fn run_replay(args: ReplayArgs, console: &Console) -> Result<(), Error> {
     let ReplayArgs { robot, physical_only, archive, images, dataset, data, format, out, open, .. } = args;
     let (width, every, fps, look) = (args.width, usize::from(args.every), args.fps, args.look);
-    if let Some(path) = &out {
-        check_writable(path).map_err(|error| Error::writing(path, &error))?;
-    }
+    // What is wrong with the file is to be known before the life is lived.
+    let named = out.as_deref().map(|path| pictures::Wanted::named(path, &format)).transpose()?;
     let folder = pictures::folder(archive.as_deref(), &robot)?;
     let replay = replay::replay(&replay::Options { robot, physical_only, archive, images, data, dataset })?;
-    let wanted = match &out {
-        Some(path) => pictures::Wanted::named(path, &format)?,
-        None => pictures::Wanted::beside(&folder, &replay.name, &format),
-    };
+    let wanted = named.unwrap_or_else(|| pictures::Wanted::beside(&folder, &replay.name, &format));
     let made = pictures::make(console, &replay, &pictures::Wanted { width, every, fps, look, ..wanted })?;
     match made.last().filter(|_| open) {
         Some(path) => open::that(path).map_err(|error| Error::other(format!("cannot open it: {error}"))),

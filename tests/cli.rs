@@ -759,6 +759,11 @@ fn replay_shows_the_images_and_formats_it_is_asked_for() {
     let view = sandbox.run("replay -a run/run.json --format terminal").ended(0, &[]);
     assert!(view.out.lines().count() > 10 && !view.out.contains('\x1b'), "{}", view.out);
     sandbox.run("replay -a run/run.json -i test:99999999").ended(2, &["--images", "99999999"]);
+    // A folder of the name that the pictures have but for their endings is no hindrance.
+    std::fs::create_dir(sandbox.path("walk")).unwrap();
+    sandbox.run("replay -a run/run.json -o walk --format png").ended(0, &[]);
+    sandbox.run("plot body -a run/run.json -o walk").ended(0, &[]);
+    assert!(sandbox.path("walk.png").exists() && sandbox.path("walk.svg").exists());
     sandbox.run("replay -a run/run.json -o nowhere/walk.gif").ended(1, &["nowhere/walk.gif"]);
     sandbox.run("replay -a run/run.json -o walk.avi").ended(2, &["walk.avi", ".gif"]);
     for width in ["0", "1", "4294967295"] {

@@ -94,7 +94,21 @@ fn its_commands_make_it_again() {
     let run = "runs/it's 3";
     std::fs::rename(sandbox.path("runs/3"), sandbox.path(run)).unwrap();
     let told = |args: &[&str]| common::program::said(sandbox.command(args));
-    told(&["eval", "-q", "-a", run, "--images", "20", "--robots", "top:2"]).ended(0, &[]);
+    told(&[
+        "eval",
+        "-q",
+        "-a",
+        run,
+        "--images",
+        "20",
+        "--cycles",
+        "3",
+        "--threshold",
+        "1",
+        "--robots",
+        "top:2",
+    ])
+    .ended(0, &[]);
     told(&["audit", "-q", "-a", run, "--robots", "top:1"]).ended(0, &[]);
     let eval = format!("{run}/eval.json");
     told(&[

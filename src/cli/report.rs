@@ -1,7 +1,6 @@
 //! `morphcog report`: its words, and what it calls.
 
 use super::run_json;
-use crate::base::files::check_writable;
 use crate::run::report;
 use crate::run::{Error, folder};
 use crate::view::console::Console;
@@ -45,7 +44,7 @@ pub(super) fn run(args: ReportArgs, console: &Console) -> Result<(), Error> {
         false => args.runs,
     };
     let out = args.out.unwrap_or_else(|| folder::above(&archives).join("report.html"));
-    check_writable(&out).map_err(|error| Error::writing(&out, &error))?;
+    folder::writable(&out)?;
     let gathered =
         report::gather(&archives, args.data.as_deref(), args.lives > 0, &|text| console.warning(text))?;
     let lives = args.lives.div_ceil(archives.len());

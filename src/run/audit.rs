@@ -200,7 +200,7 @@ fn open(options: &Options) -> Result<Opened, Error> {
 
 /// The images a run's robots were evolved on, of each class the first few. Of other data, verdicts would mean nothing.
 fn training_of(run: &RunFile, options: &Options) -> Result<Training, Error> {
-    let dataset = load_dataset_of(&run.dataset, &run.config, options.data.as_deref(), &[Split::Train])?;
+    let dataset = load_dataset_of(Some(&run.dataset), &run.config, options.data.as_deref(), &[Split::Train])?;
     let mut taken = [0; 256];
     let mut images = run.training_images.clone();
     images.retain(|image| {

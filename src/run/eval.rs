@@ -6,7 +6,7 @@ use super::eval_file::{EVAL_JSON, EVAL_VALIDATION_JSON, EvalFile, RobotReport, T
 use super::eval_images::HeldOutImages;
 use super::held_out::HeldOut;
 use super::robots::{Chosen, Selection, Source};
-use super::training::{load_dataset, load_dataset_of};
+use super::training::load_dataset_of;
 use super::validation::{self, Validated};
 use super::{Config, Error, folder::check_out, gallery};
 use crate::base::Grid;
@@ -98,12 +98,10 @@ pub fn eval(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Re
         return Err(Error::usage(format!("--validation {validated}: expected {least} or more images")));
     }
     let grouping = config.grouping()?;
-    let data = options.data.as_deref();
-    let dataset = match options.robots.validated().is_some() || options.split == HeldOut::Validation {
-        // Which images are for validation is known by their indices.
-        true => load_dataset_of(&first.run.dataset, config, data, &Split::ALL)?,
-        false => load_dataset(config, data, &Split::ALL)?,
-    };
+    // Which images are for validation is known by their indices, in the run's own data only.
+    let validates = options.robots.validated().is_some() || options.split == HeldOut::Validation;
+    let own = validates.then_some(&first.run.dataset);
+    let dataset = load_dataset_of(own, config, options.data.as_deref(), &Split::ALL)?;
     if dataset.fingerprint(Split::Train).unwrap_or_default() != first.run.dataset.train_sha256 {
         observer.warning("the training images here are not those the run was made with (another SHA-256)");
     }

@@ -112,7 +112,7 @@ pub fn name_of(config: &str) -> String {
 /// A path as a shell reads it, for commands that people copy.
 pub fn in_shell(path: &Path) -> String {
     let text = path.display().to_string();
-    let is_plain = |c: char| c.is_alphanumeric() || "_-./:@%+,\\".contains(c);
+    let is_plain = |c: char| c.is_alphanumeric() || "_-./:@%+,".contains(c);
     match !text.is_empty() && text.chars().all(is_plain) {
         true => text,
         false => format!("'{}'", text.replace('\'', r"'\''")),
@@ -148,9 +148,17 @@ pub(super) fn check_out(out: &Path, of: &Path, own: &str) -> Result<(), Error> {
                 "expected another name: this is what {other} and what goes with it are called"
             ));
         }
-        check_writable(path).map_err(|error| Error::writing(path, &error))?;
+        writable(path)?;
     }
     Ok(())
+}
+
+/// Whether a file can be written: to be known before what goes into it is made.
+///
+/// # Errors
+/// Why not.
+pub fn writable(path: &Path) -> Result<(), Error> {
+    check_writable(path).map_err(|error| Error::writing(path, &error))
 }
 
 /// What a file's name says of whose it is: capacity.trainings.json is capacity's, too.

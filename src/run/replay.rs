@@ -1,7 +1,7 @@
 //! `morphcog replay`: record a robot's life, for the pictures.
 
 use super::robots::{Selection, Source};
-use super::training::{DatasetRef, ImageRef, load_dataset, load_dataset_of, see};
+use super::training::{DatasetRef, ImageRef, load_dataset_of, see};
 use super::{Config, Error, folder, gallery};
 use crate::base::Grid;
 use crate::body::Body;
@@ -145,12 +145,8 @@ pub fn subject(options: &Options) -> Result<Subject, Error> {
     }
     let wanted: Vec<Split> =
         Split::ALL.into_iter().filter(|split| shown.iter().any(|image| image.split == *split)).collect();
-    let data = options.data.as_deref();
-    let dataset = match found.dataset.as_ref().filter(|own| own.name == config.data.dataset) {
-        Some(own) => load_dataset_of(own, config, data, &wanted),
-        None => load_dataset(config, data, &wanted),
-    };
-    let dataset = dataset.map_err(offer)?;
+    let own = found.dataset.as_ref().filter(|own| own.name == config.data.dataset);
+    let dataset = load_dataset_of(own, config, options.data.as_deref(), &wanted).map_err(offer)?;
     let mut images = Vec::new();
     for Shown { split, index } in shown {
         let label =

@@ -113,7 +113,7 @@ fn images(run: &RunFile, data: Option<&Path>) -> Result<Vec<(String, Grid<f64>)>
         None => error.hint("or --lives 0 for a report without moving pictures".to_string()),
         Some(_) => error,
     };
-    let dataset = load_dataset_of(&run.dataset, &run.config, data, &[Split::Train]).map_err(hint)?;
+    let dataset = load_dataset_of(Some(&run.dataset), &run.config, data, &[Split::Train]).map_err(hint)?;
     let mut shown: Vec<ImageRef> = run.training_images.clone();
     if shown.len() > MOST_IMAGES {
         let mut classes = Vec::new();

@@ -69,18 +69,19 @@ pub fn load_data(config: &DataConfig, data: Option<&Path>, wanted: &[Split]) -> 
     Dataset::load(&config.dataset, &given, wanted).map_err(refuse)
 }
 
-/// Loads the dataset that a run was made with. Where only other splits are wanted, it is known by its training images if these are
-/// there.
+/// Loads the dataset that a run was made with; any, if none is said. Where only other splits are wanted, it is known by its training
+/// images if these are there.
 ///
 /// # Errors
 /// As [`load_dataset`]; or that it is another one: images of the same index would be others.
 pub fn load_dataset_of(
-    run: &DatasetRef,
+    run: Option<&DatasetRef>,
     config: &Config,
     data: Option<&Path>,
     wanted: &[Split],
 ) -> Result<Dataset, Error> {
     let loaded = load_dataset(config, data, wanted)?;
+    let Some(run) = run else { return Ok(loaded) };
     let train = match loaded.fingerprint(Split::Train) {
         None => {
             load_dataset(config, data, &[Split::Train]).ok().and_then(|set| set.fingerprint(Split::Train))

@@ -123,7 +123,8 @@ pub fn validate(
     let ValidationConfig { images, best: count } = config.validation;
     let count = options.best.unwrap_or(count);
     let grouping = config.grouping()?;
-    let dataset = load_dataset_of(&source.run.dataset, config, options.data.as_deref(), &[Split::Train])?;
+    let dataset =
+        load_dataset_of(Some(&source.run.dataset), config, options.data.as_deref(), &[Split::Train])?;
     let pool = eval::pool(options.threads)?;
     let control_steps = eval::control_steps(config, eval::CYCLES);
     let walker = Walker { config, control_steps, pool: &pool, stop, observer, done: AtomicU64::new(0) };

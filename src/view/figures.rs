@@ -3,7 +3,6 @@
 use super::console::Console;
 use super::plot::{self, Background, Figure};
 use super::{PictureError, write_whole};
-use crate::base::files::check_writable;
 use crate::run::capacity_file::{CAPACITY_JSON, CapacityFile};
 use crate::run::eval_file::{EVAL_JSON, EvalFile};
 use crate::run::plot::Progress;
@@ -123,17 +122,21 @@ pub fn make(console: &Console, wanted: &Wanted) -> Result<Vec<PathBuf>, Error> {
     if count > 1 && wanted.out.is_some() {
         return Err(Error::usage(format!("--out: expected with one figure only, these are {count}")));
     }
+    let named = |path: &Path, ending: &str| match path.extension() {
+        Some(_) => path.to_path_buf(),
+        None => with_ending(path, ending),
+    };
     if let Some(path) = &wanted.out {
-        check_writable(path).map_err(|error| Error::writing(path, &error))?;
+        endings.iter().try_for_each(|ending| folder::writable(&named(path, ending)))?;
     }
     let mut files = Vec::new();
     let mut write = |made: Made| -> Result<(), Error> {
         let figure = made.figure.on(wanted.background);
         for ending in &endings {
-            let path = wanted.out.as_ref().filter(|path| path.extension().is_some());
-            let path = path
-                .cloned()
-                .unwrap_or_else(|| with_ending(wanted.out.as_ref().unwrap_or(&made.stem), ending));
+            let path = match &wanted.out {
+                Some(path) => named(path, ending),
+                None => with_ending(&made.stem, ending),
+            };
             let bytes = match *ending {
                 "svg" => figure.svg().into_bytes(),
                 _ => figure.png(f64::from(wanted.dpi) / 72.0).map_err(failed)?,

@@ -77,7 +77,7 @@ impl Wanted {
     /// A file whose ending says the format; without an ending, one file for each of `formats`.
     ///
     /// # Errors
-    /// If the ending is none of the formats'.
+    /// If the ending is none of the formats', or a file cannot be written.
     pub fn named(path: &Path, formats: &[Format]) -> Result<Self, Error> {
         let files = match path.extension().map(|ending| ending.to_string_lossy().into_owned()) {
             None => or_default(formats)
@@ -100,6 +100,10 @@ impl Wanted {
                 vec![(format, path.to_path_buf())]
             }
         };
+        files
+            .iter()
+            .filter(|(format, _)| *format != Format::Terminal)
+            .try_for_each(|(_, path)| folder::writable(path))?;
         Ok(Wanted { files, ..Wanted::default() })
     }
 }

@@ -4,7 +4,7 @@ use super::Refusal;
 use super::catalogue::Catalogue;
 use crate::base::Grid;
 use crate::run::Error;
-use crate::run::training::{load_dataset, load_dataset_of};
+use crate::run::training::load_dataset_of;
 use crate::task::dataset::{BUILTIN, Dataset, Split};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -61,11 +61,7 @@ impl ImageSets {
             if name == BUILTIN || sets.iter().any(|set: &Dataset| set.name() == name) {
                 continue;
             }
-            let loaded = match &collection.dataset {
-                Some(own) => load_dataset_of(own, &collection.config, data, &[Split::Test]),
-                None => load_dataset(&collection.config, data, &[Split::Test]),
-            };
-            match loaded {
+            match load_dataset_of(collection.dataset.as_ref(), &collection.config, data, &[Split::Test]) {
                 Ok(set) => sets.push(set),
                 Err(error) if !notes.contains(&error.message) => notes.push(error.message),
                 Err(_) => {}

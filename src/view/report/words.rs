@@ -2,6 +2,7 @@
 
 use crate::run::capacity_config::CapacityConfig;
 use crate::run::capacity_file::CapacityFile;
+use crate::run::eval;
 use crate::run::eval_file::{EVAL_JSON, Mean};
 use crate::run::folder::{self, in_shell};
 use crate::run::report::Dossier;
@@ -139,7 +140,8 @@ pub(super) fn methods(dossier: &Dossier) -> String {
     format!("<p>{}</p>\n", escape(&text))
 }
 
-/// The commands that make a run and its tests again.
+/// The commands that make a run and its tests again; audits with other criteria, and networks trained with other hyperparameters, need
+/// these besides.
 pub(super) fn commands(dossier: &Dossier) -> String {
     let config = in_shell(&dossier.path.with_file_name(folder::CONFIG));
     let again = format!("again/{}-seed{}", dossier.run.name, dossier.run.config.seed);
@@ -156,10 +158,18 @@ pub(super) fn commands(dossier: &Dossier) -> String {
     if let Some(report) = &found.eval {
         let ids: Vec<&str> = report.robots.iter().map(|robot| robot.id.as_str()).collect();
         let (images, seed) = (report.images.len(), report.seed);
-        lines.push(format!(
+        let mut line = format!(
             "morphcog eval --archive {again} --images {images} --seed {seed} --robots {}",
             ids.join(",")
-        ));
+        );
+        if report.threshold != eval::THRESHOLD {
+            line += &format!(" --threshold {}", report.threshold);
+        }
+        let cycles = report.control_steps / dossier.run.config.physics.cycle_steps.max(1);
+        if cycles != eval::CYCLES {
+            line += &format!(" --cycles {cycles}");
+        }
+        lines.push(line);
     }
     if let Some(file) = &found.capacity {
         lines.push(format!("morphcog capacity --eval {eval}{}", settings(file)));
