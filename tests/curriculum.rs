@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::program::{Sandbox, TINY, without_seconds};
+use common::program::{Sandbox, TINY, staged, without_seconds};
 use morphcog::run::Config;
 use morphcog::run::archive::{Robot, RunFile};
 use morphcog::run::curriculum::Period;
@@ -15,24 +15,9 @@ use morphcog::task::dataset::Split;
 use morphcog::task::fitness::Fitness;
 use morphcog::task::protocol::Protocol;
 use morphcog::task::rollout::walk;
-use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
-
-/// Three stages in twelve generations: the second with shorter lives; the last with three draws of images, the hardest of
-/// three times as many, with the four fittest elites at the beginning of each, half of the offspring changed in up to four voxels, each
-/// chosen among several by what three relatives did, too, every second start raised, every third image
-/// shown to robots without length limits, and two pixels of each inverted.
-fn staged() -> String {
-    let stages = "\n[[stage]]\ngenerations = 4\n\
-        [[stage]]\ngenerations = 3\nimages_per_class = 2\nfitness = \"mean_clipped\"\n\
-        control_steps = 15\n\
-        [[stage]]\nimages_per_class = 3\npool = 9\nfitness = \"right_then_margin\"\nredraw = 2\nkeep = 4\n\
-        voxel_mutations = 0.5\nvoxel_candidates = 8\nvoxel_changes = 4\nvoxel_relatives = 3\nraised_starts = 1\n\
-        without_limits = true\ninverted_pixels = 2\n";
-    format!("{TINY}{stages}")
-}
 
 fn sandbox() -> Sandbox {
     let sandbox = Sandbox::new();
@@ -283,49 +268,6 @@ fn a_stage_with_shorter_lives_judges_by_them_and_other_commands_by_whole_ones() 
         let displacements: Vec<f64> = serde_json::from_value(judged["displacements"].clone()).unwrap();
         assert_eq!(displacements, walked(&run.config.protocol, robot));
     }
-}
-
-#[test]
-fn a_stage_starts_with_the_fittest_it_keeps_on_its_own_images() {
-    let sandbox = sandbox();
-    let elites = |name: &str, text: String, generations: u64| {
-        sandbox.write("run.toml", text);
-        sandbox.run(&format!("evolve -q -c run.toml -o {name} -g {generations}")).ended(0, &[]);
-        sandbox.run_file(name).elites
-    };
-    // Nobody is born in the third stage's first generation: no parents, and a newcomer that can be told by its age.
-    let lonely = |text: String| text.replace("parents = 8", "parents = 0\nnewcomers = 1");
-    let all = elites("all", lonely(staged()).replace("keep = 4", ""), 8);
-    let mut kept = elites("kept", lonely(staged()).replace("keep = 4", "keep = 2"), 8);
-    let mut fittest: Vec<Robot> = all.into_iter().filter(|robot| robot.generation < 7).collect();
-    fittest.sort_by(|a, b| b.objective.total_cmp(&a.objective));
-    fittest.truncate(2);
-    kept.retain(|robot| robot.generation < 7);
-    kept.sort_by(|a, b| b.objective.total_cmp(&a.objective));
-    assert_eq!(kept, fittest);
-}
-
-#[test]
-fn a_stage_starts_with_the_fittest_of_the_stage_before_and_no_others() {
-    let sandbox = sandbox();
-    let elites = |name: &str, text: String, generations: u64| {
-        sandbox.write("run.toml", text);
-        sandbox.run(&format!("evolve -q -c run.toml -o {name} -g {generations}")).ended(0, &[]);
-        sandbox.run_file(name).elites
-    };
-    // Nobody is born in the third stage's first generation: no parents, and a newcomer that can be told by its age.
-    let lonely = staged().replace("parents = 8", "parents = 0\nnewcomers = 1").replace("keep = 4", "");
-    let mut before = elites("before", lonely.clone(), 7);
-    let all = elites("all", lonely.clone(), 8);
-    let few = elites("few", lonely.replace("pool = 9", "pool = 9\nstart_with = 2"), 8);
-    before.sort_by(|a, b| b.objective.total_cmp(&a.objective));
-    let ids = |robots: &[Robot]| {
-        let old = robots.iter().filter(|robot| robot.generation < 7);
-        old.map(|robot| robot.id.clone()).collect::<BTreeSet<String>>()
-    };
-    let (fittest, of_all) = (ids(&before[..2]), ids(&all));
-    assert_eq!(ids(&few), of_all.intersection(&fittest).cloned().collect());
-    assert!(of_all.len() > 2 && !ids(&few).is_empty(), "{of_all:?}");
 }
 
 #[test]

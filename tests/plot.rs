@@ -123,6 +123,9 @@ fn seeds_become_one_figure_and_robots_one_each() {
     sandbox.run("evolve -q -c tiny.toml --seed 4 -o other").ended(0, &[]);
     sandbox.run("plot progress -a run/run.json -a other/run.json -o both.svg").ended(0, &[]);
     assert!(sandbox.read("both.svg").contains("seeds 3, 4"));
+    sandbox
+        .run("plot progress -a run -a run/run.json")
+        .ended(2, &["run/run.json", "expected different runs"]);
     let ids: Vec<String> =
         sandbox.run_file("run").elites.iter().take(2).map(|elite| elite.id.clone()).collect();
     sandbox.run(&format!("plot body -a run/run.json -r {},{}", ids[0], ids[1])).ended(0, &[]);

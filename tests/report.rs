@@ -62,6 +62,10 @@ fn what_lies_beside_the_run_is_in_it_and_several_runs_go_together() {
         assert!(page.contains(part), "{part}");
     }
     assert!(page.contains("id=\"run0\"") && page.contains("id=\"run1\""));
+    // The same run by another path would stand there twice.
+    sandbox
+        .run("report runs/3 runs/3/run.json --lives 0")
+        .ended(2, &["runs/3/run.json", "expected different runs"]);
     // A broken file is left out, and said to be.
     sandbox.write("runs/3/eval.json", "{");
     sandbox.run("report runs/3 --lives 0").ended(0, &["eval.json", "left out"]);

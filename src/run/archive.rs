@@ -4,6 +4,7 @@ use super::start::StartRef;
 use super::training::{DatasetRef, ImageRef, answers};
 use super::{Config, Error};
 use crate::base::files::read_text;
+use crate::base::hash::sha256_hex;
 use crate::body::{Body, VoxelCounts};
 use crate::genome::Genome;
 use crate::qd::descriptor::{count_bin, possible_cells};
@@ -12,7 +13,7 @@ use crate::task::fitness::Criterion;
 use crate::task::protocol::Protocol;
 use crate::task::score::Answer;
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 /// What `run.json` calls itself.
@@ -261,6 +262,11 @@ impl RunFile {
         format!("{head}\n{}\n]}}\n", lines.join(",\n"))
     }
 
+    /// What identifies its content: SHA-256 in hexadecimal digits.
+    pub fn fingerprint(&self) -> String {
+        sha256_hex(self.to_json().as_bytes())
+    }
+
     /// `elites.csv`: what pyribs' `ArchiveDataFrame` reads. `index`: cell; `objective`; `measures_i`: voxel counts (and
     /// task); `solution_i`: voxels row-major; then id, task, generation and displacements.
     ///
@@ -293,4 +299,20 @@ impl RunFile {
         }
         writer.into_inner().map_err(|error| csv::Error::from(error.into_error()))
     }
+}
+/// Whether runs, each with its path, are different ones: the same twice would count twice.
+///
+/// # Errors
+/// Which are the same.
+pub fn different<'a>(runs: impl IntoIterator<Item = (&'a Path, &'a RunFile)>) -> Result<(), Error> {
+    let mut known = BTreeMap::new();
+    for (path, run) in runs {
+        if let Some(first) = known.insert(run.fingerprint(), path) {
+            let (first, path) = (first.display(), path.display());
+            return Err(Error::usage(format!(
+                "{first} and {path}: expected different runs, these are the same"
+            )));
+        }
+    }
+    Ok(())
 }

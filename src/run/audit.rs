@@ -1,7 +1,7 @@
 //! `morphcog audit`: does a robot's behaviour survive changes that no honest walker should notice?
 
 use super::archive::{Robot, RunFile};
-use super::audit_file::{AUDIT_JSON, AuditFile, RobotAudit, fingerprint};
+use super::audit_file::{AUDIT_JSON, AuditFile, RobotAudit};
 use super::folder::check_out;
 use super::robots::{self, Selection};
 use super::training::{Training, load_dataset_of, see};
@@ -192,7 +192,7 @@ fn open(options: &Options) -> Result<Opened, Error> {
                 }
             }
             let order: Vec<String> = run.elites.iter().map(|robot| robot.id.clone()).collect();
-            let file = AuditFile::new(&run.name, fingerprint(run), order.len(), &options.criteria);
+            let file = AuditFile::new(&run.name, run.fingerprint(), order.len(), &options.criteria);
             Ok((run.config.clone(), run.criterion(), training, subjects, order, file))
         }
     }

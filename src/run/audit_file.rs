@@ -4,7 +4,6 @@ use super::archive::RunFile;
 use super::verdict::{Criteria, PerturbedLife, Verdict};
 use super::{Error, toml_text};
 use crate::base::files::{read_text, write_atomically};
-use crate::base::hash::sha256_hex;
 use crate::sim::Energy;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -77,11 +76,6 @@ impl RobotAudit {
     }
 }
 
-/// What identifies the content of a run.
-pub fn fingerprint(run: &RunFile) -> String {
-    sha256_hex(run.to_json().as_bytes())
-}
-
 impl AuditFile {
     /// Without robots as yet.
     pub fn new(run: &str, run_sha256: String, elites: usize, criteria: &Criteria) -> Self {
@@ -119,12 +113,12 @@ impl AuditFile {
             return Err(Error::input(text).hint(make));
         }
         let file = AuditFile::read(path)?;
-        if file.run_sha256 != fingerprint(run) {
+        if file.run_sha256 != run.fingerprint() {
             let text = format!(
                 "{}: stale: it is about another state of the run (SHA-256 of its content {}…, expected {}…)",
                 path.display(),
                 file.run_sha256.get(..10).unwrap_or_default(),
-                &fingerprint(run)[..10]
+                &run.fingerprint()[..10]
             );
             return Err(Error::input(text).hint(format!("{make} audits the run as it is now")));
         }

@@ -48,6 +48,10 @@ pub struct StageConfig {
     /// be told early. Default: all.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub keep: Option<usize>,
+    /// Fitness that an offspring must exceed to be let in, into an empty cell, too; named as in pyribs. Elites of before stay.
+    /// Default: none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub threshold_min: Option<f64>,
     /// Fitness is that of the worst of a few perturbed lives, the unchanged one included. Default `evaluation.robust`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub robust: Option<bool>,
@@ -130,6 +134,11 @@ impl Config {
         (Period { stage: 0, draw: 0 }, u64::MAX)
     }
 
+    /// What is said of the stage of a period.
+    fn stage_of(&self, period: Period) -> StageConfig {
+        self.stage.get(period.stage).copied().unwrap_or_default()
+    }
+
     /// What answers are judged by in a generation (from 0).
     pub fn criterion(&self, generation: u64) -> Criterion {
         self.criterion_in(self.period(generation))
@@ -137,7 +146,7 @@ impl Config {
 
     /// What answers are judged by in a period.
     pub fn criterion_in(&self, period: Period) -> Criterion {
-        let stage = self.stage.get(period.stage).copied().unwrap_or_default();
+        let stage = self.stage_of(period);
         Criterion {
             fitness: stage.fitness.unwrap_or(self.evaluation.fitness),
             enough: stage.enough.unwrap_or(self.evaluation.enough),
@@ -146,65 +155,67 @@ impl Config {
 
     /// Whether perturbed lives count in a period.
     pub fn robust(&self, period: Period) -> bool {
-        let stage = self.stage.get(period.stage);
-        stage.and_then(|stage| stage.robust).unwrap_or(self.evaluation.robust)
+        self.stage_of(period).robust.unwrap_or(self.evaluation.robust)
     }
 
     /// The period whose images are shown in a period: itself, or one of a stage before.
     pub fn drawn_in(&self, period: Period) -> Period {
-        let of = self.stage.get(period.stage).and_then(|stage| stage.images_of);
-        let Some(shown) = of.and_then(|number| self.stage.get(..number)) else { return period };
+        let Some(shown) = self.stage_of(period).images_of.and_then(|number| self.stage.get(..number)) else {
+            return period;
+        };
         let end: u64 = shown.iter().filter_map(|stage| stage.generations).sum();
         self.drawn_in(self.period(end.saturating_sub(1)))
     }
 
     /// Training images of each class in a period; `None`: those of the section `[data]`.
     pub fn drawn_per_class(&self, period: Period) -> Option<usize> {
-        self.stage.get(period.stage)?.images_per_class
+        self.stage_of(period).images_per_class
     }
 
     /// Images of each class among which the hardest are chosen in a period; `None`: no choice.
     pub fn pool(&self, period: Period) -> Option<usize> {
-        self.stage.get(period.stage)?.pool
+        self.stage_of(period).pool
     }
 
     /// How images are shown in a period.
     pub fn protocol_in(&self, period: Period) -> Protocol {
-        let control_steps = self.stage.get(period.stage).and_then(|stage| stage.control_steps);
-        Protocol {
-            control_steps: control_steps.unwrap_or(self.protocol.control_steps),
-            ..self.protocol.clone()
-        }
+        let control_steps = self.stage_of(period).control_steps.unwrap_or(self.protocol.control_steps);
+        Protocol { control_steps, ..self.protocol.clone() }
     }
 
     /// Rows up to which starts are raised in a period, by turns within a class.
     pub fn raised_starts(&self, period: Period) -> u32 {
-        self.stage.get(period.stage).and_then(|stage| stage.raised_starts).unwrap_or(0)
+        self.stage_of(period).raised_starts.unwrap_or(0)
     }
 
     /// Whether half of the images are shown to robots without length limits in a period.
     pub fn without_limits(&self, period: Period) -> bool {
-        self.stage.get(period.stage).and_then(|stage| stage.without_limits).unwrap_or(false)
+        self.stage_of(period).without_limits.unwrap_or(false)
     }
 
     /// Pixels that are inverted in each training image of a period.
     pub fn inverted_pixels(&self, period: Period) -> usize {
-        self.stage.get(period.stage).and_then(|stage| stage.inverted_pixels).unwrap_or(0)
+        self.stage_of(period).inverted_pixels.unwrap_or(0)
     }
 
     /// Whether offspring are raced against their parents in a period.
     pub fn race(&self, period: Period) -> bool {
-        self.stage.get(period.stage).and_then(|stage| stage.race).unwrap_or(false)
+        self.stage_of(period).race.unwrap_or(false)
     }
 
     /// Elites of each task of before, the fittest, with which a period begins; `None`: all. When images are drawn anew, all stay.
     pub fn start_with(&self, period: Period) -> Option<usize> {
-        self.stage.get(period.stage)?.start_with.filter(|_| period.draw == 0)
+        self.stage_of(period).start_with.filter(|_| period.draw == 0)
     }
 
     /// Elites of each task that stay in the archive in a period; `None`: all.
     pub fn keep(&self, period: Period) -> Option<usize> {
-        self.stage.get(period.stage)?.keep
+        self.stage_of(period).keep
+    }
+
+    /// Fitness that who is born in a period must exceed to be let in; `None`: any will do.
+    pub fn threshold_min(&self, period: Period) -> Option<f64> {
+        self.stage_of(period).threshold_min
     }
 
     /// What is saved in a period. Whom one parent left behind in a race, another might not: nobody is evaluated twice. What
@@ -219,7 +230,7 @@ impl Config {
 
     /// How genomes mutate in a period.
     pub fn mutation_in(&self, period: Period) -> MutationParams {
-        let stage = self.stage.get(period.stage).copied().unwrap_or_default();
+        let stage = self.stage_of(period);
         MutationParams {
             voxel_mutations: stage.voxel_mutations.unwrap_or(self.genome.voxel_mutations),
             voxel_candidates: stage.voxel_candidates.unwrap_or(self.genome.voxel_candidates),
@@ -238,10 +249,8 @@ impl Config {
             let is_last = number + 1 == self.stage.len();
             match stage.generations {
                 None if !is_last => {
-                    return refuse(
-                        number,
-                        "expected generations: only the last stage lasts to the end".to_string(),
-                    );
+                    let text = "expected generations: only the last stage lasts to the end";
+                    return refuse(number, text.to_string());
                 }
                 Some(0) => return refuse(number, "generations = 0: expected 1 or more".to_string()),
                 generations => begin = begin.saturating_add(generations.unwrap_or(0)),
@@ -263,6 +272,9 @@ impl Config {
             if let Some(share) = stage.voxel_mutations.filter(|share| !(0.0..=1.0).contains(share)) {
                 return refuse(number, format!("voxel_mutations = {share}: expected a number from 0 to 1"));
             }
+            if let Some(least) = stage.threshold_min.filter(|least| !least.is_finite()) {
+                return refuse(number, format!("threshold_min = {least}: expected a finite number"));
+            }
             let by_turns = [
                 ("raised_starts", stage.raised_starts.is_some_and(|rows| rows > 0)),
                 ("without_limits", stage.without_limits == Some(true)),
@@ -270,9 +282,8 @@ impl Config {
             if let Some((key, _)) = by_turns.iter().find(|(_, is_wanted)| *is_wanted)
                 && self.protocol.life == Life::Sequential
             {
-                let text =
-                    format!("{key}: expected protocol.life = \"fresh\": a sequential life is one life");
-                return refuse(number, text);
+                let why = "expected protocol.life = \"fresh\": a sequential life is one life";
+                return refuse(number, format!("{key}: {why}"));
             }
             let pixels = self.body.height * self.body.width;
             if let Some(inverted) = stage.inverted_pixels.filter(|&inverted| inverted > pixels) {
@@ -326,10 +337,8 @@ impl Config {
             if let (Some(pool), Some(images)) = (stage.pool, stage.images_per_class)
                 && pool < images
             {
-                return refuse(
-                    number,
-                    format!("pool = {pool}: expected images_per_class, {images}, or more"),
-                );
+                let text = format!("pool = {pool}: expected images_per_class, {images}, or more");
+                return refuse(number, text);
             }
         }
         Ok(())

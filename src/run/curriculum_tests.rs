@@ -100,6 +100,7 @@ fn stages_that_cannot_be_are_refused() {
             "[[stage]]\ninverted_pixels = 9999",
             "stage 1: inverted_pixels = 9999: expected a number from 0 to 49",
         ),
+        ("[[stage]]\nthreshold_min = nan", "stage 1: threshold_min = NaN: expected a finite number"),
         ("[[stage]]\nstart_with = 0", "stage 1: start_with = 0: expected 1 or more"),
         ("[[stage]]\npool = 5", "stage 1: pool: expected images_per_class"),
         ("[[stage]]\nimages_of = 1", "stage 1: images_of = 1: expected the number of a stage before"),

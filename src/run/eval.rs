@@ -1,7 +1,6 @@
 //! `morphcog eval`: how well robots do on held-out images (paper, "Generalization test").
 
-use super::archive::Robot;
-use super::audit_file::fingerprint;
+use super::archive::{Robot, different};
 use super::eval_file::{EVAL_JSON, EVAL_VALIDATION_JSON, EvalFile, RobotReport, Trial};
 use super::eval_images::HeldOutImages;
 use super::held_out::HeldOut;
@@ -85,7 +84,7 @@ pub fn eval(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Re
         check_out(&options.out, &source.path, own_name(options.split))?;
         same_setting(first, source)?;
     }
-    different(&sources)?;
+    different(sources.iter().map(|source| (source.path.as_path(), &source.run)))?;
     let config = &first.run.config;
     if options.validation.is_some() && options.robots.validated().is_none() {
         let text =
@@ -173,20 +172,6 @@ pub fn own_name(split: HeldOut) -> &'static str {
         HeldOut::Test => EVAL_JSON,
         HeldOut::Validation => EVAL_VALIDATION_JSON,
     }
-}
-
-/// Whether all runs are different ones: the same robots twice would be in the means twice.
-fn different(sources: &[Source]) -> Result<(), Error> {
-    let mut known = BTreeMap::new();
-    for source in sources {
-        if let Some(first) = known.insert(fingerprint(&source.run), &source.path) {
-            let (first, path) = (first.display(), source.path.display());
-            return Err(Error::usage(format!(
-                "--archive {first} {path}: expected different runs, these are the same"
-            )));
-        }
-    }
-    Ok(())
 }
 
 /// Whether robots of two runs can be tested together: what they are shown, and where they live, is the same.

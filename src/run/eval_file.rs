@@ -1,7 +1,6 @@
 //! `eval.json` and `eval.csv`: what an evaluation found.
 
 use super::archive::{Robot, RunFile};
-use super::audit_file::fingerprint;
 use super::eval::Options;
 use super::held_out::HeldOut;
 use super::robots::Source;
@@ -265,7 +264,7 @@ impl EvalFile {
     /// As of [`EvalFile::read`]; or that it is about other runs, or another state of them.
     pub fn of_runs(path: &Path, runs: &[&RunFile]) -> Result<Self, Error> {
         let file = Self::read(path)?;
-        let now: Vec<String> = runs.iter().map(|run| fingerprint(run)).collect();
+        let now: Vec<String> = runs.iter().map(|run| run.fingerprint()).collect();
         match file.runs.iter().find(|run| !now.contains(&run.sha256)) {
             None => Ok(file),
             Some(run) => {

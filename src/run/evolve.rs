@@ -245,7 +245,7 @@ impl<'a> Run<'a> {
                 ) = before;
                 return Ok(false);
             }
-            self.evaluate(elites.by_ref().take(at_once).collect())?;
+            self.evaluate(elites.by_ref().take(at_once).collect(), None)?;
         }
         Ok(true)
     }
@@ -277,7 +277,7 @@ impl<'a> Run<'a> {
                 self.totals.saved_known_bodies += images;
             }
         }
-        self.evaluate(fresh)?;
+        self.evaluate(fresh, config.threshold_min(self.period))?;
         let bodies: Vec<&Body> = self.search.archive().elites().map(|elite| &elite.solution.body).collect();
         self.relatives.keep(&bodies, usize::from(params.voxel_relatives));
         self.generation += 1;
@@ -285,11 +285,15 @@ impl<'a> Run<'a> {
     }
 
     /// Evaluates robots, each with its number and its parent's cell, counts that, and puts those into the archive who walked
-    /// and are fit enough.
-    fn evaluate(&mut self, robots: Vec<(u64, Option<usize>, Robot)>) -> Result<(), Error> {
+    /// and are fit enough, fitter than `least` in any case.
+    fn evaluate(
+        &mut self,
+        robots: Vec<(u64, Option<usize>, Robot)>,
+        least: Option<f64>,
+    ) -> Result<(), Error> {
         let config = &self.options.config;
         let Training { stimuli, conditions, protocol, .. } = &self.training;
-        let floors = Floors::of(self.search.archive(), &self.grouping, config.keep(self.period));
+        let floors = Floors::of(self.search.archive(), &self.grouping, config.keep(self.period), least);
         let jobs = robots.iter().map(|(_, parent, robot)| self.job(*parent, robot, &floors));
         let jobs: Vec<Job> = jobs.collect();
         let savings = config.savings_in(self.period);

@@ -35,16 +35,15 @@ pub struct Progress {
 }
 
 impl Progress {
-    /// Reads a run.json and the metrics.csv beside it.
+    /// Reads the metrics.csv beside a run.json.
     ///
     /// # Errors
     /// What is missing or wrong, with its line.
-    pub fn read(archive: &Path) -> Result<Self, Error> {
-        let run = RunFile::read(archive)?;
+    pub fn of(run: &RunFile, archive: &Path) -> Result<Self, Error> {
         let path = archive.with_file_name(METRICS);
         let text = read_text(&path).map_err(|error| Error::reading(&path, &error))?;
         let moments = moments(&text).map_err(|error| error.within(&path.display().to_string()))?;
-        Ok(Progress { run: run.name, seed: run.config.seed, moments })
+        Ok(Progress { run: run.name.clone(), seed: run.config.seed, moments })
     }
 }
 

@@ -1,6 +1,6 @@
 //! `morphcog report`: gathers what is known of runs, for a page.
 
-use super::archive::{Robot, RunFile};
+use super::archive::{Robot, RunFile, different};
 use super::audit_file::{AUDIT_JSON, AuditFile};
 use super::capacity_file::{CAPACITY_JSON, CapacityFile};
 use super::eval_file::{EVAL_JSON, EvalFile};
@@ -90,13 +90,14 @@ pub fn gather(
         let run = RunFile::read(path)?;
         let folder = path.parent().unwrap_or(Path::new(""));
         let progress = match path.with_file_name(folder::METRICS).exists() {
-            true => Progress::read(path).map_err(|error| warn(&format!("{error}; left out"))).ok(),
+            true => Progress::of(&run, path).map_err(|error| warn(&format!("{error}; left out"))).ok(),
             false => None,
         };
         let images = if with_lives { images(&run, data)? } else { Vec::new() };
         let findings = Findings::read(folder, &[&run], warn);
         runs.push(Dossier { path: path.clone(), run, progress, findings, images });
     }
+    different(runs.iter().map(|dossier| (dossier.path.as_path(), &dossier.run)))?;
     let together = match archives.len() {
         0 | 1 => Findings::default(),
         _ => {

@@ -1,7 +1,6 @@
 //! What evaluations say of the runs they are of: enough to show others the same images.
 
 use super::archive::RunFile;
-use super::audit_file::fingerprint;
 use super::config::{BodyConfig, DataConfig, TaskConfig};
 use super::training::ImageRef;
 use crate::task::stimulus::StimulusParams;
@@ -44,7 +43,7 @@ impl RunRef {
             seed: run.config.seed,
             generations: run.generations,
             training_images: run.training_images.clone(),
-            sha256: fingerprint(run),
+            sha256: run.fingerprint(),
         }
     }
 }

@@ -1,7 +1,6 @@
 //! A run that starts from another run's archive: section `[start]`.
 
 use super::archive::{Robot, RunFile};
-use super::audit_file::fingerprint;
 use super::config::BodyConfig;
 use super::folder::run_json;
 use super::held_out::trained_on;
@@ -87,7 +86,7 @@ impl Start {
             archive.retain_fittest(most, |robot| robot.task.clone());
         }
         let origin = StartRef {
-            sha256: fingerprint(&run),
+            sha256: run.fingerprint(),
             name: run.name,
             generations: run.generations,
             trained_on: trained_on.into_iter().collect(),

@@ -4,7 +4,6 @@
 //! of each task on three tenths, the better tenth on all. Results are kept beside the run.
 
 use super::archive::{Robot, RunFile};
-use super::audit_file::fingerprint;
 use super::eval::{self, Observer, Walker};
 use super::eval_file::{RobotReport, Trial};
 use super::held_out::images;
@@ -224,7 +223,7 @@ fn key(
     let images: Vec<usize> = images.iter().map(|image| image.index).collect();
     let Wanted { count, threshold, .. } = wanted;
     sha256_hex(
-        format!("{} {data} {ids:?} {count} {images:?} {threshold} {control_steps}", fingerprint(run))
+        format!("{} {data} {ids:?} {count} {images:?} {threshold} {control_steps}", run.fingerprint())
             .as_bytes(),
     )
 }

@@ -3,11 +3,12 @@
 use super::console::Console;
 use super::plot::{self, Background, Figure};
 use super::{PictureError, write_whole};
+use crate::run::archive::{RunFile, different};
 use crate::run::capacity_file::{CAPACITY_JSON, CapacityFile};
 use crate::run::eval_file::{EVAL_JSON, EvalFile};
 use crate::run::plot::Progress;
 use crate::run::replay::{self, Found, Options};
-use crate::run::{Error, archive::RunFile, folder, gallery, sensitivity};
+use crate::run::{Error, folder, gallery, sensitivity};
 use std::fmt;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
@@ -149,8 +150,12 @@ pub fn make(console: &Console, wanted: &Wanted) -> Result<Vec<PathBuf>, Error> {
     };
     if wanted.kind == Kind::Progress {
         let paths: Vec<&Path> = archives.iter().flatten().map(PathBuf::as_path).collect();
-        let runs: Result<Vec<Progress>, Error> = paths.iter().map(|path| Progress::read(path)).collect();
-        let figure = plot::progress(&runs?);
+        let runs: Vec<RunFile> = paths.iter().map(|path| RunFile::read(path)).collect::<Result<_, _>>()?;
+        let named = || paths.iter().copied().zip(&runs);
+        different(named())?;
+        let lines: Result<Vec<Progress>, Error> =
+            named().map(|(path, run)| Progress::of(run, path)).collect();
+        let figure = plot::progress(&lines?);
         write(Made { figure, stem: stem(paths.first().copied(), wanted.kind, "") })?;
     } else if wanted.kind.is_of_robot() {
         for archive in &archives {

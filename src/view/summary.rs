@@ -87,6 +87,9 @@ pub fn evolution(console: &Console, finished: &Finished, out: &Path) {
         share(totals.saved_early_stop),
         share(totals.saved_shared_lives)
     ));
+    if run.elites.is_empty() {
+        return console.warning("the archive is empty: nobody walked, or was as fit as the config wants");
+    }
     let archive = out.join(RUN_JSON);
     console.info(&format!(
         "next: morphcog replay --robot best --archive {0}\n      morphcog eval --archive {0}",
