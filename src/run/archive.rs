@@ -300,6 +300,7 @@ impl RunFile {
         writer.into_inner().map_err(|error| csv::Error::from(error.into_error()))
     }
 }
+
 /// Whether runs, each with its path, are different ones: the same twice would count twice.
 ///
 /// # Errors
