@@ -88,7 +88,8 @@ pub fn evolution(console: &Console, finished: &Finished, out: &Path) {
         share(totals.saved_shared_lives)
     ));
     if run.elites.is_empty() {
-        return console.warning("the archive is empty: no robot has walked yet and been as fit as the config wants");
+        return console
+            .warning("the archive is empty: no robot has walked yet and been as fit as the config wants");
     }
     let archive = out.join(RUN_JSON);
     console.info(&format!(
