@@ -120,6 +120,9 @@ fn run_evolve(args: EvolveArgs, console: &Console) -> Result<(), Error> {
         let text = format!("stopped after generation {}; the run is saved", finished.run.generations);
         return Err(Error::stopped(text).hint("the same command with --resume goes on".to_string()));
     }
+    if finished.run.elites.is_empty() {
+        return Ok(());
+    }
     if finished.run.config.validation.best > 0 {
         let archive = out.join(folder::RUN_JSON);
         let options = validation::Options { archive, best: None, data: args.data.clone(), threads };

@@ -115,6 +115,13 @@ fn what_cannot_be_compared_is_refused() {
     with("--set mlp.rate=1").ended(2, &["mlp.rate"]);
     with("--physical-only").ended(3, &["audit.json", "morphcog audit"]);
     with("-o runs/eval.json").ended(2, &["overwrite"]);
+    with("-o runs/c.svg").ended(2, &["--out runs/c.svg", "the figure"]);
+    with("--set trainings=9223372036854775807").ended(3, &["trainings = 9223372036854775807", "1 to 100000"]);
+    // Nothing to learn from.
+    let mut runless: serde_json::Value = serde_json::from_str(&sandbox.read("runs/eval.json")).unwrap();
+    runless["runs"] = serde_json::json!([]);
+    sandbox.write("runless.json", runless.to_string());
+    sandbox.run("capacity --eval runless.json").ended(3, &["runless.json: runs: expected one or more"]);
     let published = sandbox.read("runs/eval.json").replace("\"name\":\"tiny\"", "\"name\":\"gallery\"");
     sandbox.write("gallery.json", published);
     sandbox.run("capacity --eval gallery.json --physical-only").ended(2, &["published"]);

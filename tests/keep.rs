@@ -91,3 +91,14 @@ fn a_stage_lets_in_only_offspring_that_exceed_its_threshold() {
     let nobody = elites(&sandbox, "nobody", &stages("threshold_min = 1"), "");
     assert!(nobody.iter().all(|robot| robot.generation < 4) && !nobody.is_empty());
 }
+
+#[test]
+fn a_run_that_lets_nobody_in_says_so_and_chooses_nobody_at_its_end() {
+    let sandbox = Sandbox::new();
+    let stage = "\n[[stage]]\nthreshold_min = 1000000\n[validation]\nbest = 1\n";
+    sandbox.write("run.toml", format!("{TINY}{stage}"));
+    for _ in 0..2 {
+        sandbox.run("evolve -c run.toml -o run --resume").ended(0, &["the archive is empty"]);
+    }
+    assert!(!sandbox.path("run/validation.json").exists());
+}

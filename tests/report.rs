@@ -66,6 +66,16 @@ fn what_lies_beside_the_run_is_in_it_and_several_runs_go_together() {
     sandbox
         .run("report runs/3 runs/3/run.json --lives 0")
         .ended(2, &["runs/3/run.json", "expected different runs"]);
+    // Networks that other robots are worth are not put beside this test; without a test they stand for themselves.
+    sandbox.run("eval -q --archive runs/3/run.json --images 20 --cycles 1 --robots top:2").ended(0, &[]);
+    let capacity = |sandbox: &Sandbox| sandbox.read("runs/3/report.html").contains("Capacity");
+    sandbox
+        .run("report runs/3 --lives 0")
+        .ended(0, &["capacity.json: it is not of the robots of", "left out"]);
+    assert!(!capacity(&sandbox));
+    std::fs::remove_file(sandbox.path("runs/3/eval.json")).unwrap();
+    let said = sandbox.run("report runs/3 --lives 0").ended(0, &[]);
+    assert!(capacity(&sandbox) && !said.err.contains("left out"), "{}", said.err);
     // A broken file is left out, and said to be.
     sandbox.write("runs/3/eval.json", "{");
     sandbox.run("report runs/3 --lives 0").ended(0, &["eval.json", "left out"]);
@@ -156,4 +166,13 @@ fn what_is_no_run_is_refused() {
     sandbox.run("report nowhere").ended(3, &["nowhere"]);
     sandbox.run("report tiny.toml").ended(3, &["tiny.toml"]);
     sandbox.run("report runs/3 -o runs").ended(1, &["runs"]);
+    // A run is not written over, be it another one.
+    let kept = sandbox.read("runs/4/run.json");
+    let over = ["overwrite a file of a run"];
+    sandbox.run("report runs/3 -o runs/4/run.json").ended(2, &over);
+    for name in ["run.json", "metrics.json", "elites.json"] {
+        sandbox.run(&format!("eval -a runs/3 --images 20 -o runs/4/{name}")).ended(2, &over);
+    }
+    sandbox.run("eval -a runs/3 --images 20 -o runs/4/audit.json").ended(2, &["audit.json"]);
+    assert_eq!(sandbox.read("runs/4/run.json"), kept);
 }

@@ -4,6 +4,7 @@
 mod common;
 
 use common::program::{PROGRAM, Sandbox, TINY, files, without_seconds};
+use morphcog::base::hash::sha256_hex;
 use morphcog::run::archive::RunFile;
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -246,6 +247,26 @@ fn resuming_with_another_config_is_refused_naming_the_key() {
     // What changes no result may change.
     let other = "--set checkpoint.seconds=1 --set savings.early_stop=false --threads 1";
     sandbox.run(&format!("{} {other}", resume_to_12())).ended(0, &[]);
+    sandbox.run("evolve -q -c tiny.toml -g 12 -o whole").ended(0, &[]);
+    assert_eq!(sandbox.run_file("run").elites, sandbox.run_file("whole").elites);
+}
+
+#[test]
+fn a_run_of_another_version_of_the_program_is_not_gone_on_with() {
+    let sandbox = sandbox_half_way();
+    let version = format!("\"program_version\":\"{}\"", env!("CARGO_PKG_VERSION"));
+    let [newest, previous] = ["run/checkpoint.json", "run/checkpoint.previous.json"];
+    let saved = sandbox.read(newest);
+    assert!(saved.contains(&version));
+    let (_, content) = saved.split_once('\n').unwrap();
+    let content = content.replace(&version, "\"program_version\":\"0.0.9\"");
+    sandbox.write(newest, format!("{}\n{content}", sha256_hex(content.trim_end().as_bytes())));
+    if sandbox.path(previous).exists() {
+        std::fs::remove_file(sandbox.path(previous)).unwrap();
+    }
+    let before = files(&sandbox.path("run"));
+    sandbox.run(&resume_to_12()).ended(3, &["morphcog 0.0.9", "hint:", "--force"]);
+    assert_eq!(files(&sandbox.path("run")), before);
 }
 
 /// An IDX dataset of two blank classes; `ink` is every pixel of the ones.

@@ -108,6 +108,11 @@ fn robots_are_compared_on_validation_images_without_a_look_at_the_test_images() 
     sandbox.run(&format!("{command} --images 60 --robots top:1")).ended(0, &[]);
     let report = EvalFile::read(&sandbox.path("run/eval-validation.json")).unwrap();
     assert_eq!(report.images, selected);
+    // Nor are those who are named after that; others are shown any.
+    let best = EvalFile::read(&sandbox.path("run/eval-validation.json")).unwrap().robots[0].id.clone();
+    sandbox.run(&format!("{command} --images 60 --robots {best}")).ended(0, &[]);
+    let report = EvalFile::read(&sandbox.path("run/eval-validation.json")).unwrap();
+    assert!(report.images.iter().all(|image| !selected.contains(image)));
     // Robots of two runs: on images that neither was trained on.
     sandbox.write("other.toml", sandbox.read("run.toml").replace("seed = 3", "seed = 2"));
     sandbox.run("evolve -q -c other.toml -o other").ended(0, &[]);

@@ -31,7 +31,7 @@ pub struct Robot {
     pub cell: Vec<usize>,
     /// The task it performs, as "0|123": classes before the bar walk one way, the others the other.
     pub task: String,
-    /// Its fitness, voxel lengths.
+    /// Its fitness, in the fitness's [unit](crate::task::fitness::Fitness::unit).
     pub objective: f64,
     /// Displacement under each training image, voxel lengths, right positive; with `until_…_wrong` under those that it
     /// had to be shown, the first.
@@ -133,25 +133,7 @@ impl RunFile {
     /// # Errors
     /// As [`RunFile::read`].
     pub fn parse(text: &str, name: &str) -> Result<Self, Error> {
-        /// What every version has, to tell a newer or foreign file before its details are refused.
-        #[derive(Deserialize)]
-        struct Head {
-            format: Option<String>,
-            format_version: Option<u32>,
-        }
-        let head: Head = super::toml_text::read_json(text, name)?;
-        if head.format.as_deref() != Some(FORMAT) {
-            return Err(Error::input(format!(
-                "{name}: not a run.json of morphcog: expected \"format\": \"{FORMAT}\""
-            )));
-        }
-        if head.format_version.is_none_or(|version| version > FORMAT_VERSION) {
-            let text = format!("{name}: format_version: expected at most {FORMAT_VERSION}");
-            return Err(
-                Error::input(text).hint("it was written by a newer morphcog; update this one".to_string())
-            );
-        }
-        let run: RunFile = super::toml_text::read_json(text, name)?;
+        let run: RunFile = super::toml_text::read_versioned(text, name, FORMAT, FORMAT_VERSION)?;
         run.check().map_err(|error| error.within(name))?;
         Ok(run)
     }
@@ -207,9 +189,21 @@ impl RunFile {
         self.config.criterion(self.latest())
     }
 
+    /// A fitness for people, with its unit.
+    pub fn in_units(&self, objective: f64) -> String {
+        let unit = self.criterion().fitness.unit().map_or(String::new(), |unit| format!(" {unit}"));
+        format!("{objective:.2}{unit}")
+    }
+
     /// How its elites were shown images.
     pub fn protocol(&self) -> Protocol {
         self.config.protocol_in(self.config.period(self.latest()))
+    }
+
+    /// Its fittest elite; of equals the one in the first cell.
+    pub fn best(&self) -> Option<&Robot> {
+        let fitter = |best: &&Robot, robot: &&Robot| robot.objective > best.objective;
+        self.elites.iter().reduce(|best, robot| if fitter(&best, &robot) { robot } else { best })
     }
 
     /// What an elite answered to the training images.

@@ -6,7 +6,7 @@ use super::folder::check_out;
 use super::robots::{self, Selection};
 use super::training::{Training, load_dataset_of, see};
 use super::verdict::{Behaviour, Criteria, PerturbedLife};
-use super::{Config, Error, gallery};
+use super::{Config, Error, eval, gallery};
 use crate::base::hash::sha256_hex;
 use crate::body::Body;
 use crate::sim::{Energy, Lattice};
@@ -101,22 +101,21 @@ pub fn audit(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> R
     let (config, fitness, training, subjects, order, mut file) = open(options)?;
     let grouping = config.grouping()?.with_fitness(fitness);
     let trial = Trial { grouping, training, criteria: options.criteria.clone(), config };
-    if let Ok(earlier) = AuditFile::read(&options.out) {
-        if earlier.run_sha256 == file.run_sha256 && earlier.criteria != file.criteria {
-            let (out, count) = (options.out.display(), earlier.robots.len());
-            let text = format!("{out}: {count} robots of this run are audited by other criteria");
-            let hint = "write elsewhere with --out, or move that file away".to_string();
-            return Err(Error::input(text).hint(hint));
-        }
-        let same = AuditFile { robots: Vec::new(), ..earlier.clone() } == file;
-        file.robots = if same { earlier.robots } else { Vec::new() };
+    if let Ok(earlier) = AuditFile::read(&options.out)
+        && earlier.run_sha256 == file.run_sha256
+        && earlier.criteria != file.criteria
+    {
+        let (out, count) = (options.out.display(), earlier.robots.len());
+        let text = format!("{out}: {count} robots of this run are audited by other criteria");
+        let hint = "write elsewhere with --out, or move that file away".to_string();
+        return Err(Error::input(text).hint(hint));
     }
+    file.add_known(&options.out);
     let asked = subjects.iter().map(|subject| subject.id.clone()).collect();
     let open: Vec<Subject> =
         subjects.into_iter().filter(|subject| file.robot(&subject.id).is_none()).collect();
     observer.started(open.len(), open.iter().map(|subject| 1 + trial.perturbations(subject).len()).sum());
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(options.threads.unwrap_or(0)).build();
-    let pool = pool.map_err(|error| Error::other(format!("no threads: {error}")))?;
+    let pool = eval::pool(options.threads)?;
     let done = AtomicU64::new(0);
     for batch in open.chunks(BATCH) {
         let found: Vec<Option<RobotAudit>> = pool.install(|| {
@@ -131,6 +130,8 @@ pub fn audit(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> R
             }
         }
         file.robots.extend(found.into_iter().flatten());
+        // Another audit of the same run may have written meanwhile.
+        file.add_known(&options.out);
         file.robots.sort_by_key(|robot| order.iter().position(|id| *id == robot.id));
         file.write(&options.out)?;
         if stopped {

@@ -149,6 +149,17 @@ impl AuditFile {
         Err(Error::input(text).hint("morphcog audit --archive … makes one beside the run".to_string()))
     }
 
+    /// Adds what a file of verdicts on the same run, by the same criteria and version, says of other robots.
+    pub(super) fn add_known(&mut self, path: &Path) {
+        let Ok(known) = AuditFile::read(path) else { return };
+        let head = |file: &AuditFile| AuditFile { robots: Vec::new(), ..file.clone() };
+        if head(&known) == head(self) {
+            let others = known.robots.into_iter().filter(|robot| self.robot(&robot.id).is_none());
+            let others: Vec<RobotAudit> = others.collect();
+            self.robots.extend(others);
+        }
+    }
+
     /// What was found of a robot.
     pub fn robot(&self, id: &str) -> Option<&RobotAudit> {
         self.robots.iter().find(|robot| robot.id == id)

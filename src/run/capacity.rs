@@ -17,6 +17,9 @@ use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
+/// Endings of the figure beside the results.
+pub const FIGURES: [&str; 2] = ["svg", "png"];
+
 /// What to compare with what.
 #[derive(Clone, Debug)]
 pub struct Options {
@@ -64,6 +67,10 @@ pub fn capacity(
             format!("{name}: expected an evaluation on test images, found one on {} images", report.split);
         return Err(Error::input(text).hint("morphcog eval --split test".to_string()));
     }
+    if report.runs.is_empty() {
+        let text = format!("{name}: runs: expected one or more, whose training images networks learn from");
+        return Err(Error::input(text).hint("run morphcog eval again".to_string()));
+    }
     if report.stopped {
         observer.warning(&format!("{name}: the evaluation was stopped before its last robot"));
     }
@@ -77,6 +84,10 @@ pub fn capacity(
         return Err(Error::input(format!("capacity: cnn.kernel = {kernel}: expected up to {most}, {of}")));
     }
     check_out(&options.out, &options.eval, CAPACITY_JSON)?;
+    if FIGURES.iter().any(|ending| options.out.with_extension(ending) == options.out) {
+        let text = format!("--out {}: expected another ending", options.out.display());
+        return Err(Error::usage(format!("{text}: the figure beside the results has that name")));
+    }
     let robots = robots(&report, options)?;
     let images = Images::of(&report, setting, options, observer)?;
     let grouping = setting.task.grouping()?;
@@ -160,7 +171,7 @@ fn point(size: usize, trained: &[(f64, usize)]) -> Point {
     let accuracies: Vec<f64> = trained.iter().map(|(accuracy, _)| *accuracy).collect();
     let mean = accuracies.iter().sum::<f64>() / accuracies.len().max(1) as f64;
     let parameters = trained.first().map_or(0, |(_, parameters)| *parameters);
-    Point { size, mean, standard_deviation: standard_deviation(&accuracies).unwrap_or(0.0), parameters }
+    Point { size, mean, standard_deviation: standard_deviation(&accuracies), parameters }
 }
 
 fn curve_of(kind: Kind, points: Vec<Point>, accuracy: f64) -> Curve {

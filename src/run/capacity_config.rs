@@ -8,6 +8,9 @@ use std::path::Path;
 /// Largest size of a network that can be asked for.
 const MOST: usize = 1000;
 
+/// Most trainings of a size that can be asked for.
+const MOST_TRAININGS: usize = 100_000;
+
 /// What is trained, and how.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -67,6 +70,9 @@ impl CapacityConfig {
             return refuse(&format!(
                 "sizes = [{from}, {to}]: expected two sizes from 1 to {MOST}, the smaller first"
             ));
+        }
+        if self.trainings > MOST_TRAININGS {
+            return refuse(&format!("trainings = {}: expected 1 to {MOST_TRAININGS}", self.trainings));
         }
         if self.step == 0 || self.trainings == 0 || self.networks.is_empty() || self.waiting_images == 0 {
             return refuse("step, trainings, networks, waiting_images: expected one or more of each");

@@ -75,8 +75,8 @@ pub struct Point {
     pub size: usize,
     /// Mean test accuracy over the trainings, 0 to 1.
     pub mean: f64,
-    /// Standard deviation over the trainings.
-    pub standard_deviation: f64,
+    /// Standard deviation over the trainings; none of one.
+    pub standard_deviation: Option<f64>,
     /// Trainable parameters.
     pub parameters: usize,
 }
@@ -94,13 +94,17 @@ impl CapacityFile {
     /// The analysis beside an `eval.json`, if there is one of just the robots and images that the evaluation is of.
     pub fn of(report: &EvalFile, eval: &Path) -> Option<Self> {
         let found = Self::read(&eval.with_file_name(CAPACITY_JSON)).ok()?;
+        found.is_of(report).then_some(found)
+    }
+
+    /// Whether it is of just the robots and images that an evaluation is of.
+    pub fn is_of(&self, report: &EvalFile) -> bool {
         let same = |task: &TaskCapacity| {
             report.means.get(&task.task).is_some_and(|mean| {
                 mean.robots == task.robots && (mean.accuracy - task.accuracy).abs() < 1e-9
             })
         };
-        let is_of_it = found.dataset == report.dataset && found.selected == report.selected;
-        (is_of_it && found.tasks.iter().all(same)).then_some(found)
+        self.dataset == report.dataset && self.selected == report.selected && self.tasks.iter().all(same)
     }
 
     /// `capacity.csv`: a line per task, network and size.
@@ -118,7 +122,8 @@ impl CapacityFile {
                     let fit = curve.value(point.size as f64).map_or(String::new(), |value| value.to_string());
                     let mut row = vec![task.task.clone(), curve.network.clone()];
                     row.extend([point.size, point.parameters].map(|count| count.to_string()));
-                    row.extend([point.mean, point.standard_deviation].map(|value| value.to_string()));
+                    let deviation = point.standard_deviation.map_or(String::new(), |value| value.to_string());
+                    row.extend([point.mean.to_string(), deviation]);
                     row.extend([fit, task.accuracy.to_string()]);
                     writer.write_record(&row)?;
                 }

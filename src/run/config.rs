@@ -271,7 +271,6 @@ impl Config {
             return refuse(&key, number.to_string(), &format!("0 to {MAX_NUMBER}"));
         }
         self.grouping()?;
-        self.validate_stages()?;
         self.physics.validate().map_err(|error| Error::input(format!("physics.{error}")))?;
         self.stimulus.validate().map_err(|error| Error::input(format!("stimulus: {error}")))?;
         self.data.builtin.check().map_err(|error| Error::input(format!("data.builtin: {error}")))?;
@@ -280,6 +279,7 @@ impl Config {
                 return refuse(key, side.to_string(), &format!("1 to {MAX_SIDE}"));
             }
         }
+        self.validate_stages()?;
         if self.body.min_muscles > self.body.height * self.body.width {
             return refuse(
                 "body.min_muscles",

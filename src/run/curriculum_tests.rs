@@ -1,4 +1,5 @@
 use super::*;
+use crate::run::Error;
 use crate::run::config::BUILT_IN;
 
 fn config(stages: &str) -> Result<Config, Error> {
@@ -64,7 +65,7 @@ fn starts_are_raised_and_limits_removed_in_fresh_lives_only() {
         assert!(text.contains(&format!("stage 1: {name}: expected protocol.life = \"fresh\"")), "{text}");
     }
     with("sequential", "[[stage]]\nraised_starts = 0\nwithout_limits = false").unwrap();
-    let stages = "[[stage]]\nraised_starts = 2\nwithout_limits = true\ngenerations = 1\n[[stage]]";
+    let stages = "[[stage]]\nimages_per_class = 4\nraised_starts = 2\nwithout_limits = true\ngenerations = 1\n[[stage]]";
     let fresh = with("fresh", stages).unwrap();
     let periods = [0, 1].map(|generation| fresh.period(generation));
     assert_eq!(periods.map(|period| fresh.raised_starts(period)), [2, 0]);
@@ -94,6 +95,16 @@ fn stages_that_cannot_be_are_refused() {
         ),
         ("[[stage]]\nrace = true", "stage 1: race: expected fitness = \"mean_clipped\" or \"mean_hinge\""),
         ("[[stage]]\nfitness = 'mean_hinge'\nenough = 0", "stage 1: enough = 0"),
+        (
+            "[[stage]]\nimages_per_class = 2\nraised_starts = 2",
+            "stage 1: raised_starts: expected 3 images per class or more, found 2",
+        ),
+        ("[[stage]]\nwithout_limits = true", "stage 1: without_limits: expected 2 images per class or more"),
+        (
+            "[[stage]]\ngenerations = 1\nimages_per_class = 3\n[[stage]]\nimages_of = 1\nraised_starts = 2\nwithout_limits = true",
+            "stage 2: without_limits: expected 4 images per class or more, found 3",
+        ),
+        ("[[stage]]\nstart_with = 3", "stage 1: start_with: expected a stage before, or [start] archive"),
         ("[[stage]]\nenough = 20", "stage 1: enough: expected fitness = \"mean_clipped\" or \"mean_hinge\""),
         ("[evaluation]\nenough = 0", "evaluation.enough = 0: expected 1 or more"),
         (

@@ -107,9 +107,13 @@ pub fn eval(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Re
     let robots = options.robots.of(&sources, options.seed)?;
     let (robots, unskilled): (Vec<Chosen>, Vec<Chosen>) =
         robots.into_iter().partition(|chosen| task_of(&grouping, chosen.robot).is_some());
-    if let Some(chosen) = unskilled.first() {
+    if let Some(chosen) = unskilled.first().filter(|_| !robots.is_empty()) {
         let (count, id) = (unskilled.len(), &chosen.robot.id);
         observer.warning(&format!("{count} robots ({id} …) walk the same way for every class; left out"));
+    }
+    if robots.is_empty() {
+        let text = "there is no robot to evaluate: those selected walk the same way for every class";
+        return Err(Error::input(text.to_string()));
     }
     let shown = HeldOutImages::draw(config, &sources, &dataset, options)?;
     let test_sha256 = dataset.fingerprint(Split::Test).unwrap_or_default();

@@ -1,11 +1,11 @@
 //! The images that `eval` shows, and what takes no body on them.
 
-use super::archive::RunFile;
 use super::eval::Options;
 use super::eval_file::Baselines;
 use super::held_out::{self, HeldOut, images_besides};
 use super::robots::Source;
 use super::training::{ImageRef, see};
+use super::validation;
 use super::{Config, Error};
 use crate::base::Grid;
 use crate::task::baselines::{Labelled, best_pixel, larger_group, nearest_training_image};
@@ -47,7 +47,7 @@ impl<'a> HeldOutImages<'a> {
             HeldOut::Test => (test_images(config, dataset, options)?, Split::Test),
             HeldOut::Validation => {
                 let runs: Vec<_> = sources.iter().map(|source| &source.run).collect();
-                let besides = chosen_by(config, &runs, dataset, options)?;
+                let besides = chosen_by(config, sources, dataset, options)?;
                 (images_besides(&besides, &runs, dataset, "--images", asked)?, Split::Train)
             }
         };
@@ -115,18 +115,22 @@ fn labelled(list: &[(Grid<f64>, u8)]) -> Vec<Labelled<'_>> {
     list.iter().map(|(stimulus, class)| Labelled { stimulus, class: *class }).collect()
 }
 
-/// Validation images that robots of each run are chosen by, if they are.
+/// Validation images that robots of each run are chosen by, if they are, now or before: whoever is named may be one of the best
+/// of `validation.json`.
 fn chosen_by(
     config: &Config,
-    runs: &[&RunFile],
+    sources: &[Source],
     dataset: &Dataset,
     options: &Options,
 ) -> Result<BTreeSet<usize>, Error> {
     let mut all = BTreeSet::new();
-    if options.robots.validated().is_some() {
-        let count = options.validation.unwrap_or(config.validation.images);
-        for run in runs {
-            let of_run = held_out::images(&[run], dataset, "--validation", count)?;
+    for source in sources {
+        let count = match options.robots.validated() {
+            Some(_) => Some(options.validation.unwrap_or(config.validation.images)),
+            None => options.robots.names_any().then(|| validation::shown(source)).flatten(),
+        };
+        if let Some(count) = count {
+            let of_run = held_out::images(&[&source.run], dataset, "--validation", count)?;
             all.extend(of_run.into_iter().map(|image| image.index));
         }
     }

@@ -21,6 +21,8 @@ pub const ELITES: &str = "elites.csv";
 pub const METRICS: &str = "metrics.csv";
 const LOCK: &str = ".lock";
 
+const OF_RUN: &str = "expected another name: this would overwrite a file of a run";
+
 /// What commands find, beside a run.
 const RESULTS: [&str; 5] = [AUDIT_JSON, CAPACITY_JSON, EVAL_JSON, EVAL_VALIDATION_JSON, VALIDATION_JSON];
 
@@ -136,14 +138,13 @@ pub(super) fn check_out(out: &Path, of: &Path, own: &str) -> Result<(), Error> {
     let same_folder = folder_of(out) == folder_of(of);
     for path in [out, csv.as_path()] {
         let name = path.file_name();
-        let is_of_run = RunFolder::files().iter().any(|file| name == Some(file.as_ref()));
-        if same_folder && (is_of_run || name == of.file_name()) {
-            return refuse("expected another name: this would overwrite a file of the run");
+        if is_of_run(path) || same_folder && name == of.file_name() {
+            return refuse(OF_RUN);
         }
         let is_others = |other: &&&str| {
             **other != own && name.is_some_and(|name| before_dot(name) == before_dot(other.as_ref()))
         };
-        if let Some(other) = RESULTS.iter().find(is_others).filter(|_| same_folder) {
+        if let Some(other) = RESULTS.iter().find(is_others).filter(|_| same_folder || holds_run(path)) {
             return refuse(&format!(
                 "expected another name: this is what {other} and what goes with it are called"
             ));
@@ -153,11 +154,24 @@ pub(super) fn check_out(out: &Path, of: &Path, own: &str) -> Result<(), Error> {
     Ok(())
 }
 
-/// Whether a file can be written: to be known before what goes into it is made.
+/// Whether there is a run beside a file.
+fn holds_run(path: &Path) -> bool {
+    path.with_file_name(RUN_JSON).exists()
+}
+
+/// Whether a file is, or would be, one of those of a run.
+fn is_of_run(path: &Path) -> bool {
+    holds_run(path) && RunFolder::files().iter().any(|file| path.file_name() == Some(file.as_ref()))
+}
+
+/// Whether a file can be written, and is none of a run: to be known before what goes into it is made.
 ///
 /// # Errors
 /// Why not.
 pub fn writable(path: &Path) -> Result<(), Error> {
+    if is_of_run(path) {
+        return Err(Error::usage(format!("{}: {OF_RUN}", path.display())));
+    }
     check_writable(path).map_err(|error| Error::writing(path, &error))
 }
 

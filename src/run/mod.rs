@@ -42,6 +42,7 @@ pub mod session;
 pub mod setting;
 pub mod signals;
 pub mod simulate;
+mod stage_checks;
 pub mod start;
 pub mod statistics;
 pub mod table;

@@ -38,11 +38,11 @@ pub(super) fn physical<'a>(
     let mut named = Vec::new();
     if let Selection::Ids(ids) = selection {
         for id in ids.iter().filter(|id| *id != "best") {
-            named.push(by_id(&fittest, id)?);
+            named.extend(by_id(&fittest, id)?);
         }
     }
     // Who names robots needs to know of those only; of a part of an archive nothing can be drawn fairly.
-    let is_named = matches!(selection, Selection::Ids(ids) if ids.len() == named.len());
+    let is_named = matches!(selection, Selection::Ids(ids) if !ids.iter().any(|id| id == "best"));
     for chosen in if is_named { &named } else { &fittest } {
         if found(chosen).is_none() {
             let audit = &audits[chosen.source];

@@ -2,7 +2,7 @@
 
 use super::capacity_config::CapacityConfig;
 use super::verdict::Criteria;
-use super::{Error, toml_text};
+use super::{Config, Error, toml_text};
 use crate::base::files::read_text;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
@@ -103,9 +103,37 @@ impl Plan {
     }
 }
 
+/// A config at a scale: its generations, and those of its stages.
+pub(super) fn scaled(config: &Config, scale: f64) -> Config {
+    let part = |generations: u64| ((generations as f64 * scale).round() as u64).max(1);
+    let mut stage = config.stage.clone();
+    for stage in &mut stage {
+        stage.generations = stage.generations.map(part);
+    }
+    // Every stage that begins at full scale begins, however small it is.
+    let last = config.period(config.generations.saturating_sub(1)).stage;
+    let before: u64 = stage.iter().take(last).filter_map(|stage| stage.generations).sum();
+    Config { generations: part(config.generations).max(before + 1), stage, ..config.clone() }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn at_a_small_scale_every_stage_is_as_much_shorter_and_none_is_lost() {
+        let text = "generations = 1000\n[task]\ngroups = [[0], [1]]\n[data]\ndataset = \"builtin\"\n";
+        let stages = "[[stage]]\ngenerations = 600\n[[stage]]\ngenerations = 4\n[[stage]]\ngenerations = 300\n[[stage]]";
+        let config = Config::parse(&format!("{text}{stages}"), "a.toml", &[]).unwrap();
+        let lengths = |scale: f64| {
+            let scaled = scaled(&config, scale);
+            let stages: Vec<_> = scaled.stage.iter().map(|stage| stage.generations).collect();
+            (scaled.generations, stages)
+        };
+        assert_eq!(lengths(1.0), (1000, vec![Some(600), Some(4), Some(300), None]));
+        assert_eq!(lengths(0.1), (100, vec![Some(60), Some(1), Some(30), None]));
+        assert_eq!(lengths(0.001), (4, vec![Some(1), Some(1), Some(1), None]));
+    }
 
     #[test]
     fn a_small_scale_has_fewer_images_and_trainings_but_never_too_few() {

@@ -30,6 +30,8 @@ pub struct Progress {
     pub run: String,
     /// Its seed.
     pub seed: u64,
+    /// What its fitness is measured in.
+    pub unit: Option<&'static str>,
     /// A moment per generation, at least one.
     pub moments: Vec<Moment>,
 }
@@ -43,7 +45,8 @@ impl Progress {
         let path = archive.with_file_name(METRICS);
         let text = read_text(&path).map_err(|error| Error::reading(&path, &error))?;
         let moments = moments(&text).map_err(|error| error.within(&path.display().to_string()))?;
-        Ok(Progress { run: run.name.clone(), seed: run.config.seed, moments })
+        let unit = run.criterion().fitness.unit();
+        Ok(Progress { run: run.name.clone(), seed: run.config.seed, unit, moments })
     }
 }
 

@@ -240,7 +240,7 @@ pub fn find(options: &Options) -> Result<Found, Error> {
         ("Robot".to_string(), robot.id.clone()),
         ("From".to_string(), format!("{}, seed {}", run.name, run.config.seed)),
         ("Task".to_string(), robot.task.clone()),
-        ("Fitness".to_string(), format!("{:.2} voxel lengths", robot.objective)),
+        ("Fitness".to_string(), run.in_units(robot.objective)),
         ("Born".to_string(), format!("generation {}", robot.generation)),
     ];
     let (name, body) = (robot.id.clone(), robot.body.clone());

@@ -55,13 +55,21 @@ impl Findings {
             .and_then(|(path, run)| AuditFile::of_run(run, &path).map_err(told).ok());
         let tested = existing(EVAL_JSON);
         let eval = tested.clone().and_then(|path| EvalFile::of_runs(&path, runs).map_err(told).ok());
-        let mut capacity = existing(CAPACITY_JSON);
-        if eval.is_none()
-            && let Some(path) = tested.and(capacity.take())
-        {
-            warn(&format!("{}: it is of that {EVAL_JSON}; left out", path.display()));
-        }
-        let capacity = capacity.and_then(|path| CapacityFile::read(&path).map_err(told).ok());
+        let is_of_it = |capacity: &CapacityFile| match (&eval, &tested) {
+            (Some(eval), _) => capacity.is_of(eval),
+            (None, is_there) => is_there.is_none(),
+        };
+        let capacity = existing(CAPACITY_JSON).and_then(|path| {
+            let capacity = CapacityFile::read(&path).map_err(told).ok()?;
+            if !is_of_it(&capacity) {
+                warn(&format!(
+                    "{}: it is not of the robots of the {EVAL_JSON} beside it; left out",
+                    path.display()
+                ));
+                return None;
+            }
+            Some(capacity)
+        });
         Findings { eval, audit, capacity }
     }
 }
@@ -146,11 +154,11 @@ impl Dossier {
     }
 
     /// Robots that differ most from each other: the fittest, then in turn the one whose body is farthest from all before
-    /// (in voxels that differ), among those that answer all training images right.
+    /// (in voxels that differ), among those fitter than 0.
     pub fn most_different(&self, count: usize) -> Vec<&Robot> {
         let able = || self.run.elites.iter().filter(|robot| robot.objective > 0.0);
         let mut chosen: Vec<&Robot> =
-            able().max_by(|a, b| a.objective.total_cmp(&b.objective)).into_iter().collect();
+            self.run.best().filter(|best| best.objective > 0.0).into_iter().collect();
         while !chosen.is_empty() && chosen.len() < count {
             let nearest =
                 |robot: &Robot| chosen.iter().map(|other| distance(robot, other)).min().unwrap_or(0);
@@ -186,6 +194,13 @@ mod tests {
         assert!(!chosen.contains(&"c") && chosen.len() <= 3, "{chosen:?}");
         let [a, d] = [0, 3].map(|place| distance(&dossier.run.elites[place], &dossier.run.elites[1]));
         assert_eq!(chosen.get(1), Some(&if d >= a { "d" } else { "a" }));
+    }
+
+    #[test]
+    fn of_equals_the_first_is_the_best() {
+        let dossier = dossier(&[("a", 1.0), ("b", 9.0), ("c", 9.0)]);
+        assert_eq!(dossier.run.best().map(|robot| robot.id.as_str()), Some("b"));
+        assert_eq!(dossier.most_different(1)[0].id, "b");
     }
 
     #[test]

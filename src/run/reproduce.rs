@@ -5,7 +5,7 @@ use super::capacity_file::CapacityFile;
 use super::eval_file::EvalFile;
 use super::folder::{IfExists, RUN_JSON};
 use super::held_out::HeldOut;
-use super::plan::Plan;
+use super::plan::{self, Plan};
 use super::robots::{Chosen, Selection, Source};
 use super::setting::RunRef;
 use super::table::{self, Row};
@@ -153,11 +153,12 @@ impl Job<'_> {
     fn evolved(&self, name: &str, config: &Config) -> Result<Option<Vec<Source>>, Error> {
         let mut sources = Vec::new();
         for &seed in &self.plan.seeds {
-            let generations = ((config.generations as f64 * self.options.scale).round() as u64).max(1);
+            let config = plan::scaled(config, self.options.scale);
+            let generations = config.generations;
             let out = self.options.out.join(format!("{name}-seed{seed}"));
             self.observer.step(&format!("{name}, seed {seed}: {generations} generations"));
             let options = evolve::Options {
-                config: Config { seed, generations, ..config.clone() },
+                config: Config { seed, ..config },
                 name: name.to_string(),
                 out: out.clone(),
                 if_exists: IfExists::Resume,
@@ -287,5 +288,6 @@ fn is_of(known: &EvalFile, sources: &[Source], options: &eval::Options) -> bool 
     };
     let same = (known.seed, known.split, known.images.len(), known.threshold)
         == (options.seed, options.split, options.images, options.threshold);
-    !known.stopped && known.runs == runs && same && same_robots
+    let is_ours = known.program_version == env!("CARGO_PKG_VERSION");
+    is_ours && !known.stopped && known.runs == runs && same && same_robots
 }

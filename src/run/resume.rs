@@ -45,6 +45,13 @@ pub(super) fn saved(
 /// Whether a saved run can be gone on with under a config: all that its results depend on must be the same.
 fn compatible(saved: &Checkpoint, config: &Config, dataset: &Dataset) -> Result<(), Error> {
     let hint = || format!("resume with the config it was started with, or {ANEW}");
+    let (theirs, ours) = (&saved.run.program_version, env!("CARGO_PKG_VERSION"));
+    if theirs != ours {
+        let text = format!(
+            "the run in this folder was made by morphcog {theirs}; this is {ours}, whose numbers may be others"
+        );
+        return Err(Error::input(text).hint(format!("go on with morphcog {theirs}, or {ANEW}")));
+    }
     let last = saved.run.generations.saturating_sub(1);
     let begun = saved.run.config.period(last).stage + 1;
     let (theirs, ours) = (keys(&saved.run.config, begun), keys(config, begun));

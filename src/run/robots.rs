@@ -97,6 +97,15 @@ impl Selection {
         }
     }
 
+    /// Whether it names robots by their ids.
+    pub(super) fn names_any(&self) -> bool {
+        match self {
+            Selection::Ids(_) | Selection::Drawn { .. } => true,
+            Selection::Physical(of) => of.names_any(),
+            _ => false,
+        }
+    }
+
     /// What it says, for people.
     pub fn describe(&self) -> String {
         match self {
@@ -156,9 +165,9 @@ impl Selection {
             }
             Selection::Ids(ids) => {
                 // Whoever is named twice is one robot.
-                let named: Result<Vec<Chosen>, Error> = ids.iter().map(|id| by_id(&fittest, id)).collect();
+                let named: Result<Vec<_>, Error> = ids.iter().map(|id| by_id(&fittest, id)).collect();
                 let mut once: Vec<Chosen> = Vec::new();
-                for chosen in named? {
+                for chosen in named?.into_iter().flatten() {
                     if !once.iter().any(|other| std::ptr::eq(other.robot, chosen.robot)) {
                         once.push(chosen);
                     }
@@ -168,7 +177,8 @@ impl Selection {
             Selection::Drawn { robots, .. } => {
                 let of_run = |source: usize| fittest.iter().filter(move |c| c.source == source).copied();
                 let find = |(source, id): &(usize, String)| by_id(&of_run(*source).collect::<Vec<_>>(), id);
-                robots.iter().map(find).collect()
+                let found: Result<Vec<_>, Error> = robots.iter().map(find).collect();
+                Ok(found?.into_iter().flatten().collect())
             }
             // The first in a ranking can be told without the last; it is asked when they are ranked.
             Selection::Physical(of) if of.validated().is_some() && !all_audited(&fittest, sources)? => {
@@ -179,10 +189,11 @@ impl Selection {
     }
 }
 
-/// The robot of an id, or of the unique beginning of one; "best" is the first.
-pub(super) fn by_id<'a>(robots: &[Chosen<'a>], id: &str) -> Result<Chosen<'a>, Error> {
+/// The robot of an id, or of the unique beginning of one; "best" is the first. Of several runs that have it all, as when they
+/// started from one archive, from each.
+pub(super) fn by_id<'a>(robots: &[Chosen<'a>], id: &str) -> Result<Vec<Chosen<'a>>, Error> {
     if id == "best" {
-        return Ok(robots[0]);
+        return Ok(robots.iter().take(1).copied().collect());
     }
     let lower = id.to_ascii_lowercase();
     let found: Vec<Chosen> = robots
@@ -193,7 +204,7 @@ pub(super) fn by_id<'a>(robots: &[Chosen<'a>], id: &str) -> Result<Chosen<'a>, E
     let list =
         |some: &[Chosen]| some.iter().take(5).map(|c| c.robot.id.as_str()).collect::<Vec<_>>().join(", ");
     match found.as_slice() {
-        [chosen] => Ok(*chosen),
+        [first, others @ ..] if others.iter().all(|other| other.robot.id == first.robot.id) => Ok(found),
         [] => {
             let hint = format!("there are {} robots, the fittest are {}", robots.len(), list(robots));
             Err(Error::input(format!("there is no robot {id}")).hint(hint))
@@ -227,6 +238,15 @@ mod tests {
     #[test]
     fn a_robot_that_is_named_twice_is_one() {
         assert_eq!(selected("aa,b300,aa10", 1).unwrap(), ["aa10", "b300"]);
+    }
+
+    #[test]
+    fn a_robot_that_several_runs_have_is_taken_of_each() {
+        let runs = [source(&[("aa10", 1.0), ("ab20", 3.0)]), source(&[("ab20", 2.0), ("b3ff", 4.0)])];
+        assert_eq!(of("ab20,best", 1, &runs).unwrap(), ["ab20", "ab20", "b3ff"]);
+        let chosen = Selection::Ids(vec!["ab".to_string()]).of(&runs, 1).unwrap();
+        assert_eq!(chosen.iter().map(|c| c.source).collect::<Vec<_>>(), [0, 1]);
+        assert!(of("a", 1, &runs).unwrap_err().message.contains("3 robots"));
     }
 
     #[test]

@@ -71,9 +71,16 @@ pub(super) fn read_versioned<T: DeserializeOwned>(
         format_version: Option<u32>,
     }
     let head: Head = read_json(text, name)?;
-    if head.format.as_deref() != Some(format) || head.format_version.is_none_or(|version| version > newest) {
-        let text = format!("{name}: expected \"format\": \"{format}\", \"format_version\": {newest}");
+    if head.format.as_deref() != Some(format) {
+        let file = format.strip_prefix("morphcog-").unwrap_or(format);
+        let text = format!("{name}: not a {file}.json of morphcog: expected \"format\": \"{format}\"");
         return Err(Error::input(text));
+    }
+    if head.format_version.is_none_or(|version| version > newest) {
+        let text = format!("{name}: format_version: expected at most {newest}");
+        return Err(
+            Error::input(text).hint("it was written by a newer morphcog; update this one".to_string())
+        );
     }
     read_json(text, name)
 }

@@ -17,6 +17,7 @@ use crate::task::dataset::{Dataset, Split};
 use crate::task::grouping::{self, Grouping};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
+use std::mem::replace;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, AtomicU64};
 
@@ -135,6 +136,12 @@ pub fn validate(
     Ok(best.map(|best| best.into_iter().map(|(_, validated)| validated).collect()))
 }
 
+/// How many images the robots in the `validation.json` beside a run were chosen by; `None` without such a file.
+pub(super) fn shown(source: &Source) -> Option<usize> {
+    let text = read_text(&source.path.with_file_name(VALIDATION_JSON)).ok()?;
+    serde_json::from_str::<ValidationFile>(&text).ok()?.robots.first().map(|robot| robot.images)
+}
+
 /// The best of each run and task among some robots, or the best physical ones if the selection says so, with how they did;
 /// `None` if stopped.
 ///
@@ -223,8 +230,12 @@ fn key(
     let images: Vec<usize> = images.iter().map(|image| image.index).collect();
     let Wanted { count, threshold, .. } = wanted;
     sha256_hex(
-        format!("{} {data} {ids:?} {count} {images:?} {threshold} {control_steps}", run.fingerprint())
-            .as_bytes(),
+        format!(
+            "{} {} {data} {ids:?} {count} {images:?} {threshold} {control_steps}",
+            env!("CARGO_PKG_VERSION"),
+            run.fingerprint()
+        )
+        .as_bytes(),
     )
 }
 
@@ -256,26 +267,32 @@ fn screened(
     let mut tasks = BTreeMap::<&str, Vec<&Robot>>::new();
     robots.iter().for_each(|robot| tasks.entry(&robot.task).or_default().push(robot));
     let of = (images.len(), config.classes().len());
-    let showings = tasks.values().flat_map(|all| rounds(all.len(), count, of)).map(|(n, k)| n * k);
+    let showings = |all: &Vec<&Robot>| {
+        let mut before = 0;
+        rounds(all.len(), count, of).map(|(robots, shown)| robots * (shown - replace(&mut before, shown)))
+    };
+    let showings = tasks.values().flat_map(showings);
     walker.validating(robots.len(), images.len(), showings.sum::<usize>() as u64);
     let mut chosen = Vec::new();
     for (_, all) in tasks {
-        let mut left = all.clone();
+        // With its displacements so far.
+        let mut left: Vec<_> = all.iter().map(|robot| (*robot, Vec::new())).collect();
         let mut scores = Vec::new();
         for (keep, shown) in rounds(all.len(), count, of) {
             left.truncate(keep);
             scores = Vec::with_capacity(left.len());
-            for robot in &left {
+            for (robot, mut displacements) in left {
                 let Some(split) = split_of(robot) else { continue };
-                let Some((displacements, simulated)) = walker.lives(robot, &stimuli[..shown]) else {
+                let Some((others, _)) = walker.lives(robot, &stimuli[displacements.len()..shown]) else {
                     return Ok(None);
                 };
+                displacements.extend(others);
                 let trial = Trial { run, robot, split, images: &images[..shown], threshold };
-                scores.push((*robot, RobotReport::new(&trial, displacements, simulated)));
+                scores.push((robot, RobotReport::new(&trial, displacements, 0)));
             }
             // Stable: equals stay in the order of the round before, at first of their fitness.
             scores.sort_by(|(_, a), (_, b)| b.balanced_accuracy.total_cmp(&a.balanced_accuracy));
-            left = scores.iter().map(|(robot, _)| *robot).collect();
+            left = scores.iter().map(|(robot, report)| (*robot, report.displacements.clone())).collect();
         }
         chosen.extend(scores.into_iter().take(count).map(|(robot, report)| Validated {
             id: robot.id.clone(),

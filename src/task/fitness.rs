@@ -47,6 +47,20 @@ pub enum Fitness {
     UntilTwentiethWrong,
 }
 
+impl Fitness {
+    /// What it is measured in; a mean of shares in nothing.
+    pub fn unit(self) -> Option<&'static str> {
+        match self {
+            Fitness::Min => Some("voxel lengths"),
+            Fitness::MeanClipped | Fitness::MeanHinge => None,
+            Fitness::RightThenMargin
+            | Fitness::RightThenMin
+            | Fitness::UntilFifthWrong
+            | Fitness::UntilTwentiethWrong => Some("right answers"),
+        }
+    }
+}
+
 /// The two ways to assign sides to groups: group A is to walk right, or left.
 pub(super) type Assignments = (f64, f64);
 

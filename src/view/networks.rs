@@ -2,6 +2,7 @@
 
 use super::console::{Console, Mode};
 use super::{PictureError, plot, write_whole};
+use crate::run::capacity::FIGURES;
 use crate::run::capacity_file::{CapacityFile, TaskCapacity};
 use crate::run::published;
 use crate::run::reproduce::Finished;
@@ -85,7 +86,7 @@ fn unknown() -> String {
 /// If it cannot be made or written.
 pub fn figure(file: &CapacityFile, out: &Path) -> Result<[PathBuf; 2], PictureError> {
     let figure = plot::capacity(file);
-    let files = ["svg", "png"].map(|ending| out.with_extension(ending));
+    let files = FIGURES.map(|ending| out.with_extension(ending));
     write_whole(&files[0], figure.svg().as_bytes())?;
     write_whole(&files[1], &figure.png(plot::PRINT)?)?;
     Ok(files)

@@ -42,8 +42,7 @@ pub fn evolution(console: &Console, finished: &Finished, out: &Path) {
     let Finished { run, totals, .. } = finished;
     if console.mode() == Mode::Json {
         let elites = run.elites.len();
-        let best =
-            run.elites.iter().max_by(|a, b| a.objective.total_cmp(&b.objective)).map(|robot| &robot.id);
+        let best = run.best().map(|robot| &robot.id);
         let done = serde_json::json!({
             "folder": out.display().to_string(), "generations": run.generations, "stopped": finished.stopped, "best": best,
             "elites": elites, "stats": run.stats, "totals": totals,

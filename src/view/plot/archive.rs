@@ -81,6 +81,8 @@ struct Scale {
     lowest: Option<f64>,
     /// Whether a cell is without an elite.
     is_open: bool,
+    /// What fitness is measured in.
+    unit: Option<&'static str>,
 }
 
 impl Scale {
@@ -93,6 +95,7 @@ impl Scale {
             right: Axis::nice(0.0, highest, 4),
             lowest: (lowest < 0.0).then_some(lowest),
             is_open: run.elites.len() < run.dimensions.possible_cells,
+            unit: run.criterion().fitness.unit(),
         }
     }
 
@@ -188,9 +191,8 @@ fn axes(canvas: &mut Canvas, [x, y]: [f64; 2], side: f64, run: &RunFile, is_firs
 
 /// What colours mean; `is_above` a map that leaves little room.
 fn legend(canvas: &mut Canvas, [x, y]: [f64; 2], width: f64, scale: &Scale, is_above: bool) {
-    colour_bar(canvas, [x, y + 4.0], width - 6.0, &scale.right, "fitness [voxel lengths]", |value| {
-        scale.colour(value)
-    });
+    let name = scale.unit.map_or("fitness".to_string(), |unit| format!("fitness [{unit}]"));
+    colour_bar(canvas, [x, y + 4.0], width - 6.0, &scale.right, &name, |value| scale.colour(value));
     let mut lines = Vec::new();
     if let Some(lowest) = scale.lowest {
         lines.push((scales::below(0.5), format!("below 0 (to {})", number(lowest).replace('-', "−"))));
@@ -222,7 +224,7 @@ mod tests {
 
     #[test]
     fn what_is_wrong_is_gray_and_what_is_right_is_not() {
-        let scale = Scale { right: Axis::nice(0.0, 20.0, 4), lowest: Some(-10.0), is_open: true };
+        let scale = Scale { right: Axis::nice(0.0, 20.0, 4), lowest: Some(-10.0), is_open: true, unit: None };
         assert_eq!(scale.colour(20.0), scales::sequential(1.0));
         assert_eq!(scale.colour(-10.0), scales::below(0.0));
         assert_ne!(scale.colour(-0.1), scale.colour(0.1));

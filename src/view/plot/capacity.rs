@@ -4,7 +4,7 @@ use super::axes::{AXIS, Axis, MARGIN, Plot, heading, left_space};
 use super::canvas::{Anchor, Canvas, Pen, Words};
 use super::figure::{COLUMN, Figure, PAGE};
 use super::{fonts, scales};
-use crate::run::capacity_file::{CapacityFile, Curve, TaskCapacity};
+use crate::run::capacity_file::{CapacityFile, Curve, Point, TaskCapacity};
 use crate::view::colour;
 
 /// Height of a panel, points.
@@ -43,13 +43,17 @@ pub fn capacity(file: &CapacityFile) -> Figure {
 fn accuracies(panels: &[(&TaskCapacity, &Curve)]) -> Axis {
     let values = panels.iter().flat_map(|(task, curve)| {
         let points = curve.points.iter();
-        points
-            .flat_map(|p| [p.mean - p.standard_deviation, p.mean + p.standard_deviation])
-            .chain([task.accuracy])
+        points.flat_map(bar).chain([task.accuracy])
     });
     let (low, high) =
         values.filter(|v| v.is_finite()).fold((0.5f64, 0.6f64), |(l, h), v| (l.min(v), h.max(v)));
     Axis::nice(100.0 * low.max(0.0), 100.0 * high.min(1.0), 5)
+}
+
+/// A standard deviation below and above a point; the point itself if nobody knows it.
+fn bar(point: &Point) -> [f64; 2] {
+    let deviation = point.standard_deviation.unwrap_or(0.0);
+    [point.mean - deviation, point.mean + deviation]
 }
 
 fn network(curve: &Curve) -> (&str, &str) {
@@ -83,7 +87,7 @@ fn panel(canvas: &mut Canvas, at: [f64; 2], size: [f64; 2], y: &Axis, task: &Tas
     canvas.clipped(at, size, |canvas| {
         for point in &curve.points {
             let place = |accuracy: f64| plot.place([point.size as f64, 100.0 * accuracy]);
-            let (low, high) = (point.mean - point.standard_deviation, point.mean + point.standard_deviation);
+            let [low, high] = bar(point);
             canvas.line(place(low), place(high), Pen::new(scales::BLUE.with_opacity(120), 0.8));
             canvas.dot(place(point.mean), 1.4, scales::BLUE);
         }
@@ -138,7 +142,7 @@ mod tests {
         let point = |size: usize| Point {
             size,
             mean: 0.55 + 0.005 * size as f64,
-            standard_deviation: 0.05,
+            standard_deviation: Some(0.05),
             parameters: 3 * size,
         };
         let curve = |network: &str| Curve {

@@ -18,7 +18,7 @@ type Quantity = (&'static str, fn(&Moment) -> f64, Colour);
 const QUANTITIES: [Quantity; 3] = [
     ("QD score", |moment| moment.qd_score, scales::BLUE),
     ("coverage [%]", |moment| 100.0 * moment.coverage, scales::GREEN),
-    ("best fitness [vl]", |moment| moment.obj_max.unwrap_or(f64::NAN), scales::VERMILLION),
+    ("best fitness", |moment| moment.obj_max.unwrap_or(f64::NAN), scales::VERMILLION),
 ];
 
 /// QD score, coverage and best fitness of runs over their evaluations; of several runs the median, and the band from the
@@ -55,7 +55,11 @@ pub fn progress(runs: &[Progress]) -> Figure {
     }
     let note = Words { size: TEXT, ..Words::end() }.colour(crate::view::colour::FAINT);
     let height = top - 9.0 + AXIS + MARGIN;
-    canvas.text([COLUMN - MARGIN, height - MARGIN - 2.0], "vl: voxel lengths", note);
+    if let Some(unit) =
+        runs.first().and_then(|run| run.unit).filter(|unit| runs.iter().all(|run| run.unit == Some(unit)))
+    {
+        canvas.text([COLUMN - MARGIN, height - MARGIN - 2.0], &format!("fitness: {unit}"), note);
+    }
     Figure::new(&format!("Progress: {of}"), [COLUMN, height], canvas.finish())
 }
 
@@ -128,7 +132,12 @@ mod tests {
             obj_max: *best,
             seconds: 0.0,
         };
-        Progress { run: "toy".into(), seed, moments: best.iter().enumerate().map(moment).collect() }
+        Progress {
+            run: "toy".into(),
+            seed,
+            unit: None,
+            moments: best.iter().enumerate().map(moment).collect(),
+        }
     }
 
     #[test]

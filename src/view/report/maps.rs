@@ -107,8 +107,9 @@ pub(super) fn archive(number: usize, dossier: &Dossier, lives: &Lives) -> String
     }
     let stops: Vec<String> = (0..=8).map(|k| sequential(f64::from(k) / 8.0).hex()).collect();
     out += &format!(
-        "<div class=\"scale\">fitness 0 <i style=\"background:linear-gradient(90deg,{})\"></i> {highest:.1} voxel lengths; gray: below 0</div>\n",
-        stops.join(",")
+        "<div class=\"scale\">fitness 0 <i style=\"background:linear-gradient(90deg,{})\"></i> {}; gray: below 0</div>\n",
+        stops.join(","),
+        run.in_units(highest)
     );
     out += "<div class=\"archive\">\n<div>\n";
     let best = played(dossier, 1).first().map(|robot| robot.id.clone());

@@ -96,7 +96,7 @@ pub(super) fn about(dossier: &Dossier) -> String {
                 run.dimensions.possible_cells,
                 percent(stats.coverage),
                 stats.qd_score,
-                or_none(stats.obj_max, |best| format!("{best:.2} voxel lengths"))
+                or_none(stats.obj_max, |best| run.in_units(best))
             ),
         ),
         ("Made with", format!("morphcog {}", run.program_version)),

@@ -48,7 +48,7 @@ pub(super) fn methods(dossier: &Dossier) -> String {
         Encoding::Saturated => "1 for any pixel above 0".to_string(),
         Encoding::Threshold => format!("1 for any pixel above {} of full intensity", config.stimulus.level),
     };
-    let steps = config.protocol.control_steps;
+    let steps = run.protocol().control_steps;
     let cycles = f64::from(steps) / f64::from(config.physics.cycle_steps);
     let life = match config.protocol.life {
         Life::Fresh => "a life of its own from the initial state",
