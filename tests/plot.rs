@@ -122,6 +122,11 @@ fn seeds_become_one_figure_and_robots_one_each() {
     let sandbox = with_run();
     sandbox.run("evolve -q -c tiny.toml --seed 4 -o other").ended(0, &[]);
     sandbox.run("plot progress -a run/run.json -a other/run.json -o both.svg").ended(0, &[]);
+    let said = sandbox.run("plot progress --stage 1 -a run").ended(0, &[]);
+    assert!(said.out.contains("plot-progress-stage1.svg"), "{}", said.out);
+    assert!(sandbox.read("run/plot-progress-stage1.svg").contains("stage 1"));
+    sandbox.run("plot progress --stage 2 -a run").ended(3, &["metrics.csv", "--stage 2", "of stage 1"]);
+    sandbox.run("plot archive --stage 1 -a run").ended(2, &["--stage", "progress only"]);
     assert!(sandbox.read("both.svg").contains("seeds 3, 4"));
     sandbox
         .run("plot progress -a run -a run/run.json")

@@ -25,7 +25,8 @@ Examples:
   morphcog plot body --robot best --robot 3fa -a runs/zero_one-seed1/run.json
   morphcog plot snapshots --robot YJTLA -o yjtla.svg         a robot published with the paper
   morphcog plot spacetime --images train:1,test:17 -o walk.png --dpi 600
-  morphcog plot progress -a runs/zero_one-seed1/run.json -a runs/zero_one-seed2/run.json";
+  morphcog plot progress -a runs/zero_one-seed1/run.json -a runs/zero_one-seed2/run.json
+  morphcog plot progress --stage 7 -a runs/zero_one_curriculum-seed1";
 
 #[derive(Debug, Args)]
 pub(super) struct PlotArgs {
@@ -50,6 +51,9 @@ pub(super) struct PlotArgs {
     /// Folder with the images.
     #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,
+    /// Of progress: the stage of a curriculum to show alone, from 1; evaluations count from where it began.
+    #[arg(long, value_parser = clap::value_parser!(u16).range(1..))]
+    stage: Option<u16>,
     /// Control steps between the poses of snapshots (default: as suits the walk).
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..))]
     every: Option<u32>,
@@ -71,6 +75,7 @@ pub(super) fn run(args: PlotArgs, console: &Console) -> Result<(), Error> {
         archives: args.archive,
         robots: args.robot,
         options: Options { physical_only, images, data, dataset, ..Options::default() },
+        stage: args.stage.map(usize::from),
         every: args.every.map_or(0, |steps| steps as usize),
         out: args.out,
         dpi: args.dpi,

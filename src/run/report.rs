@@ -98,7 +98,7 @@ pub fn gather(
         let run = RunFile::read(path)?;
         let folder = path.parent().unwrap_or(Path::new(""));
         let progress = match path.with_file_name(folder::METRICS).exists() {
-            true => Progress::of(&run, path).map_err(|error| warn(&format!("{error}; left out"))).ok(),
+            true => Progress::of(&run, path, None).map_err(|error| warn(&format!("{error}; left out"))).ok(),
             false => None,
         };
         let images = if with_lives { images(&run, data)? } else { Vec::new() };

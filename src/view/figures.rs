@@ -79,6 +79,8 @@ pub struct Wanted {
     pub robots: Vec<String>,
     /// How to find robots and images; its robot and archive are not looked at.
     pub options: Options,
+    /// Of a run's progress, the stage to show alone, from 1.
+    pub stage: Option<usize>,
     /// Control steps between poses; 0: as suits the walk.
     pub every: usize,
     /// The file; `None`: SVG and PNG beside the run.json.
@@ -109,6 +111,12 @@ pub fn make(console: &Console, wanted: &Wanted) -> Result<Vec<PathBuf>, Error> {
             of_robots.collect::<Vec<_>>().join(", ")
         );
         return Err(Error::usage(text));
+    }
+    if wanted.stage.is_some() && wanted.kind != Kind::Progress {
+        return Err(Error::usage(format!(
+            "--stage: plot {} shows no stages; expected with progress only",
+            wanted.kind
+        )));
     }
     let archives = archives(wanted)?;
     let robots = match wanted.robots.as_slice() {
@@ -154,9 +162,10 @@ pub fn make(console: &Console, wanted: &Wanted) -> Result<Vec<PathBuf>, Error> {
         let named = || paths.iter().copied().zip(&runs);
         different(named())?;
         let lines: Result<Vec<Progress>, Error> =
-            named().map(|(path, run)| Progress::of(run, path)).collect();
+            named().map(|(path, run)| Progress::of(run, path, wanted.stage)).collect();
         let figure = plot::progress(&lines?);
-        write(Made { figure, stem: stem(paths.first().copied(), wanted.kind, "") })?;
+        let of_stage = wanted.stage.map_or(String::new(), |stage| format!("stage{stage}"));
+        write(Made { figure, stem: stem(paths.first().copied(), wanted.kind, &of_stage) })?;
     } else if wanted.kind.is_of_robot() {
         for archive in &archives {
             for robot in &robots {
