@@ -211,10 +211,10 @@ fn run_replay(args: ReplayArgs, console: &Console) -> Result<(), Error> {
 }
 
 fn run_simulate(args: &SimulateArgs, console: &Console) -> Result<(), Error> {
-    let scenario = simulate::Scenario::read(&args.scenario)?;
     match &args.out {
-        Some(path) => simulate::to_file(&scenario, path),
+        Some(path) => simulate::to_file(&args.scenario, path),
         None => {
+            let scenario = simulate::Scenario::read(&args.scenario)?;
             let written = |row: String| {
                 console.text(&row);
                 // Nobody waits for the rest.

@@ -195,6 +195,10 @@ fn what_cannot_be_audited_is_refused_with_what_to_do() {
     audit("--set perturbations.time_step=[1]").ended(3, &["perturbations.time_step", "2 to 64"]);
     audit("--criteria none.toml").ended(3, &["none.toml"]);
     audit("--robots nobody").ended(3, &["no robot nobody"]);
+    // Verdicts that cannot be read may be those of a newer version: they stay.
+    sandbox.write("run/audit.json", "{");
+    audit("--robots top:1").ended(3, &["run/audit.json", "move it away"]);
+    assert_eq!(sandbox.read("run/audit.json"), "{");
     audit("-o run/run.json").ended(2, &["overwrite a file of a run"]);
     sandbox.write("own.toml", "threshold = -1\n");
     audit("--criteria own.toml").ended(3, &["threshold"]);

@@ -125,6 +125,10 @@ fn seeds_become_one_figure_and_robots_one_each() {
     let said = sandbox.run("plot progress --stage 1 -a run").ended(0, &[]);
     assert!(said.out.contains("plot-progress-stage1.svg"), "{}", said.out);
     assert!(sandbox.read("run/plot-progress-stage1.svg").contains("stage 1"));
+    for kind in ["archive", "body"] {
+        sandbox.run(&format!("plot {kind} -a run -o run/")).ended(2, &["--out run/", "a folder"]);
+    }
+    sandbox.run("replay -a run -f gif -o figs/").ended(2, &["--out figs/", "a folder"]);
     sandbox.run("plot progress --stage 2 -a run").ended(3, &["metrics.csv", "--stage 2", "of stage 1"]);
     sandbox.run("plot archive --stage 1 -a run").ended(2, &["--stage", "progress only"]);
     assert!(sandbox.read("both.svg").contains("seeds 3, 4"));

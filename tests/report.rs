@@ -76,6 +76,9 @@ fn what_lies_beside_the_run_is_in_it_and_several_runs_go_together() {
     std::fs::remove_file(sandbox.path("runs/3/eval.json")).unwrap();
     let said = sandbox.run("report runs/3 --lives 0").ended(0, &[]);
     assert!(capacity(&sandbox) && !said.err.contains("left out"), "{}", said.err);
+    // Nor would two states of one run be two.
+    sandbox.run("evolve -q -c tiny.toml --seed 3 -g 14 -o later").ended(0, &[]);
+    sandbox.run("eval -a runs/3 later --images 20").ended(2, &["later/run.json", "two states of one"]);
     // A broken file is left out, and said to be.
     sandbox.write("runs/3/eval.json", "{");
     sandbox.run("report runs/3 --lives 0").ended(0, &["eval.json", "left out"]);
@@ -97,6 +100,12 @@ fn what_was_found_of_another_state_of_a_run_is_left_out_and_what_was_stopped_is_
         sandbox.run("report runs/3 --lives 0").ended(0, &["eval.json: stale", "capacity.json", "left out"]);
     assert!(!sandbox.read("runs/3/report.html").contains("Test on held-out images"), "{said:?}");
     sandbox.run("plot accuracy -a runs/3").ended(3, &["eval.json: stale", "morphcog eval"]);
+    let trained = "capacity --eval runs/3/eval.json --set trainings=1 --set sizes=[1,3]";
+    std::fs::remove_file(sandbox.path("runs/3/capacity.json")).unwrap();
+    sandbox.run(trained).ended(0, &["eval.json: stale: the run beside it"]);
+    assert!(sandbox.read("runs/3/capacity.json").contains("\"standard_deviation\": null"));
+    sandbox.run("plot capacity -a runs/3").ended(3, &["eval.json: stale", "morphcog eval"]);
+    sandbox.run("plot capacity -a runs/3/capacity.json -o networks.svg").ended(0, &[]);
     // The file itself, named, is what is meant.
     sandbox.run("plot accuracy -a runs/3/eval.json -o figure.svg").ended(0, &[]);
     assert!(sandbox.read("figure.svg").contains("stopped before"));
@@ -173,6 +182,9 @@ fn what_is_no_run_is_refused() {
     for name in ["run.json", "metrics.json", "elites.json"] {
         sandbox.run(&format!("eval -a runs/3 --images 20 -o runs/4/{name}")).ended(2, &over);
     }
+    sandbox.write("block.json", "{\"body\": [[1]], \"control_steps\": 1}");
+    sandbox.run("simulate block.json -o runs/4/metrics.csv").ended(2, &over);
+    sandbox.run("simulate block.json -o block.json").ended(2, &["overwrite the scenario"]);
     sandbox.run("eval -a runs/3 --images 20 -o runs/4/audit.json").ended(2, &["audit.json"]);
     assert_eq!(sandbox.read("runs/4/run.json"), kept);
 }

@@ -13,7 +13,7 @@ use crate::task::fitness::Criterion;
 use crate::task::protocol::Protocol;
 use crate::task::score::Answer;
 use serde::{Deserialize, Serialize};
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::path::Path;
 
 /// What `run.json` calls itself.
@@ -200,6 +200,12 @@ impl RunFile {
         self.config.protocol_in(self.config.period(self.latest()))
     }
 
+    /// Whether both are of one run, however far it had got: the same config and seed make the same robots.
+    fn is_one_with(&self, other: &RunFile) -> bool {
+        let essence = |run: &RunFile| (run.config.essence(), run.dataset.clone());
+        self.fingerprint() == other.fingerprint() || essence(self) == essence(other)
+    }
+
     /// Its fittest elite; of equals the one in the first cell.
     pub fn best(&self) -> Option<&Robot> {
         let fitter = |best: &&Robot, robot: &&Robot| robot.objective > best.objective;
@@ -300,14 +306,17 @@ impl RunFile {
 /// # Errors
 /// Which are the same.
 pub fn different<'a>(runs: impl IntoIterator<Item = (&'a Path, &'a RunFile)>) -> Result<(), Error> {
-    let mut known = BTreeMap::new();
+    let mut known: Vec<(&Path, &RunFile)> = Vec::new();
     for (path, run) in runs {
-        if let Some(first) = known.insert(run.fingerprint(), path) {
+        if let Some((first, other)) = known.iter().find(|(_, other)| other.is_one_with(run)) {
             let (first, path) = (first.display(), path.display());
-            return Err(Error::usage(format!(
-                "{first} and {path}: expected different runs, these are the same"
-            )));
+            let these = match other.generations == run.generations {
+                true => "these are the same",
+                false => "these are two states of one",
+            };
+            return Err(Error::usage(format!("{first} and {path}: expected different runs, {these}")));
         }
+        known.push((path, run));
     }
     Ok(())
 }

@@ -101,7 +101,13 @@ pub fn audit(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> R
     let (config, fitness, training, subjects, order, mut file) = open(options)?;
     let grouping = config.grouping()?.with_fitness(fitness);
     let trial = Trial { grouping, training, criteria: options.criteria.clone(), config };
-    if let Ok(earlier) = AuditFile::read(&options.out)
+    let earlier = match options.out.exists() {
+        true => Some(AuditFile::read(&options.out).map_err(|error| {
+            error.hint("it would be written over: move it away, or write elsewhere with --out".to_string())
+        })?),
+        false => None,
+    };
+    if let Some(earlier) = earlier
         && earlier.run_sha256 == file.run_sha256
         && earlier.criteria != file.criteria
     {

@@ -1,10 +1,11 @@
 //! `morphcog capacity`: the networks that the robots are worth (paper, "Morphological cognition capacity").
 
+use super::archive::RunFile;
 use super::capacity_config::CapacityConfig;
 use super::capacity_file::{CAPACITY_JSON, CapacityFile, Curve, FORMAT, FORMAT_VERSION, Point, TaskCapacity};
 use super::capacity_images::{Images, Task};
 use super::eval_file::{EvalFile, RobotReport};
-use super::folder::check_out;
+use super::folder::{RUN_JSON, check_out};
 use super::held_out::HeldOut;
 use super::statistics::standard_deviation;
 use super::trainings::Trainings;
@@ -71,6 +72,12 @@ pub fn capacity(
         let text = format!("{name}: runs: expected one or more, whose training images networks learn from");
         return Err(Error::input(text).hint("run morphcog eval again".to_string()));
     }
+    if let [of] = report.runs.as_slice()
+        && let Ok(run) = RunFile::read(&options.eval.with_file_name(RUN_JSON))
+        && run.fingerprint() != of.sha256
+    {
+        observer.warning(&format!("{name}: stale: the run beside it is another one, or has gone on since"));
+    }
     if report.stopped {
         observer.warning(&format!("{name}: the evaluation was stopped before its last robot"));
     }
@@ -122,6 +129,7 @@ pub fn capacity(
         dataset: report.dataset.clone(),
         patience_on: if config.clean { "validation" } else { "test" }.to_string(),
         trainings: config.trainings,
+        physical_only: options.physical_only,
         stopped: false,
         tasks: Vec::new(),
     };

@@ -33,10 +33,18 @@ pub struct CapacityFile {
     pub patience_on: String,
     /// Trainings from scratch per size.
     pub trainings: usize,
+    /// Whether only those of the robots count that an audit found physical.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub physical_only: bool,
     /// Whether a signal stopped it before the end.
     pub stopped: bool,
     /// The tasks.
     pub tasks: Vec<TaskCapacity>,
+}
+
+/// What a file needs not say.
+fn is_false(value: &bool) -> bool {
+    !value
 }
 
 /// The capacity of the robots of one task.
@@ -101,7 +109,8 @@ impl CapacityFile {
     pub fn is_of(&self, report: &EvalFile) -> bool {
         let same = |task: &TaskCapacity| {
             report.means.get(&task.task).is_some_and(|mean| {
-                mean.robots == task.robots && (mean.accuracy - task.accuracy).abs() < 1e-9
+                let is_whole = mean.robots == task.robots && (mean.accuracy - task.accuracy).abs() < 1e-9;
+                is_whole || self.physical_only && task.robots <= mean.robots
             })
         };
         self.dataset == report.dataset && self.selected == report.selected && self.tasks.iter().all(same)

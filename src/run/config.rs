@@ -242,6 +242,18 @@ impl Config {
         toml::to_string_pretty(self).unwrap_or_default()
     }
 
+    /// What the results of a generation depend on: without how many there are, and what changes no result.
+    pub(super) fn essence(&self) -> Config {
+        Config {
+            generations: 1,
+            savings: Savings::default(),
+            validation: ValidationConfig::default(),
+            checkpoint: CheckpointConfig::default(),
+            data: DataConfig { dir: None, ..self.data.clone() },
+            ..self.clone()
+        }
+    }
+
     /// What bodies evolution makes.
     pub fn body_spec(&self) -> BodySpec {
         let BodyConfig { height, width, min_muscles } = self.body;

@@ -175,6 +175,19 @@ pub fn writable(path: &Path) -> Result<(), Error> {
     check_writable(path).map_err(|error| Error::writing(path, &error))
 }
 
+/// Whether a path can be one of a file: it ends with a name.
+///
+/// # Errors
+/// If not.
+pub fn of_file(path: &Path) -> Result<(), Error> {
+    let last = path.as_os_str().as_encoded_bytes().last();
+    let ends_open = last.is_some_and(|&byte| std::path::is_separator(byte.into()));
+    match ends_open || path.file_name().is_none() {
+        true => Err(Error::usage(format!("--out {}: expected a file, this is a folder", path.display()))),
+        false => Ok(()),
+    }
+}
+
 /// What a file's name says of whose it is: capacity.trainings.json is capacity's, too.
 fn before_dot(name: &OsStr) -> Option<&[u8]> {
     name.as_encoded_bytes().split(|&byte| byte == b'.').next()

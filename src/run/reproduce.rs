@@ -165,7 +165,14 @@ impl Job<'_> {
                 data: self.options.data.clone(),
                 threads: self.options.threads,
             };
-            if evolve::evolve(&options, self.stop, &mut *self.observer.evolution())?.stopped {
+            // Only evolve has the options that its hints name.
+            let otherwise = |error: Error| match &error.hint {
+                Some(hint) if hint.contains("--force") => error
+                    .hint("reproduce with the same plan and --scale, or elsewhere with --out".to_string()),
+                _ => error,
+            };
+            let evolved = evolve::evolve(&options, self.stop, &mut *self.observer.evolution());
+            if evolved.map_err(otherwise)?.stopped {
                 return Ok(None);
             }
             sources.push(Source::read(&out.join(RUN_JSON))?);

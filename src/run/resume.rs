@@ -2,15 +2,12 @@
 //! begun may be others: no result depends on them yet.
 
 use super::checkpoint::{self, Checkpoint};
-use super::config::{CheckpointConfig, DataConfig};
 use super::curriculum::StageConfig;
 use super::folder::{RUN_JSON, RunFolder};
 use super::start::Start;
 use super::training::Training;
-use super::validation::ValidationConfig;
 use super::{Config, Error};
 use crate::task::dataset::Dataset;
-use crate::task::evaluation::Savings;
 use std::collections::BTreeMap;
 
 /// The key of the archive that a run starts from.
@@ -99,16 +96,7 @@ type Keys = BTreeMap<String, toml::Value>;
 /// All keys that results of the first `begun` stages depend on, as `map_elites.parents` or `stage 2: keep`, with their values. The last
 /// of these stages may last longer, or end.
 fn keys(config: &Config, begun: usize) -> Keys {
-    let essence = Config {
-        stage: Vec::new(),
-        generations: 1,
-        savings: Savings::default(),
-        // What is chosen at the end changes nothing before.
-        validation: ValidationConfig::default(),
-        checkpoint: CheckpointConfig::default(),
-        data: DataConfig { dir: None, ..config.data.clone() },
-        ..config.clone()
-    };
+    let essence = Config { stage: Vec::new(), ..config.essence() };
     let mut keys = Keys::new();
     // Every field is a number, text, list or table, which TOML has.
     toml::Value::try_from(essence).into_iter().for_each(|root| flatten("", root, &mut keys));

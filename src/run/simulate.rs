@@ -1,6 +1,6 @@
 //! `morphcog simulate`: any body under any stimuli.
 
-use super::{Error, toml_text};
+use super::{Error, folder, toml_text};
 use crate::base::Grid;
 use crate::base::files::{read_text, write_atomically};
 use crate::body::Body;
@@ -181,11 +181,18 @@ pub fn simulate(scenario: &Scenario, mut line: impl FnMut(String) -> Result<(), 
     Ok(())
 }
 
-/// Writes the CSV to a file, also of a life that ends unstable, up to its end.
+/// Writes the CSV of a scenario's file to a file, also of a life that ends unstable, up to its end.
 ///
 /// # Errors
-/// As [`simulate`], and if the file cannot be written.
-pub fn to_file(scenario: &Scenario, path: &Path) -> Result<(), Error> {
+/// As [`Scenario::read`] and [`simulate`], and if the file cannot be written, or is the scenario's.
+pub fn to_file(from: &Path, path: &Path) -> Result<(), Error> {
+    let scenario = &Scenario::read(from)?;
+    if path.exists() && path.canonicalize().ok() == from.canonicalize().ok() {
+        let text =
+            format!("--out {}: expected another name: this would overwrite the scenario", path.display());
+        return Err(Error::usage(text));
+    }
+    folder::writable(path)?;
     let mut text = String::new();
     let outcome = simulate(scenario, |line| {
         text.push_str(&line);

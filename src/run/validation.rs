@@ -10,7 +10,7 @@ use super::held_out::images;
 use super::physical::first_physical;
 use super::robots::{Chosen, Selection, Source};
 use super::training::{ImageRef, load_dataset_of, see};
-use super::{Config, Error};
+use super::{Config, Error, toml_text};
 use crate::base::files::{read_text, write_atomically};
 use crate::base::hash::sha256_hex;
 use crate::task::dataset::{Dataset, Split};
@@ -18,7 +18,7 @@ use crate::task::grouping::{self, Grouping};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::mem::replace;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicU64};
 
 /// Its name beside `run.json`.
@@ -95,6 +95,14 @@ struct ValidationFile {
     robots: Vec<Validated>,
 }
 
+impl ValidationFile {
+    /// What is in a file; `None` if that cannot be read: then robots are chosen anew.
+    fn read(path: &Path) -> Option<Self> {
+        let text = read_text(path).ok()?;
+        toml_text::read_versioned(&text, &path.display().to_string(), FORMAT.0, FORMAT.1).ok()
+    }
+}
+
 /// Which robots of a run are to be chosen.
 #[derive(Clone, Debug)]
 pub struct Options {
@@ -138,8 +146,10 @@ pub fn validate(
 
 /// How many images the robots in the `validation.json` beside a run were chosen by; `None` without such a file.
 pub(super) fn shown(source: &Source) -> Option<usize> {
-    let text = read_text(&source.path.with_file_name(VALIDATION_JSON)).ok()?;
-    serde_json::from_str::<ValidationFile>(&text).ok()?.robots.first().map(|robot| robot.images)
+    ValidationFile::read(&source.path.with_file_name(VALIDATION_JSON))?
+        .robots
+        .first()
+        .map(|robot| robot.images)
 }
 
 /// The best of each run and task among some robots, or the best physical ones if the selection says so, with how they did;
@@ -192,7 +202,7 @@ pub(super) fn best<'a>(
     let shown = (dataset.fingerprint(Split::Train).unwrap_or_default(), &images[..]);
     let key = key(run, &robots, searched, shown, walker.control_steps);
     let path = source.path.with_file_name(VALIDATION_JSON);
-    let known = read_text(&path).ok().and_then(|text| serde_json::from_str::<ValidationFile>(&text).ok());
+    let known = ValidationFile::read(&path);
     let by_id = |validated: &Validated| {
         let robot = robots.iter().find(|robot| robot.id == validated.id && robot.task == validated.task)?;
         Some((*robot, validated.clone()))

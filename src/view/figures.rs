@@ -186,6 +186,7 @@ pub fn make(console: &Console, wanted: &Wanted) -> Result<Vec<PathBuf>, Error> {
 /// The formats that a file name asks for.
 fn endings(out: Option<&Path>) -> Result<Vec<&'static str>, Error> {
     let Some(path) = out else { return Ok(vec!["svg", "png"]) };
+    folder::of_file(path)?;
     match path.extension().map(|ending| ending.to_string_lossy().to_lowercase()).as_deref() {
         None => Ok(vec!["svg", "png"]),
         Some("svg") => Ok(vec!["svg"]),
@@ -276,7 +277,12 @@ fn of_run(kind: Kind, path: &Path) -> Result<Figure, Error> {
             Ok(plot::accuracy(&report))
         }
         Kind::Capacity => {
-            let file = CapacityFile::read(&result(path, CAPACITY_JSON)).map_err(hint)?;
+            let (beside, eval) = (result(path, CAPACITY_JSON), path.with_file_name(EVAL_JSON));
+            let file = CapacityFile::read(&beside).map_err(hint)?;
+            if beside != *path && eval.exists() {
+                // Where its robots come from.
+                EvalFile::of_runs(&eval, &[&RunFile::read(path)?])?;
+            }
             Ok(plot::capacity(&file))
         }
         _ => RunFile::read(path).map(|run| plot::archive(&run)),

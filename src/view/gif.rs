@@ -79,7 +79,11 @@ pub fn encode(recording: &Recording, options: &GifOptions) -> Result<Vec<u8>, Pi
     encoder.set_repeat(Repeat::Infinite).map_err(|e| PictureError::Encode(e.to_string()))?;
     let centiseconds =
         |seconds: f64| if seconds > 0.0 { (100.0 * seconds).round().min(6e3) as u16 } else { 0 };
-    let (delay, hold) = (centiseconds(1.0 / options.fps.max(0.1)).max(2), centiseconds(options.hold));
+    // Frames last whole hundredths of a second, together as long as they should.
+    let until = |frame: usize| f64::from(centiseconds(1.0)) * frame as f64 / options.fps.max(0.1);
+    let delay = |frame: usize| ((until(frame + 1).round() - until(frame).round()).min(6e3) as u16).max(2);
+    let hold = centiseconds(options.hold);
+    let mut number = 0;
     let mut before: Vec<u8> = Vec::new();
     for batch in frames.chunks(BATCH) {
         // In parallel, but in order; a batch's frames are all the memory it needs.
@@ -92,7 +96,8 @@ pub fn encode(recording: &Recording, options: &GifOptions) -> Result<Vec<u8>, Pi
         let encoded = pairs.par_iter().map(|p| difference(&p[0], &p[1], width, height, unchanged));
         for (f, mut encoded) in batch.iter().zip(encoded.collect::<Vec<_>>()) {
             let is_last = f + 1 == walk.phase_frames(walk.phase_index(*f)).end;
-            encoded.delay = if is_last { delay.max(hold) } else { delay };
+            encoded.delay = if is_last { delay(number).max(hold) } else { delay(number) };
+            number += 1;
             encoder.write_lzw_pre_encoded_frame(&encoded).map_err(failed)?;
         }
         before = images.pop().unwrap_or_default();
@@ -217,6 +222,9 @@ mod tests {
         let (.., frames) = decode(&encode(&recording, &options).unwrap());
         let delays: Vec<u16> = frames.iter().map(|f| f.1).collect();
         assert_eq!(delays, [5, 5, 5, 50, 5, 5, 5, 50]);
+        let thirds = GifOptions { width: 320, every: 4, fps: 30.0, hold: 0.0, ..GifOptions::default() };
+        let delays: Vec<u16> = decode(&encode(&recording, &thirds).unwrap()).3.iter().map(|f| f.1).collect();
+        assert_eq!(delays[..6], [3, 4, 3, 3, 4, 3]);
     }
 
     #[test]

@@ -11,8 +11,13 @@ use std::path::{Path, PathBuf};
 /// The table: task, accuracy and capacity, the paper's beside ours.
 pub fn capacity(console: &Console, file: &CapacityFile, out: &Path) {
     if console.mode() == Mode::Json {
-        let done = serde_json::json!({ "file": out.display().to_string(), "stopped": file.stopped, "tasks": file.tasks });
+        let written = (!file.tasks.is_empty()).then(|| out.display().to_string());
+        let done = serde_json::json!({ "file": written, "stopped": file.stopped, "tasks": file.tasks });
         return console.event("capacity", &done);
+    }
+    // Stopped before anything was found: nothing was written.
+    if file.tasks.is_empty() {
+        return;
     }
     let rows = file.tasks.iter().map(|task| (task.task.as_str(), task.robots, task.accuracy, Some(task)));
     papers_table(console, &file.dataset, rows);

@@ -79,6 +79,7 @@ impl Wanted {
     /// # Errors
     /// If the ending is none of the formats', or a file cannot be written.
     pub fn named(path: &Path, formats: &[Format]) -> Result<Self, Error> {
+        folder::of_file(path)?;
         let files = match path.extension().map(|ending| ending.to_string_lossy().into_owned()) {
             None => or_default(formats)
                 .iter()

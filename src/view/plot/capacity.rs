@@ -166,6 +166,7 @@ mod tests {
             dataset: "mnist".into(),
             patience_on: "test".into(),
             trainings: 50,
+            physical_only: false,
             stopped: false,
             tasks: vec![task("0|1"), task("01|23")],
         }
