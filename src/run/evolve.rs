@@ -15,7 +15,7 @@ pub use super::session::{Finished, Observer, Options, Progress};
 use super::start::{Start, StartRef};
 use super::training::{Training, load_dataset};
 use super::variation::{Lessons, Mutations};
-use super::{Error, held_out, resume};
+use super::{Error, eval, held_out, resume};
 use crate::base::files::write_atomically;
 use crate::body::Body;
 use crate::genome::GenomeError;
@@ -78,10 +78,13 @@ pub fn evolve(
     if there.ok().as_ref() != Some(config) {
         write(folder::CONFIG, config.to_toml().as_bytes())?;
     }
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(options.threads.unwrap_or(0)).build();
-    let pool = pool.map_err(|error| Error::other(format!("no threads: {error}")))?;
+    let pool = eval::pool(options.threads)?;
     let mut run = Run::new(options, &dataset, first, saved)?;
     let mut metrics = Metrics::open(folder.path(), run.generation)?;
+    if metrics.missing > 0 {
+        let (path, missing) = (folder.path().join(folder::METRICS).display().to_string(), metrics.missing);
+        observer.warning(&format!("{path}: {missing} of {} generations are missing in it", run.generation));
+    }
     pool.install(|| run.live(start, &folder, &mut metrics, stop, observer))?;
     metrics.flush()?;
     let file = run.save(&folder)?;

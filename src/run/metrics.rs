@@ -50,6 +50,8 @@ simulated,saved,saved_known_bodies,saved_early_stop,saved_shared_lives,unstable,
 pub struct Metrics {
     path: PathBuf,
     file: BufWriter<File>,
+    /// Generations before the one it goes on with that have no line in it any more.
+    pub missing: u64,
 }
 
 impl Metrics {
@@ -77,12 +79,13 @@ impl Metrics {
             }
             None => line.to_string(),
         };
-        let kept = kept.map(whole);
-        let mut text: String = std::iter::once(HEADER.to_string()).chain(kept).collect::<Vec<_>>().join("\n");
+        let kept: Vec<String> = kept.map(whole).collect();
+        let missing = generations.saturating_sub(kept.len() as u64);
+        let mut text = std::iter::once(HEADER.to_string()).chain(kept).collect::<Vec<_>>().join("\n");
         text.push('\n');
         write_atomically(&path, text.as_bytes()).map_err(|error| Error::writing(&path, &error))?;
         let file = File::options().append(true).open(&path).map_err(|error| Error::writing(&path, &error))?;
-        Ok(Metrics { path, file: BufWriter::new(file) })
+        Ok(Metrics { path, file: BufWriter::new(file), missing })
     }
 
     /// Adds the line of a generation (from 0) in a stage (from 0; from 1 in the file).
@@ -209,5 +212,6 @@ mod tests {
         std::fs::remove_file(folder.path().join("metrics.csv")).unwrap();
         write(folder.path(), 4, 5, 1);
         assert_eq!(lines(folder.path()).len(), 2, "a lost file is no reason not to go on");
+        assert_eq!([5, 4].map(|from| Metrics::open(folder.path(), from).unwrap().missing), [4, 4]);
     }
 }
