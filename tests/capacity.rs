@@ -109,6 +109,7 @@ fn what_cannot_be_compared_is_refused() {
     let sandbox = sandbox();
     let with = |options: &str| sandbox.run(&format!("capacity --eval runs/eval.json {options}"));
     with("--set trainings=0").ended(3, &["trainings"]);
+    with("--set sizes=[1,4,9]").ended(2, &["--set sizes=[1,4,9]", "a list of two, found 3"]);
     with("--set sizes=[3,2]").ended(3, &["sizes = [3, 2]", "the smaller first"]);
     with("--set cnn.kernel=5").ended(3, &["cnn.kernel = 5", "up to 4", "max2"]);
     with("--set cnn.kernel=6 --set cnn.pooling=none").ended(3, &["cnn.kernel = 6", "up to 5"]);

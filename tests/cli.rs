@@ -223,6 +223,9 @@ fn a_wrong_config_is_refused_with_file_line_and_key() {
     wrong("own.toml", &with("substeps = 1e3"), &[&place, "physics.substeps"]);
     wrong("own.toml", &with("substeps = = 3"), &[&place]);
     wrong("own.toml", &TINY.replace("[[0], [1]]", "[[0], [300]]"), &["own.toml:10", "task.groups"]);
+    let two = ["own.toml:10", "task.groups", "a list of two"];
+    wrong("own.toml", &TINY.replace("[[0], [1]]", "[[0], [1], [2]]"), &two);
+    wrong("own.toml", &TINY.replace("[[0], [1]]", "[[0]]"), &two);
     wrong("own.toml", &TINY.replace("\"fresh\"", "\"stale\""), &["own.toml:20", "protocol.life", "stale"]);
     wrong("own.toml", &TINY.replace("seed = 3", "seed = 3\nseed = 4"), &["own.toml:3", "duplicate key"]);
     wrong("own.toml", &TINY.replace("seed = 3", "sed = 3"), &["own.toml:2", "sed"]);

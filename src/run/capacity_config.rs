@@ -1,6 +1,6 @@
 //! What networks robots are compared with, and how those are trained.
 
-use super::{Error, toml_text};
+use super::{Error, pair, toml_text};
 use crate::baseline::{Hyperparameters, Kind, Pooling};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -18,6 +18,7 @@ pub struct CapacityConfig {
     /// Kinds of network.
     pub networks: Vec<Kind>,
     /// Smallest and largest size.
+    #[serde(deserialize_with = "pair::read")]
     pub sizes: [usize; 2],
     /// From one size to the next.
     pub step: usize,

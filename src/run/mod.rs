@@ -23,6 +23,7 @@ mod hardest;
 pub mod held_out;
 mod keep;
 pub mod metrics;
+mod pair;
 mod physical;
 pub mod plan;
 pub mod plot;

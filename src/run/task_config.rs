@@ -1,6 +1,6 @@
 //! [`TaskConfig`]: a config's section `[task]`.
 
-use super::Error;
+use super::{Error, pair};
 use crate::task::grouping::Grouping;
 use serde::{Deserialize, Serialize};
 
@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 #[serde(default, deny_unknown_fields)]
 pub struct TaskConfig {
     /// One task: two groups of classes that are to walk opposite ways.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none", deserialize_with = "pair::read_some")]
     pub groups: Option<[Vec<u8>; 2]>,
     /// All ways to split these classes in two groups; the task a robot performs is a dimension of the archive.
     #[serde(skip_serializing_if = "Option::is_none")]
