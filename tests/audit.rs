@@ -62,6 +62,26 @@ fn verdicts_are_the_same_bytes_on_any_number_of_threads_and_however_often_it_was
 }
 
 #[test]
+fn robots_of_several_runs_are_audited_each_with_its_run_and_a_wrong_id_before_any() {
+    let sandbox = evolved();
+    sandbox.run("evolve --config tiny.toml --out other --generations 40 --seed 9").ended(0, &[]);
+    let best = |run: &str| sandbox.run_file(run).best().unwrap().id.clone();
+    let both = "audit --archive run/run.json --archive other/run.json";
+    let wrong = format!("{both} {MILD} --robots {},{},nobody", best("run"), best("other"));
+    sandbox.run(&wrong).ended(3, &["no robot nobody"]);
+    assert!(!sandbox.path("run/audit.json").exists() && !sandbox.path("other/audit.json").exists());
+    sandbox.run(&format!("{both} {MILD} --robots {},{}", best("run"), best("other"))).ended(0, &[]);
+    for run in ["run", "other"] {
+        let file = AuditFile::read(&sandbox.path(&format!("{run}/audit.json"))).unwrap();
+        assert_eq!(file.robots.iter().map(|robot| &robot.id).collect::<Vec<_>>(), [&best(run)]);
+    }
+    // Robots of one run only: there is nothing to say of the other.
+    std::fs::remove_file(sandbox.path("other/audit.json")).unwrap();
+    sandbox.run(&format!("{both} {MILD} --robots {}", best("run"))).ended(0, &[]);
+    assert!(!sandbox.path("other/audit.json").exists());
+}
+
+#[test]
 fn physical_only_selects_physical_robots_and_nothing_else() {
     let sandbox = evolved();
     audit(&sandbox, "");

@@ -5,7 +5,7 @@ use crate::run::audit::{self, Options, Source};
 use crate::run::audit_file::AUDIT_JSON;
 use crate::run::robots::Selection;
 use crate::run::verdict::Criteria;
-use crate::run::{Error, folder, gallery, signals, validation};
+use crate::run::{Error, folder, gallery, robots, signals, validation};
 use crate::view::console::Console;
 use crate::view::{reporters, verdicts};
 use clap::Args;
@@ -28,8 +28,8 @@ pub(super) struct AuditArgs {
     /// A run.json, or its folder (default: the newest under runs/); may be given several times.
     #[arg(short, long, value_name = "FILE", value_parser = run_json())]
     archive: Vec<PathBuf>,
-    /// all, top:N, random:N, best-validation:N (the best of each task on the validation images of the run's config), or ids
-    /// (or beginnings of ids) separated by commas; or gallery, or names of published robots.
+    /// all, top:N and random:N (of each task; of several archives together), best-validation:N (the best of each run and task on the
+    /// validation images of its config), or ids (or beginnings of ids) separated by commas; or gallery, or names of published robots.
     #[arg(short, long, visible_alias = "select", default_value = "all")]
     robots: Selection,
     /// Seed of robots drawn with random:N.
@@ -56,18 +56,28 @@ pub(super) fn run(args: AuditArgs, console: &Console) -> Result<(), Error> {
     let criteria = Criteria::load(args.criteria.as_deref(), &args.set)?;
     let stop = signals::stop_flag()?;
     let sources = sources(&args)?;
+    // Whom to audit is known of all runs before the first life.
+    let asked = match args.archive.is_empty() {
+        true => vec![Some(args.robots.clone())],
+        false => {
+            let runs: Result<Vec<_>, Error> =
+                args.archive.iter().map(|path| robots::Source::read(path)).collect();
+            args.robots.of_each(&runs?, args.seed)?
+        }
+    };
     if sources.len() > 1 && args.out.is_some() {
         let text = "--out: expected with one --archive only; of several, each gets an audit.json beside it";
         return Err(Error::usage(text.to_string()));
     }
-    for source in sources {
+    for (source, robots) in sources.into_iter().zip(asked) {
+        let Some(robots) = robots else { continue };
         let beside = match &source {
             Source::Archive(path) => path.with_file_name(AUDIT_JSON),
             Source::Gallery => Path::new("gallery-audit.json").to_path_buf(),
         };
-        let robots = match (&source, args.robots.validated()) {
+        let robots = match (&source, robots.validated()) {
             (Source::Archive(path), Some(best)) => validated(&args, path, best, &stop, console)?,
-            _ => args.robots.clone(),
+            _ => robots,
         };
         let options = Options {
             source,

@@ -140,6 +140,22 @@ impl Selection {
         self.among(fittest, sources, seed)
     }
 
+    /// The same robots of several runs, each run's by their ids, so that runs can be looked at one after the other: `None` for
+    /// a run of which there are none. Who is best on validation images is told run by run as it is.
+    ///
+    /// # Errors
+    /// As [`Selection::of`].
+    pub fn of_each(&self, sources: &[Source], seed: u64) -> Result<Vec<Option<Selection>>, Error> {
+        if sources.len() < 2 || self.validated().is_some() {
+            return Ok(vec![Some(self.clone()); sources.len()]);
+        }
+        let mut ids = vec![Vec::new(); sources.len()];
+        for chosen in self.of(sources, seed)? {
+            ids[chosen.source].push(chosen.robot.id.clone());
+        }
+        Ok(ids.into_iter().map(|ids| (!ids.is_empty()).then_some(Selection::Ids(ids))).collect())
+    }
+
     fn among<'a>(
         &self,
         fittest: Vec<Chosen<'a>>,
@@ -257,6 +273,19 @@ mod tests {
         assert_eq!(of("random:9", 1, &runs).unwrap().len(), 4);
         let chosen = Selection::All.of(&runs, 1).unwrap();
         assert_eq!(chosen.iter().map(|c| c.source).collect::<Vec<_>>(), [1, 0, 1, 0]);
+    }
+
+    #[test]
+    fn robots_of_several_runs_are_named_run_by_run_and_a_wrong_name_is_known_before_the_first() {
+        let runs = [source(&[("aa10", 1.0), ("ab20", 3.0)]), source(&[("b300", 2.0), ("b3ff", 4.0)])];
+        let each = |text: &str, runs: &[Source]| Selection::from_str(text).unwrap().of_each(runs, 1);
+        let ids = |ids: &[&str]| Some(Selection::Ids(ids.iter().map(ToString::to_string).collect()));
+        assert_eq!(each("b3f,aa", &runs).unwrap(), [ids(&["aa10"]), ids(&["b3ff"])]);
+        assert_eq!(each("top:1", &runs).unwrap(), [None, ids(&["b3ff"])]);
+        assert!(each("aa,c", &runs).unwrap_err().message.contains("no robot c"));
+        let validated = Selection::Validated(3);
+        assert_eq!(validated.of_each(&runs, 1).unwrap(), [Some(validated.clone()), Some(validated.clone())]);
+        assert_eq!(each("aa", &runs[..1]).unwrap(), [ids(&["aa"])]);
     }
 
     #[test]
