@@ -15,8 +15,6 @@ const ROOMS: [(&str, u8); 9] = [
     ("view", 5),
 ];
 const CLI_FLOOR: u8 = 6;
-/// Longest file, tests included: a longer one is two things.
-const MAX_LINES: usize = 350;
 /// Rooms whose numbers are results: the same bits on every machine.
 const EXACT_ROOMS: [&str; 6] = ["base", "body", "sim", "genome", "qd", "task"];
 /// Functions of the standard library whose last bits differ between systems (`libm` has them, too), and fused multiply-add.
@@ -174,9 +172,6 @@ fn violations(path: &str, source: &str, is_test: bool) -> Vec<String> {
     let mut found = Vec::new();
     let mut refuse = |what: String| found.push(format!("src/{path}: {what}"));
 
-    if source.lines().count() > MAX_LINES {
-        refuse(format!("{} lines, at most {MAX_LINES} are one thing", source.lines().count()));
-    }
     match floor(room) {
         _ if is_top => {}
         None => refuse(format!("the room {room} has no floor")),
@@ -211,8 +206,8 @@ fn violations(path: &str, source: &str, is_test: bool) -> Vec<String> {
         }
     }
     for triple in code.windows(3) {
-        if matches!(triple, [".", "unwrap" | "expect" | "unwrap_err" | "expect_err", "("]) {
-            refuse(format!("{}: errors are typed", triple.concat()));
+        if matches!(triple, [".", "unwrap" | "unwrap_err", "("]) {
+            refuse(format!("{}: an invariant is expect(\"why it holds\")", triple.concat()));
         }
         if EXACT_ROOMS.contains(&room) && matches!(triple, [".", name, "("] if INEXACT.contains(name)) {
             refuse(format!("{}: differs between machines; libm's is the same everywhere", triple.concat()));
@@ -302,7 +297,6 @@ fn what_is_against_the_plan_is_found() {
     );
     assert_eq!(found("view/console.rs", "fn f() { println!(\"x\"); std::io::stderr(); }"), 0);
     assert_eq!(found("run/config.rs", "#[derive(clap::Args)] struct A;"), 1);
-    assert_eq!(found("run/config.rs", &"\n".repeat(351)), 1);
     assert_eq!(
         found("sim/world.rs", "fn f(x: f64) -> f64 { x.sin() + x.powf(2.0) + x.sqrt() + x.abs() }"),
         2
@@ -312,7 +306,7 @@ fn what_is_against_the_plan_is_found() {
     assert_eq!(found("view/gif.rs", "fn f(x: f64) -> f64 { x.sin() }"), 0);
     assert_eq!(
         found("view/gif.rs", "fn f() { g().unwrap(); g().expect(\"x\"); g().unwrap_or(1); panic!() }"),
-        3
+        2
     );
     assert_eq!(
         test_modules("#[cfg(test)]\npub(super) mod wobble;\n#[cfg(test)]\nmod tests { fn f(); }"),
