@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{Reference, golden, references};
+use common::{Reference, golden, references, sensitive};
 use morphcog::sim::{Physics, UnstableReason, World};
 
 /// 1e-6 voxel lengths in world units.
@@ -41,6 +41,28 @@ fn compare(world: &World, life: &Reference) -> f64 {
         }
     }
     worst
+}
+
+#[test]
+fn sensitive_lives_agree_within_three_times_the_spread_of_evogym_itself() {
+    let physics = Physics::default();
+    for life in sensitive() {
+        let spread = life.spread();
+        let lattice = life.lattice(&physics);
+        let mut world = World::new(&lattice, &physics, life.start());
+        world.set_stimulus(&life.stimulus);
+        let start = world.centre_of_mass();
+        let mut worst = 0f64;
+        for theirs in &life.com[1..] {
+            world.step().unwrap();
+            let ours = world.centre_of_mass();
+            let [x, y] = [0, 1].map(|i| (ours[i] - start[i]) - (theirs[i] - life.com[0][i]));
+            worst = worst.max(x.hypot(y) * 10.0);
+        }
+        println!("{:20} differs by at most {worst:.1e} voxel lengths, EvoGym by {spread:.1e}", life.name);
+        assert_eq!(world.control_step(), life.control_steps);
+        assert!(worst <= 3.0 * spread, "{}: {worst:e} voxel lengths, EvoGym {spread:e}", life.name);
+    }
 }
 
 #[test]

@@ -209,9 +209,9 @@ fn shrink_scalar(t: f64) -> f64 {
     if t.abs() > RANGE {
         return 1.0 - 1.0 / (1.0 + t).sqrt();
     }
-    let [c0, c1, c2, c3, c4] = TERMS;
+    let [c0, c1, c2, c3, c4, c5] = TERMS;
     let square = t * t;
-    ((c0 + c1 * t) + square * ((c2 + c3 * t) + square * c4)) * t
+    ((c0 + c1 * t) + square * ((c2 + c3 * t) + square * (c4 + c5 * t))) * t
 }
 
 #[cfg(test)]
