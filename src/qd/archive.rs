@@ -51,14 +51,14 @@ pub enum ArchiveError {
     Occupied(usize),
 }
 
-/// Figures of an archive, named as in pyribs.
+/// Figures of an archive: pyribs' `ArchiveStats`, of an archive that has the possible cells and no others.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ArchiveStats {
     /// Number of elites.
     pub num_elites: usize,
     /// Elites per possible cell.
     pub coverage: f64,
-    /// Σ max(objective − offset, 0): an elite below the offset counts nothing.
+    /// Σ (objective − offset) over the elites: less than 0 if they are below the offset on average.
     pub qd_score: f64,
     /// QD score per possible cell.
     pub norm_qd_score: f64,
@@ -144,14 +144,14 @@ impl<S> Archive<S> {
         self.elites().reduce(|best, e| if e.objective > best.objective { e } else { best })
     }
 
-    /// Figures of the archive, of `possible` cells that can be filled; `qd_offset` is the objective that counts
-    /// as nothing in the QD score.
+    /// Figures of the archive, of `possible` cells that can be filled; `qd_offset` is what pyribs calls
+    /// `qd_score_offset`.
     pub fn stats(&self, possible: usize, qd_offset: f64) -> ArchiveStats {
         let (num_elites, cells) = (self.len(), possible.max(1) as f64);
         // (`sum` of nothing would be −0.)
         let sum =
             |term: fn(f64, f64) -> f64| self.elites().fold(0.0, |s, e| s + term(e.objective, qd_offset));
-        let qd_score = sum(|objective, offset| (objective - offset).max(0.0));
+        let qd_score = sum(|objective, offset| objective - offset);
         let total = sum(|objective, _| objective);
         ArchiveStats {
             num_elites,
@@ -240,18 +240,37 @@ mod tests {
     }
 
     #[test]
-    fn figures_are_those_of_pyribs_with_failures_counting_nothing() {
-        let mut archive = Archive::new();
-        let empty = archive.stats(90, 0.0);
-        assert_eq!((empty.coverage, empty.qd_score, empty.obj_max, empty.obj_mean), (0.0, 0.0, None, None));
-        for (cell, objective) in [(7, 4.0), (2, -3.0), (5, 2.0)] {
-            archive.insert(elite(cell, objective, 'x')).unwrap();
+    fn figures_are_those_of_pyribs() {
+        #[derive(Deserialize)]
+        struct Case {
+            cells: usize,
+            qd_score_offset: f64,
+            told: Vec<(usize, f64)>,
+            stats: ArchiveStats,
         }
-        let stats = archive.stats(12, 0.0);
-        assert_eq!((stats.num_elites, stats.coverage), (3, 0.25));
-        assert_eq!((stats.qd_score, stats.norm_qd_score), (6.0, 0.5));
-        assert_eq!((stats.obj_max, stats.obj_mean), (Some(4.0), Some(1.0)));
-        assert_eq!(archive.stats(12, -5.0).qd_score, 9.0 + 2.0 + 7.0);
+        let text = include_str!("../../tests/pyribs/stats.json");
+        let cases: Vec<Case> = serde_json::from_str(text).unwrap();
+        assert!(cases.len() > 3 && cases.iter().any(|case| case.stats.qd_score < 0.0));
+        for Case { cells, qd_score_offset, told, stats: theirs } in cases {
+            let mut archive = Archive::new();
+            for (cell, objective) in told {
+                archive.insert(elite(cell, objective, 'x')).unwrap();
+            }
+            let ours = archive.stats(cells, qd_score_offset);
+            assert_eq!((ours.num_elites, ours.obj_max), (theirs.num_elites, theirs.obj_max));
+            assert_eq!(
+                (ours.coverage, ours.obj_mean.is_some()),
+                (theirs.coverage, theirs.obj_mean.is_some())
+            );
+            // They add in the order in which robots came, we in the order of cells.
+            let near = |a: f64, b: f64| (a - b).abs() <= 1e-12 * (1.0 + b.abs());
+            assert!(near(ours.qd_score, theirs.qd_score), "{ours:?} {theirs:?}");
+            assert!(near(ours.norm_qd_score, theirs.norm_qd_score), "{ours:?} {theirs:?}");
+            assert!(
+                near(ours.obj_mean.unwrap_or(0.0), theirs.obj_mean.unwrap_or(0.0)),
+                "{ours:?} {theirs:?}"
+            );
+        }
     }
 
     #[test]

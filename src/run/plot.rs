@@ -15,7 +15,7 @@ pub struct Moment {
     pub evaluations: f64,
     /// Elites per possible cell.
     pub coverage: f64,
-    /// Sum of the objectives above the offset.
+    /// Sum of the objectives, each less the offset.
     pub qd_score: f64,
     /// Largest objective; none without elites.
     pub obj_max: Option<f64>,
