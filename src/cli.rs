@@ -14,9 +14,9 @@ use crate::run::data::catalogue::Catalogue;
 use crate::run::data::fetch::{FetchOptions, fetch};
 use crate::run::folder::IfExists;
 use crate::run::plan::{PAPER_TOML, Plan};
-use crate::run::robots::Selection;
+use crate::run::robots::{BEST, Selection};
 use crate::run::{
-    Config, Error, bench, config, data, eval, evolve, folder, gallery, replay, signals, simulate, validation,
+    Config, Error, bench, config, data, eval, evolve, folder, gallery, replay, signals, simulate,
 };
 use crate::task::dataset::{Dataset, Split};
 use crate::task::files::places;
@@ -116,29 +116,23 @@ fn run_evolve(args: EvolveArgs, console: &Console) -> Result<(), Error> {
         evolve::evolve(&options, &stop, &mut reporter)?
     };
     summary::evolution(console, &finished, &out);
+    if !finished.validated.is_empty() {
+        summary::validation(console, &finished.validated);
+    }
     if finished.stopped {
-        let text = format!("stopped after generation {}; the run is saved", finished.run.generations);
+        let done = finished.run.generations;
+        let text = match done < finished.run.config.generations {
+            true => format!("stopped after generation {done}; the run is saved"),
+            false => "stopped while validating; the run is saved".to_string(),
+        };
         return Err(Error::stopped(text).hint("the same command with --resume goes on".to_string()));
     }
     if finished.run.elites.is_empty() {
         return Ok(());
     }
-    if finished.run.config.validation.best > 0 {
-        let archive = out.join(folder::RUN_JSON);
-        let options = validation::Options { archive, best: None, data: args.data.clone(), threads };
-        match validation::validate(&options, &stop, &reporters::Evaluation::new(console))? {
-            Some(best) => summary::validation(console, &best),
-            None => {
-                let hint = "the same command with --resume goes on".to_string();
-                return Err(
-                    Error::stopped("stopped while validating; the run is saved".to_string()).hint(hint)
-                );
-            }
-        }
-    }
     if args.replay {
         let archive = Some(out.join(folder::RUN_JSON));
-        let robot = "best".to_string();
+        let robot = BEST.to_string();
         let replay = replay::Options { robot, archive, data: args.data, ..replay::Options::default() };
         let replay = replay::replay(&replay)?;
         let wanted = pictures::Wanted::beside(&out, &replay.name, &[Format::Gif, Format::Html]);
@@ -177,6 +171,7 @@ fn run_eval(args: EvalArgs, console: &Console) -> Result<(), Error> {
         threshold: args.threshold,
         cycles: args.cycles,
         data: args.data,
+        dataset: args.dataset,
         threads: args.threads.map(usize::from),
         out,
         archives,

@@ -3,11 +3,17 @@
 mod common;
 
 use common::program::{Sandbox, TINY, files};
+use morphcog::run::Config;
 use morphcog::run::audit_file::AuditFile;
+use morphcog::run::curriculum::Period;
 use morphcog::run::eval_file::EvalFile;
+use morphcog::run::evolve::{Observer, Options, Progress, evolve};
+use morphcog::run::folder::{IfExists, RunFolder};
 use morphcog::run::held_out::{HeldOut, images};
+use morphcog::run::start::StartRef;
 use morphcog::run::training::{Training, load_dataset};
 use morphcog::task::dataset::Split;
+use std::sync::atomic::AtomicBool;
 
 /// A run with redrawn images, so that it was trained on more than it ends with.
 fn sandbox() -> Sandbox {
@@ -256,4 +262,81 @@ fn those_that_are_best_on_validation_images_can_be_audited_by_themselves() {
     audited.sort();
     expected.sort();
     assert_eq!((audited.len(), audited), (2, expected));
+}
+
+#[test]
+fn evolve_itself_chooses_robots_at_its_end_and_so_whatever_calls_it() {
+    struct Quiet;
+    impl Observer for Quiet {
+        fn started(&mut self, _: &RunFolder, _: &Training, _: &Progress) {}
+        fn starting_from(&mut self, _: &StartRef, _: usize) {}
+        fn period(&mut self, _: Period, _: &Training, _: &Progress) {}
+        fn generation(&mut self, _: &Progress) {}
+        fn warning(&mut self, text: &str) {
+            panic!("{text}");
+        }
+    }
+    let sandbox = Sandbox::new();
+    let text = format!("{TINY}\n[validation]\nimages = 60\nbest = 2\n");
+    let config = Config::parse(&text, "run.toml", &[]).unwrap();
+    let options = |folder: &str| Options {
+        config: config.clone(),
+        name: "run".to_string(),
+        out: sandbox.path(folder),
+        if_exists: IfExists::Refuse,
+        data: None,
+        threads: Some(1),
+    };
+    let finished = evolve(&options("library"), &AtomicBool::new(false), &mut Quiet).unwrap();
+    assert!(!finished.stopped);
+    assert_eq!(finished.validated.len(), 2);
+    let first = &finished.validated[0];
+    assert_eq!((first.images, finished.best()), (60, Some(first.id.as_str())));
+    // The program does the same.
+    sandbox.write("run.toml", text);
+    sandbox.run("evolve -q -c run.toml -o program").ended(0, &[]);
+    assert_eq!(sandbox.read("library/validation.json"), sandbox.read("program/validation.json"));
+    // Stopped before its last generation, a run chooses none.
+    let stopped = evolve(&options("stopped"), &AtomicBool::new(true), &mut Quiet).unwrap();
+    assert!(stopped.stopped && stopped.validated.is_empty());
+    assert!(!sandbox.path("stopped/validation.json").exists());
+}
+
+#[test]
+fn the_best_robot_is_the_first_on_validation_images_where_the_run_ranked_them_else_the_fittest() {
+    let sandbox = Sandbox::new();
+    sandbox.write("run.toml", format!("{TINY}\n[validation]\nimages = 60\nbest = 1\n"));
+    sandbox.run("evolve -q -c run.toml -o run").ended(0, &[]);
+    let run = sandbox.run_file("run");
+    let fittest = run.best().unwrap();
+    let first = run.elites.iter().find(|robot| robot.id != fittest.id && robot.task == fittest.task).unwrap();
+    // Robots of a tiny run are as good as each other on images they have not seen: so that it is not the fittest by chance.
+    let mut ranking: serde_json::Value = serde_json::from_str(&sandbox.read("run/validation.json")).unwrap();
+    ranking["robots"][0]["id"] = first.id.as_str().into();
+    ranking["robots"][0]["task"] = first.task.as_str().into();
+    sandbox.write("run/validation.json", ranking.to_string());
+    let is_best = |id: &str| {
+        sandbox.run("eval -q -a run/run.json --images 20 --cycles 1 --robots best").ended(0, &[]);
+        let report = EvalFile::read(&sandbox.path("run/eval.json")).unwrap();
+        assert_eq!((report.robots.len(), report.robots[0].id.as_str()), (1, id));
+        sandbox.run("audit -q -a run/run.json --robots best -o audit.json").ended(0, &[]);
+        let audit = AuditFile::read(&sandbox.path("audit.json")).unwrap();
+        assert!(audit.robot(id).is_some() && audit.robots.len() == 1);
+        sandbox.run("plot body -a run/run.json").ended(0, &[]);
+        assert!(sandbox.path(&format!("run/plot-body-{id}.svg")).exists());
+        sandbox.run("replay -a run/run.json --format png").ended(0, &[]);
+        assert!(sandbox.path(&format!("run/replay-{id}.png")).exists());
+        for name in
+            ["audit.json".to_string(), format!("run/plot-body-{id}.svg"), format!("run/replay-{id}.png")]
+        {
+            std::fs::remove_file(sandbox.path(&name)).unwrap();
+        }
+    };
+    is_best(&first.id);
+    // A ranking of what the run was before says nothing of it.
+    ranking["run_sha256"] = "0".repeat(64).into();
+    sandbox.write("run/validation.json", ranking.to_string());
+    is_best(&fittest.id);
+    std::fs::remove_file(sandbox.path("run/validation.json")).unwrap();
+    is_best(&fittest.id);
 }

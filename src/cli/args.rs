@@ -185,7 +185,7 @@ pub(super) struct EvolveArgs {
     /// Replace the run in the folder.
     #[arg(long)]
     pub(super) force: bool,
-    /// At the end, replay the fittest robot into the run folder.
+    /// At the end, replay the best robot into the run folder.
     #[arg(long)]
     pub(super) replay: bool,
 }
@@ -216,6 +216,9 @@ pub(super) struct EvalArgs {
     /// Seed of what is drawn: images, and robots with random:N.
     #[arg(long, default_value_t = 1)]
     pub(super) seed: u64,
+    /// Another dataset than the run's, as builtin: its test images are shown.
+    #[arg(long, value_name = "NAME")]
+    pub(super) dataset: Option<String>,
     /// Displacements up to this many voxel lengths are wrong.
     #[arg(long, default_value_t = eval::THRESHOLD)]
     pub(super) threshold: f64,
@@ -235,10 +238,11 @@ pub(super) struct EvalArgs {
 
 #[derive(Debug, Args)]
 pub(super) struct ReplayArgs {
-    /// Id (or the beginning of one), "best", or the name of a published robot.
+    /// Id (or the beginning of one), "best" (first on validation images if the run ranked robots by them, else the fittest), or the
+    /// name of a published robot.
     #[arg(short, long, default_value = "best")]
     pub(super) robot: String,
-    /// Only robots that morphcog audit found physical: "best" is the fittest of them.
+    /// Only robots that morphcog audit found physical: "best" is the best of them.
     #[arg(long)]
     pub(super) physical_only: bool,
     /// The run.json, or its folder (default: the newest under runs/).

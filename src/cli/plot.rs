@@ -36,10 +36,11 @@ pub(super) struct PlotArgs {
     /// capacity.json; may be given several times.
     #[arg(short, long, value_name = "FILE", value_parser = run_json())]
     archive: Vec<PathBuf>,
-    /// Id (or the beginning of one), "best", or the name of a published robot; may be given several times.
+    /// Id (or the beginning of one), "best" (first on validation images if the run ranked robots by them, else the fittest), or the
+    /// name of a published robot; may be given several times.
     #[arg(short, long, value_delimiter = ',')]
     robot: Vec<String>,
-    /// Only robots that morphcog audit found physical: "best" is the fittest of them.
+    /// Only robots that morphcog audit found physical: "best" is the best of them.
     #[arg(long)]
     physical_only: bool,
     /// Images by index, as train:1,test:17 (default: the training images).

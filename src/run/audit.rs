@@ -6,6 +6,7 @@ use super::folder::check_out;
 use super::robots::{self, Selection};
 use super::training::{Training, load_dataset_of, see};
 use super::verdict::{Behaviour, Criteria, PerturbedLife};
+use super::whereabouts::Whereabouts;
 use super::{Config, Error, eval, gallery};
 use crate::base::hash::sha256_hex;
 use crate::body::Body;
@@ -181,7 +182,8 @@ fn open(options: &Options) -> Result<Opened, Error> {
             let source = robots::Source::read(path)?;
             let run = &source.run;
             check_out(&options.out, path, AUDIT_JSON)?;
-            let training = training_of(run, options)?;
+            let whereabouts = Whereabouts::given(data).and_of(path);
+            let training = training_of(run, &whereabouts)?;
             // A stage may have shown images otherwise than the protocol says, which is what is judged.
             let is_known = run.follows_protocol() && training.images == run.training_images;
             let subject = |robot: &Robot| Subject {
@@ -206,8 +208,8 @@ fn open(options: &Options) -> Result<Opened, Error> {
 }
 
 /// The images a run's robots were evolved on, of each class the first few. Of other data, verdicts would mean nothing.
-fn training_of(run: &RunFile, options: &Options) -> Result<Training, Error> {
-    let dataset = load_dataset_of(Some(&run.dataset), &run.config, options.data.as_deref(), &[Split::Train])?;
+fn training_of(run: &RunFile, whereabouts: &Whereabouts) -> Result<Training, Error> {
+    let dataset = load_dataset_of(Some(&run.dataset), &run.config, whereabouts, &[Split::Train])?;
     let mut taken = [0; 256];
     let mut images = run.training_images.clone();
     images.retain(|image| {

@@ -68,6 +68,13 @@ pub fn capacity(
             format!("{name}: expected an evaluation on test images, found one on {} images", report.split);
         return Err(Error::input(text).hint("morphcog eval --split test".to_string()));
     }
+    if let Some(own) = &report.trained_on {
+        let text = format!(
+            "{name}: expected an evaluation on images of the data that the robots were trained on ({}), found one on {}",
+            own.name, report.dataset
+        );
+        return Err(Error::input(text).hint("morphcog eval without --dataset".to_string()));
+    }
     if report.runs.is_empty() {
         let text = format!("{name}: runs: expected one or more, whose training images networks learn from");
         return Err(Error::input(text).hint("run morphcog eval again".to_string()));
@@ -96,7 +103,7 @@ pub fn capacity(
         return Err(Error::usage(format!("{text}: the figure beside the results has that name")));
     }
     let robots = robots(&report, options)?;
-    let images = Images::of(&report, setting, options, observer)?;
+    let images = Images::of(&report, setting, options)?;
     let grouping = setting.task.grouping()?;
     let splits: Vec<&grouping::Split> = grouping
         .tasks()

@@ -1,17 +1,20 @@
 //! The images that networks are trained and tested on: those of the robots, seen as they see them.
 
 use super::Error;
-use super::capacity::{Observer, Options};
+use super::capacity::Options;
 use super::capacity_config::CapacityConfig;
 use super::eval_file::EvalFile;
+use super::folder::RUN_JSON;
 use super::setting::{RunRef, Setting};
-use super::training::{ImageRef, load_data, seen};
+use super::training::{ImageRef, seen};
+use super::whereabouts::Whereabouts;
 use crate::base::Grid;
 use crate::base::hash::sha256_hex;
 use crate::base::random::{Purpose, stream};
 use crate::baseline::{Kind, Samples, Trained, train};
 use crate::task::dataset::{Dataset, Split};
 use crate::task::grouping::{self, Group};
+use std::path::{Path, PathBuf};
 
 /// The images networks learn from, wait on and are tested on, with their classes.
 pub(super) struct Images {
@@ -30,16 +33,16 @@ pub(super) struct Seen {
 }
 
 impl Images {
-    pub fn of(
-        report: &EvalFile,
-        setting: &Setting,
-        options: &Options,
-        observer: &dyn Observer,
-    ) -> Result<Images, Error> {
-        let dataset = load_data(&setting.data, options.data.as_deref(), &Split::ALL)?;
+    pub fn of(report: &EvalFile, setting: &Setting, options: &Options) -> Result<Images, Error> {
+        let dataset = whereabouts(options).load(&setting.data, &Split::ALL)?;
         let [train, test] = Split::ALL.map(|split| dataset.fingerprint(split).unwrap_or_default());
         if train != setting.train_sha256 || test != report.test_sha256 {
-            observer.warning("the images here are not those of the evaluation (another SHA-256)");
+            let text = format!(
+                "{}: the images here are not those of {} (another SHA-256)",
+                dataset.place(),
+                options.eval.display()
+            );
+            return Err(Error::input(text).hint("name their folder with --data".to_string()));
         }
         let see = |split: Split, images: &[ImageRef]| -> Result<Vec<Seen>, Error> {
             let one = |image: &ImageRef| {
@@ -64,6 +67,16 @@ impl Images {
         let key = sha256_hex(format!("{counts:?} {pixels:?} {indices:?}").as_bytes());
         Ok(Images { training, waiting: see(Split::Train, &waited)?, test: test_images, key })
     }
+}
+
+/// Where the images are: a run beside the evaluation, or in a folder beside it, may know.
+fn whereabouts(options: &Options) -> Whereabouts {
+    let folder = options.eval.parent().filter(|folder| !folder.as_os_str().is_empty());
+    let entries = std::fs::read_dir(folder.unwrap_or(Path::new("."))).into_iter().flatten().flatten();
+    let mut runs: Vec<PathBuf> = entries.map(|entry| entry.path().join(RUN_JSON)).collect();
+    runs.sort();
+    let here = Whereabouts::given(options.data.as_deref()).and_of(&options.eval);
+    runs.iter().fold(here, |whereabouts, run| whereabouts.and_of(run))
 }
 
 /// Images of the training split that no run was trained on last.

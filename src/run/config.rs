@@ -125,7 +125,7 @@ impl Default for BodyConfig {
 pub struct DataConfig {
     /// "mnist", "fashion-mnist", "builtin", or a name of one's own.
     pub dataset: String,
-    /// Folder of its files, if neither `--data` nor `MORPHCOG_DATA` says one. Default `data/<dataset>`.
+    /// Folder of its files, if neither `--data` nor `MORPHCOG_DATA` says one, nor the run where they were. Default `data/<dataset>`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub dir: Option<PathBuf>,
     /// Training images by index, in the order in which a sequential life sees them.
@@ -139,6 +139,17 @@ pub struct DataConfig {
     pub builtin: BuiltinDigits,
 }
 
+impl DataConfig {
+    /// The same with another dataset, in which its folder and its images mean nothing; its own changes nothing.
+    #[must_use]
+    pub(super) fn of(&self, dataset: &str) -> Self {
+        if dataset == self.dataset {
+            return self.clone();
+        }
+        DataConfig { dataset: dataset.to_string(), dir: None, train_images: None, ..self.clone() }
+    }
+}
+
 fn one_image() -> usize {
     1
 }
@@ -147,7 +158,7 @@ fn one_image() -> usize {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct ArchiveConfig {
-    /// Fitness that counts as nothing in the QD score \[voxel lengths\]. Default 0: elites that fail count nothing.
+    /// Fitness that counts as nothing in the QD score \[voxel lengths\]; a smaller one counts less than nothing. Default 0.
     pub qd_offset: f64,
 }
 

@@ -6,7 +6,8 @@ pub mod fetch;
 use crate::task::dataset::{Dataset, DatasetError, Split};
 use crate::task::files::Place;
 use crate::task::info::DatasetInfo;
-use catalogue::Catalogue;
+use catalogue::{Catalogue, known_as};
+use std::collections::BTreeMap;
 
 /// What there is of a dataset (`morphcog data info`).
 #[derive(Debug)]
@@ -15,6 +16,8 @@ pub struct Found {
     pub info: DatasetInfo,
     /// Names of those of its files that are exactly the published ones.
     pub published: Vec<String>,
+    /// Splits that are those of a dataset known by another name, and that name.
+    pub others: BTreeMap<Split, &'static str>,
     /// Why other splits cannot be used.
     pub problems: Vec<(Split, DatasetError)>,
 }
@@ -42,7 +45,9 @@ pub fn info(name: &str, given: &[Place]) -> Result<Found, DatasetError> {
     let files = info.splits.values().flat_map(|split| &split.files);
     let published = files.filter(|file| known.iter().any(|k| k.sha256 == file.sha256));
     let published = published.map(|file| file.name.clone()).collect();
-    Ok(Found { info, published, problems })
+    let known = info.splits.iter().filter_map(|(&split, found)| Some((split, known_as(found)?)));
+    let others = known.filter(|(_, known)| *known != name).collect();
+    Ok(Found { info, published, others, problems })
 }
 
 #[cfg(test)]

@@ -7,6 +7,7 @@ use super::held_out::HeldOut;
 use super::robots::{Chosen, Selection, Source};
 use super::training::load_dataset_of;
 use super::validation::{self, Validated};
+use super::whereabouts::Whereabouts;
 use super::{Config, Error, folder::check_out, gallery};
 use crate::base::Grid;
 use crate::base::files::write_atomically;
@@ -46,6 +47,8 @@ pub struct Options {
     pub cycles: u32,
     /// Where the data are, if the command line says.
     pub data: Option<PathBuf>,
+    /// Another dataset than the runs', whose test images are shown.
+    pub dataset: Option<String>,
     /// Where the results go (eval.json; eval.csv beside it).
     pub out: PathBuf,
     /// Number of threads; `None`: one per core.
@@ -64,6 +67,14 @@ pub trait Observer: Sync {
     fn warning(&self, text: &str);
 }
 
+/// Nobody is told.
+impl Observer for () {
+    fn validating(&self, _robots: usize, _images: usize, _showings: u64) {}
+    fn started(&self, _robots: usize, _images: usize) {}
+    fn progress(&self, _done: u64) {}
+    fn warning(&self, _text: &str) {}
+}
+
 /// Evaluates robots; results are written after every robot, so that stopping keeps what is finished.
 ///
 /// # Errors
@@ -76,7 +87,7 @@ pub fn eval(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Re
         )));
     }
     let sources: Vec<Source> = match options.archives.as_slice() {
-        [] => vec![gallery::source(options.data.as_deref())?],
+        [] => vec![gallery::source(options.data.as_deref(), options.dataset.as_deref())?],
         archives => archives.iter().map(|path| Source::read(path)).collect::<Result<_, _>>()?,
     };
     let first = &sources[0];
@@ -97,13 +108,26 @@ pub fn eval(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Re
         return Err(Error::usage(format!("--validation {validated}: expected {least} or more images")));
     }
     let grouping = config.grouping()?;
-    // Which images are for validation is known by their indices, in the run's own data only.
-    let validates = options.robots.validated().is_some() || options.split == HeldOut::Validation;
-    let own = validates.then_some(&first.run.dataset);
-    let dataset = load_dataset_of(own, config, options.data.as_deref(), &Split::ALL)?;
-    if dataset.fingerprint(Split::Train).unwrap_or_default() != first.run.dataset.train_sha256 {
-        observer.warning("the training images here are not those the run was made with (another SHA-256)");
+    let other = options.dataset.as_deref().filter(|name| *name != config.data.dataset);
+    if other.is_some() && options.split == HeldOut::Validation {
+        let text = "--dataset: expected with --split test only: validation images are of the runs' own data";
+        return Err(Error::usage(text.to_string()));
     }
+    let mut whereabouts = Whereabouts::given(options.data.as_deref());
+    for archive in &options.archives {
+        whereabouts = whereabouts.and_of(archive);
+    }
+    let own = |splits: &[Split]| {
+        load_dataset_of(Some(&first.run.dataset), config, &whereabouts, splits).map_err(|error| {
+            let hint =
+                error.hint.clone().unwrap_or("name the folder of the run's data with --data".to_string());
+            error.hint(format!("{hint}; robots are shown another dataset's images with --dataset NAME"))
+        })
+    };
+    let dataset = match other {
+        None => own(&Split::ALL)?,
+        Some(name) => whereabouts.load(&config.data.of(name), &Split::ALL)?,
+    };
     let robots = options.robots.of(&sources, options.seed)?;
     let (robots, unskilled): (Vec<Chosen>, Vec<Chosen>) =
         robots.into_iter().partition(|chosen| task_of(&grouping, chosen.robot).is_some());
@@ -119,6 +143,9 @@ pub fn eval(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Re
     let test_sha256 = dataset.fingerprint(Split::Test).unwrap_or_default();
     let steps = control_steps(config, options.cycles);
     let mut report = EvalFile::new(&sources, options, steps, &shown.images, test_sha256);
+    if let Some(name) = other {
+        report.transfer(name, &dataset);
+    }
     let splits = robots.iter().filter_map(|chosen| task_of(&grouping, chosen.robot));
     report.baselines = shown.baselines(&sources, splits)?;
     let pool = pool(options.threads)?;
@@ -128,11 +155,13 @@ pub fn eval(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Re
         None => (robots, Vec::new()),
         Some(count) => {
             let wanted = validation::Wanted { count, images: validated, threshold: options.threshold };
+            // Which images are for validation is known by their indices, in the run's own data only.
+            let others = other.map(|_| own(&[Split::Train])).transpose()?;
             let Some(best) = validation::chosen(
                 &sources,
                 &robots,
                 &options.robots,
-                &dataset,
+                others.as_ref().unwrap_or(&dataset),
                 &grouping,
                 &wanted,
                 &walker,

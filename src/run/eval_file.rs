@@ -6,14 +6,16 @@ use super::held_out::HeldOut;
 use super::robots::Source;
 use super::setting::{RunRef, Setting};
 use super::statistics::{bootstrap, standard_deviation, wilson};
-use super::training::ImageRef;
+use super::training::{DatasetRef, ImageRef};
 use super::validation::Validated;
 use super::{Error, toml_text};
 use crate::base::files::read_text;
+use crate::task::dataset::{self, Dataset};
 use crate::task::direction::Assignment;
 use crate::task::grouping::{Group, Split};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
+use std::mem::replace;
 use std::path::Path;
 
 /// What `eval.json` calls itself.
@@ -51,6 +53,9 @@ pub struct EvalFile {
     pub dataset: String,
     /// SHA-256 of its test split.
     pub test_sha256: String,
+    /// What the robots were trained on, if that is another dataset.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub trained_on: Option<DatasetRef>,
     /// Which images: those of the test split, or validation images.
     #[serde(default, skip_serializing_if = "HeldOut::is_default")]
     pub split: HeldOut,
@@ -81,8 +86,9 @@ pub struct Baselines {
     pub best_single_pixel: f64,
     /// That pixel: row, column.
     pub pixel: [usize; 2],
-    /// The group of the nearest of the run's training images.
-    pub nearest_training_image: f64,
+    /// The group of the nearest of the run's training images; none if those are of another dataset.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub nearest_training_image: Option<f64>,
 }
 
 /// Averages over the robots of a task.
@@ -222,6 +228,7 @@ impl EvalFile {
             selected: options.robots.describe(),
             dataset: first.map_or(String::new(), |run| run.dataset.name.clone()),
             test_sha256,
+            trained_on: None,
             split: options.split,
             seed: options.seed,
             control_steps,
@@ -231,6 +238,18 @@ impl EvalFile {
             baselines: BTreeMap::new(),
             means: BTreeMap::new(),
             robots: Vec::new(),
+        }
+    }
+
+    /// Says that the images are of another dataset than that the robots were trained on.
+    pub(super) fn transfer(&mut self, name: &str, dataset: &Dataset) {
+        self.dataset = name.to_string();
+        if let Some(setting) = &mut self.setting {
+            let train_sha256 = dataset.fingerprint(dataset::Split::Train).unwrap_or_default();
+            let train_sha256 = replace(&mut setting.train_sha256, train_sha256);
+            let shown = setting.data.of(name);
+            let own = replace(&mut setting.data, shown).dataset;
+            self.trained_on = Some(DatasetRef { name: own, train_sha256 });
         }
     }
 
@@ -252,10 +271,13 @@ impl EvalFile {
         self.means = means.collect();
     }
 
-    /// How the robots were selected, for people; if a signal came before the last of them, that, too.
+    /// How the robots were selected, for people; if they were trained on another dataset, or a signal came before the last of them,
+    /// that, too.
     pub fn selection(&self) -> String {
         let stopped = if self.stopped { "; stopped before the last of them" } else { "" };
-        format!("{}{stopped}", self.selected)
+        let trained =
+            self.trained_on.as_ref().map_or(String::new(), |own| format!(", trained on {}", own.name));
+        format!("{}{trained}{stopped}", self.selected)
     }
 
     /// Reads an evaluation of robots of these runs as they are now, and of no others.

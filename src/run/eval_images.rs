@@ -70,8 +70,10 @@ impl<'a> HeldOutImages<'a> {
             images.iter().map(|image| Ok((stimulus(image.index)?, image.label))).collect()
         };
         let choice = seen(&self.pixel_images()?)?;
+        // In another dataset, a run's training images are other ones.
+        let is_own = self.dataset.name() == self.config.data.dataset;
         let of_runs = sources.iter().map(|source| seen(&source.run.training_images));
-        let of_runs = of_runs.collect::<Result<Vec<_>, Error>>()?;
+        let of_runs = is_own.then(|| of_runs.collect::<Result<Vec<_>, Error>>()).transpose()?;
         let shown = self.stimuli.iter().zip(&self.images);
         let shown: Vec<Labelled> =
             shown.map(|(stimulus, image)| Labelled { stimulus, class: image.label }).collect();
@@ -82,11 +84,13 @@ impl<'a> HeldOutImages<'a> {
             }
             let rule = best_pixel(task, &labelled(&choice));
             let nearest = |of_run: &Vec<_>| nearest_training_image(task, &labelled(of_run), &shown);
+            let nearest_of_all =
+                of_runs.as_ref().map(|all| all.iter().map(nearest).sum::<f64>() / all.len() as f64);
             let baselines = Baselines {
                 larger_group: larger_group(task, &shown),
                 best_single_pixel: rule.map_or(0.0, |rule| rule.accuracy(task, &shown)),
                 pixel: rule.map_or([0, 0], |rule| [rule.row, rule.column]),
-                nearest_training_image: of_runs.iter().map(nearest).sum::<f64>() / of_runs.len() as f64,
+                nearest_training_image: nearest_of_all,
             };
             all.insert(task.name(), baselines);
         }

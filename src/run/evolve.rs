@@ -13,9 +13,10 @@ use super::relatives::Relatives;
 use super::robust::{Scored, with_perturbed_lives};
 pub use super::session::{Finished, Observer, Options, Progress};
 use super::start::{Start, StartRef};
-use super::training::{Training, load_dataset};
+use super::training::Training;
 use super::variation::{Lessons, Mutations};
-use super::{Error, eval, held_out, resume};
+use super::whereabouts::{self, Whereabouts};
+use super::{Error, eval, held_out, resume, validation};
 use crate::base::files::write_atomically;
 use crate::body::Body;
 use crate::genome::GenomeError;
@@ -32,7 +33,7 @@ use std::time::{Duration, Instant};
 /// enough for nobody to wait long. What is simulated depends on it, so not on the number of threads.
 const LIVES_AT_ONCE: usize = 256;
 
-/// Runs a config, or goes on with a run. `stop` is looked at after every generation, and more often where a stage begins.
+/// Runs a config, or goes on with a run, and at its end chooses robots on validation images if the config says so. `stop` is looked at after every generation, and more often where a stage begins.
 ///
 /// # Errors
 /// What is wrong with config, data or folder; nothing that was there is lost.
@@ -42,7 +43,11 @@ pub fn evolve(
     observer: &mut (dyn Observer + Send),
 ) -> Result<Finished, Error> {
     let config = &options.config;
-    let dataset = load_dataset(config, options.data.as_deref(), &[Split::Train])?;
+    let mut whereabouts = Whereabouts::given(options.data.as_deref());
+    if options.if_exists == IfExists::Resume {
+        whereabouts = whereabouts.and_of(&options.out.join(folder::RUN_JSON));
+    }
+    let dataset = whereabouts.load(&config.data, &[Split::Train])?;
     // Whether there are images and bodies for it is to be known before anything is written.
     let first = Training::of(config, &dataset, config.period(0))?;
     for stage in (0..config.stage.len()).map(|stage| Period { stage, draw: 0 }) {
@@ -78,6 +83,7 @@ pub fn evolve(
     if there.ok().as_ref() != Some(config) {
         write(folder::CONFIG, config.to_toml().as_bytes())?;
     }
+    whereabouts::remember(&folder, &dataset)?;
     let pool = eval::pool(options.threads)?;
     let mut run = Run::new(options, &dataset, first, saved)?;
     let mut metrics = Metrics::open(folder.path(), run.generation)?;
@@ -88,8 +94,18 @@ pub fn evolve(
     pool.install(|| run.live(start, &folder, &mut metrics, stop, observer))?;
     metrics.flush()?;
     let file = run.save(&folder)?;
-    let stopped = run.generation < config.generations;
-    Ok(Finished { run: file, totals: run.totals(), stopped })
+    let totals = run.totals();
+    let is_whole = run.generation >= config.generations;
+    let chooses = is_whole && config.validation.best > 0 && !file.elites.is_empty();
+    let validated = match chooses {
+        true => {
+            let archive = folder.path().join(folder::RUN_JSON);
+            validation::at_end(&archive, &dataset, &pool, stop, &*observer.validation())?
+        }
+        false => Some(Vec::new()),
+    };
+    let stopped = !is_whole || validated.is_none();
+    Ok(Finished { run: file, totals, validated: validated.unwrap_or_default(), stopped })
 }
 
 /// A run under way.

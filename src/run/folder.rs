@@ -5,6 +5,7 @@ use super::audit_file::AUDIT_JSON;
 use super::capacity_file::CAPACITY_JSON;
 use super::eval_file::{EVAL_JSON, EVAL_VALIDATION_JSON};
 use super::validation::VALIDATION_JSON;
+use super::whereabouts::DATA_FOLDER;
 use super::{Error, checkpoint};
 use crate::base::files::{check_writable, remove_half_written};
 use std::ffi::OsStr;
@@ -91,9 +92,9 @@ impl RunFolder {
     }
 
     /// Names of the files of a run.
-    pub(super) fn files() -> [&'static str; 6] {
+    pub(super) fn files() -> [&'static str; 7] {
         let [newest, previous] = checkpoint::NAMES;
-        [RUN_JSON, CONFIG, ELITES, METRICS, newest, previous]
+        [RUN_JSON, CONFIG, ELITES, METRICS, DATA_FOLDER, newest, previous]
     }
 }
 

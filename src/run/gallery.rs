@@ -2,8 +2,9 @@
 
 use super::archive::{Dimensions, FORMAT, FORMAT_VERSION, Robot, RunFile};
 use super::config::BUILT_IN;
+use super::data::catalogue;
 use super::robots::{Selection, Source};
-use super::training::Training;
+use super::training::{DatasetRef, ImageRef, Training};
 use super::{Config, Error};
 use crate::body::Body;
 use crate::genome::Genome;
@@ -95,12 +96,26 @@ pub fn is_meant(selection: &Selection) -> Result<bool, Error> {
 /// The published robots as a run, for a test. Their genomes were not published: each has the empty one, and none of their
 /// displacements but the fitness.
 ///
+/// Those data need not be there if images of another `dataset` are to be shown.
+///
 /// # Errors
 /// If the data are missing or broken, which say what the robots were trained on.
-pub fn source(data: Option<&Path>) -> Result<Source, Error> {
+pub fn source(data: Option<&Path>, dataset: Option<&str>) -> Result<Source, Error> {
     let config = config()?;
-    let hint = |error: Error| error.hint("morphcog data fetch mnist".to_string());
-    let training = Training::load(&config, data).map_err(hint)?;
+    let (dataset, training_images) = match dataset.is_some_and(|name| name != config.data.dataset) {
+        true => {
+            let indices = config.data.train_images.iter().flatten();
+            let images = indices.zip(config.classes()).map(|(&index, label)| ImageRef { index, label });
+            let train_sha256 = catalogue::MNIST_CONTENT[0].to_string();
+            (DatasetRef { name: config.data.dataset.clone(), train_sha256 }, images.collect())
+        }
+        false => {
+            let hint = "morphcog data fetch mnist, or --dataset builtin for digits the program draws";
+            let hint = |error: Error| error.hint(hint.to_string());
+            let training = Training::load(&config, data).map_err(hint)?;
+            (training.dataset, training.images)
+        }
+    };
     let robot = |(number, robot): (usize, Published)| {
         let (left, right) = (-robot.fitness, robot.fitness);
         let displacements = match robot.zero_walks {
@@ -126,8 +141,8 @@ pub fn source(data: Option<&Path>) -> Result<Source, Error> {
         format_version: FORMAT_VERSION,
         program_version: env!("CARGO_PKG_VERSION").to_string(),
         name: ALL.to_string(),
-        dataset: training.dataset,
-        training_images: training.images,
+        dataset,
+        training_images,
         dimensions: Dimensions::of(&config)?,
         start: None,
         generations: config.generations,

@@ -54,6 +54,7 @@ mod trainings;
 pub mod validation;
 mod variation;
 pub mod verdict;
+pub mod whereabouts;
 
 pub use config::Config;
 pub use error::{Error, ErrorKind};

@@ -3,7 +3,7 @@
 use super::Error;
 use super::archive::Robot;
 use super::audit_file::{AUDIT_JSON, AuditFile};
-use super::robots::{Chosen, Selection, Source, by_id};
+use super::robots::{BEST, Chosen, Selection, Source, by_id};
 use super::validation::Validated;
 use std::path::PathBuf;
 
@@ -37,12 +37,12 @@ pub(super) fn physical<'a>(
     let hint = "morphcog audit goes on with the robots that are missing; give it the same --archive";
     let mut named = Vec::new();
     if let Selection::Ids(ids) = selection {
-        for id in ids.iter().filter(|id| *id != "best") {
+        for id in ids.iter().filter(|id| *id != BEST) {
             named.extend(by_id(&fittest, id)?);
         }
     }
     // Who names robots needs to know of those only; of a part of an archive nothing can be drawn fairly.
-    let is_named = matches!(selection, Selection::Ids(ids) if !ids.iter().any(|id| id == "best"));
+    let is_named = matches!(selection, Selection::Ids(ids) if !ids.iter().any(|id| id == BEST));
     for chosen in if is_named { &named } else { &fittest } {
         if found(chosen).is_none() {
             let audit = &audits[chosen.source];

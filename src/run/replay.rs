@@ -1,7 +1,8 @@
 //! `morphcog replay`: record a robot's life, for the pictures.
 
 use super::robots::{Selection, Source};
-use super::training::{DatasetRef, ImageRef, load_dataset_of, see};
+use super::training::{DatasetRef, ImageRef, Training, load_dataset_of, see};
+use super::whereabouts::Whereabouts;
 use super::{Config, Error, folder, gallery};
 use crate::base::Grid;
 use crate::body::Body;
@@ -111,17 +112,14 @@ pub fn record_subject(subject: &Subject) -> Recording {
 pub fn subject(options: &Options) -> Result<Subject, Error> {
     let mut found = find(options)?;
     let config = &mut found.config;
-    if let Some(dataset) = &options.dataset
-        && *dataset != config.data.dataset
-    {
-        // Images of one dataset mean nothing in another.
-        config.data = super::config::DataConfig {
-            dataset: dataset.clone(),
-            dir: None,
-            train_images: None,
-            ..config.data.clone()
-        };
+    if let Some(dataset) = &options.dataset {
+        config.data = config.data.of(dataset);
     }
+    let whereabouts = Whereabouts::given(options.data.as_deref());
+    let whereabouts = match &found.archive {
+        Some(path) => whereabouts.and_of(path),
+        None => whereabouts,
+    };
     // Published robots come without images of their own.
     let offer = |error: Error| match found.published {
         true => error
@@ -132,7 +130,10 @@ pub fn subject(options: &Options) -> Result<Subject, Error> {
     if shown.is_empty() {
         let own = if options.dataset.is_none() { found.training.as_slice() } else { &[] };
         let all = match own {
-            [] => super::training::Training::load(config, options.data.as_deref()).map_err(offer)?.images,
+            [] => {
+                let train = whereabouts.load(&config.data, &[Split::Train]).map_err(offer)?;
+                Training::of(config, &train, config.period(0)).map_err(offer)?.images
+            }
             own => own.to_vec(),
         };
         let training = |image: &ImageRef| Shown { split: Split::Train, index: image.index };
@@ -146,7 +147,7 @@ pub fn subject(options: &Options) -> Result<Subject, Error> {
     let wanted: Vec<Split> =
         Split::ALL.into_iter().filter(|split| shown.iter().any(|image| image.split == *split)).collect();
     let own = found.dataset.as_ref().filter(|own| own.name == config.data.dataset);
-    let dataset = load_dataset_of(own, config, options.data.as_deref(), &wanted).map_err(offer)?;
+    let dataset = load_dataset_of(own, config, &whereabouts, &wanted).map_err(offer)?;
     let mut images = Vec::new();
     for Shown { split, index } in shown {
         let label =
@@ -182,6 +183,8 @@ pub struct Found {
     pub dataset: Option<DatasetRef>,
     /// What a page says about it: words and values.
     pub about: Vec<(String, String)>,
+    /// The run.json it is from; none of a published one.
+    archive: Option<PathBuf>,
     published: bool,
 }
 
@@ -215,7 +218,16 @@ pub fn find(options: &Options) -> Result<Found, Error> {
             ("Published fitness".to_string(), format!("{:.2} voxel lengths", robot.fitness)),
         ];
         let (name, body, config) = (robot.name, robot.body, gallery::config()?);
-        return Ok(Found { name, body, config, training: Vec::new(), dataset: None, about, published: true });
+        return Ok(Found {
+            name,
+            body,
+            config,
+            training: Vec::new(),
+            dataset: None,
+            about,
+            archive: None,
+            published: true,
+        });
     }
     let archive = match &options.archive {
         Some(path) => path.clone(),
@@ -250,6 +262,7 @@ pub fn find(options: &Options) -> Result<Found, Error> {
         training: run.training_images.clone(),
         dataset: Some(run.dataset.clone()),
         about,
+        archive: Some(archive),
         published: false,
         config: run.config.clone(),
     })

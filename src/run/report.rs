@@ -6,6 +6,7 @@ use super::capacity_file::{CAPACITY_JSON, CapacityFile};
 use super::eval_file::{EVAL_JSON, EvalFile};
 use super::plot::Progress;
 use super::training::{ImageRef, load_dataset_of, see};
+use super::whereabouts::Whereabouts;
 use super::{Error, folder};
 use crate::base::Grid;
 use crate::task::dataset::Split;
@@ -101,7 +102,8 @@ pub fn gather(
             true => Progress::of(&run, path, None).map_err(|error| warn(&format!("{error}; left out"))).ok(),
             false => None,
         };
-        let images = if with_lives { images(&run, data)? } else { Vec::new() };
+        let whereabouts = Whereabouts::given(data).and_of(path);
+        let images = if with_lives { images(&run, &whereabouts)? } else { Vec::new() };
         let findings = Findings::read(folder, &[&run], warn);
         runs.push(Dossier { path: path.clone(), run, progress, findings, images });
     }
@@ -117,12 +119,13 @@ pub fn gather(
 }
 
 /// The training images, or one of each class if they are many.
-fn images(run: &RunFile, data: Option<&Path>) -> Result<Vec<(String, Grid<f64>)>, Error> {
+fn images(run: &RunFile, whereabouts: &Whereabouts) -> Result<Vec<(String, Grid<f64>)>, Error> {
     let hint = |error: Error| match &error.hint {
         None => error.hint("or --lives 0 for a report without moving pictures".to_string()),
         Some(_) => error,
     };
-    let dataset = load_dataset_of(Some(&run.dataset), &run.config, data, &[Split::Train]).map_err(hint)?;
+    let dataset = load_dataset_of(Some(&run.dataset), &run.config, whereabouts, &[Split::Train]);
+    let dataset = dataset.map_err(hint)?;
     let mut shown: Vec<ImageRef> = run.training_images.clone();
     if shown.len() > MOST_IMAGES {
         let mut classes = Vec::new();

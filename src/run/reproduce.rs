@@ -269,6 +269,7 @@ impl Job<'_> {
             threshold: eval::THRESHOLD,
             cycles: eval::CYCLES,
             data: self.options.data.clone(),
+            dataset: None,
             out: path.to_path_buf(),
             threads: self.options.threads,
         };
@@ -296,5 +297,5 @@ fn is_of(known: &EvalFile, sources: &[Source], options: &eval::Options) -> bool 
     let same = (known.seed, known.split, known.images.len(), known.threshold)
         == (options.seed, options.split, options.images, options.threshold);
     let is_ours = known.program_version == env!("CARGO_PKG_VERSION");
-    is_ours && !known.stopped && known.runs == runs && same && same_robots
+    is_ours && !known.stopped && known.trained_on.is_none() && known.runs == runs && same && same_robots
 }

@@ -3,9 +3,13 @@
 use super::Error;
 use super::archive::{Robot, RunFile};
 use super::physical::{all_audited, physical};
+use super::validation::{self, Validated};
 use crate::base::random::{Purpose, stream};
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
+
+/// The word for the best robot.
+pub const BEST: &str = "best";
 
 /// A run, and where it lies.
 #[derive(Clone, Debug)]
@@ -46,7 +50,8 @@ pub enum Selection {
     Random(usize),
     /// The so many best of each run and task on validation images; only `eval` shows those.
     Validated(usize),
-    /// Those with these ids, or unique beginnings of ids; "best" is the fittest.
+    /// Those with these ids, or unique beginnings of ids; "best" is the first on validation images if the runs ranked their robots
+    /// by those (validation.json), else the fittest.
     Ids(Vec<String>),
     /// These, by the place of their run and by id, and how they were come by.
     Drawn {
@@ -181,7 +186,11 @@ impl Selection {
             }
             Selection::Ids(ids) => {
                 // Whoever is named twice is one robot.
-                let named: Result<Vec<_>, Error> = ids.iter().map(|id| by_id(&fittest, id)).collect();
+                let named = ids.iter().map(|id| match id == BEST {
+                    true => Ok(best(&fittest, sources).into_iter().collect()),
+                    false => by_id(&fittest, id),
+                });
+                let named: Result<Vec<_>, Error> = named.collect();
                 let mut once: Vec<Chosen> = Vec::new();
                 for chosen in named?.into_iter().flatten() {
                     if !once.iter().any(|other| std::ptr::eq(other.robot, chosen.robot)) {
@@ -205,12 +214,28 @@ impl Selection {
     }
 }
 
-/// The robot of an id, or of the unique beginning of one; "best" is the first. Of several runs that have it all, as when they
-/// started from one archive, from each.
-pub(super) fn by_id<'a>(robots: &[Chosen<'a>], id: &str) -> Result<Vec<Chosen<'a>>, Error> {
-    if id == "best" {
-        return Ok(robots.iter().take(1).copied().collect());
+/// The best of some robots, given fittest first: the first on validation images if all runs ranked their robots by those, and
+/// ranked one of these; else the fittest.
+fn best<'a>(fittest: &[Chosen<'a>], sources: &'a [Source]) -> Option<Chosen<'a>> {
+    let rankings: Option<Vec<Vec<Validated>>> = sources.iter().map(validation::ranking).collect();
+    let mut first: Option<(Chosen, f64)> = None;
+    for (source, ranked) in rankings.iter().flatten().enumerate() {
+        for Validated { id, task, balanced_accuracy, .. } in ranked {
+            let is_it = |c: &&Chosen| c.source == source && c.robot.id == *id && c.robot.task == *task;
+            // Of equals the first stays, which was fitter.
+            if first.is_none_or(|(_, accuracy)| *balanced_accuracy > accuracy)
+                && let Some(chosen) = fittest.iter().find(is_it)
+            {
+                first = Some((*chosen, *balanced_accuracy));
+            }
+        }
     }
+    first.map(|(chosen, _)| chosen).or(fittest.first().copied())
+}
+
+/// The robot of an id, or of the unique beginning of one. Of several runs that have it all, as when they started from one
+/// archive, from each.
+pub(super) fn by_id<'a>(robots: &[Chosen<'a>], id: &str) -> Result<Vec<Chosen<'a>>, Error> {
     let lower = id.to_ascii_lowercase();
     let found: Vec<Chosen> = robots
         .iter()

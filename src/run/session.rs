@@ -1,12 +1,13 @@
 //! What a session of a run is given ([`Options`]), tells ([`Observer`]) and ends with ([`Finished`]).
 
-use super::Config;
 use super::archive::RunFile;
 use super::curriculum::Period;
 use super::folder::{IfExists, RunFolder};
 use super::metrics::Totals;
 use super::start::StartRef;
 use super::training::Training;
+use super::validation::Validated;
+use super::{Config, eval};
 use crate::qd::ArchiveStats;
 use std::path::PathBuf;
 
@@ -50,6 +51,10 @@ pub trait Observer {
     fn period(&mut self, period: Period, training: &Training, progress: &Progress);
     /// After every generation.
     fn generation(&mut self, progress: &Progress);
+    /// Who is told how robots are chosen on validation images when the run ends, if it is to choose some; nobody if it is not said.
+    fn validation(&mut self) -> Box<dyn eval::Observer + '_> {
+        Box::new(())
+    }
     /// Something the user should know.
     fn warning(&mut self, text: &str);
 }
@@ -61,6 +66,18 @@ pub struct Finished {
     pub run: RunFile,
     /// Counts of the whole run.
     pub totals: Totals,
-    /// Whether a signal stopped it before its last generation.
+    /// The best robots of each task on validation images, best first; none if the config asks for none, or it was stopped.
+    pub validated: Vec<Validated>,
+    /// Whether a signal stopped it before its end: its last generation, and the choice of robots after that.
     pub stopped: bool,
+}
+
+impl Finished {
+    /// Id of the best robot: the first on validation images if some were chosen by them, else the fittest.
+    pub fn best(&self) -> Option<&str> {
+        let better = |a: &Validated, b: &Validated| a.balanced_accuracy > b.balanced_accuracy;
+        let first =
+            self.validated.iter().reduce(|best, other| if better(other, best) { other } else { best });
+        first.map(|robot| robot.id.as_str()).or(self.run.best().map(|robot| robot.id.as_str()))
+    }
 }

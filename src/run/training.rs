@@ -1,14 +1,14 @@
 //! [`Training`]: the images a run evolves on, as its robots see them.
 
-use super::config::{BodyConfig, DataConfig};
+use super::config::BodyConfig;
 use super::curriculum::Period;
 use super::hardest::hardest;
+use super::whereabouts::Whereabouts;
 use super::{Config, Error};
 use crate::base::Grid;
 use crate::base::random::{Purpose, Stream, stream};
 use crate::task::condition::Condition;
-use crate::task::dataset::{BUILTIN, Dataset, DatasetError, Split};
-use crate::task::files::places;
+use crate::task::dataset::{Dataset, DatasetError, Split};
 use crate::task::protocol::Protocol;
 use crate::task::score::Answer;
 use crate::task::stimulus::{StimulusParams, stimulus};
@@ -53,20 +53,7 @@ pub struct Training {
 /// # Errors
 /// What is missing or broken, where it was looked for and what to do.
 pub fn load_dataset(config: &Config, data: Option<&Path>, wanted: &[Split]) -> Result<Dataset, Error> {
-    load_data(&config.data, data, wanted)
-}
-
-/// Loads the dataset of a section `[data]`.
-///
-/// # Errors
-/// As [`load_dataset`].
-pub fn load_data(config: &DataConfig, data: Option<&Path>, wanted: &[Split]) -> Result<Dataset, Error> {
-    let refuse = |error: DatasetError| Error::input(error.to_string());
-    if config.dataset == BUILTIN {
-        return Dataset::builtin(config.builtin.clone(), wanted).map_err(refuse);
-    }
-    let given = places(data, std::env::var_os("MORPHCOG_DATA"), config.dir.as_deref());
-    Dataset::load(&config.dataset, &given, wanted).map_err(refuse)
+    Whereabouts::given(data).load(&config.data, wanted)
 }
 
 /// Loads the dataset that a run was made with; any, if none is said. Where only other splits are wanted, it is known by its training
@@ -77,15 +64,13 @@ pub fn load_data(config: &DataConfig, data: Option<&Path>, wanted: &[Split]) -> 
 pub fn load_dataset_of(
     run: Option<&DatasetRef>,
     config: &Config,
-    data: Option<&Path>,
+    data: &Whereabouts,
     wanted: &[Split],
 ) -> Result<Dataset, Error> {
-    let loaded = load_dataset(config, data, wanted)?;
+    let loaded = data.load(&config.data, wanted)?;
     let Some(run) = run else { return Ok(loaded) };
     let train = match loaded.fingerprint(Split::Train) {
-        None => {
-            load_dataset(config, data, &[Split::Train]).ok().and_then(|set| set.fingerprint(Split::Train))
-        }
+        None => data.load(&config.data, &[Split::Train]).ok().and_then(|set| set.fingerprint(Split::Train)),
         known => known,
     };
     match train.is_none_or(|train| train == run.train_sha256) {
@@ -93,7 +78,7 @@ pub fn load_dataset_of(
         false => {
             let text = format!(
                 "{}: the training images here are not those the run was made with (another SHA-256)",
-                run.name
+                loaded.place()
             );
             Err(Error::input(text).hint("name their folder with --data".to_string()))
         }

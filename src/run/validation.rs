@@ -10,6 +10,7 @@ use super::held_out::images;
 use super::physical::first_physical;
 use super::robots::{Chosen, Selection, Source};
 use super::training::{ImageRef, load_dataset_of, see};
+use super::whereabouts::Whereabouts;
 use super::{Config, Error, toml_text};
 use crate::base::files::{read_text, write_atomically};
 use crate::base::hash::sha256_hex;
@@ -89,6 +90,8 @@ pub struct Validated {
 struct ValidationFile {
     format: String,
     format_version: u32,
+    /// SHA-256 of the run's content: of a run that has gone on since, this says nothing.
+    run_sha256: String,
     /// SHA-256 of all that the result depends on.
     key: String,
     /// The best of each task, best first.
@@ -128,20 +131,52 @@ pub fn validate(
 ) -> Result<Option<Vec<Validated>>, Error> {
     let source = Source::read(&options.archive)?;
     let config = &source.run.config;
-    let ValidationConfig { images, best: count } = config.validation;
-    let count = options.best.unwrap_or(count);
-    let grouping = config.grouping()?;
-    let dataset =
-        load_dataset_of(Some(&source.run.dataset), config, options.data.as_deref(), &[Split::Train])?;
+    let count = options.best.unwrap_or(config.validation.best);
+    let whereabouts = Whereabouts::given(options.data.as_deref()).and_of(&source.path);
+    let dataset = load_dataset_of(Some(&source.run.dataset), config, &whereabouts, &[Split::Train])?;
     let pool = eval::pool(options.threads)?;
+    ranked(&source, count, &dataset, &pool, stop, observer)
+}
+
+/// The same when a run ends, of the so many best that its config asks for, on data that are loaded already.
+///
+/// # Errors
+/// As of [`validate`].
+pub(super) fn at_end(
+    archive: &Path,
+    dataset: &Dataset,
+    pool: &rayon::ThreadPool,
+    stop: &AtomicBool,
+    observer: &dyn Observer,
+) -> Result<Option<Vec<Validated>>, Error> {
+    let source = Source::read(archive)?;
+    ranked(&source, source.run.config.validation.best, dataset, pool, stop, observer)
+}
+
+fn ranked(
+    source: &Source,
+    count: usize,
+    dataset: &Dataset,
+    pool: &rayon::ThreadPool,
+    stop: &AtomicBool,
+    observer: &dyn Observer,
+) -> Result<Option<Vec<Validated>>, Error> {
+    let config = &source.run.config;
+    let grouping = config.grouping()?;
     let control_steps = eval::control_steps(config, eval::CYCLES);
-    let walker = Walker { config, control_steps, pool: &pool, stop, observer, done: AtomicU64::new(0) };
-    let chosen = Selection::Validated(count).of(std::slice::from_ref(&source), 0)?;
+    let walker = Walker { config, control_steps, pool, stop, observer, done: AtomicU64::new(0) };
+    let chosen = Selection::Validated(count).of(std::slice::from_ref(source), 0)?;
     let skilled = |robot: &&Robot| eval::task_of(&grouping, robot).is_some();
     let robots = chosen.iter().map(|chosen| chosen.robot).filter(skilled).collect();
-    let wanted = Wanted { count, images, threshold: eval::THRESHOLD };
-    let best = best(&source, &dataset, &grouping, robots, &wanted, &walker)?;
+    let wanted = Wanted { count, images: config.validation.images, threshold: eval::THRESHOLD };
+    let best = best(source, dataset, &grouping, robots, &wanted, &walker)?;
     Ok(best.map(|best| best.into_iter().map(|(_, validated)| validated).collect()))
+}
+
+/// The best robots of a run on validation images, as far as they are known for the run as it is; `None` if none are.
+pub(super) fn ranking(source: &Source) -> Option<Vec<Validated>> {
+    let file = ValidationFile::read(&source.path.with_file_name(VALIDATION_JSON))?;
+    (file.run_sha256 == source.run.fingerprint() && !file.robots.is_empty()).then_some(file.robots)
 }
 
 /// How many images the robots in the `validation.json` beside a run were chosen by; `None` without such a file.
@@ -219,7 +254,13 @@ pub(super) fn best<'a>(
     let Some(chosen) = screened(run, dataset, grouping, &robots, searched, &images, walker)? else {
         return Ok(None);
     };
-    let file = ValidationFile { format: FORMAT.0.to_string(), format_version: FORMAT.1, key, robots: chosen };
+    let file = ValidationFile {
+        format: FORMAT.0.to_string(),
+        format_version: FORMAT.1,
+        run_sha256: run.fingerprint(),
+        key,
+        robots: chosen,
+    };
     let text = serde_json::to_string(&file).map_err(|error| Error::other(error.to_string()))? + "\n";
     if let Err(error) = write_atomically(&path, text.as_bytes()) {
         let error = Error::writing(&path, &error);

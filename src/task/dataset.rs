@@ -8,6 +8,7 @@ use crate::base::random::{Purpose, stream};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fmt;
+use std::path::{Path, PathBuf};
 
 /// Name of the built-in digits as a dataset.
 pub const BUILTIN: &str = "builtin";
@@ -93,7 +94,8 @@ pub enum DatasetError {
 #[derive(Clone, Debug)]
 pub struct Dataset {
     name: String,
-    source: String,
+    /// The folder with its files; none of the built-in digits.
+    folder: Option<PathBuf>,
     origin: String,
     splits: BTreeMap<Split, Loaded>,
 }
@@ -128,8 +130,7 @@ impl Dataset {
             let (labels, stored) = files::load(name, &place, split)?;
             splits.insert(split, Loaded::new(labels, Images::Stored(stored)));
         }
-        let (source, origin) = (place.path.display().to_string(), place.origin);
-        Ok(Dataset { name: name.to_string(), source, origin, splits })
+        Ok(Dataset { name: name.to_string(), folder: Some(place.path), origin: place.origin, splits })
     }
 
     /// Built-in digits with parameters of one's own. Images are drawn when they are asked for.
@@ -143,13 +144,25 @@ impl Dataset {
             (split, Loaded::new(labels, Images::Drawn(digits.clone())))
         };
         let splits = wanted.iter().map(loaded).collect();
-        let name = || BUILTIN.to_string();
-        Ok(Dataset { name: name(), source: name(), origin: name(), splits })
+        Ok(Dataset { name: BUILTIN.to_string(), folder: None, origin: BUILTIN.to_string(), splits })
     }
 
     /// Name of the dataset.
     pub fn name(&self) -> &str {
         &self.name
+    }
+
+    /// The folder it was read from; none of the built-in digits.
+    pub fn folder(&self) -> Option<&Path> {
+        self.folder.as_deref()
+    }
+
+    /// Name, folder, and who named that: for messages.
+    pub fn place(&self) -> String {
+        match &self.folder {
+            Some(folder) => format!("{} in {} ({})", self.name, folder.display(), self.origin),
+            None => self.name.clone(),
+        }
     }
 
     /// Number of images in a split; 0 if it was not loaded.
@@ -213,7 +226,8 @@ impl Dataset {
             (split, SplitInfo { images: loaded.labels.len(), height, width, fingerprint, per_class, files })
         };
         let splits = self.splits.iter().map(describe).collect();
-        let (name, source, origin) = (self.name.clone(), self.source.clone(), self.origin.clone());
+        let source = self.folder.as_ref().map_or(BUILTIN.to_string(), |folder| folder.display().to_string());
+        let (name, origin) = (self.name.clone(), self.origin.clone());
         DatasetInfo { name, source, origin, splits }
     }
 

@@ -8,6 +8,7 @@ use crate::run::capacity_file::{CAPACITY_JSON, CapacityFile};
 use crate::run::eval_file::{EVAL_JSON, EvalFile};
 use crate::run::plot::Progress;
 use crate::run::replay::{self, Found, Options};
+use crate::run::robots::BEST;
 use crate::run::{Error, folder, gallery, sensitivity};
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -120,7 +121,7 @@ pub fn make(console: &Console, wanted: &Wanted) -> Result<Vec<PathBuf>, Error> {
     }
     let archives = archives(wanted)?;
     let robots = match wanted.robots.as_slice() {
-        [] => vec!["best".to_string()],
+        [] => vec![BEST.to_string()],
         robots => robots.to_vec(),
     };
     let count = match wanted.kind {

@@ -76,6 +76,12 @@ impl evolve::Observer for Evolution<'_> {
         }
     }
 
+    fn validation(&mut self) -> Box<dyn eval::Observer + '_> {
+        // Its bar ends first: there is one line on the screen.
+        self.bar = None;
+        Box::new(Evaluation::new(self.console))
+    }
+
     fn warning(&mut self, text: &str) {
         self.console.warning(text);
     }

@@ -42,7 +42,7 @@ pub fn evolution(console: &Console, finished: &Finished, out: &Path) {
     let Finished { run, totals, .. } = finished;
     if console.mode() == Mode::Json {
         let elites = run.elites.len();
-        let best = run.best().map(|robot| &robot.id);
+        let best = finished.best();
         let done = serde_json::json!({
             "folder": out.display().to_string(), "generations": run.generations, "stopped": finished.stopped, "best": best,
             "elites": elites, "stats": run.stats, "totals": totals,
@@ -118,6 +118,7 @@ pub fn evaluation(console: &Console, report: &EvalFile, capacity: Option<&Capaci
     if console.mode() == Mode::Json {
         let done = serde_json::json!({
             "file": out.display().to_string(), "stopped": report.stopped, "images": report.images.len(), "split": report.split,
+            "dataset": report.dataset, "trained_on": report.trained_on,
             "means": report.means, "baselines": report.baselines,
             "robots": report.robots.iter().map(RobotReport::without_displacements).collect::<Vec<_>>(),
         });
@@ -155,7 +156,7 @@ pub fn evaluation(console: &Console, report: &EvalFile, capacity: Option<&Capaci
             percent(mean.balanced_accuracy),
             baseline(|b| b.larger_group),
             baseline(|b| b.best_single_pixel),
-            baseline(|b| b.nearest_training_image),
+            baselines.and_then(|b| b.nearest_training_image).map_or("–".to_string(), percent),
         ]
     });
     let headers = [
@@ -171,7 +172,7 @@ pub fn evaluation(console: &Console, report: &EvalFile, capacity: Option<&Capaci
     ];
     console.table(&headers, &rows.collect::<Vec<_>>());
     console.line("");
-    let is_test = report.split == HeldOut::Test;
+    let is_test = report.split == HeldOut::Test && report.trained_on.is_none();
     let as_published = |task: &String| is_test && published::row(&report.dataset, task).is_some();
     if capacity.is_some() || report.means.keys().any(as_published) {
         let tasks = report.means.iter().map(|(task, mean)| {
@@ -186,7 +187,7 @@ pub fn evaluation(console: &Console, report: &EvalFile, capacity: Option<&Capaci
         report.images.len(),
         report.dataset,
         report.split,
-        report.selected,
+        report.selection(),
         report.threshold
     ));
     console.line(&format!("wrote {} and {}", out.display(), out.with_extension("csv").display()));
@@ -253,7 +254,11 @@ pub fn fetched(console: &Console, files: &[Fetched]) {
 pub fn dataset(console: &Console, found: &Found) {
     let info = &found.info;
     if console.mode() == Mode::Json {
-        return console.event("dataset", info);
+        let mut event = serde_json::to_value(info).expect("names, numbers and texts are JSON");
+        if let (Some(event), false) = (event.as_object_mut(), found.others.is_empty()) {
+            event.insert("known_as".to_string(), serde_json::json!(found.others));
+        }
+        return console.event("dataset", &event);
     }
     console.line(&format!("{}: {} ({})", info.name, info.source, info.origin));
     let mut rows = Vec::new();
@@ -277,6 +282,10 @@ pub fn dataset(console: &Console, found: &Found) {
         );
     }
     console.table(&["split", "class", "images"], &rows);
+    for (split, known) in &found.others {
+        console
+            .warning(&format!("{split}: these are the images of {known}, here under the name {}", info.name));
+    }
     for (split, problem) in &found.problems {
         console.warning(&format!("{split}: {problem}"));
     }

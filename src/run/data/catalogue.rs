@@ -1,6 +1,7 @@
 //! What can be downloaded, from where, and how to know that it is the right thing.
 
 use crate::task::files::FETCHABLE;
+use crate::task::info::{FileInfo, SplitInfo};
 
 /// A file to be downloaded, as published.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -52,6 +53,12 @@ const MNIST: Published = [
         "8d422c7b0a1c1c79245a5bcf07fe86e33eeafee792b84584aec276f5a2dbc4e6",
     ),
     ("t10k-labels-idx1-ubyte.gz", 4_542, "f7ae60f92e00ec6debd23a6088c31dbd2371eca3ffa0defaefb259924204aec6"),
+];
+
+/// SHA-256 of the content of MNIST's training and test split (see [`SplitInfo::fingerprint`]): it is known however it is packed.
+pub const MNIST_CONTENT: [&str; 2] = [
+    "c5097fdd51cfdbe7695fd9df3612695696864b5c424f58d843ffdc5d335e9914",
+    "18489308deedfe2f7bd3a11e599a597126f161d991b1ffcffb71642aa76f7f62",
 ];
 
 const MNIST_MIRRORS: [&str; 2] =
@@ -106,6 +113,19 @@ impl Catalogue {
     }
 }
 
+/// The dataset that a split is known to be of, whatever it is called where it was found: MNIST by its content, Fashion-MNIST by its
+/// files as published.
+pub fn known_as(split: &SplitInfo) -> Option<&'static str> {
+    let are_published = |published: &Published| {
+        let is_one = |file: &FileInfo| published.iter().any(|(_, _, sha256)| *sha256 == file.sha256);
+        split.files.len() == 2 && split.files.iter().all(is_one)
+    };
+    if MNIST_CONTENT.contains(&split.fingerprint.as_str()) {
+        return Some("mnist");
+    }
+    are_published(&FASHION_MNIST).then_some("fashion-mnist")
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -122,5 +142,26 @@ mod tests {
         }
         let error = Catalogue::named("kmnist").unwrap_err().to_string();
         assert_eq!(error, "\"kmnist\" cannot be fetched; expected mnist or fashion-mnist");
+    }
+
+    #[test]
+    fn splits_are_known_by_their_content_or_their_published_files() {
+        let split = |fingerprint: &str, files: &[&str]| SplitInfo {
+            images: 1,
+            height: 1,
+            width: 1,
+            fingerprint: fingerprint.to_string(),
+            per_class: Default::default(),
+            files: files
+                .iter()
+                .map(|sha256| FileInfo { name: String::new(), bytes: 1, sha256: sha256.to_string() })
+                .collect(),
+        };
+        assert_eq!(known_as(&split(MNIST_CONTENT[1], &[])), Some("mnist"));
+        let [(_, _, images), (_, _, labels), ..] = FASHION_MNIST;
+        assert_eq!(known_as(&split("", &[images, labels])), Some("fashion-mnist"));
+        // With other labels they are other data.
+        assert_eq!(known_as(&split("", &[images, "0"])), None);
+        assert_eq!(known_as(&split("", &[])), None);
     }
 }

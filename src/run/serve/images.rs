@@ -5,6 +5,7 @@ use super::catalogue::Catalogue;
 use crate::base::Grid;
 use crate::run::Error;
 use crate::run::training::load_dataset_of;
+use crate::run::whereabouts::Whereabouts;
 use crate::task::dataset::{BUILTIN, Dataset, Split};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -61,7 +62,13 @@ impl ImageSets {
             if name == BUILTIN || sets.iter().any(|set: &Dataset| set.name() == name) {
                 continue;
             }
-            match load_dataset_of(collection.dataset.as_ref(), &collection.config, data, &[Split::Test]) {
+            let whereabouts = Whereabouts::given(data);
+            let whereabouts = match &collection.path {
+                Some(path) => whereabouts.and_of(path),
+                None => whereabouts,
+            };
+            let (own, config) = (collection.dataset.as_ref(), &collection.config);
+            match load_dataset_of(own, config, &whereabouts, &[Split::Test]) {
                 Ok(set) => sets.push(set),
                 Err(error) if !notes.contains(&error.message) => notes.push(error.message),
                 Err(_) => {}

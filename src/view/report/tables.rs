@@ -122,6 +122,7 @@ pub(super) fn eval(report: &EvalFile) -> String {
         escape(&report.selection()),
         report.threshold
     );
+    let as_published = report.split == HeldOut::Test && report.trained_on.is_none();
     let row = |(task, mean): (&String, &Mean)| {
         let known = report.baselines.get(task);
         vec![
@@ -130,13 +131,13 @@ pub(super) fn eval(report: &EvalFile) -> String {
             percent(mean.accuracy),
             or_none(mean.standard_deviation, percent),
             or_none(mean.interval, |[low, high]| format!("{}–{}", percent(low), percent(high))),
-            or_none(published::row(&report.dataset, task).filter(|_| report.split == HeldOut::Test), |row| {
+            or_none(published::row(&report.dataset, task).filter(|_| as_published), |row| {
                 format!("{:.1}", row.accuracy)
             }),
             percent(mean.balanced_accuracy),
             or_none(known, |known| percent(known.larger_group)),
             or_none(known, |known| percent(known.best_single_pixel)),
-            or_none(known, |known| percent(known.nearest_training_image)),
+            or_none(known.and_then(|known| known.nearest_training_image), percent),
         ]
     };
     let headers = [

@@ -121,8 +121,9 @@ pub(super) fn methods(dossier: &Dossier) -> String {
         };
         let means: Vec<String> = report.means.iter().map(mean).collect();
         text += &format!(
-            " On {} held-out {} images, with displacements up to {} voxel lengths counted as wrong, {} robots ({}) reached a mean accuracy of {}.",
+            " On {} held-out {}{} images, with displacements up to {} voxel lengths counted as wrong, {} robots ({}) reached a mean accuracy of {}.",
             report.images.len(),
+            report.trained_on.as_ref().map_or(String::new(), |_| format!("{} ", report.dataset)),
             report.split,
             report.threshold,
             report.robots.len(),

@@ -1,0 +1,192 @@
+//! Whose images robots are shown: the run's own, wherever they lie, and others only if they are asked for by name.
+
+mod common;
+
+use common::program::{Sandbox, TINY, said};
+use morphcog::run::eval_file::EvalFile;
+use std::fs::{remove_dir_all, rename};
+
+/// An IDX dataset of zeros and ones: noise with a bar, of the first ones upright; `seed` decides which noise.
+fn write_dataset(sandbox: &Sandbox, folder: &str, seed: u8) {
+    const SIDE: usize = 10;
+    let header = |sizes: &[u32]| {
+        let magic = [0, 0, 8, sizes.len() as u8];
+        [&magic[..], &sizes.iter().flat_map(|size| size.to_be_bytes()).collect::<Vec<_>>()].concat()
+    };
+    for (split, count) in [("train", 120u32), ("t10k", 24)] {
+        let pixel = |image: u32, place: usize| {
+            let (row, column) = (place / SIDE, place % SIDE);
+            let on_bar = if image % 2 == 1 { column / 2 == 2 } else { row / 2 == 2 };
+            let noise = (place as u32 + 31 * image).wrapping_mul(2_654_435_761).to_be_bytes()[0] ^ seed;
+            if on_bar { 255 } else { noise / 3 }
+        };
+        let pixels = (0..count).flat_map(|image| (0..SIDE * SIDE).map(move |place| pixel(image, place)));
+        let images = [header(&[count, SIDE as u32, SIDE as u32]), pixels.collect()].concat();
+        let labels = [header(&[count]), (0..count).map(|image| (image % 2) as u8).collect()].concat();
+        sandbox.write(&format!("{folder}/{split}-images-idx3-ubyte"), images);
+        sandbox.write(&format!("{folder}/{split}-labels-idx1-ubyte"), labels);
+    }
+}
+
+/// A run on `shapes`, which lie in `there`.
+fn with_run() -> Sandbox {
+    let sandbox = Sandbox::new();
+    write_dataset(&sandbox, "there", 1);
+    let config = TINY.replace("\"builtin\"", "\"shapes\"");
+    sandbox.write("shapes.toml", format!("{config}\n[validation]\nimages = 40\nbest = 1\n"));
+    sandbox.run("evolve -q -c shapes.toml -o runs/one -g 6 --data there").ended(0, &[]);
+    sandbox
+}
+
+/// What looks at images of a run.
+const COMMANDS: [&str; 9] = [
+    "eval -a runs/one --images 8 --cycles 1 --robots top:2",
+    "eval -a runs/one --images 8 --cycles 1 --robots best-validation:2 --validation 40",
+    "eval -a runs/one --images 8 --cycles 1 --split validation -o validated.json",
+    "audit -a runs/one --robots top:1 -o audit.json",
+    "replay -a runs/one --images test:3 -o replay.png",
+    "plot spacetime -a runs/one -o plot.svg",
+    "report runs/one -o report.html --lives 1",
+    "capacity --eval runs/one/eval.json --set trainings=2 --set sizes=[1,2] -o capacity.json",
+    "evolve -c shapes.toml -o runs/one -g 7 --resume",
+];
+
+#[test]
+fn a_run_remembers_where_its_images_were() {
+    let sandbox = with_run();
+    let file: serde_json::Value = serde_json::from_str(&sandbox.read("runs/one/data-folder.json")).unwrap();
+    assert_eq!(file["dataset"], "shapes");
+    assert_eq!(file["folder"].as_str().unwrap(), sandbox.path("there").to_str().unwrap());
+    for command in COMMANDS {
+        sandbox.run(command).ended(0, &[]);
+    }
+    // It is of the run, so nothing is written over it, and a run that takes its place has none of it.
+    sandbox.run("eval -a runs/one --images 8 -o runs/one/data-folder.json").ended(2, &["a file of a run"]);
+    sandbox.run("evolve -q -c shapes.toml --set data.dataset=builtin -o runs/one --force").ended(0, &[]);
+    assert!(!sandbox.path("runs/one/data-folder.json").exists());
+}
+
+#[test]
+fn where_the_images_lie_is_no_part_of_the_run() {
+    let sandbox = with_run();
+    write_dataset(&sandbox, "elsewhere/shapes", 1);
+    sandbox.run("evolve -q -c shapes.toml -o runs/two -g 6 --data elsewhere").ended(0, &[]);
+    assert_eq!(sandbox.read("runs/one/run.json"), sandbox.read("runs/two/run.json"));
+    let folder = sandbox.read("runs/two/data-folder.json");
+    assert!(folder.contains("elsewhere/shapes"), "{folder}");
+}
+
+#[test]
+fn a_folder_that_is_gone_is_one_error_that_says_where_it_was_looked_for() {
+    let sandbox = with_run();
+    sandbox.run(COMMANDS[0]).ended(0, &[]);
+    rename(sandbox.path("there"), sandbox.path("moved")).unwrap();
+    for command in COMMANDS {
+        let words = ["runs/one/data-folder.json", "there", "not there any more", "data/shapes", "--data"];
+        let said = sandbox.run(command).ended(3, &words);
+        assert_eq!(said.err.matches("error:").count(), 1, "{}", said.err);
+    }
+    for command in COMMANDS {
+        sandbox.run(&format!("{command} --data moved")).ended(0, &[]);
+    }
+    // Named once more when it went on, they are known again.
+    sandbox.run(COMMANDS[0]).ended(0, &[]);
+    // Where a dataset always lies it is found, too.
+    remove_dir_all(sandbox.path("runs/one")).unwrap();
+    sandbox.run("evolve -q -c shapes.toml -o runs/one -g 6 --data moved").ended(0, &[]);
+    std::fs::create_dir(sandbox.path("data")).unwrap();
+    rename(sandbox.path("moved"), sandbox.path("data/shapes")).unwrap();
+    sandbox.run(COMMANDS[0]).ended(0, &[]);
+}
+
+#[test]
+fn what_the_user_says_comes_before_what_a_run_remembers() {
+    let sandbox = with_run();
+    write_dataset(&sandbox, "other", 2);
+    std::fs::create_dir(sandbox.path("empty")).unwrap();
+    sandbox.run(&format!("{} --data other", COMMANDS[0])).ended(3, &["other", "another SHA-256"]);
+    let mut command = sandbox.command(COMMANDS[0].split_whitespace());
+    command.env("MORPHCOG_DATA", "empty");
+    said(command).ended(3, &["empty", "MORPHCOG_DATA"]);
+    sandbox.write("runs/one/data-folder.json", "{}");
+    sandbox.run(COMMANDS[0]).ended(3, &["runs/one/data-folder.json", "--data"]);
+    sandbox.run(&format!("{} --data there", COMMANDS[0])).ended(0, &[]);
+    // One that someone wrote may go from the run's folder on.
+    let text =
+        r#"{"format":"morphcog-data-folder","format_version":1,"dataset":"shapes","folder":"../../there"}"#;
+    sandbox.write("runs/one/data-folder.json", text);
+    sandbox.run(COMMANDS[0]).ended(0, &[]);
+}
+
+#[test]
+fn an_evaluation_on_other_images_than_the_runs_is_refused() {
+    let sandbox = with_run();
+    sandbox.run(COMMANDS[0]).ended(0, &[]);
+    let before = sandbox.read("runs/one/eval.json");
+    write_dataset(&sandbox, "there", 2);
+    let said = sandbox.run(COMMANDS[0]).ended(3, &["another SHA-256", "there", "--data", "--dataset NAME"]);
+    assert_eq!((said.out.as_str(), sandbox.read("runs/one/eval.json")), ("", before));
+    // Networks on other images are worth nothing beside its robots.
+    sandbox.run(COMMANDS[7]).ended(3, &["another SHA-256", "runs/one/eval.json", "--data"]);
+}
+
+#[test]
+fn robots_are_shown_another_dataset_if_it_is_asked_for_and_the_results_say_so() {
+    let sandbox = with_run();
+    let command = "eval -a runs/one --images 8 --cycles 1 --dataset builtin --robots";
+    let said = sandbox.run(&format!("{command} top:2")).ended(0, &[]);
+    assert!(
+        said.out.contains("8 builtin test images") && said.out.contains("trained on shapes"),
+        "{}",
+        said.out
+    );
+    let read = || EvalFile::read(&sandbox.path("runs/one/eval.json")).unwrap();
+    let (run, report) = (sandbox.run_file("runs/one"), read());
+    assert_eq!(report.dataset, "builtin");
+    assert_eq!(report.trained_on, Some(run.dataset.clone()));
+    let setting = report.setting.as_ref().unwrap();
+    assert_eq!(setting.data.dataset, "builtin");
+    assert_ne!(setting.train_sha256, run.dataset.train_sha256);
+    assert!(report.baselines.values().all(|baselines| baselines.nearest_training_image.is_none()));
+    sandbox.run("plot accuracy -a runs/one").ended(0, &[]);
+    assert!(sandbox.read("runs/one/plot-accuracy.svg").contains("trained on shapes"));
+    sandbox.run("report runs/one --lives 0").ended(0, &[]);
+    assert!(sandbox.read("runs/one/report.html").contains("trained on shapes"));
+    sandbox.run(COMMANDS[7]).ended(3, &["runs/one/eval.json", "shapes", "builtin", "without --dataset"]);
+    // Who is best is told by the run's own images.
+    sandbox.run(&format!("{command} best-validation:1 --validation 40")).ended(0, &[]);
+    assert_eq!(read().robots[0].validation.as_ref().unwrap().images, 40);
+    sandbox.run(&format!("{command} top:1 --split validation")).ended(2, &["--dataset", "--split test"]);
+    // Its own name changes nothing.
+    sandbox.run(&format!("{} --dataset shapes", COMMANDS[0])).ended(0, &[]);
+    let named = sandbox.read("runs/one/eval.json");
+    sandbox.run(COMMANDS[0]).ended(0, &[]);
+    assert_eq!(sandbox.read("runs/one/eval.json"), named);
+    assert_eq!(read().trained_on, None);
+    // Published robots need no MNIST then.
+    sandbox
+        .run("eval --robots XFJPI --dataset builtin --images 2 --cycles 1 -o published.json")
+        .ended(0, &[]);
+    let report = EvalFile::read(&sandbox.path("published.json")).unwrap();
+    assert_eq!((report.dataset.as_str(), report.trained_on.unwrap().name.as_str()), ("builtin", "mnist"));
+}
+
+#[test]
+fn mnist_is_known_by_any_name() {
+    let Some(mnist) = std::env::var_os("MORPHCOG_DATA").filter(|folder| !folder.is_empty()) else {
+        use std::io::Write;
+        let text = "SKIPPED: MORPHCOG_DATA does not name a folder with MNIST; other names of it not tested\n";
+        return std::io::stderr().write_all(text.as_bytes()).unwrap();
+    };
+    let sandbox = Sandbox::new();
+    let info = |name: &str, options: &[&str]| {
+        let mut command = sandbox.command(["data", "info", name].iter().chain(options));
+        command.env("MORPHCOG_DATA", &mnist);
+        said(command).ended(0, &[])
+    };
+    let words = ["train: these are the images of mnist", "test: these are the images of mnist", "mine"];
+    info("mine", &[]).ended(0, &words);
+    let event = &info("mine", &["--json"]).json_lines()[0];
+    assert_eq!(event["known_as"], serde_json::json!({"train": "mnist", "test": "mnist"}));
+    assert!(!info("mnist", &[]).err.contains("these are the images of"));
+}
