@@ -81,3 +81,17 @@ fn what_cannot_be_is_refused_before_anything_is_done() {
     sandbox.run("reproduce bad.toml").ended(3, &["missing.toml"]);
     assert!(!sandbox.path("reproduction").exists());
 }
+
+#[test]
+fn a_run_chooses_robots_at_its_end_if_its_config_says_so() {
+    let sandbox = sandbox();
+    let set = "config = \"tiny.toml\"\nset = [\"validation.best=2\", \"validation.images=40\"]";
+    sandbox.write("plan.toml", PLAN.replace("config = \"tiny.toml\"", set));
+    let reproduce = "reproduce plan.toml --set seeds=[1] --scale 0.5 --out small";
+    let said = sandbox.run(reproduce).ended(0, &["validating"]);
+    assert!(!said.err.contains("warning"), "{}", said.err);
+    assert!(sandbox.read("small/tiny-seed1/validation.json").contains("\"images\":40"));
+    // Chosen once, they are known.
+    let said = sandbox.run(reproduce).ended(0, &[]);
+    assert!(!said.err.contains("validating"), "{}", said.err);
+}

@@ -3,6 +3,7 @@
 mod common;
 
 use common::program::{Sandbox, TINY, said};
+use common::server::Server;
 use morphcog::run::eval_file::EvalFile;
 use std::fs::{remove_dir_all, rename};
 
@@ -60,6 +61,8 @@ fn a_run_remembers_where_its_images_were() {
     for command in COMMANDS {
         sandbox.run(command).ended(0, &[]);
     }
+    let sets = Server::start(&sandbox, "--archive runs/one").get("/api/images").body;
+    assert!(sets.contains("shapes"), "{sets}");
     // It is of the run, so nothing is written over it, and a run that takes its place has none of it.
     sandbox.run("eval -a runs/one --images 8 -o runs/one/data-folder.json").ended(2, &["a file of a run"]);
     sandbox.run("evolve -q -c shapes.toml --set data.dataset=builtin -o runs/one --force").ended(0, &[]);
