@@ -1,5 +1,7 @@
 //! Cost of what is larger than a substep: a life, a generation's lives, an evaluation, and a run's bookkeeping.
 
+mod processor;
+
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use morphcog::base::random::{Purpose, stream};
 use morphcog::base::{Grid, lanes::InstructionSet};
@@ -18,6 +20,7 @@ use morphcog::run::{archive::RunFile, bench};
 use morphcog::sim::Lattice;
 use morphcog::task::evaluation::{Job, Savings, evaluate};
 use morphcog::task::rollout::fresh_life;
+use processor::Processor;
 use std::sync::atomic::AtomicBool;
 
 /// The paper's bodies and lives, on built-in digits.
@@ -48,7 +51,7 @@ fn stimulus(seed: usize) -> Grid<f64> {
     Grid::from_fn(14, 14, |row, column| f64::from(u8::from((row * 3 + column * 5 + seed).is_multiple_of(7))))
 }
 
-fn lives(criterion: &mut Criterion) {
+fn lives(criterion: &mut Criterion<Processor>) {
     let config = config(&OVERRIDES[..4]);
     let mut group = criterion.benchmark_group("rollout, 500 control steps");
     group.sample_size(10);
@@ -135,5 +138,7 @@ fn bookkeeping(criterion: &mut Criterion) {
     });
 }
 
-criterion_group!(benches, lives, evaluations, bookkeeping);
-criterion_main!(benches);
+criterion_group!(name = one_thread; config = Criterion::default().with_measurement(Processor); targets = lives);
+// Threads that wait for each other, and files: what they take is the clock's time.
+criterion_group!(by_the_clock, evaluations, bookkeeping);
+criterion_main!(one_thread, by_the_clock);

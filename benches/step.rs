@@ -1,12 +1,15 @@
 //! Cost of one substep by body and instruction set; see `benches/README.md`.
 
+mod processor;
+
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use morphcog::base::Grid;
 use morphcog::base::lanes::InstructionSet;
 use morphcog::run::bench::specimens;
 use morphcog::sim::{Lattice, Physics, Start, World};
+use processor::Processor;
 
-fn steps(criterion: &mut Criterion) {
+fn steps(criterion: &mut Criterion<Processor>) {
     let physics = Physics::default();
     let stimulus = Grid::from_fn(14, 14, |row, column| {
         let square = (row as f64 - 6.5).powi(2) + (column as f64 - 6.5).powi(2);
@@ -27,5 +30,5 @@ fn steps(criterion: &mut Criterion) {
     }
 }
 
-criterion_group!(benches, steps);
+criterion_group!(name = benches; config = Criterion::default().with_measurement(Processor); targets = steps);
 criterion_main!(benches);

@@ -259,6 +259,32 @@ fn every_source_file_keeps_to_the_plan() {
     assert!(found.is_empty(), "{found:#?}");
 }
 
+/// Lines with a number of decimals of their own.
+fn own_decimals(source: &str) -> Vec<&str> {
+    let code = source.split("#[cfg(test)]").next().unwrap_or_default();
+    let has = |line: &&str| {
+        let specs = line.split('{').skip(1).filter_map(|rest| rest.split('}').next()?.split_once(':'));
+        let mut specs = specs.map(|(_, spec)| spec.trim_start_matches(['+', '>', '<']));
+        !line.trim_start().starts_with("//")
+            && specs.any(|spec| spec.starts_with('.') && !spec.ends_with('e'))
+    };
+    code.lines().filter(has).collect()
+}
+
+#[test]
+fn numbers_for_people_are_made_in_one_place_where_none_is_minus_nothing() {
+    assert_eq!(own_decimals("f(\"{x:.2} {:+.1}\")\nf(\"{x}\")\n// {:.1}\nf(\"{d:.n$}\")").len(), 2);
+    // A file for programs with every digit, and one column of seconds.
+    let exempt = ["base/number.rs", "run/simulate.rs", "run/metrics.rs"];
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+    for path in sources(&root) {
+        let source = fs::read_to_string(&path).unwrap();
+        let found = own_decimals(&source);
+        let is_exempt = exempt.iter().any(|name| path.ends_with(name));
+        assert!(is_exempt || found.is_empty(), "{}: base::number has it: {found:?}", path.display());
+    }
+}
+
 #[test]
 fn the_map_in_lib_rs_names_every_room() {
     let lib = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("src/lib.rs")).unwrap();

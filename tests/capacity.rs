@@ -54,6 +54,23 @@ fn several_archives_are_evaluated_together_above_their_folders() {
 }
 
 #[test]
+fn robots_that_know_less_than_the_smallest_network_are_worth_less_than_it() {
+    let sandbox = sandbox();
+    let mut report: serde_json::Value = serde_json::from_str(&sandbox.read("runs/eval.json")).unwrap();
+    report["robots"].as_array_mut().unwrap().iter_mut().for_each(|robot| robot["accuracy"] = 0.01.into());
+    report["means"]["0|1"]["accuracy"] = 0.01.into();
+    sandbox.write("runs/eval.json", report.to_string());
+    let said = sandbox.run(&format!("capacity --eval runs/eval.json {FEW} --set sizes.1=2")).ended(0, &[]);
+    let row = said.out.lines().find(|line| line.starts_with("0|1")).unwrap();
+    assert_eq!(row.matches("< 2").count(), 2, "{row}");
+    let found: serde_json::Value = serde_json::from_str(&sandbox.read("runs/capacity.json")).unwrap();
+    assert_eq!(found["tasks"][0]["curves"][1]["capacity"], serde_json::json!({ "below": 2.0 }));
+    assert!(sandbox.read("runs/capacity.svg").contains("capacity &lt; 2"));
+    sandbox.run("report -q --archive runs/3 runs/4 --lives 0 -o runs/page.html").ended(0, &[]);
+    assert!(sandbox.read("runs/page.html").contains(">&lt; 2<"));
+}
+
+#[test]
 fn networks_are_trained_once_and_the_same_on_any_number_of_threads() {
     let sandbox = sandbox();
     let first = capacity(&sandbox, "--threads 1");

@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::program::{Sandbox, TINY, files, said};
+use common::program::{Sandbox, TINY, files, said, staged};
 use common::{Reference, golden};
 use morphcog::run::config::{BUILT_IN, Config};
 use morphcog::run::eval_file::EvalFile;
@@ -301,6 +301,79 @@ fn a_wrong_set_is_refused_with_2_and_quotes_it() {
     sandbox
         .run("evolve -c tiny.toml -o run --set generations=0")
         .ended(3, &["--set generations=0: ", "generations = 0"]);
+}
+
+/// What `config` prints of `three.toml`, [`TINY`] in three stages, with some overrides.
+fn changed(sandbox: &Sandbox, set: &[&str]) -> toml::Table {
+    let set = set.iter().flat_map(|set| ["--set", set]);
+    let said = said(sandbox.command(["config", "three.toml"].into_iter().chain(set))).ended(0, &[]);
+    toml::from_str(&said.out).unwrap()
+}
+
+#[test]
+fn set_reaches_a_stage_by_its_number_and_unsets_a_key() {
+    let sandbox = Sandbox::new();
+    sandbox.write("three.toml", staged());
+    let plain = changed(&sandbox, &[]);
+    let third = changed(&sandbox, &["stage.3.keep=7", "stage.2.control_steps=", "data.train_images="]);
+    assert_eq!(third["stage"][2]["keep"].as_integer(), Some(7));
+    assert_eq!(third["stage"][0], plain["stage"][0]);
+    assert!(plain["stage"][1].get("control_steps").is_some() && plain["data"].get("train_images").is_some());
+    assert!(third["stage"][1].get("control_steps").is_none() && third["data"].get("train_images").is_none());
+    // Unset is what it would be if it did not stand in the file, and once more changes nothing.
+    assert_eq!(
+        changed(&sandbox, &["generations=", "start.archive="])["generations"].as_integer(),
+        Some(30_000)
+    );
+    assert_eq!(changed(&sandbox, &["stage="]).get("stage"), None);
+    // What was set is what is run.
+    sandbox.run("evolve -q -c three.toml -o run --set stage.3.keep=7 --set data.train_images=").ended(0, &[]);
+    let config = sandbox.run_file("run").config;
+    assert_eq!((config.stage[2].keep, config.data.train_images), (Some(7), None));
+}
+
+#[test]
+fn an_error_blames_the_override_that_caused_it() {
+    let sandbox = Sandbox::new();
+    sandbox.write("three.toml", staged());
+    sandbox.write("one.toml", TINY);
+    let blamed = |file: &str, set: &[&str], code: i32, blamed: &str, words: &[&str]| {
+        let all = set.iter().flat_map(|set| ["--set", set]);
+        let command = sandbox.command(["evolve", "-c", file, "-o", "run"].into_iter().chain(all));
+        let place = format!("error: --set {blamed}: ");
+        said(command).ended(code, &[&[place.as_str()], words].concat());
+        assert!(!sandbox.path("run").exists());
+    };
+    let three = "three.toml";
+    // By itself, alone or beside others.
+    blamed(three, &["stage.3.keep=0"], 3, "stage.3.keep=0", &["stage 3: keep = 0"]);
+    blamed(three, &["stage.3.keep=0", "seed=4"], 3, "stage.3.keep=0", &[]);
+    blamed(three, &["stage.1.keep=2", "stage.3.keep=0"], 3, "stage.3.keep=0", &[]);
+    blamed(three, &["body.width=0", "body.height=0"], 3, "body.height=0", &["body.height = 0"]);
+    // With what stands in the file only, where the message begins with a key of the file.
+    blamed(three, &["physics.ground_row=9", "seed=4"], 3, "physics.ground_row=9", &["protocol.start_row"]);
+    blamed(three, &["seed=4", "stage.3.pool=2"], 3, "stage.3.pool=2", &["images_per_class"]);
+    blamed(three, &["stage.3.images_per_class=99"], 3, "stage.3.images_per_class=99", &["pool = 9"]);
+    blamed(three, &["stage.1.generations=", "seed=4"], 3, "stage.1.generations=", &["stage 1"]);
+    // Keys and stages that are not there, to be set or unset.
+    blamed(three, &["seed=4", "stage.4.keep=1"], 2, "stage.4.keep=1", &["no stage 4", "from 1 to 3"]);
+    blamed(three, &["stage.0.keep=1"], 2, "stage.0.keep=1", &["from 1 to 3"]);
+    blamed(three, &["stage.first.keep=1"], 2, "stage.first.keep=1", &["from 1 to 3"]);
+    blamed("one.toml", &["stage.1.keep=1"], 2, "stage.1.keep=1", &["no stage 1"]);
+    blamed("one.toml", &["stages.1.keep=1"], 2, "stages.1.keep=1", &["unknown field `stages`"]);
+    blamed(three, &["seed=4", "stage.2.kep=1"], 2, "stage.2.kep=1", &["unknown field `kep`"]);
+    blamed(three, &["seed=4", "stage.2.kep="], 2, "stage.2.kep=", &["unknown field `kep`"]);
+    blamed(three, &["data.dataset=", "seed=4"], 2, "data.dataset=", &["missing field `dataset`"]);
+    blamed(three, &["body.height=x", "seed=4"], 2, "body.height=x", &["a whole number"]);
+    // The file's own fault stays the file's.
+    sandbox.write("bad.toml", TINY.replace("height = 5", "height = 0"));
+    sandbox.run("evolve -c bad.toml -o run --set seed=4").ended(3, &["error: bad.toml:6: body.height = 0"]);
+    // So it is with what else is set.
+    sandbox.run("audit --set least_kept=2 --set threshold=1").ended(3, &["--set least_kept=2: "]);
+    sandbox.run("audit --set perturbations.raised.9=1").ended(2, &["no perturbations.raised 9"]);
+    sandbox
+        .run("capacity --eval no.json --set step=2 --set mlp.epochs=0")
+        .ended(3, &["--set mlp.epochs=0: "]);
 }
 
 #[test]
@@ -814,6 +887,42 @@ fn evolve_with_replay_leaves_the_pictures_in_the_run_folder() {
 }
 
 // ---- where the words go ----
+
+#[test]
+fn no_table_shows_a_minus_nothing() {
+    let sandbox = with_run();
+    let mut run: serde_json::Value = serde_json::from_str(&sandbox.read("run/run.json")).unwrap();
+    for elite in run["elites"].as_array_mut().unwrap() {
+        elite["objective"] = (-0.001).into();
+        elite["displacements"] = serde_json::json!([-0.001, 0.001]);
+    }
+    sandbox.write("run/run.json", run.to_string());
+    let mut said = sandbox.run("eval -a run -n 4 --cycles 1 --robots top:2").ended(0, &[]).out;
+    said += &sandbox.run("replay -a run --format html").ended(0, &[]).out;
+    sandbox.run("report -q --archive run --lives 1").ended(0, &[]);
+    sandbox.run("plot -q archive --archive run").ended(0, &[]);
+    sandbox.run("plot -q body --archive run -o body.svg").ended(0, &[]);
+    for file in ["run/report.html", "run/plot-archive.svg", "body.svg"] {
+        said += &sandbox.read(file);
+    }
+    for nothing in
+        ["-0.00<", "-0.00 ", "−0.00", "-0.0<", "-0.0 ", "-0.0]", "−0.0<", "−0.0 ", "+0.0<", "+0.0 "]
+    {
+        let at =
+            said.find(nothing).map(|at| said[at.saturating_sub(60)..].chars().take(90).collect::<String>());
+        assert_eq!(at, None, "{nothing:?}");
+    }
+}
+
+#[test]
+fn speed_is_measured_in_processor_time_and_says_so() {
+    let sandbox = Sandbox::new();
+    let said = sandbox.run("bench --json").ended(0, &[]);
+    let clocks: Vec<_> = said.json_lines().iter().map(|line| line["clock"].clone()).collect();
+    let expected = if cfg!(any(target_os = "linux", target_os = "macos")) { "processor" } else { "wall" };
+    assert!(clocks.len() >= 5 && clocks.iter().all(|clock| clock == expected), "{clocks:?}");
+    assert!(sandbox.run("bench --help").ended(0, &[]).out.contains("processor time"));
+}
 
 #[test]
 fn quiet_leaves_results_only() {

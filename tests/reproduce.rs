@@ -77,8 +77,18 @@ fn what_cannot_be_is_refused_before_anything_is_done() {
     sandbox.run("reproduce plan.toml --set images=1").ended(3, &["images = 1", "2 or more"]);
     sandbox.run("reproduce plan.toml --set robots=0").ended(3, &["robots"]);
     sandbox.run("reproduce nowhere.toml").ended(3, &["nowhere.toml"]);
+    // An override is blamed for what it makes, of an experiment's config, too.
+    let unkept = "experiment.1.set=[\"generations=0\"]";
+    sandbox
+        .run(&format!("reproduce plan.toml --set seeds=[3] --set {unkept}"))
+        .ended(3, &[&format!("--set {unkept}: experiment 1: --set generations=0: ")]);
+    sandbox.run("reproduce plan.toml --set experiment.1.config=no.toml").ended(3, &["no.toml", "--set exp"]);
+    sandbox
+        .run("reproduce plan.toml --set experiment.2.config=tiny.toml")
+        .ended(2, &["--set experiment.2.config=tiny.toml: there is no experiment 2"]);
+    sandbox.run("reproduce plan.toml --set seeds=[1,1]").ended(3, &["--set seeds=[1,1]: "]);
     sandbox.write("bad.toml", PLAN.replace("tiny.toml", "missing.toml"));
-    sandbox.run("reproduce bad.toml").ended(3, &["missing.toml"]);
+    sandbox.run("reproduce bad.toml").ended(3, &["bad.toml:6: experiment 1: ", "missing.toml"]);
     assert!(!sandbox.path("reproduction").exists());
 }
 

@@ -1,9 +1,11 @@
-//! Floor 0: what every room stands on (index arithmetic, random generators, hashes).
+//! Floor 0: what every room stands on (index arithmetic, random generators, hashes, numbers as text).
 
+pub mod clock;
 pub mod files;
 pub mod grid;
 pub mod hash;
 pub mod lanes;
+pub mod number;
 pub mod random;
 
 pub use grid::Grid;

@@ -1,6 +1,31 @@
 //! Accuracy over size: a parabola through the points, and the size at which it reaches an accuracy.
 
+use crate::base::number;
 use nalgebra::{DMatrix, DVector};
+use serde::{Deserialize, Serialize};
+use std::fmt;
+
+/// Where a curve reaches a value.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum Crossing {
+    /// At this size. A number in JSON.
+    At(f64),
+    /// It is above the value at the smallest size of all already. An object in JSON: nobody is to take the bound for the size.
+    Below {
+        /// That smallest size.
+        below: f64,
+    },
+}
+
+impl fmt::Display for Crossing {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Crossing::At(size) => f.write_str(&number::fixed(*size, 1)),
+            Crossing::Below { below } => write!(f, "< {below}"),
+        }
+    }
+}
 
 /// c0, c1, c2 of the least-squares parabola c0 + c1·x + c2·x² through points; `None` of fewer than three different x.
 pub fn parabola(points: &[(f64, f64)]) -> Option<[f64; 3]> {
@@ -23,10 +48,13 @@ pub fn parabola(points: &[(f64, f64)]) -> Option<[f64; 3]> {
 
 /// The smallest x in [from, to] at which a parabola reaches a value: where it is at or above it first. `None` if it
 /// never is.
-pub fn first_crossing([c0, c1, c2]: [f64; 3], value: f64, (from, to): (f64, f64)) -> Option<f64> {
+pub fn first_crossing([c0, c1, c2]: [f64; 3], value: f64, (from, to): (f64, f64)) -> Option<Crossing> {
     let at = |x: f64| c0 + x * (c1 + x * c2);
-    if at(from) >= value {
-        return Some(from);
+    if at(from) > value {
+        return Some(Crossing::Below { below: from });
+    }
+    if at(from) == value {
+        return Some(Crossing::At(from));
     }
     let c = c0 - value;
     let roots = if c2 == 0.0 {
@@ -41,7 +69,7 @@ pub fn first_crossing([c0, c1, c2]: [f64; 3], value: f64, (from, to): (f64, f64)
         [Some(q / c2), (q != 0.0).then(|| c / q)]
     };
     let within = roots.into_iter().flatten().filter(|root| (from..=to).contains(root));
-    within.min_by(f64::total_cmp)
+    within.min_by(f64::total_cmp).map(Crossing::At)
 }
 
 #[cfg(test)]
@@ -75,15 +103,34 @@ mod tests {
     fn the_first_crossing_is_the_smallest_size_that_reaches_the_value() {
         let fit = [0.5, 0.02, -0.0002];
         // 0.02x − 0.0002x² = 0.3: x = 50 − √(2500 − 1500)
-        let x = first_crossing(fit, 0.8, (1.0, 45.0)).unwrap();
+        let first = |fit: [f64; 3], value: f64| match first_crossing(fit, value, (1.0, 45.0)) {
+            Some(Crossing::At(x)) => x,
+            other => panic!("{other:?}"),
+        };
+        let x = first(fit, 0.8);
         assert!((x - (50.0 - 1000_f64.sqrt())).abs() < 1e-9, "{x}");
-        assert_eq!(first_crossing(fit, 0.4, (1.0, 45.0)), Some(1.0), "already the smallest");
+        let below = Some(Crossing::Below { below: 3.0 });
+        assert_eq!(first_crossing(fit, 0.4, (3.0, 45.0)), below, "the smallest is above it already");
+        assert_eq!(first([0.5, 0.25, 0.0], 0.75), 1.0, "just reached by the smallest");
         assert_eq!(first_crossing(fit, 1.01, (1.0, 45.0)), None, "above its top");
         assert_eq!(first_crossing(fit, 0.997, (1.0, 45.0)), None, "reached, but beyond the largest size");
-        assert_eq!(first_crossing([0.5, 0.01, 0.0], 0.6, (1.0, 45.0)).map(f64::round), Some(10.0));
+        assert_eq!(first([0.5, 0.01, 0.0], 0.6).round(), 10.0);
         assert_eq!(first_crossing([0.5, 0.0, 0.0], 0.6, (1.0, 45.0)), None);
         // A dip, then up again.
-        let x = first_crossing([0.7, -0.02, 0.001], 0.75, (1.0, 45.0)).unwrap();
-        assert!((0.7 - 0.02 * x + 0.001 * x * x - 0.75).abs() < 1e-12 && x > 20.0);
+        let x = first([0.6, -0.02, 0.001], 0.75);
+        assert!((0.6 - 0.02 * x + 0.001 * x * x - 0.75).abs() < 1e-12 && x > 20.0);
+    }
+
+    #[test]
+    fn what_is_below_the_smallest_size_is_no_number() {
+        for (crossing, text, json) in [
+            (Some(Crossing::At(16.84)), "16.8", "16.84"),
+            (Some(Crossing::Below { below: 1.0 }), "< 1", "{\"below\":1.0}"),
+            (None, "", "null"),
+        ] {
+            assert_eq!(crossing.map_or(String::new(), |crossing| crossing.to_string()), text);
+            assert_eq!(serde_json::to_string(&crossing).unwrap(), json);
+            assert_eq!(serde_json::from_str::<Option<Crossing>>(json).unwrap(), crossing);
+        }
     }
 }

@@ -35,6 +35,10 @@ pub struct Cli {
     pub(super) json: bool,
 }
 
+/// What is said of `--set`.
+pub(super) const SET: &str = "Change a key, as in map_elites.parents=10 or stage.2.keep=3 (stages are counted from 1); \
+without a value, as in data.train_images=, it has its default again; may be given several times";
+
 const EXAMPLES: &str = "\
 Examples:
   morphcog evolve --config quickstart.toml     about a minute, no download
@@ -126,8 +130,7 @@ Examples:
     Config {
         /// Name of a built-in config, or a file: printed with its defaults.
         name: Option<String>,
-        /// Change a key before printing.
-        #[arg(long, value_name = "KEY=VALUE", requires = "name")]
+        #[arg(long, value_name = "KEY=VALUE", requires = "name", help = SET)]
         set: Vec<String>,
     },
     /// Completions for a shell.
@@ -148,6 +151,9 @@ Examples:
         out: Option<PathBuf>,
     },
     /// How fast this machine simulates.
+    ///
+    /// Measured is the processor time of one thread, which other work on the machine leaves nearly as it is. Where the
+    /// system does not tell it (Windows), it is wall-clock time, and the output says so.
     #[command(after_help = "Examples:\n  morphcog bench\n  morphcog bench --all")]
     Bench {
         /// Every instruction set of this machine, not only the one in use.
@@ -161,8 +167,7 @@ pub(super) struct EvolveArgs {
     /// Config file (TOML or JSON), or the name of a built-in one (see morphcog config).
     #[arg(short, long, value_name = "FILE")]
     pub(super) config: String,
-    /// Change a key, as in map_elites.parents=10; may be given several times.
-    #[arg(long, value_name = "KEY=VALUE")]
+    #[arg(long, value_name = "KEY=VALUE", help = SET)]
     pub(super) set: Vec<String>,
     /// Seed of all chance.
     #[arg(long, value_parser = clap::value_parser!(u64).range(..=config::MAX_NUMBER))]

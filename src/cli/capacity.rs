@@ -32,7 +32,8 @@ pub(super) struct CapacityArgs {
     /// Settings: a TOML file (or JSON); keys that are not in it have their defaults.
     #[arg(short, long, value_name = "FILE")]
     config: Option<PathBuf>,
-    /// Change a setting, as in trainings=10; may be given several times.
+    /// Change a setting, as in trainings=10 or mlp.epochs=20; without a value, it has its default again; may be given several
+    /// times.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
     /// Folder with the images.

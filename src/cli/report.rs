@@ -1,6 +1,7 @@
 //! `morphcog report`: its words, and what it calls.
 
 use super::run_json;
+use crate::base::number;
 use crate::run::report;
 use crate::run::{Error, folder};
 use crate::view::console::Console;
@@ -56,7 +57,7 @@ pub(super) fn run(args: ReportArgs, console: &Console) -> Result<(), Error> {
     let failed = |error: crate::view::PictureError| Error::other(error.to_string());
     let page = page.map_err(failed)?;
     write_whole(&out, page.as_bytes()).map_err(failed)?;
-    console.line(&format!("wrote {} ({:.1} MB)", out.display(), page.len() as f64 / 1e6));
+    console.line(&format!("wrote {} ({} MB)", out.display(), number::fixed(page.len() as f64 / 1e6, 1)));
     match args.open {
         true => open::that(&out).map_err(|error| Error::other(format!("cannot open it: {error}"))),
         false => Ok(()),

@@ -25,7 +25,8 @@ pub(super) struct ReproduceArgs {
     /// More than 0, up to 1: generations are multiplied by it, test images and trainings by its square root.
     #[arg(long, default_value_t = 1.0)]
     scale: f64,
-    /// Change a key, as in seeds=[1,2]; may be given several times.
+    /// Change a key, as in seeds=[1,2] or experiment.1.config=mine.toml (experiments are counted from 1); without a value, it has
+    /// its default again; may be given several times.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
     /// Folder for everything.

@@ -5,6 +5,7 @@ use super::training::{DatasetRef, ImageRef, answers};
 use super::{Config, Error};
 use crate::base::files::read_text;
 use crate::base::hash::sha256_hex;
+use crate::base::number;
 use crate::body::{Body, VoxelCounts};
 use crate::genome::Genome;
 use crate::qd::descriptor::{count_bin, possible_cells};
@@ -192,7 +193,7 @@ impl RunFile {
     /// A fitness for people, with its unit.
     pub fn in_units(&self, objective: f64) -> String {
         let unit = self.criterion().fitness.unit().map_or(String::new(), |unit| format!(" {unit}"));
-        format!("{objective:.2}{unit}")
+        format!("{}{unit}", number::fixed(objective, 2))
     }
 
     /// How its elites were shown images.

@@ -58,9 +58,7 @@ impl CapacityConfig {
     /// # Errors
     /// What is wrong with them.
     pub fn load(path: Option<&Path>, overrides: &[String]) -> Result<Self, Error> {
-        let config: CapacityConfig = toml_text::load(path, overrides)?;
-        config.check()?;
-        Ok(config)
+        toml_text::load(path, overrides, CapacityConfig::check)
     }
 
     /// Checks what a type cannot.

@@ -3,6 +3,7 @@
 use super::eval_file::EvalFile;
 use super::{Error, toml_text};
 use crate::base::files::read_text;
+use crate::baseline::curve::Crossing;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -71,8 +72,9 @@ pub struct Curve {
     pub points: Vec<Point>,
     /// c0, c1, c2 of accuracy ≈ c0 + c1·size + c2·size², least squares through the points.
     pub fit: Option<[f64; 3]>,
-    /// The smallest size at which the fit reaches the robots' accuracy; none if it never does.
-    pub capacity: Option<f64>,
+    /// The smallest size at which the fit reaches the robots' accuracy, or that it is above it from the smallest network on;
+    /// none if it never reaches it.
+    pub capacity: Option<Crossing>,
 }
 
 /// One size of network.
@@ -150,7 +152,7 @@ impl CapacityFile {
 
 impl TaskCapacity {
     /// The capacity as one kind of network tells it, if that was trained; none within: no match.
-    pub fn worth(&self, network: &str) -> Option<Option<f64>> {
+    pub fn worth(&self, network: &str) -> Option<Option<Crossing>> {
         self.curves.iter().find(|curve| curve.network == network).map(|curve| curve.capacity)
     }
 }

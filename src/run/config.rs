@@ -201,7 +201,7 @@ fn too_large(place: &str, value: &serde_json::Value) -> Option<(String, u64)> {
 
 impl Config {
     /// Reads a config: a file (JSON if its name ends in `.json`, else TOML) or, if there is none, the built-in config of
-    /// that name; then sets `overrides` (`key=value`, keys as `map_elites.parents`).
+    /// that name; then sets `overrides` (`key=value`, keys as `map_elites.parents` or `stage.2.keep`).
     ///
     /// # Errors
     /// What is wrong, with file, line and key.
@@ -232,19 +232,15 @@ impl Config {
     /// As [`Config::load`].
     pub fn parse(text: &str, name: &str, overrides: &[String]) -> Result<Self, Error> {
         let format = if name.ends_with(".json") { Format::Json } else { Format::Toml };
-        let mut config: Config = toml_text::read(text, format, name).map_err(|error| {
+        let config: Config = toml_text::read(text, format, name).map_err(|error| {
             let is_lacking = error.message.contains("missing field");
             let hint = "morphcog config zero_one.toml prints a whole one to start your own from".to_string();
             if is_lacking { error.hint(hint) } else { error }
         })?;
-        for assignment in overrides {
-            config = toml_text::set(&config, assignment)?;
-        }
-        config.validate().map_err(|error| {
-            let place = toml_text::place(text, format, name, overrides, &error.message);
+        toml_text::changed(config, overrides, Config::validate, |error| {
+            let place = toml_text::place(text, format, name, &error.message);
             error.within(&place)
-        })?;
-        Ok(config)
+        })
     }
 
     /// The config as TOML, every key with its value.

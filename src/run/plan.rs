@@ -2,7 +2,7 @@
 
 use super::capacity_config::CapacityConfig;
 use super::verdict::Criteria;
-use super::{Config, Error, toml_text};
+use super::{Config, Error, folder, toml_text};
 use crate::base::files::read_text;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
@@ -70,22 +70,49 @@ impl Plan {
         };
         let is_json = name.ends_with(".json");
         let format = if is_json { toml_text::Format::Json } else { toml_text::Format::Toml };
-        let mut plan: Plan = toml_text::read(&text, format, name)?;
-        for assignment in overrides {
-            plan = toml_text::set(&plan, assignment)?;
-        }
-        let refuse = |text: &str| Err(Error::input(format!("{name}: {text}")));
-        if plan.seeds.is_empty() || plan.experiment.is_empty() {
+        let plan: Plan = toml_text::read(&text, format, name)?;
+        let check = |plan: &Plan| plan.check().and_then(|()| plan.experiments().map(|_| ()));
+        toml_text::changed(plan, overrides, check, |error| {
+            let place = toml_text::place(&text, format, name, &error.message);
+            error.within(&place)
+        })
+    }
+
+    /// Checks what a type cannot.
+    fn check(&self) -> Result<(), Error> {
+        let refuse = |text: &str| Err(Error::input(text.to_string()));
+        if self.seeds.is_empty() || self.experiment.is_empty() {
             return refuse("seeds, experiment: expected one or more of each");
         }
-        if plan.seeds.iter().collect::<BTreeSet<_>>().len() < plan.seeds.len() {
+        if self.seeds.iter().collect::<BTreeSet<_>>().len() < self.seeds.len() {
             return refuse("seeds: expected different ones");
         }
-        if plan.robots == 0 || plan.images == 0 {
+        if self.robots == 0 || self.images == 0 {
             return refuse("robots, images: expected 1 or more");
         }
-        plan.audit.check().and_then(|()| plan.capacity.check()).map_err(|error| error.within(name))?;
-        Ok(plan)
+        self.audit.check().and_then(|()| self.capacity.check())
+    }
+
+    /// The experiments: what their runs are called, and their configs.
+    ///
+    /// # Errors
+    /// What is wrong with one: a slip in the last one would be found out after hours.
+    pub(super) fn experiments(&self) -> Result<Vec<(String, Config)>, Error> {
+        let mut experiments = Vec::<(String, Config)>::new();
+        for (number, experiment) in (1..).zip(&self.experiment) {
+            let within = |error: Error| error.within(&format!("experiment {number}"));
+            let name = folder::name_of(&experiment.config);
+            if experiments.iter().any(|(other, _)| *other == name) {
+                return Err(within(Error::input(format!("config: {name}: expected once"))));
+            }
+            let config = Config::load(&experiment.config, &experiment.set).map_err(within)?;
+            for &seed in &self.seeds {
+                let seeded = Config { seed, ..config.clone() };
+                seeded.validate().map_err(|error| error.within("seeds"))?;
+            }
+            experiments.push((name, config));
+        }
+        Ok(experiments)
     }
 
     /// The plan at a scale: generations are multiplied by it, test images and trainings by its square root.

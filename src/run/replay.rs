@@ -5,6 +5,7 @@ use super::training::{DatasetRef, ImageRef, Training, load_dataset_of, see};
 use super::whereabouts::Whereabouts;
 use super::{Config, Error, folder, gallery};
 use crate::base::Grid;
+use crate::base::number;
 use crate::body::Body;
 use crate::task::dataset::Split;
 use crate::task::protocol::Life;
@@ -215,7 +216,7 @@ pub fn find(options: &Options) -> Result<Found, Error> {
             ("Robot".to_string(), robot.name.clone()),
             ("From".to_string(), "the robots published with the paper".to_string()),
             ("Task".to_string(), "0|1".to_string()),
-            ("Published fitness".to_string(), format!("{:.2} voxel lengths", robot.fitness)),
+            ("Published fitness".to_string(), format!("{} voxel lengths", number::fixed(robot.fitness, 2))),
         ];
         let (name, body, config) = (robot.name, robot.body, gallery::config()?);
         return Ok(Found {

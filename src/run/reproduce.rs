@@ -10,7 +10,7 @@ use super::robots::{Chosen, Selection, Source};
 use super::setting::RunRef;
 use super::table::{self, Row};
 use super::verdict::Verdict;
-use super::{Config, Error, audit, capacity, eval, evolve, folder};
+use super::{Config, Error, audit, capacity, eval, evolve};
 use crate::base::random::{Purpose, stream};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -68,24 +68,14 @@ pub fn reproduce(options: &Options, stop: &AtomicBool, observer: &dyn Observer) 
     }
     let plan = options.plan.at(options.scale);
     let job = Job { options, plan: &plan, stop, observer };
-    // All configs first: a slip in the last one would be found out after hours.
-    let mut experiments = Vec::new();
-    for experiment in &plan.experiment {
-        let name = folder::name_of(&experiment.config);
-        if experiments.iter().any(|(other, _)| *other == name) {
-            return Err(Error::input(format!("experiment: {name}: expected once")));
-        }
-        let config = Config::load(&experiment.config, &experiment.set)?;
-        for &seed in &plan.seeds {
-            Config { seed, ..config.clone() }.validate().map_err(|error| error.within("seeds"))?;
-        }
+    let experiments = plan.experiments()?;
+    for (name, config) in &experiments {
         let least = config.classes().len();
         if plan.images < least {
             let text =
                 format!("images = {}: expected {least} or more, one of each class of {name}", plan.images);
             return Err(Error::input(text));
         }
-        experiments.push((name, config));
     }
     let (mut rows, mut capacities) = (Vec::new(), Vec::new());
     for (name, config) in &experiments {

@@ -5,6 +5,7 @@ use super::capacity_file::CapacityFile;
 use super::eval_file::EvalFile;
 use super::published;
 use crate::base::files::write_atomically;
+use crate::baseline::curve::Crossing;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
@@ -30,9 +31,9 @@ pub struct Row {
     /// Always answering the larger group \[%\].
     pub larger_group: Option<f64>,
     /// Capacity in neurons; none: no match.
-    pub mlp: Option<f64>,
+    pub mlp: Option<Crossing>,
     /// Capacity in kernels; none: no match.
-    pub cnn: Option<f64>,
+    pub cnn: Option<Crossing>,
     /// The paper's accuracy \[%\].
     pub paper_accuracy: Option<f64>,
     /// The paper's capacity in neurons; none: no match.
@@ -113,22 +114,19 @@ pub(super) fn write(folder: &Path, scale: f64, rows: &[Row]) -> Result<Vec<PathB
     writer.write_record(header).map_err(failed)?;
     for row in rows {
         let [low, high] = row.interval.map_or([None, None], |interval| interval.map(Some));
-        let numbers = [
-            row.accuracy,
-            row.deviation,
-            low,
-            high,
-            row.balanced_accuracy,
-            row.larger_group,
-            row.mlp,
-            row.cnn,
-            row.paper_accuracy,
-            row.paper_mlp,
-            row.paper_cnn,
-        ];
+        let text = |number: Option<f64>| number.map_or(String::new(), |number| number.to_string());
+        let size = |size: Option<Crossing>| match size {
+            Some(Crossing::At(size)) => size.to_string(),
+            Some(below) => below.to_string(),
+            None => String::new(),
+        };
+        let accuracies = [row.accuracy, row.deviation, low, high, row.balanced_accuracy, row.larger_group];
+        let papers = [row.paper_accuracy, row.paper_mlp, row.paper_cnn];
         let mut cells =
             vec![row.task.clone(), row.robots.to_string(), row.physical.to_string(), row.audited.to_string()];
-        cells.extend(numbers.map(|number| number.map_or(String::new(), |number| number.to_string())));
+        cells.extend(accuracies.map(text));
+        cells.extend([row.mlp, row.cnn].map(size));
+        cells.extend(papers.map(text));
         writer.write_record(&cells).map_err(failed)?;
     }
     let text = writer.into_inner().map_err(|error| Error::other(error.to_string()))?;

@@ -86,24 +86,24 @@ pub(super) fn read_versioned<T: DeserializeOwned>(
 }
 
 /// Reads settings, a JSON file if its name ends in `.json`, else TOML; keys that are not in it have their defaults.
-/// Then sets `overrides` (`key=value`).
+/// Then sets `overrides` (`key=value`), and checks what types cannot.
 pub(super) fn load<T: Serialize + DeserializeOwned + Default>(
     path: Option<&Path>,
     overrides: &[String],
+    check: impl Fn(&T) -> Result<(), Error>,
 ) -> Result<T, Error> {
-    let mut settings = match path {
-        None => T::default(),
-        Some(path) => {
-            let text = read_text(path).map_err(|error| Error::reading(path, &error))?;
-            let is_json = path.extension().is_some_and(|ending| ending == "json");
-            let format = if is_json { Format::Json } else { Format::Toml };
-            read(&text, format, &path.display().to_string())?
-        }
+    let Some(path) = path else {
+        return changed(T::default(), overrides, check, |error| error);
     };
-    for assignment in overrides {
-        settings = set(&settings, assignment)?;
-    }
-    Ok(settings)
+    let text = read_text(path).map_err(|error| Error::reading(path, &error))?;
+    let is_json = path.extension().is_some_and(|ending| ending == "json");
+    let format = if is_json { Format::Json } else { Format::Toml };
+    let name = path.display().to_string();
+    let settings = read(&text, format, &name)?;
+    changed(settings, overrides, check, |error| {
+        let place = place(&text, format, &name, &error.message);
+        error.within(&place)
+    })
 }
 
 fn refused(name: &str, line: Option<usize>, key: &str, message: &str) -> Error {
@@ -141,21 +141,9 @@ fn line_at(text: &str, span: Option<std::ops::Range<usize>>) -> Option<usize> {
     Some(text.get(..span?.start)?.matches('\n').count() + 1)
 }
 
-/// Where that stands which a message about a config begins with, as `body.height = 0: …` or `stage 2: keep = 0: …`: the override that
-/// set it, or file and, in TOML, line.
-pub(super) fn place(text: &str, format: Format, name: &str, overrides: &[String], message: &str) -> String {
-    let key = key_of(message);
-    // The key itself, the table it is of, or a key of the table that is meant.
-    let is_within = |inner: &str, outer: &str| {
-        inner.strip_prefix(outer).is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
-    };
-    let is_set = |assignment: &&String| {
-        let set = assignment.split_once('=').map(|(set, _)| set.trim());
-        set.is_some_and(|set| is_within(set, key) || is_within(key, set))
-    };
-    if let Some(assignment) = overrides.iter().rfind(is_set) {
-        return format!("--set {assignment}");
-    }
+/// Where in a file that stands which a message about it begins with, as `body.height = 0: …` or `stage 2: keep = 0: …`:
+/// the file and, in TOML, the line.
+pub(super) fn place(text: &str, format: Format, name: &str, message: &str) -> String {
     let line = (format == Format::Toml).then(|| line_of(text, message)).flatten();
     line.map_or(name.to_string(), |line| format!("{name}:{line}"))
 }
@@ -165,14 +153,20 @@ fn key_of(message: &str) -> &str {
     message.split([' ', ':']).next().unwrap_or_default()
 }
 
+/// List, number and what follows of a message that begins with one of a list, as `stage 2: keep = 0: …`.
+fn numbered(message: &str) -> Option<(&str, &str, &str)> {
+    let (place, rest) = message.split_once(": ")?;
+    let (list, number) = place.split_once(' ')?;
+    is_number(number).then_some((list, number, rest))
+}
+
 /// The line of what a message begins with, or of the innermost table around it that the text has.
 fn line_of(text: &str, message: &str) -> Option<usize> {
     let table = toml::de::DeTable::parse(text).ok()?.into_inner();
-    let stage = message.strip_prefix("stage ").and_then(|rest| rest.split_once(": "));
-    let (mut value, key) = match stage {
-        Some((number, rest)) => {
+    let (mut value, key) = match numbered(message) {
+        Some((list, number, rest)) => {
             let place = number.parse::<usize>().ok()?.checked_sub(1)?;
-            (table.get("stage")?.get_ref().get(place)?, Some(key_of(rest)))
+            (table.get(list)?.get_ref().get(place)?, Some(key_of(rest)))
         }
         None => {
             let (first, rest) = match key_of(message).split_once('.') {
@@ -189,28 +183,177 @@ fn line_of(text: &str, message: &str) -> Option<usize> {
     line_at(text, Some(value.span()))
 }
 
-/// A copy with one key changed: `map_elites.parents=10`. What follows the sign is read as TOML, and as plain text if
-/// it is none.
-pub(super) fn set<T: Serialize + DeserializeOwned>(config: &T, assignment: &str) -> Result<T, Error> {
-    let refuse = |message: String| Error::usage(format!("--set {assignment}: {message}"));
+/// Settings with `overrides` set, checked. What is wrong is said of the override that causes it; `in_file` puts the place in
+/// the file to an error that would be there without any.
+pub(super) fn changed<T: Serialize + DeserializeOwned>(
+    settings: T,
+    overrides: &[String],
+    check: impl Fn(&T) -> Result<(), Error>,
+    in_file: impl Fn(Error) -> Error,
+) -> Result<T, Error> {
+    if overrides.is_empty() {
+        return check(&settings).map(|()| settings).map_err(in_file);
+    }
+    let root = match toml::Value::try_from(&settings) {
+        Ok(root) => root,
+        // Only a number from JSON can be too large for TOML; the check says which one it is.
+        Err(error) => {
+            return Err(in_file(check(&settings).err().unwrap_or(Error::input(error.to_string()))));
+        }
+    };
+    let attempt = |overrides: &[&String]| -> Result<T, Failure> {
+        let mut root = root.clone();
+        for assignment in overrides {
+            set::<T>(&mut root, assignment)
+                .map_err(|text| Failure::Of(Error::usage(format!("--set {assignment}: {text}"))))?;
+        }
+        let read = serde_path_to_error::deserialize(root)
+            .map_err(|error| Failure::Together(Error::usage(spoken(error.inner().message()))));
+        read.and_then(|settings| check(&settings).map(|()| settings).map_err(Failure::Together))
+    };
+    let all: Vec<&String> = overrides.iter().collect();
+    let error = match attempt(&all) {
+        Ok(settings) => return Ok(settings),
+        Err(Failure::Of(error)) => return Err(error),
+        Err(Failure::Together(error)) => error,
+    };
+    // Whether it stays the same under only some of them; and if not, whether all is well then.
+    let stays = |some: &[&String]| match attempt(some) {
+        Ok(_) => (false, true),
+        Err(Failure::Of(_)) => (false, false),
+        Err(Failure::Together(other)) => (other.message == error.message, false),
+    };
+    let without = |place: usize| {
+        let others: Vec<&String> = [&all[..place], &all[place + 1..]].concat();
+        stays(&others)
+    };
+    let causes: Vec<(&String, bool)> = (0..all.len())
+        .map(|place| (all[place], without(place)))
+        .filter(|(_, (stays, _))| !stays)
+        .map(|(assignment, (_, is_well))| (assignment, is_well))
+        .collect();
+    let named = causes.iter().rfind(|(assignment, _)| sets(assignment, &error.message));
+    let healed = || causes.iter().rfind(|(_, is_well)| *is_well);
+    // Where two do the same harm, neither can be left away: then it is the first of them.
+    let first = || (0..all.len()).rev().find(|&count| !stays(&all[..count]).0).map(|count| all[count]);
+    let culprit = named.or_else(healed).or(causes.last()).map(|(assignment, _)| *assignment).or_else(first);
+    Err(match culprit {
+        Some(assignment) => error.within(&format!("--set {assignment}")),
+        None => in_file(error),
+    })
+}
+
+/// Why settings cannot be.
+enum Failure {
+    /// One override is to blame, and named.
+    Of(Error),
+    /// What they make together.
+    Together(Error),
+}
+
+/// Whether an override sets what a message begins with: the key itself, the table it is of, or a key of the table that is
+/// meant.
+fn sets(assignment: &str, message: &str) -> bool {
+    let set = assignment.split_once('=').map_or(assignment, |(set, _)| set).trim();
+    let key = match numbered(message) {
+        Some((list, number, rest)) => format!("{list}.{number}.{}", key_of(rest)),
+        None => key_of(message).to_string(),
+    };
+    let is_within = |inner: &str, outer: &str| {
+        inner.strip_prefix(outer).is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
+    };
+    is_within(set, &key) || is_within(&key, set)
+}
+
+/// Changes one key: `map_elites.parents=10`, or `stage.2.keep=3` in the second of a list; without a value, `keep=`, it has
+/// its default again. What follows the sign is read as TOML, and as plain text if it is none.
+fn set<T: DeserializeOwned>(root: &mut toml::Value, assignment: &str) -> Result<(), String> {
     let Some((key, text)) = assignment.split_once('=') else {
-        return Err(refuse("expected key=value, as in --set map_elites.parents=10".to_string()));
+        return Err("expected key=value, as in --set map_elites.parents=10".to_string());
     };
     let (key, text) = (key.trim(), text.trim());
-    let value = toml::from_str::<toml::Table>(&format!("value = {text}"))
-        .ok()
-        .and_then(|mut table| table.remove("value"))
-        .unwrap_or_else(|| toml::Value::String(text.to_string()));
-    let mut root = toml::Value::try_from(config).map_err(|error| refuse(error.to_string()))?;
+    let value = (!text.is_empty()).then(|| {
+        toml::from_str::<toml::Table>(&format!("value = {text}"))
+            .ok()
+            .and_then(|mut table| table.remove("value"))
+            .unwrap_or_else(|| toml::Value::String(text.to_string()))
+    });
+    let mut before = String::new();
+    let mut place = &mut *root;
+    let mut parts = key.split('.').peekable();
+    while let Some(part) = parts.next() {
+        let is_last = parts.peek().is_none();
+        let is_of_list = parts.peek().is_some_and(|next| is_number(next));
+        place = match place {
+            toml::Value::Table(table) => {
+                if is_last && value.is_none() {
+                    let was_there = table.remove(part).is_some();
+                    return if was_there { Ok(()) } else { is_known::<T>(root, key) };
+                }
+                table.entry(part).or_insert_with(|| match is_of_list {
+                    true => toml::Value::Array(Vec::new()),
+                    false => toml::Value::Table(toml::Table::new()),
+                })
+            }
+            toml::Value::Array(list) => {
+                let count = list.len();
+                let index = part.parse::<usize>().ok().and_then(|number| number.checked_sub(1));
+                let Some(index) = index.filter(|&index| index < count) else {
+                    // Not a list at all, perhaps.
+                    is_known::<T>(root, &before)?;
+                    return Err(match count {
+                        0 => format!("there is no {before} {part}: there is none at all"),
+                        _ => format!("there is no {before} {part}: expected a number from 1 to {count}"),
+                    });
+                };
+                if is_last && value.is_none() {
+                    list.remove(index);
+                    return Ok(());
+                }
+                &mut list[index]
+            }
+            _ => return Err(format!("{key} is not a key: there is nothing below {before}")),
+        };
+        if !before.is_empty() {
+            before.push('.');
+        }
+        before.push_str(part);
+    }
+    if let Some(value) = value {
+        *place = value;
+    }
+    Ok(())
+}
+
+fn is_number(part: &str) -> bool {
+    !part.is_empty() && part.bytes().all(|byte| byte.is_ascii_digit())
+}
+
+/// Whether settings have a key, which may be at its default and left out: if not, its reader says so.
+fn is_known<T: DeserializeOwned>(root: &toml::Value, key: &str) -> Result<(), String> {
+    let mut root = root.clone();
     let mut place = &mut root;
     for part in key.split('.') {
-        let Some(table) = place.as_table_mut() else {
-            return Err(refuse(format!("{key} is not a key: there is nothing below {part}")));
+        let inner = match place {
+            toml::Value::Table(table) => {
+                Some(table.entry(part).or_insert_with(|| toml::Value::Table(toml::Table::new())))
+            }
+            toml::Value::Array(list) => {
+                part.parse::<usize>().ok().and_then(|number| list.get_mut(number.checked_sub(1)?))
+            }
+            _ => None,
         };
-        place = table.entry(part).or_insert_with(|| toml::Value::Table(toml::Table::new()));
+        let Some(inner) = inner else { return Ok(()) };
+        place = inner;
     }
-    *place = value;
-    serde_path_to_error::deserialize(root).map_err(|error| refuse(spoken(error.inner().message())))
+    match serde_path_to_error::deserialize::<_, T>(root) {
+        Err(error) => {
+            let message = error.inner().message();
+            let is_meant = |part: &str| message.starts_with(&format!("unknown field `{part}`"));
+            if key.split('.').any(is_meant) { Err(spoken(message)) } else { Ok(()) }
+        }
+        Ok(_) => Ok(()),
+    }
 }
 
 #[cfg(test)]
@@ -289,31 +432,68 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_is_said_with_the_override_or_the_line_it_stands_on() {
+    fn what_cannot_be_is_said_with_the_line_it_stands_on() {
         let text = "seed = 3\n\n[body]\nwidth = 5\nheight = 0\n\n[[stage]]\nkeep = 1\n\n[[stage]]\n\nkeep = 0\n[task]\n";
-        let place = |message: &str, set: &[&str]| {
-            let set: Vec<String> = set.iter().map(|set| set.to_string()).collect();
-            super::place(text, Format::Toml, "own.toml", &set, message)
-        };
-        assert_eq!(place("seed = 3: expected another", &[]), "own.toml:1");
-        assert_eq!(place("body.height = 0: expected 1", &[]), "own.toml:5");
-        assert_eq!(place("stage 2: keep = 0: expected 1", &[]), "own.toml:12");
+        let place = |message: &str| super::place(text, Format::Toml, "own.toml", message);
+        assert_eq!(place("seed = 3: expected another"), "own.toml:1");
+        assert_eq!(place("body.height = 0: expected 1"), "own.toml:5");
+        assert_eq!(place("stage 2: keep = 0: expected 1"), "own.toml:12");
         // Where the key itself is missing, or the whole table is meant.
-        assert_eq!(place("stage 2: expected generations: only", &[]), "own.toml:10");
-        assert_eq!(place("body.depth: expected it", &[]), "own.toml:3");
-        assert_eq!(place("task: expected groups", &[]), "own.toml:13");
-        assert_eq!(place("physics.gravity = 0: expected more", &[]), "own.toml");
-        assert_eq!(place("stage 3: keep = 0", &[]), "own.toml");
-        // What was set last.
-        let set = ["body.height=7", "body.width=5", " body.height = 0"];
-        assert_eq!(place("body.height = 0: expected 1", &set), "--set  body.height = 0");
-        assert_eq!(
-            place("task: expected groups", &["task.groups=[[0], [0]]"]),
-            "--set task.groups=[[0], [0]]"
-        );
-        assert_eq!(place("body.height = 0: expected 1", &["body={height=0}"]), "--set body={height=0}");
-        assert_eq!(place("body.height = 0: expected 1", &["body.heights=7"]), "own.toml:5");
-        assert_eq!(super::place("{}", Format::Json, "own.json", &[], "seed = 3: expected"), "own.json");
+        assert_eq!(place("stage 2: expected generations: only"), "own.toml:10");
+        assert_eq!(place("body.depth: expected it"), "own.toml:3");
+        assert_eq!(place("task: expected groups"), "own.toml:13");
+        assert_eq!(place("physics.gravity = 0: expected more"), "own.toml");
+        assert_eq!(place("stage 3: keep = 0"), "own.toml");
+        assert_eq!(super::place("{}", Format::Json, "own.json", "seed = 3: expected"), "own.json");
+    }
+
+    /// What is said of an [`Outer`] whose number is not below the first of its list, or negative.
+    fn blamed(count: u8, list: &[f64], overrides: &[&str]) -> String {
+        let inner = Inner { count, list: list.to_vec(), maybe: None };
+        let overrides: Vec<String> = overrides.iter().map(|text| text.to_string()).collect();
+        let check = |outer: &Outer| {
+            let Inner { count, list, maybe } = &outer.inner;
+            let refuse = |text: String| Err(Error::input(text));
+            match (list.first(), maybe) {
+                (Some(first), _) if f64::from(*count) >= *first => {
+                    refuse(format!("inner.count = {count}: expected less than {first}"))
+                }
+                (_, Some(maybe)) if *maybe < 0 => {
+                    refuse(format!("inner.maybe = {maybe}: expected 0 or more"))
+                }
+                _ => Ok(()),
+            }
+        };
+        let outer = Outer { name: "a".to_string(), inner };
+        let error = changed(outer, &overrides, check, |error| error.within("own.toml:7")).unwrap_err();
+        error.message.split(": ").next().unwrap_or_default().to_string()
+    }
+
+    #[test]
+    fn the_override_is_blamed_that_makes_what_cannot_be() {
+        let file = "own.toml:7";
+        assert_eq!(blamed(9, &[5.0], &[]), file);
+        assert_eq!(blamed(9, &[5.0], &["name=b"]), file, "one that changes nothing of it");
+        assert_eq!(blamed(3, &[5.0], &["name=b", "inner.count=9", "inner.maybe=1"]), "--set inner.count=9");
+        // Bad only together with the file, by a key that the message does not begin with.
+        assert_eq!(blamed(3, &[5.0], &["inner.list=[2]", "name=b"]), "--set inner.list=[2]");
+        assert_eq!(blamed(3, &[5.0], &["name=b", "inner.list.1=2"]), "--set inner.list.1=2");
+        // Bad only together: the one that the message is about; and the later one of a key.
+        assert_eq!(blamed(3, &[9.0], &["inner.count=5", "inner.list=[4]"]), "--set inner.count=5");
+        assert_eq!(blamed(3, &[9.0], &["inner.list=[4]", "inner.count=5"]), "--set inner.count=5");
+        assert_eq!(blamed(3, &[9.0], &["inner.count=10", "inner.count=11"]), "--set inner.count=11");
+        assert_eq!(blamed(3, &[9.0], &["inner.count=9", "inner.count=9"]), "--set inner.count=9");
+        // Of two that are bad, that of which the message is.
+        assert_eq!(blamed(3, &[9.0], &["inner.count=9", "inner.maybe=-1"]), "--set inner.count=9");
+        assert_eq!(blamed(3, &[9.0], &["inner.maybe=-1", "inner.count=9"]), "--set inner.count=9");
+        // One that another one has mended is not bad.
+        let mended = ["inner.count=9", "inner.maybe=-1", "inner.count=1"];
+        assert_eq!(blamed(3, &[9.0], &mended), "--set inner.maybe=-1");
+        for wrong in ["inner.cont=1", "inner.cont=", "inner.count=x", "inner.list.2=1", "inner.list.2="] {
+            let set = |others: &[&'static str]| blamed(3, &[9.0], &[&[wrong], others].concat());
+            assert_eq!(set(&[]), format!("--set {wrong}"));
+            assert_eq!(set(&["name=b"]), format!("--set {wrong}"));
+        }
     }
 
     #[test]
@@ -328,7 +508,8 @@ mod tests {
     #[test]
     fn one_key_is_set_and_the_others_stay() {
         let outer = Outer { name: "a".to_string(), inner: Inner { count: 3, ..Inner::default() } };
-        let set = |assignment: &str| set(&outer, assignment);
+        let set =
+            |assignment: &str| changed(outer.clone(), &[assignment.to_string()], |_| Ok(()), |error| error);
         assert_eq!(set("inner.count=4").unwrap().inner.count, 4);
         assert_eq!(set(" inner.count = 4 ").unwrap().inner.count, 4);
         assert_eq!(set("inner.list=[1.5, 2]").unwrap().inner.list, [1.5, 2.0]);
@@ -339,10 +520,29 @@ mod tests {
         assert_eq!(set("name=\"b=c\"").unwrap().name, "b=c");
         assert_eq!(set("name=b").unwrap().inner, outer.inner);
         for wrong in
-            ["inner.count", "inner.count=x", "inner.count=-1", "inner.cont=1", "name.x=1", "=1", "", "inner="]
+            ["inner.count", "inner.count=x", "inner.count=-1", "inner.cont=1", "name.x=1", "=1", "", "name="]
         {
             let error = set(wrong).unwrap_err();
             assert!(error.message.starts_with(&format!("--set {wrong}: ")), "{}", error.message);
         }
+    }
+    #[test]
+    fn an_item_of_a_list_is_set_by_its_number_and_a_key_unset_by_no_value() {
+        let inner = Inner { count: 3, list: vec![1.0, 2.0], maybe: Some(4) };
+        let outer = Outer { name: "a".to_string(), inner };
+        let set =
+            |assignment: &str| changed(outer.clone(), &[assignment.to_string()], |_| Ok(()), |error| error);
+        assert_eq!(set("inner.list.2=7").unwrap().inner.list, [1.0, 7.0]);
+        assert_eq!(set("inner.list.1=").unwrap().inner.list, [2.0]);
+        assert_eq!(set("inner.maybe=").unwrap().inner.maybe, None);
+        assert_eq!(set(" inner.maybe = ").unwrap().inner.maybe, None);
+        assert_eq!(set("inner=").unwrap().inner, Inner::default());
+        assert!(set("name=").unwrap_err().message.contains("missing field `name`"));
+        assert!(set("inner.list.3=7").unwrap_err().message.contains("from 1 to 2"));
+        assert!(set("inner.list.0=7").unwrap_err().message.contains("from 1 to 2"));
+        // What is at its default already may be left out of what is written.
+        let bare = Outer { name: "a".to_string(), inner: Inner::default() };
+        let bare = changed(bare.clone(), &["inner.maybe=".to_string()], |_| Ok(()), |error| error);
+        assert_eq!(bare.unwrap().inner, Inner::default());
     }
 }

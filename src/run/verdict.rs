@@ -2,6 +2,7 @@
 
 use super::Error;
 use super::toml_text;
+use crate::base::number;
 use crate::task::direction::{Assignment, Direction};
 use crate::task::fitness::Criterion;
 use crate::task::grouping::{Group, Split};
@@ -55,9 +56,7 @@ impl Criteria {
     /// # Errors
     /// What is wrong, with file, line and key.
     pub fn load(path: Option<&Path>, overrides: &[String]) -> Result<Self, Error> {
-        let criteria: Criteria = toml_text::load(path, overrides)?;
-        criteria.check()?;
-        Ok(criteria)
+        toml_text::load(path, overrides, Criteria::check)
     }
 
     /// Checks what a type cannot.
@@ -179,7 +178,10 @@ impl<'a> Behaviour<'a> {
         } else if (walked as f64) < criteria.least_answered * asked.len() as f64 {
             Some(format!("answers {walked} of {} training images", asked.len()))
         } else if balanced <= CHANCE {
-            Some(format!("answers {:.0} % of its training images right, balanced", 100.0 * balanced))
+            Some(format!(
+                "answers {} % of its training images right, balanced",
+                number::fixed(100.0 * balanced, 0)
+            ))
         } else {
             None
         };

@@ -5,6 +5,7 @@
 
 use super::protocol::{Life, Protocol};
 use crate::base::Grid;
+use crate::base::number;
 use crate::base::random::{Purpose, stream};
 use crate::body::Body;
 use crate::sim::Physics;
@@ -174,7 +175,8 @@ impl Perturbation {
             Kind::LengthLimits => format!("{kind} half as fast"),
             Kind::SelfContact => format!("{kind} counted once"),
             Kind::Stiffness | Kind::Friction | Kind::Gravity => {
-                format!("{kind} {:+.3} %", 100.0 * (amount - 1.0)).replace(".000", "")
+                let change = number::signed(100.0 * (amount - 1.0), 3);
+                format!("{kind} {} %", change.strip_suffix(".000").unwrap_or(&change))
             }
             Kind::Pixel => format!("{kind} {amount}"),
         }

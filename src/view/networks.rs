@@ -2,6 +2,8 @@
 
 use super::console::{Console, Mode};
 use super::{PictureError, plot, write_whole};
+use crate::base::number::{self, percent};
+use crate::baseline::curve::Crossing;
 use crate::run::capacity::FIGURES;
 use crate::run::capacity_file::{CapacityFile, TaskCapacity};
 use crate::run::published;
@@ -26,13 +28,13 @@ pub fn capacity(console: &Console, file: &CapacityFile, out: &Path) {
         for curve in &task.curves {
             if let (Some(first), Some(last)) = (curve.points.first(), curve.points.last()) {
                 console.line(&format!(
-                    "{}: {}s of size {} reach {:.1} %, of size {} {:.1} % on average over {} trainings",
+                    "{}: {}s of size {} reach {} %, of size {} {} % on average over {} trainings",
                     task.task,
                     curve.network.to_uppercase(),
                     first.size,
-                    100.0 * first.mean,
+                    percent(first.mean),
                     last.size,
-                    100.0 * last.mean,
+                    percent(last.mean),
                     file.trainings
                 ));
             }
@@ -57,13 +59,14 @@ pub(super) fn papers_table<'a>(
     let rows = tasks.map(|(task, robots, accuracy, capacity)| {
         let paper = published::row(dataset, task);
         let own = |network: &str| capacity.and_then(|known| known.worth(network)).map_or_else(unknown, size);
-        let theirs =
-            |of: fn(&published::PaperRow) -> Option<f64>| paper.map_or_else(unknown, |row| size(of(row)));
+        let theirs = |of: fn(&published::PaperRow) -> Option<f64>| {
+            paper.map_or_else(unknown, |row| size(of(row).map(Crossing::At)))
+        };
         vec![
             task.to_string(),
             robots.to_string(),
-            format!("{:.1}", 100.0 * accuracy),
-            paper.map_or_else(unknown, |row| format!("{:.1}", row.accuracy)),
+            percent(accuracy),
+            paper.map_or_else(unknown, |row| number::fixed(row.accuracy, 1)),
             own("mlp"),
             theirs(|row| row.mlp),
             own("cnn"),
@@ -76,8 +79,8 @@ pub(super) fn papers_table<'a>(
 }
 
 /// A capacity in a table.
-fn size(capacity: Option<f64>) -> String {
-    capacity.map_or_else(|| "no match".to_string(), |size| format!("{size:.1}"))
+pub(super) fn size(capacity: Option<Crossing>) -> String {
+    capacity.map_or_else(|| "no match".to_string(), |size| size.to_string())
 }
 
 /// What nobody measured, in a table.
@@ -102,16 +105,21 @@ pub fn table(console: &Console, finished: &Finished) {
     if console.mode() == Mode::Json {
         return console.event("reproduced", &finished.rows);
     }
-    let number = |value: Option<f64>| value.map_or_else(unknown, |value| format!("{value:.1}"));
+    let number = |value: Option<f64>| value.map_or_else(unknown, |value| number::fixed(value, 1));
     let rows = finished.rows.iter().map(|row| {
-        let own = |value: Option<f64>| if row.robots == 0 { unknown() } else { size(value) };
-        let paper = |value: Option<f64>| if row.paper_accuracy.is_none() { unknown() } else { size(value) };
+        let own = |value: Option<Crossing>| if row.robots == 0 { unknown() } else { size(value) };
+        let paper = |value: Option<f64>| match row.paper_accuracy {
+            None => unknown(),
+            Some(_) => size(value.map(Crossing::At)),
+        };
         vec![
             row.task.clone(),
             row.robots.to_string(),
             format!("{} of {}", row.physical, row.audited),
             number(row.accuracy),
-            row.interval.map_or_else(unknown, |[low, high]| format!("{low:.1}–{high:.1}")),
+            row.interval.map_or_else(unknown, |[low, high]| {
+                format!("{}–{}", number::fixed(low, 1), number::fixed(high, 1))
+            }),
             number(row.paper_accuracy),
             number(row.balanced_accuracy),
             number(row.larger_group),

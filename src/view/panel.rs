@@ -6,6 +6,7 @@ use super::font;
 use super::scene::{Primitive, ruler};
 use super::stage::Stage;
 use super::walk::Walk;
+use crate::base::number;
 use crate::body::{Body, Material};
 
 /// Side of the stimulus picture at zoom 1, pixels.
@@ -54,16 +55,16 @@ pub fn readout(walk: &Walk, frame: usize) -> Readout {
     };
     Readout {
         label: walk.phase(frame).label.clone(),
-        time: format!("step {step}/{} · cycle {cycles:.1}", last - frames.start),
+        time: format!("step {step}/{} · cycle {}", last - frames.start, number::fixed(cycles, 1)),
         displacement: format!("{arrow} {}", signed(d)),
     }
 }
 
 /// A distance with its sign and two decimals; shorter when huge.
 pub fn signed(distance: f64) -> String {
-    let text = if distance.abs() < 1e5 { format!("{distance:+.2}") } else { format!("{distance:+.1e}") };
-    // "−0.00" is 0.
-    if text == "-0.00" || text == "+0.00" { "0.00".into() } else { text.replace('-', "−") }
+    let is_short = distance.abs() < 1e5;
+    let text = if is_short { number::signed(distance, 2) } else { format!("{distance:+.1e}") };
+    text.replace('-', "−")
 }
 
 /// The picture as the sensors see it, the sensor voxels framed in their colour. Returns its width and height.

@@ -3,6 +3,7 @@
 use super::console::Console;
 use super::scene::Look;
 use super::{PictureError, Stage, Walk, gif, html, player, raster};
+use crate::base::number;
 use crate::run::replay::Replay;
 use crate::run::{Error, folder, gallery};
 use std::fmt;
@@ -163,10 +164,10 @@ pub fn make(console: &Console, replay: &Replay, wanted: &Wanted) -> Result<Vec<P
     for phase in &recording.phases {
         let way = if phase.displacement < 0.0 { "left" } else { "right" };
         console.line(&format!(
-            "{}: sees {}, moves {:.2} voxel lengths {way}",
+            "{}: sees {}, moves {} voxel lengths {way}",
             recording.robot,
             phase.label,
-            phase.displacement.abs()
+            number::fixed(phase.displacement.abs(), 2)
         ));
     }
     if recording.unstable {

@@ -1,5 +1,6 @@
 //! Progress in words: how far, how fast, how long still.
 
+use crate::base::number;
 use serde::Serialize;
 
 /// How far an evolution is.
@@ -23,14 +24,14 @@ impl Progress {
     /// In one line, given the progress at the beginning (of this session: a resumed run has done some already) and the
     /// seconds since.
     pub fn line(&self, begin: &Progress, seconds: f64) -> String {
-        let best = self.best.map_or("none".into(), |b| format!("{b:.2}"));
+        let best = self.best.map_or("none".into(), |best| number::fixed(best, 2));
         let rate = rate(self.evaluations.saturating_sub(begin.evaluations), seconds);
         // The speed last: it is what a narrow terminal cuts off.
         format!(
-            "generation {}/{} · best {best} · coverage {:.1} %{} · {rate} evaluations/s",
+            "generation {}/{} · best {best} · coverage {} %{} · {rate} evaluations/s",
             self.done,
             self.total,
-            100.0 * self.coverage,
+            number::percent(self.coverage),
             left(begin.done, self.done, self.total, seconds)
         )
     }
@@ -41,16 +42,17 @@ impl Progress {
 pub fn count_line(label: &str, [begin, done, total]: [u64; 3], unit: &str, seconds: f64) -> String {
     let end = left(begin, done, total, seconds);
     if unit == "bytes" {
-        let mega = |bytes: u64| bytes as f64 / 1e6;
-        let speed = if seconds > 0.0 { mega(done) / seconds } else { 0.0 };
-        return format!("{label} {:.1}/{:.1} MB · {speed:.1} MB/s{end}", mega(done), mega(total));
+        let mega = |bytes: f64| number::fixed(bytes / 1e6, 1);
+        let speed = if seconds > 0.0 { done as f64 / seconds } else { 0.0 };
+        let [done, total, speed] = [done as f64, total as f64, speed].map(mega);
+        return format!("{label} {done}/{total} MB · {speed} MB/s{end}");
     }
     format!("{label} {done}/{total} {unit} · {} {unit}/s{end}", rate(done.saturating_sub(begin), seconds))
 }
 
 fn rate(count: u64, seconds: f64) -> String {
     let rate = if seconds > 0.0 { count as f64 / seconds } else { 0.0 };
-    if rate < 10.0 { format!("{rate:.1}") } else { format!("{rate:.0}") }
+    number::fixed(rate, if rate < 10.0 { 1 } else { 0 })
 }
 
 fn left(begin: u64, done: u64, total: u64, seconds: f64) -> String {

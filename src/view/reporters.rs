@@ -1,6 +1,7 @@
 //! What the console shows while a command runs: the observers of `run`.
 
 use super::console::{Bar, Console, Counter, Progress};
+use crate::base::number;
 use crate::run::curriculum::Period;
 use crate::run::data::catalogue::RemoteFile;
 use crate::run::data::fetch::{Attempt, FetchObserver};
@@ -63,7 +64,7 @@ impl evolve::Observer for Evolution<'_> {
 
     fn period(&mut self, period: Period, training: &Training, progress: &evolve::Progress) {
         let Progress { done, best, .. } = shown(progress);
-        let best = best.map_or("no elite".to_string(), |best| format!("best {best:.2}"));
+        let best = best.map_or("no elite".to_string(), |best| format!("best {}", number::fixed(best, 2)));
         let number = period.stage + 1;
         let text =
             format!("stage {number} from generation {done} on: {}; elites anew: {best}", listed(training));

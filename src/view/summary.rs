@@ -3,6 +3,8 @@
 use super::console::{Console, Mode};
 use super::networks;
 use super::progress::duration;
+use crate::base::clock::CLOCK;
+use crate::base::number::{self, percent};
 use crate::run::bench::Speed;
 use crate::run::capacity_file::CapacityFile;
 use crate::run::data::Found;
@@ -20,17 +22,13 @@ use std::path::Path;
 /// Robots shown after an evolution.
 const SHOWN: usize = 5;
 
-pub(super) fn percent(share: f64) -> String {
-    format!("{:.1}", 100.0 * share)
-}
-
 /// What tables of evaluated robots begin with: robot, task, fitness, accuracy, its interval, balanced accuracy.
 pub(super) fn of_robot(robot: &RobotReport) -> Vec<String> {
     let [low, high] = robot.interval.map(percent);
     vec![
         robot.id.clone(),
         robot.task.clone(),
-        format!("{:.2}", robot.objective),
+        number::fixed(robot.objective, 2),
         percent(robot.accuracy),
         format!("{low}–{high}"),
         percent(robot.balanced_accuracy),
@@ -56,7 +54,7 @@ pub fn evolution(console: &Console, finished: &Finished, out: &Path) {
         vec![
             robot.id.clone(),
             robot.task.clone(),
-            format!("{:.2}", robot.objective),
+            number::fixed(robot.objective, 2),
             walks(&run.training_images, &robot.displacements),
             kinds.muscle.to_string(),
             kinds.sensor.to_string(),
@@ -68,10 +66,10 @@ pub fn evolution(console: &Console, finished: &Finished, out: &Path) {
     let stats = run.stats;
     let cells = run.dimensions.possible_cells;
     console.line(&format!(
-        "{} of {cells} cells filled (coverage {} %), QD score {:.1}, {} generations in {}",
+        "{} of {cells} cells filled (coverage {} %), QD score {}, {} generations in {}",
         stats.num_elites,
         percent(stats.coverage),
-        stats.qd_score,
+        number::fixed(stats.qd_score, 1),
         run.generations,
         duration(totals.seconds)
     ));
@@ -134,7 +132,7 @@ pub fn evaluation(console: &Console, report: &EvalFile, capacity: Option<&Capaci
     let rows = report.robots.iter().map(|robot| {
         let mut row = of_robot(robot);
         row.extend(robot.per_class.values().map(|share| percent(*share)));
-        row.extend([format!("{:.1}", robot.mean_distance), percent(robot.not_moved)]);
+        row.extend([number::fixed(robot.mean_distance, 1), percent(robot.not_moved)]);
         row.extend([robot.unstable.to_string(), robot.simulated.to_string()]);
         row.extend(robot.validation.as_ref().map(|v| percent(v.balanced_accuracy)));
         row
@@ -202,7 +200,7 @@ pub fn speeds(console: &Console, speeds: &[Speed]) {
         return speeds.iter().for_each(|speed| console.event("speed", speed));
     }
     let rows = speeds.iter().map(|speed| {
-        let (micros, steps) = (format!("{:.2}", speed.microseconds), format!("{:.0}", speed.control_steps));
+        let (micros, steps) = (number::fixed(speed.microseconds, 2), number::fixed(speed.control_steps, 0));
         vec![
             speed.body.to_string(),
             speed.voxels.to_string(),
@@ -214,6 +212,10 @@ pub fn speeds(console: &Console, speeds: &[Speed]) {
     let headers =
         ["body", "voxels", "instruction set", "µs per substep", "control steps per second and core"];
     console.table(&headers, &rows.collect::<Vec<_>>());
+    console.line(match CLOCK {
+        "processor" => "processor time of one thread: other work on the machine does not count",
+        _ => "wall-clock time, since this system does not tell a thread's processor time: measure on a machine without other work",
+    });
 }
 
 /// The published robots.
@@ -221,7 +223,7 @@ pub fn gallery(console: &Console, robots: &[Published]) {
     let rows = robots.iter().map(|robot| {
         let counts = robot.body.counts();
         let counts = [counts.muscle, counts.sensor, counts.total].map(|count| count.to_string());
-        [vec![robot.name.clone(), "0|1".to_string(), format!("{:.2}", robot.fitness)], counts.to_vec()]
+        [vec![robot.name.clone(), "0|1".to_string(), number::fixed(robot.fitness, 2)], counts.to_vec()]
             .concat()
     });
     let headers = ["robot", "task", "published fitness", "muscle", "sensor", "voxels"];
@@ -296,13 +298,17 @@ fn walks(images: &[ImageRef], displacements: &[f64]) -> String {
     const FEW: usize = 8;
     let shown = images.iter().zip(displacements);
     if images.len() <= FEW {
-        return shown.map(|(image, d)| format!("{}: {d:+.1}", image.label)).collect::<Vec<_>>().join("  ");
+        return shown
+            .map(|(image, d)| format!("{}: {}", image.label, number::signed(*d, 1)))
+            .collect::<Vec<_>>()
+            .join("  ");
     }
     let mut classes = std::collections::BTreeMap::<u8, (f64, f64)>::new();
     for (image, displacement) in shown {
         let (sum, count) = classes.entry(image.label).or_default();
         (*sum, *count) = (*sum + displacement, *count + 1.0);
     }
-    let mean = |(class, (sum, count)): (u8, (f64, f64))| format!("{class}: mean {:+.1}", sum / count);
+    let mean =
+        |(class, (sum, count)): (u8, (f64, f64))| format!("{class}: mean {}", number::signed(sum / count, 1));
     classes.into_iter().map(mean).collect::<Vec<_>>().join("  ")
 }

@@ -1,6 +1,7 @@
 //! What `morphcog audit` says at its end.
 
 use super::console::{Console, Mode};
+use crate::base::number;
 use crate::run::audit::Finished;
 use crate::run::audit_file::{AuditFile, RobotAudit};
 use crate::run::verdict::Verdict;
@@ -43,7 +44,7 @@ fn note(console: &Console, file: &AuditFile) {
 
 fn row(robot: &RobotAudit) -> Vec<String> {
     let walks = |d: &Vec<f64>| match d.len() {
-        0..=4 => d.iter().map(|d| format!("{d:+.1}")).collect::<Vec<_>>().join(" "),
+        0..=4 => d.iter().map(|d| number::signed(*d, 1)).collect::<Vec<_>>().join(" "),
         many => format!("{many} images"),
     };
     let energy = robot.energy_per_cycle;
@@ -53,9 +54,9 @@ fn row(robot: &RobotAudit) -> Vec<String> {
         robot.id.clone(),
         robot.task.clone(),
         robot.verdict.name().to_string(),
-        of_walker(format!("{:.0}", 100.0 * robot.persisting)),
-        of_walker(format!("{:.2}", robot.spread)),
-        if energy.drive > 0.0 { format!("{:.3}", energy.limits / energy.drive) } else { "–".to_string() },
+        of_walker(number::fixed(100.0 * robot.persisting, 0)),
+        of_walker(number::fixed(robot.spread, 2)),
+        if energy.drive > 0.0 { number::fixed(energy.limits / energy.drive, 3) } else { "–".to_string() },
         robot.displacements.as_ref().map_or("unstable".to_string(), walks),
         robot.reason.clone(),
     ]
@@ -78,7 +79,7 @@ fn breaking(console: &Console, robots: &[&RobotAudit]) {
         let broken = lives.iter().filter(|life| !life.persists).count();
         let mean = lives.iter().map(|life| life.distance).sum::<f64>() / lives.len() as f64;
         let counts = [broken, lives.len()].map(|count| count.to_string());
-        [vec![name.to_string()], counts.to_vec(), vec![format!("{:.1}", 100.0 * mean)]].concat()
+        [vec![name.to_string()], counts.to_vec(), vec![number::percent(mean)]].concat()
     });
     let rows: Vec<Vec<String>> = rows.collect();
     console.line("");

@@ -4,6 +4,7 @@ use super::axes::{AXIS, Axis, MARGIN, Plot, heading};
 use super::canvas::{Canvas, Pen, TEXT, Words};
 use super::figure::{COLUMN, Figure};
 use super::{fonts, scales};
+use crate::base::number;
 use crate::run::eval_file::{EvalFile, RobotReport};
 use crate::view::colour;
 
@@ -113,7 +114,7 @@ fn lines(canvas: &mut Canvas, plot: &Plot, report: &EvalFile, task: &str, [from,
 /// What the lines mean, in two columns; the y below.
 fn legend(canvas: &mut Canvas, report: &EvalFile, top: f64) -> f64 {
     let value = |text: &str, share: Option<f64>| match share {
-        Some(share) => format!("{text} {:.1} %", percent(share)),
+        Some(share) => format!("{text} {} %", number::fixed(percent(share), 1)),
         None => text.to_string(),
     };
     // Of several tasks each has its own numbers.

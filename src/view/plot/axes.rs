@@ -2,6 +2,7 @@
 
 use super::canvas::{Canvas, HEADING, Pen, TEXT, Words};
 use super::{fonts, scales};
+use crate::base::number;
 use crate::view::colour::{self, Colour};
 
 /// Line of an axis, points.
@@ -56,7 +57,7 @@ impl Axis {
     /// A number as it stands at a tick.
     pub fn label(&self, value: f64) -> String {
         let decimals = (-self.step.log10().floor()).clamp(0.0, 6.0) as usize;
-        grouped(&format!("{value:.decimals$}"))
+        grouped(&number::fixed(value, decimals))
     }
 
     /// Width of the widest number, points.
@@ -75,9 +76,6 @@ impl Axis {
 fn grouped(text: &str) -> String {
     let (sign, digits) = text.strip_prefix('-').map_or(("", text), |digits| ("−", digits));
     let (whole, rest) = digits.split_at(digits.find('.').unwrap_or(digits.len()));
-    if digits.chars().all(|c| matches!(c, '0' | '.')) {
-        return digits.to_string();
-    }
     let mut out = String::from(sign);
     for (k, digit) in whole.chars().enumerate() {
         if k > 0 && (whole.len() - k) % 3 == 0 {
@@ -234,7 +232,7 @@ mod tests {
     #[test]
     fn numbers_are_grouped_and_have_a_minus() {
         assert_eq!(
-            ["-12", "600000", "-1234.5", "0.50", "-0"].map(grouped),
+            ["-12", "600000", "-1234.5", "0.50", "0"].map(grouped),
             ["−12", "600,000", "−1,234.5", "0.50", "0"]
         );
     }

@@ -1,6 +1,7 @@
 //! [`Canvas`]: SVG elements in points, y down, without ids, classes or styles.
 
 use super::fonts;
+use crate::base::number;
 use crate::view::colour::{self, Colour};
 use std::fmt::Write;
 
@@ -219,9 +220,8 @@ pub fn path(points: &[[f64; 2]], closed: bool) -> String {
 /// A number with two decimals at most; what is not finite or absurd becomes something that can be drawn.
 pub fn number(value: f64) -> String {
     let value = if value.is_nan() { 0.0 } else { value.clamp(-1e6, 1e6) };
-    let text = format!("{value:.2}");
-    let text = text.trim_end_matches('0').trim_end_matches('.');
-    if text == "-0" { "0".to_string() } else { text.to_string() }
+    let text = number::fixed(value, 2);
+    text.trim_end_matches('0').trim_end_matches('.').to_string()
 }
 
 /// A text as it may stand in XML.

@@ -4,6 +4,7 @@ use super::axes::{AXIS, Axis, MARGIN, Plot, heading, left_space};
 use super::canvas::{Anchor, Canvas, Pen, Words};
 use super::figure::{COLUMN, Figure, PAGE};
 use super::{fonts, scales};
+use crate::baseline::curve::Crossing;
 use crate::run::capacity_file::{CapacityFile, Curve, Point, TaskCapacity};
 use crate::view::colour;
 
@@ -70,14 +71,12 @@ fn panel(canvas: &mut Canvas, at: [f64; 2], size: [f64; 2], y: &Axis, task: &Tas
     let plot = Plot { at, size, x: Axis::exact(0.0, largest + 1.0, 5).whole(), y: y.clone() };
     let (kind, unit) = network(curve);
     // Where the smallest size is above the robots already, nothing crosses.
-    let is_above = |size: f64| curve.value(size).is_some_and(|fit| fit > task.accuracy + 1e-6);
-    let crossing = curve.capacity.filter(|&size| !is_above(size));
-    let found = match curve.capacity {
-        Some(capacity) if crossing.is_none() => {
-            format!("capacity at most {capacity:.0}: the fit begins above the robots")
+    let (found, crossing) = match curve.capacity {
+        Some(below @ Crossing::Below { .. }) => {
+            (format!("capacity {below}: the fit begins above the robots"), None)
         }
-        Some(capacity) => format!("capacity {capacity:.1} {unit}"),
-        None => "no capacity: the fit never reaches the robots".to_string(),
+        Some(at @ Crossing::At(size)) => (format!("capacity {at} {unit}"), Some(size)),
+        None => ("no capacity: the fit never reaches the robots".to_string(), None),
     };
     let title = format!("{}, {kind}", task.task);
     canvas.text([at[0], at[1] - 5.0], &title, Words::default().bold());
@@ -138,7 +137,7 @@ mod tests {
     use super::*;
     use crate::run::capacity_file::Point;
 
-    fn file(capacity: Option<f64>) -> CapacityFile {
+    fn file(capacity: Option<Crossing>) -> CapacityFile {
         let point = |size: usize| Point {
             size,
             mean: 0.55 + 0.005 * size as f64,
@@ -174,15 +173,15 @@ mod tests {
 
     #[test]
     fn every_task_and_network_has_a_panel_with_its_capacity() {
-        let svg = capacity(&file(Some(16.8))).svg();
+        let svg = capacity(&file(Some(Crossing::At(16.8)))).svg();
         assert_eq!(svg.matches("capacity 16.8").count(), 4);
         assert!(svg.contains("01|23, CNN") && svg.contains("hidden neurons") && svg.contains("kernels"));
         assert!(capacity(&file(None)).svg().contains("never reaches"));
         // Robots that know less than any network: nothing is marked where nothing crosses.
-        let mut below = file(Some(1.0));
+        let mut below = file(Some(Crossing::Below { below: 1.0 }));
         below.tasks.iter_mut().for_each(|task| task.accuracy = 0.3);
         let below = capacity(&below).svg();
-        assert!(below.contains("capacity at most 1:") && !below.contains("capacity 1.0"));
+        assert!(below.contains("capacity &lt; 1: the fit begins above") && !below.contains("capacity 1"));
         assert_eq!(below.matches("<circle").count(), svg.matches("<circle").count() - 4);
     }
 

@@ -1,6 +1,7 @@
 //! Robots as buttons: a click plays them.
 
 use super::maps::Lives;
+use crate::base::number;
 use crate::body::{Body, Material};
 use crate::run::archive::Robot;
 use crate::run::report::Dossier;
@@ -44,8 +45,14 @@ fn about(dossier: &Dossier, robot: &Robot) -> String {
     let verdict = dossier.findings.audit.as_ref().and_then(|audit| audit.robot(&robot.id));
     let verdict = verdict.map_or(String::new(), |found| format!("; {}", found.conclusion()));
     format!(
-        "{} ({}), fitness {:.2}: {} muscle, {} sensor, {} voxels in all, born in generation {}{verdict}.",
-        robot.id, robot.task, robot.objective, counts.muscle, counts.sensor, counts.total, robot.generation
+        "{} ({}), fitness {}: {} muscle, {} sensor, {} voxels in all, born in generation {}{verdict}.",
+        robot.id,
+        robot.task,
+        number::fixed(robot.objective, 2),
+        counts.muscle,
+        counts.sensor,
+        counts.total,
+        robot.generation
     )
 }
 
@@ -59,7 +66,8 @@ pub(super) fn bodies(run: usize, dossier: &Dossier, lives: &Lives) -> String {
         .filter(|robot| seen.insert(robot.id.clone()))
         .map(|robot| {
             let id = escape(&robot.id);
-            let walks: Vec<String> = robot.displacements.iter().take(4).map(|d| format!("{d:+.1}")).collect();
+            let walks: Vec<String> =
+                robot.displacements.iter().take(4).map(|d| number::signed(*d, 1)).collect();
             let content = format!(
                 "{}<span>{id}</span><small>{}: {}</small>",
                 picture(&robot.body),

@@ -2,6 +2,8 @@
 
 use super::words;
 use crate::base::lanes::InstructionSet;
+use crate::base::number::{self, percent};
+use crate::baseline::curve::Crossing;
 use crate::run::audit_file::AuditFile;
 use crate::run::capacity_file::CapacityFile;
 use crate::run::eval_file::{EvalFile, Mean, RobotReport};
@@ -10,8 +12,9 @@ use crate::run::published;
 use crate::run::report::Dossier;
 use crate::run::verdict::Verdict;
 use crate::view::html::escape;
+use crate::view::networks::size;
 use crate::view::progress::duration;
-use crate::view::summary::{of_robot, percent};
+use crate::view::summary::of_robot;
 
 /// Robots of a test or an audit that are listed one by one.
 const LISTED: usize = 50;
@@ -50,8 +53,8 @@ pub(super) fn runs(runs: &[Dossier]) -> String {
             words::name(dossier),
             dossier.run.generations.to_string(),
             format!("{} of {}", stats.num_elites, dossier.run.dimensions.possible_cells),
-            format!("{:.1}", stats.qd_score),
-            or_none(stats.obj_max, |best| format!("{best:.2}")),
+            number::fixed(stats.qd_score, 1),
+            or_none(stats.obj_max, |best| number::fixed(best, 2)),
             or_none(dossier.effort(), |(seconds, _)| duration(seconds)),
         ]
     };
@@ -79,7 +82,7 @@ pub(super) fn about(dossier: &Dossier) -> String {
         InstructionSet::in_use().name()
     );
     let effort = or_none(dossier.effort(), |(seconds, evaluations)| {
-        format!("{evaluations:.0} evaluations in {}", duration(seconds))
+        format!("{} evaluations in {}", number::fixed(evaluations, 0), duration(seconds))
     });
     let rows = [
         ("Run", words::name(dossier)),
@@ -91,11 +94,11 @@ pub(super) fn about(dossier: &Dossier) -> String {
         (
             "Archive",
             format!(
-                "{} of {} cells (coverage {} %), QD score {:.1}, best fitness {}",
+                "{} of {} cells (coverage {} %), QD score {}, best fitness {}",
                 stats.num_elites,
                 run.dimensions.possible_cells,
                 percent(stats.coverage),
-                stats.qd_score,
+                number::fixed(stats.qd_score, 1),
                 or_none(stats.obj_max, |best| run.in_units(best))
             ),
         ),
@@ -132,7 +135,7 @@ pub(super) fn eval(report: &EvalFile) -> String {
             or_none(mean.standard_deviation, percent),
             or_none(mean.interval, |[low, high]| format!("{}–{}", percent(low), percent(high))),
             or_none(published::row(&report.dataset, task).filter(|_| as_published), |row| {
-                format!("{:.1}", row.accuracy)
+                number::fixed(row.accuracy, 1)
             }),
             percent(mean.balanced_accuracy),
             or_none(known, |known| percent(known.larger_group)),
@@ -198,7 +201,7 @@ pub(super) fn audit(audit: &AuditFile) -> String {
             robot.task.clone(),
             robot.conclusion(),
             percent(robot.persisting),
-            format!("{:.2}", robot.spread),
+            number::fixed(robot.spread, 2),
         ]
     };
     let rows: Vec<Vec<String>> = walkers.iter().take(LISTED).map(row).collect();
@@ -210,21 +213,18 @@ pub(super) fn audit(audit: &AuditFile) -> String {
 
 /// Capacities.
 pub(super) fn capacity(file: &CapacityFile) -> String {
-    let size = |size: Option<f64>| size.map_or("no match".to_string(), |size| format!("{size:.1}"));
     let rows = file.tasks.iter().map(|task| {
-        let own = |network: &str| {
-            or_none(task.curves.iter().find(|curve| curve.network == network), |curve| size(curve.capacity))
-        };
+        let own = |network: &str| or_none(task.worth(network), size);
         let paper = published::row(&file.dataset, &task.task);
         vec![
             task.task.clone(),
             task.robots.to_string(),
             percent(task.accuracy),
-            or_none(paper, |row| format!("{:.1}", row.accuracy)),
+            or_none(paper, |row| number::fixed(row.accuracy, 1)),
             own("mlp"),
-            or_none(paper, |row| size(row.mlp)),
+            or_none(paper, |row| size(row.mlp.map(Crossing::At))),
             own("cnn"),
-            or_none(paper, |row| size(row.cnn)),
+            or_none(paper, |row| size(row.cnn.map(Crossing::At))),
         ]
     });
     let headers =

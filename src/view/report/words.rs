@@ -1,5 +1,6 @@
 //! The words of a report: its title, a methods paragraph, and the commands that make it again.
 
+use crate::base::number::{self, percent};
 use crate::run::capacity_config::CapacityConfig;
 use crate::run::capacity_file::CapacityFile;
 use crate::run::eval;
@@ -41,15 +42,16 @@ pub(super) fn methods(dossier: &Dossier) -> String {
     let run = &dossier.run;
     let config = &run.config;
     let (height, width) = (config.body.height, config.body.width);
-    let evaluations =
-        dossier.effort().map_or(String::new(), |(_, count)| format!(" ({count:.0} evaluations)"));
+    let evaluations = dossier
+        .effort()
+        .map_or(String::new(), |(_, count)| format!(" ({} evaluations)", number::fixed(count, 0)));
     let encoding = match config.stimulus.encoding {
         Encoding::Intensity => "proportional to the pixel's intensity".to_string(),
         Encoding::Saturated => "1 for any pixel above 0".to_string(),
         Encoding::Threshold => format!("1 for any pixel above {} of full intensity", config.stimulus.level),
     };
     let steps = run.protocol().control_steps;
-    let cycles = f64::from(steps) / f64::from(config.physics.cycle_steps);
+    let cycles = number::fixed(f64::from(steps) / f64::from(config.physics.cycle_steps), 0);
     let life = match config.protocol.life {
         Life::Fresh => "a life of its own from the initial state",
         Life::Sequential => "one continuous life for all images",
@@ -99,7 +101,7 @@ pub(super) fn methods(dossier: &Dossier) -> String {
          pattern-producing networks and evolved with MAP-Elites for {} generations{evaluations}, seed {}, using morphcog {}. \
          The archive's dimensions are the numbers of muscle, sensor and all voxels in seven bins each{}; {} of its {} cells can be filled. \
          Each generation mutated up to {} elites; an offspring replaced an elite only if it was strictly fitter. \
-         Robots were trained on {} images of {} ({}); each image was shown for {steps} control steps ({cycles:.0} actuation cycles) in {life}, \
+         Robots were trained on {} images of {} ({}); each image was shown for {steps} control steps ({cycles} actuation cycles) in {life}, \
          a sensor's stimulus being {encoding}. Fitness is {fitness}.{stages}",
         run.generations,
         config.seed,
@@ -115,9 +117,9 @@ pub(super) fn methods(dossier: &Dossier) -> String {
     if let Some(report) = dossier.findings.eval.as_ref().filter(|report| !report.means.is_empty()) {
         let mean = |(task, mean): (&String, &Mean)| {
             let interval = mean.interval.map_or(String::new(), |[low, high]| {
-                format!(" (95 % bootstrap interval {:.1}–{:.1} %)", 100.0 * low, 100.0 * high)
+                format!(" (95 % bootstrap interval {}–{} %)", percent(low), percent(high))
             });
-            format!("{:.1} %{interval} on {task}", 100.0 * mean.accuracy)
+            format!("{} %{interval} on {task}", percent(mean.accuracy))
         };
         let means: Vec<String> = report.means.iter().map(mean).collect();
         text += &format!(

@@ -108,8 +108,11 @@ export class Robots {
   }
 }
 
-// A number with a minus sign that is one.
-export const signed = (value, digits) => value.toFixed(digits).replace("-", "−");
+// A number with a minus sign that is one; what rounds to nothing has none.
+export const signed = (value, digits) => {
+  const text = value.toFixed(digits);
+  return Number(text) === 0 ? text.replace("-", "") : text.replace("-", "−");
+};
 
 // A body's rows as text, as the drawing functions take them.
 export const rows = (robot) => robot.body.map((row) => row.join(""));

@@ -1,0 +1,83 @@
+//! The time that a thread's own work takes, whatever else the machine has to do.
+
+use std::time::Duration;
+
+/// What [`thread_time`] tells: "processor", or "wall" where the system does not tell a thread's processor time.
+pub const CLOCK: &str = if IS_KNOWN { "processor" } else { "wall" };
+
+#[cfg(all(
+    unix,
+    not(any(
+        target_os = "solaris",
+        target_os = "illumos",
+        target_os = "netbsd",
+        target_os = "redox",
+        target_os = "horizon",
+        target_os = "vita"
+    ))
+))]
+mod system {
+    use super::Duration;
+    use rustix::time::{ClockId, clock_gettime};
+
+    pub const IS_KNOWN: bool = true;
+
+    pub fn now() -> Duration {
+        Duration::try_from(clock_gettime(ClockId::ThreadCPUTime))
+            .expect("no thread has run for less than nothing")
+    }
+}
+
+#[cfg(not(all(
+    unix,
+    not(any(
+        target_os = "solaris",
+        target_os = "illumos",
+        target_os = "netbsd",
+        target_os = "redox",
+        target_os = "horizon",
+        target_os = "vita"
+    ))
+)))]
+mod system {
+    use super::Duration;
+    use std::sync::LazyLock;
+    use std::time::Instant;
+
+    pub const IS_KNOWN: bool = false;
+
+    static BEGIN: LazyLock<Instant> = LazyLock::new(Instant::now);
+
+    pub fn now() -> Duration {
+        BEGIN.elapsed()
+    }
+}
+
+use system::IS_KNOWN;
+
+/// Processor time of the calling thread so far; where the system does not tell it, wall-clock time since the first call. Only
+/// differences mean anything.
+pub fn thread_time() -> Duration {
+    system::now()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_thread_that_waits_spends_no_time_and_one_that_works_does() {
+        let begin = thread_time();
+        std::thread::sleep(Duration::from_millis(100));
+        let waited = thread_time() - begin;
+        let wall = std::time::Instant::now();
+        let mut sum = 0.0_f64;
+        while thread_time() - begin < waited + Duration::from_millis(20) {
+            sum = std::hint::black_box(sum.sqrt() + 1.0);
+        }
+        assert!(wall.elapsed() >= Duration::from_millis(19), "no more than what passed");
+        if CLOCK == "processor" {
+            assert!(waited < Duration::from_millis(50), "{waited:?}");
+        }
+    }
+}

@@ -1,0 +1,40 @@
+//! Numbers for people: the one place where tables, labels and messages get theirs from.
+
+/// A number with so many decimals. What rounds to nothing has no sign: there is no −0.00.
+pub fn fixed(value: f64, decimals: usize) -> String {
+    unsigned_zero(format!("{value:.decimals$}"))
+}
+
+/// The same with a plus before what is above nothing.
+pub fn signed(value: f64, decimals: usize) -> String {
+    unsigned_zero(format!("{value:+.decimals$}"))
+}
+
+/// A share of 1 in percent, with one decimal.
+pub fn percent(share: f64) -> String {
+    fixed(100.0 * share, 1)
+}
+
+fn unsigned_zero(text: String) -> String {
+    let is_zero = text.chars().all(|c| matches!(c, '+' | '-' | '0' | '.'));
+    if is_zero { text.trim_start_matches(['+', '-']).to_string() } else { text }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_rounds_to_nothing_has_no_sign() {
+        for value in [-0.0, 0.0, -0.004, 0.004, -f64::MIN_POSITIVE] {
+            assert_eq!((fixed(value, 2), signed(value, 2)), ("0.00".to_string(), "0.00".to_string()));
+        }
+        assert_eq!(
+            (fixed(-0.4, 0), signed(-0.4, 0), percent(-0.0004)),
+            ("0".into(), "0".into(), "0.0".into())
+        );
+        assert_eq!((fixed(-0.006, 2), signed(-0.006, 2)), ("-0.01".to_string(), "-0.01".to_string()));
+        assert_eq!((fixed(1.25, 1), signed(1.26, 1)), ("1.2".to_string(), "+1.3".to_string()));
+        assert_eq!((fixed(f64::NAN, 2), signed(-f64::INFINITY, 1)), ("NaN".to_string(), "-inf".to_string()));
+    }
+}
