@@ -3,6 +3,7 @@
 mod args;
 mod audit;
 mod capacity;
+mod choice;
 mod plot;
 mod report;
 mod reproduce;
@@ -13,6 +14,7 @@ use crate::run::capacity_file::CapacityFile;
 use crate::run::data::catalogue::Catalogue;
 use crate::run::data::fetch::{FetchOptions, fetch};
 use crate::run::folder::IfExists;
+use crate::run::one_by_one::{self, Named};
 use crate::run::plan::{PAPER_TOML, Plan};
 use crate::run::robots::{BEST, Selection};
 use crate::run::{
@@ -26,6 +28,7 @@ use crate::view::sheet::{self, SheetError};
 use crate::view::{reporters, summary};
 pub use args::Cli;
 use args::{Command, DataCommand, DatasetArgs, EvalArgs, EvolveArgs, ReplayArgs, SimulateArgs};
+use choice::selected;
 use clap::CommandFactory;
 use clap::builder::{PathBufValueParser, TypedValueParser};
 use std::path::{Path, PathBuf};
@@ -142,15 +145,16 @@ fn run_evolve(args: EvolveArgs, console: &Console) -> Result<(), Error> {
 }
 
 fn run_eval(args: EvalArgs, console: &Console) -> Result<(), Error> {
-    let of_gallery = args.archive.is_empty() && gallery::is_meant(&args.robots)?;
+    let (archives, robots) = (args.archives.archive, selected(args.robots)?.unwrap_or(Selection::All));
+    let of_gallery = archives.is_empty() && gallery::is_meant(&robots)?;
     if of_gallery && args.physical_only {
         let text = "--physical-only: expected robots of an archive, not published ones";
         return Err(Error::usage(text.to_string()).hint("morphcog audit --robots gallery".to_string()));
     }
-    let archives = match args.archive.is_empty() {
+    let archives = match archives.is_empty() {
         true if of_gallery => Vec::new(),
         true => vec![folder::newest_run()?],
-        false => args.archive,
+        false => archives,
     };
     let name = eval::own_name(args.split);
     let beside = || match of_gallery {
@@ -158,9 +162,9 @@ fn run_eval(args: EvalArgs, console: &Console) -> Result<(), Error> {
         false => folder::above(&archives).join(name),
     };
     let out = args.out.unwrap_or_else(beside);
-    let robots = match &args.robots {
+    let robots = match robots {
         Selection::Ids(ids) if of_gallery && ids.iter().any(|id| id == gallery::ALL) => Selection::All,
-        robots => robots.clone(),
+        robots => robots,
     };
     let options = eval::Options {
         robots: robots.physical(args.physical_only),
@@ -191,10 +195,18 @@ fn run_eval(args: EvalArgs, console: &Console) -> Result<(), Error> {
 }
 
 fn run_replay(args: ReplayArgs, console: &Console) -> Result<(), Error> {
-    let ReplayArgs { robot, physical_only, archive, images, dataset, data, format, out, open, .. } = args;
+    let ReplayArgs { physical_only, images, dataset, data, format, out, open, .. } = args;
     let (width, every, fps, look) = (args.width, usize::from(args.every), args.fps, args.look);
     // What is wrong with the file is to be known before the life is lived.
     let named = out.as_deref().map(|path| pictures::Wanted::named(path, &format)).transpose()?;
+    let search = one_by_one::Options {
+        robots: args.robot,
+        archives: args.archive.into_iter().collect(),
+        physical_only,
+        seed: args.seed,
+        data: data.clone(),
+    };
+    let Named { archive, robot } = the_one(&search, console)?;
     let folder = pictures::folder(archive.as_deref(), &robot)?;
     let replay = replay::replay(&replay::Options { robot, physical_only, archive, images, data, dataset })?;
     let wanted = named.unwrap_or_else(|| pictures::Wanted::beside(&folder, &replay.name, &format));
@@ -202,6 +214,29 @@ fn run_replay(args: ReplayArgs, console: &Console) -> Result<(), Error> {
     match made.last().filter(|_| open) {
         Some(path) => open::that(path).map_err(|error| Error::other(format!("cannot open it: {error}"))),
         None => Ok(()),
+    }
+}
+
+/// The robot that is to be watched.
+fn the_one(search: &one_by_one::Options, console: &Console) -> Result<Named, Error> {
+    // What is more than one for certain needs no search.
+    let many = |these: String, first: &str| {
+        let text = format!("--robot: expected one robot to watch, these are {these}");
+        let hint = format!("name one, as in --robot {first}; morphcog plot and report show several");
+        Err(Error::usage(text).hint(hint))
+    };
+    if let Some(count) = search.robots.validated().filter(|&count| count > 1) {
+        return many(format!("up to {count} of each task"), "best-validation:1");
+    }
+    let found = choice::one_by_one(search, console)?;
+    match found.as_slice() {
+        [one] => Ok(one.clone()),
+        several => {
+            let names: Vec<&str> = several.iter().take(5).map(|named| named.robot.as_str()).collect();
+            let more = if several.len() > names.len() { ", …" } else { "" };
+            let these = format!("{} ({}{more})", several.len(), names.join(", "));
+            many(these, names.first().copied().unwrap_or("best"))
+        }
     }
 }
 

@@ -559,6 +559,103 @@ fn a_wrong_scenario_is_refused_with_file_line_and_key() {
     sandbox.run("simulate s.json").ended(3, &["65", "64"]);
 }
 
+// ---- archives and robots ----
+
+/// A sandbox with two finished runs, `a` and `b`, that have few validation images.
+fn with_two_runs() -> Sandbox {
+    let sandbox = Sandbox::tiny();
+    for (run, seed) in [("a", 3), ("b", 4)] {
+        let evolve = format!("evolve -q -c tiny.toml -o {run} --seed {seed} --set validation.images=40");
+        sandbox.run(&evolve).ended(0, &[]);
+    }
+    sandbox
+}
+
+#[test]
+fn several_archives_are_named_in_the_same_way_by_every_command() {
+    let sandbox = with_two_runs();
+    let commands = [
+        "eval -q -n 4 --cycles 1 --robots top:1",
+        "audit -q --robots top:1",
+        "plot -q archive",
+        "plot -q progress",
+        "plot -q body",
+        "report -q --lives 0",
+    ];
+    for command in commands {
+        for archives in ["--archive a b", "--archive a/run.json --archive b", "-a a -a b/run.json"] {
+            sandbox.run(&format!("{command} {archives}")).ended(0, &[]);
+        }
+        sandbox.run(&format!("{command} -a a b a/run.json")).ended(2, &["expected different runs"]);
+        sandbox.run(&format!("{command} -a a none")).ended(3, &["none"]);
+    }
+    let words = |command: &str| {
+        let help = sandbox.run(&format!("{command} --help")).ended(0, &[]).out;
+        let (_, words) =
+            help.split_once("--archive <FILE>...").unwrap_or_else(|| panic!("{command}: {help}"));
+        let words: Vec<&str> = words.split("\n\n").next().unwrap_or_default().split_whitespace().collect();
+        words.join(" ")
+    };
+    for command in ["audit", "plot", "report", "serve"] {
+        let own = words(command);
+        assert!(own.contains("several may follow"), "{own}");
+        assert!(words("eval").starts_with(&own) || own.starts_with(&words("eval")), "{command}: {own}");
+    }
+}
+
+#[test]
+fn robots_are_selected_in_the_same_words_by_every_command() {
+    let sandbox = with_two_runs();
+    let run = sandbox.run_file("a");
+    let [first, second] = [0, 1].map(|place| run.elites[place].id.as_str());
+    let commands = ["eval -q -n 4 --cycles 1", "audit -q", "plot -q body"];
+    for command in commands {
+        for robots in ["best", first, &format!("{first},{second}"), "top:1", "random:2", "best-validation:1"]
+        {
+            for word in ["--robots", "--robot", "--select"] {
+                sandbox.run(&format!("{command} -a a {word} {robots}")).ended(0, &[]);
+            }
+        }
+        sandbox.run(&format!("{command} -a a --robots {first} --robots {second}")).ended(0, &[]);
+        sandbox
+            .run(&format!("{command} -a a --robots best --robots top:1"))
+            .ended(2, &["expected one selection"]);
+    }
+    for command in commands.iter().chain(&["replay"]) {
+        sandbox.run(&format!("{command} -a a --robots worst:3")).ended(2, &["expected all, top:N, random:N"]);
+        sandbox.run(&format!("{command} -a a --robots top:0")).ended(2, &["a number from 1 after the colon"]);
+        sandbox.run(&format!("{command} -a a --robots zzz")).ended(3, &["there is no robot zzz"]);
+    }
+    // A figure each.
+    sandbox.run("plot body -a a --robots all").ended(0, &[]);
+    assert!(run.elites.iter().all(|robot| sandbox.path(&format!("a/plot-body-{}.svg", robot.id)).exists()));
+    sandbox.run("plot body --robots gallery").ended(0, &[]);
+    assert!(["APUKI", "YJTLA"].iter().all(|name| sandbox.path(&format!("plot-body-{name}.svg")).exists()));
+    // Of several archives together.
+    let best = ["a", "b"].map(|run| sandbox.run_file(run).best().unwrap().clone());
+    let fittest = if best[1].objective > best[0].objective { &best[1] } else { &best[0] };
+    let said = sandbox.run("plot body -a a b --robots top:1").ended(0, &[]);
+    assert_eq!(said.out.matches("wrote").count(), 2, "{}", said.out);
+    assert!(said.out.contains(&fittest.id), "{}", said.out);
+}
+
+#[test]
+fn a_command_that_shows_one_robot_says_what_to_do_where_several_are_selected() {
+    let sandbox = with_two_runs();
+    let run = sandbox.run_file("a");
+    for one in ["best", "top:1", "random:1", "best-validation:1", &run.elites[0].id] {
+        sandbox.run(&format!("replay -a a --robot {one} -o walk.png")).ended(0, &[]);
+    }
+    let [first, second] = [0, 1].map(|place| run.elites[place].id.as_str());
+    for many in ["all", "top:2", "random:2", "best-validation:2", &format!("{first},{second}")] {
+        let said = sandbox.run(&format!("replay -a a --robot {many} -o many.png"));
+        said.ended(2, &["--robot: expected one robot", "hint: name one, as in --robot ", "morphcog plot"]);
+    }
+    let said = sandbox.run("replay --robot gallery --dataset builtin -o many.png");
+    said.ended(2, &["expected one robot", "5 (APUKI", "--robot APUKI"]);
+    assert!(!sandbox.path("many.png").exists());
+}
+
 // ---- robots ----
 
 #[test]

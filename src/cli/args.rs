@@ -2,6 +2,7 @@
 
 use super::audit::{self, AuditArgs};
 use super::capacity::{self, CapacityArgs};
+use super::choice::{Archives, ROBOTS};
 use super::plot::{self, PlotArgs};
 use super::report::{self, ReportArgs};
 use super::reproduce::{self, ReproduceArgs};
@@ -34,6 +35,10 @@ pub struct Cli {
     #[arg(long, global = true)]
     pub(super) json: bool,
 }
+
+/// What is said of a robot where one is shown: as of several.
+const ROBOT: &str = "Which robot: best (first on validation images if the run ranked robots by them, else the fittest), an id or the beginning of one; top:1, random:1 or best-validation:1 (of each task) if that is one \
+robot; without --archive also the name of a published robot";
 
 /// What is said of `--set`.
 pub(super) const SET: &str = "Change a key, as in map_elites.parents=10 or stage.2.keep=3 (stages are counted from 1); \
@@ -91,6 +96,7 @@ Examples:
   morphcog replay --robot 3fa --archive runs/zero_one-seed1/run.json --images train:1,test:17
   morphcog replay --robot XFJPI            a robot published with the paper (see morphcog gallery)
   morphcog replay --robot best --format terminal           space pauses, . steps, q quits
+  morphcog replay --robot best-validation:1                the best on validation images
   morphcog replay --robot best -o walk.gif")]
     Replay(ReplayArgs),
     /// Make a figure: SVG and PNG for papers and pages.
@@ -197,9 +203,8 @@ pub(super) struct EvolveArgs {
 
 #[derive(Debug, Args)]
 pub(super) struct EvalArgs {
-    /// The run.json (or its folder), or those of several runs of the same task (default: the newest under runs/).
-    #[arg(short, long, value_name = "FILE", value_parser = run_json(), num_args = 1..)]
-    pub(super) archive: Vec<PathBuf>,
+    #[command(flatten)]
+    pub(super) archives: Archives,
     /// Images in all, evenly divided between the classes.
     #[arg(short = 'n', long, default_value_t = 1000, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pub(super) images: u32,
@@ -207,11 +212,8 @@ pub(super) struct EvalArgs {
     /// and leave the test images unseen.
     #[arg(long, default_value_t = HeldOut::Test, value_name = "SPLIT")]
     pub(super) split: HeldOut,
-    /// all, top:N or random:N (of each task), best-validation:N (the best of each run and task on validation images,
-    /// drawn from the training split), or ids (or beginnings of ids) separated by commas; without --archive also gallery,
-    /// or names of published robots.
-    #[arg(short, long, visible_alias = "select", default_value = "top:10")]
-    pub(super) robots: Selection,
+    #[arg(short, long, visible_aliases = ["robot", "select"], default_value = "top:10", help = ROBOTS)]
+    pub(super) robots: Vec<Selection>,
     /// Validation images in all, for best-validation (default: those of the config, or 400).
     #[arg(long, value_name = "IMAGES", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pub(super) validation: Option<u32>,
@@ -243,10 +245,11 @@ pub(super) struct EvalArgs {
 
 #[derive(Debug, Args)]
 pub(super) struct ReplayArgs {
-    /// Id (or the beginning of one), "best" (first on validation images if the run ranked robots by them, else the fittest), or the
-    /// name of a published robot.
-    #[arg(short, long, default_value = "best")]
-    pub(super) robot: String,
+    #[arg(short, long, visible_aliases = ["robots", "select"], default_value = "best", help = ROBOT)]
+    pub(super) robot: Selection,
+    /// Seed of a robot drawn with random:1.
+    #[arg(long, default_value_t = 1)]
+    pub(super) seed: u64,
     /// Only robots that morphcog audit found physical: "best" is the best of them.
     #[arg(long)]
     pub(super) physical_only: bool,

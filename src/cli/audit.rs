@@ -1,6 +1,7 @@
 //! `morphcog audit`: its words, and what it calls.
 
-use super::run_json;
+use super::choice::{Archives, ROBOTS, selected};
+use crate::run::archive::different;
 use crate::run::audit::{self, Options, Source};
 use crate::run::audit_file::AUDIT_JSON;
 use crate::run::robots::Selection;
@@ -17,7 +18,7 @@ Examples:
   morphcog audit --archive runs/zero_one-seed1/run.json
   morphcog audit --archive runs/zero_one-seed1/run.json --robots top:10
   morphcog audit --archive runs/zero_one-seed1/run.json --robots best-validation:3
-  morphcog audit --archive runs/a/run.json --archive runs/b/run.json
+  morphcog audit --archive runs/zero_one-seed*
   morphcog audit --robots gallery                     the robots published with the paper
   morphcog audit --set perturbations.time_step=[2,4,8] --set threshold=2
 then
@@ -25,13 +26,10 @@ then
 
 #[derive(Debug, Args)]
 pub(super) struct AuditArgs {
-    /// A run.json, or its folder (default: the newest under runs/); may be given several times.
-    #[arg(short, long, value_name = "FILE", value_parser = run_json())]
-    archive: Vec<PathBuf>,
-    /// all, top:N and random:N (of each task; of several archives together), best-validation:N (the best of each run and task on the
-    /// validation images of its config), or ids (or beginnings of ids) separated by commas; or gallery, or names of published robots.
-    #[arg(short, long, visible_alias = "select", default_value = "all")]
-    robots: Selection,
+    #[command(flatten)]
+    archives: Archives,
+    #[arg(short, long, visible_aliases = ["robot", "select"], default_value = "all", help = ROBOTS)]
+    robots: Vec<Selection>,
     /// Seed of robots drawn with random:N.
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -56,14 +54,18 @@ pub(super) struct AuditArgs {
 pub(super) fn run(args: AuditArgs, console: &Console) -> Result<(), Error> {
     let criteria = Criteria::load(args.criteria.as_deref(), &args.set)?;
     let stop = signals::stop_flag()?;
-    let sources = sources(&args)?;
+    let (archives, chosen) = (&args.archives.archive, selected(args.robots.clone())?);
+    let chosen = chosen.unwrap_or(Selection::All);
+    let sources = sources(archives, &chosen)?;
     // Whom to audit is known of all runs before the first life.
-    let asked = match args.archive.is_empty() {
-        true => vec![Some(args.robots.clone())],
+    let asked = match archives.is_empty() {
+        true => vec![Some(chosen)],
         false => {
             let runs: Result<Vec<_>, Error> =
-                args.archive.iter().map(|path| robots::Source::read(path)).collect();
-            args.robots.of_each(&runs?, args.seed)?
+                archives.iter().map(|path| robots::Source::read(path)).collect();
+            let runs = runs?;
+            different(runs.iter().map(|source| (source.path.as_path(), &source.run)))?;
+            chosen.of_each(&runs, args.seed)?
         }
     };
     if sources.len() > 1 && args.out.is_some() {
@@ -121,11 +123,11 @@ fn validated(
 }
 
 /// The archives, or the gallery if that is what the robots are named from.
-fn sources(args: &AuditArgs) -> Result<Vec<Source>, Error> {
-    if !args.archive.is_empty() {
-        return Ok(args.archive.iter().cloned().map(Source::Archive).collect());
+fn sources(archives: &[PathBuf], robots: &Selection) -> Result<Vec<Source>, Error> {
+    if !archives.is_empty() {
+        return Ok(archives.iter().cloned().map(Source::Archive).collect());
     }
-    if gallery::is_meant(&args.robots)? {
+    if gallery::is_meant(robots)? {
         return Ok(vec![Source::Gallery]);
     }
     Ok(vec![Source::Archive(folder::newest_run()?)])

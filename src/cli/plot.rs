@@ -1,8 +1,10 @@
 //! `morphcog plot`: its words, and what it calls.
 
-use super::run_json;
+use super::choice::{self, Archives, ROBOTS, selected};
 use crate::run::Error;
+use crate::run::one_by_one::{self, Named};
 use crate::run::replay::{Options, Shown};
+use crate::run::robots::{BEST, Selection};
 use crate::view::console::Console;
 use crate::view::figures::{self, Kind, Wanted};
 use crate::view::plot::Background;
@@ -16,30 +18,31 @@ Kinds:
   snapshots    poses of its life laid over each other
   sensitivity  by how much each pixel changes its walk
   archive      fitness over muscle, sensor and total voxels
-  progress     QD score, coverage and best fitness; several --archive (seeds) make a band
-  accuracy     what morphcog eval found (eval.json beside run.json)
-  capacity     what morphcog capacity found (capacity.json beside run.json)
+  progress     QD score, coverage and best fitness; several archives (seeds) make a band
+  accuracy     what morphcog eval found (eval.json beside run.json, or named in its place by --archive)
+  capacity     what morphcog capacity found (capacity.json beside run.json, or named in its place by --archive)
+Of several robots or archives, all but progress make a figure each.
 
 Examples:
   morphcog plot archive --archive runs/zero_one-seed1/run.json
   morphcog plot body --robot best --robot 3fa -a runs/zero_one-seed1/run.json
   morphcog plot snapshots --robot YJTLA -o yjtla.svg         a robot published with the paper
   morphcog plot spacetime --images train:1,test:17 -o walk.png --dpi 600
-  morphcog plot progress -a runs/zero_one-seed1/run.json -a runs/zero_one-seed2/run.json
+  morphcog plot body --robot top:3
+  morphcog plot progress --archive runs/zero_one-seed*
   morphcog plot progress --stage 7 -a runs/zero_one_curriculum-seed1";
 
 #[derive(Debug, Args)]
 pub(super) struct PlotArgs {
     /// What to show: body, spacetime, snapshots, sensitivity, archive, progress, accuracy or capacity.
     kind: Kind,
-    /// A run.json, or its folder (default: the newest under runs/); for accuracy and capacity also an eval.json or
-    /// capacity.json; may be given several times.
-    #[arg(short, long, value_name = "FILE", value_parser = run_json())]
-    archive: Vec<PathBuf>,
-    /// Id (or the beginning of one), "best" (first on validation images if the run ranked robots by them, else the fittest), or the
-    /// name of a published robot; may be given several times.
-    #[arg(short, long, value_delimiter = ',')]
-    robot: Vec<String>,
+    #[command(flatten)]
+    archives: Archives,
+    #[arg(short, long, visible_aliases = ["robots", "select"], help = format!("{ROBOTS} [default: best]"))]
+    robot: Vec<Selection>,
+    /// Seed of robots drawn with random:N.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
     /// Only robots that morphcog audit found physical: "best" is the best of them.
     #[arg(long)]
     physical_only: bool,
@@ -70,11 +73,24 @@ pub(super) struct PlotArgs {
 }
 
 pub(super) fn run(args: PlotArgs, console: &Console) -> Result<(), Error> {
-    let PlotArgs { physical_only, images, data, dataset, .. } = args;
+    let PlotArgs { kind, physical_only, images, data, dataset, .. } = args;
+    let archives = args.archives.archive;
+    // What is wrong with the file is to be known before robots are searched for.
+    figures::endings(args.out.as_deref())?;
+    let robots: Vec<Named> = match selected(args.robot)? {
+        Some(_) if !kind.is_of_robot() => return Err(figures::no_robot(kind)),
+        None if !kind.is_of_robot() => Vec::new(),
+        robots => {
+            let robots = robots.unwrap_or(Selection::Ids(vec![BEST.to_string()]));
+            let (archives, data) = (archives.clone(), data.clone());
+            let search = one_by_one::Options { robots, archives, physical_only, seed: args.seed, data };
+            choice::one_by_one(&search, console)?
+        }
+    };
     let wanted = Wanted {
-        kind: args.kind,
-        archives: args.archive,
-        robots: args.robot,
+        kind,
+        archives,
+        robots,
         options: Options { physical_only, images, data, dataset, ..Options::default() },
         stage: args.stage.map(usize::from),
         every: args.every.map_or(0, |steps| steps as usize),

@@ -1,5 +1,6 @@
 //! `morphcog report`: its words, and what it calls.
 
+use super::choice::Archives;
 use super::run_json;
 use crate::base::number;
 use crate::run::report;
@@ -12,17 +13,19 @@ use std::path::PathBuf;
 
 pub(super) const EXAMPLES: &str = "\
 Examples:
-  morphcog report runs/zero_one-seed1
-  morphcog report runs/zero_one-seed* -o seeds.html
-  morphcog report runs/zero_one-seed1 --lives 20 --open
+  morphcog report --archive runs/zero_one-seed1
+  morphcog report --archive runs/zero_one-seed* -o seeds.html
+  morphcog report --archive runs/zero_one-seed1 --lives 20 --open
 
 What lies beside a run.json is part of its report: metrics.csv, eval.json, audit.json, capacity.json. Of several runs, those of
 them together are looked for above their folders.";
 
 #[derive(Debug, Args)]
 pub(super) struct ReportArgs {
-    /// Run folders, or files run.json (default: the newest under runs/).
-    #[arg(value_parser = run_json())]
+    #[command(flatten)]
+    archives: Archives,
+    /// The same without the option's name, as command lines of before have it.
+    #[arg(value_parser = run_json(), hide = true)]
     runs: Vec<PathBuf>,
     /// Robots that can be watched, the fittest of each run; the more, the fewer frames each has (the page stays below
     /// 20 MB).
@@ -40,10 +43,11 @@ pub(super) struct ReportArgs {
 }
 
 pub(super) fn run(args: ReportArgs, console: &Console) -> Result<(), Error> {
-    let archives: Vec<PathBuf> = match args.runs.is_empty() {
-        true => vec![folder::newest_run()?],
-        false => args.runs,
-    };
+    let mut archives = args.archives.archive;
+    archives.extend(args.runs);
+    if archives.is_empty() {
+        archives.push(folder::newest_run()?);
+    }
     let out = args.out.unwrap_or_else(|| folder::above(&archives).join("report.html"));
     folder::writable(&out)?;
     let gathered =

@@ -1,6 +1,6 @@
 //! `morphcog serve`: its words, and what it calls.
 
-use super::run_json;
+use super::choice::Archives;
 use crate::run::serve::{Options, Service};
 use crate::run::{Error, folder, signals};
 use crate::view::console::Console;
@@ -11,16 +11,15 @@ use std::path::PathBuf;
 pub(super) const EXAMPLES: &str = "\
 Examples:
   morphcog serve                                    the published robots, and the newest run if there is one
-  morphcog serve --archive runs/zero_one-seed1/run.json --archive runs/four_digit-seed1/run.json
+  morphcog serve --archive runs/zero_one-seed1 runs/four_digit-seed1
   morphcog serve --port 8080 --no-open              then open http://127.0.0.1:8080/
 
 Only this machine can reach the page. Ctrl-C ends it.";
 
 #[derive(Debug, Args)]
 pub(super) struct ServeArgs {
-    /// A run.json, or its folder, to browse (default: the newest under runs/); may be given several times.
-    #[arg(short, long, value_name = "FILE", value_parser = run_json())]
-    archive: Vec<PathBuf>,
+    #[command(flatten)]
+    archives: Archives,
     /// Folder with the images.
     #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,
@@ -33,7 +32,7 @@ pub(super) struct ServeArgs {
 }
 
 pub(super) fn run(args: ServeArgs, console: &Console) -> Result<(), Error> {
-    let archives = match args.archive {
+    let archives = match args.archives.archive {
         // A page without a run is of use, too: the published robots are there.
         given if given.is_empty() => folder::newest_run().into_iter().collect(),
         given => given,

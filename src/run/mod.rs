@@ -23,6 +23,7 @@ mod hardest;
 pub mod held_out;
 mod keep;
 pub mod metrics;
+pub mod one_by_one;
 mod pair;
 mod physical;
 pub mod plan;

@@ -64,6 +64,10 @@ pub enum Selection {
     Physical(Box<Selection>),
 }
 
+/// What can be read as a selection.
+const EXPECTED: &str = "expected all, top:N, random:N, best-validation:N, or, separated by commas, ids or their beginnings, best, \
+names of published robots or gallery";
+
 impl FromStr for Selection {
     type Err = String;
     fn from_str(text: &str) -> Result<Self, String> {
@@ -77,10 +81,7 @@ impl FromStr for Selection {
             Some(("random", digits)) => count(digits).map(Selection::Random),
             Some(("best-validation", digits)) => count(digits).map(Selection::Validated),
             None if text == "best-validation" => Ok(Selection::Validated(1)),
-            Some(_) => {
-                Err("expected all, top:N, random:N, best-validation:N, or ids separated by commas"
-                    .to_string())
-            }
+            Some(_) => Err(EXPECTED.to_string()),
             None => Ok(Selection::Ids(text.split(',').map(|id| id.trim().to_string()).collect())),
         }
     }

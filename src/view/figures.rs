@@ -6,9 +6,9 @@ use super::{PictureError, write_whole};
 use crate::run::archive::{RunFile, different};
 use crate::run::capacity_file::{CAPACITY_JSON, CapacityFile};
 use crate::run::eval_file::{EVAL_JSON, EvalFile};
+use crate::run::one_by_one::Named;
 use crate::run::plot::Progress;
 use crate::run::replay::{self, Found, Options};
-use crate::run::robots::BEST;
 use crate::run::{Error, folder, gallery, sensitivity};
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -76,8 +76,8 @@ pub struct Wanted {
     pub kind: Kind,
     /// The run.json files; none: the newest under `runs/`.
     pub archives: Vec<PathBuf>,
-    /// The robots; none: "best".
-    pub robots: Vec<String>,
+    /// The robots, of a kind that shows some.
+    pub robots: Vec<Named>,
     /// How to find robots and images; its robot and archive are not looked at.
     pub options: Options,
     /// Of a run's progress, the stage to show alone, from 1.
@@ -104,29 +104,19 @@ struct Made {
 /// What is wrong with the command line or a file, or if a figure cannot be made or written.
 pub fn make(console: &Console, wanted: &Wanted) -> Result<Vec<PathBuf>, Error> {
     let endings = endings(wanted.out.as_deref())?;
-    if !wanted.robots.is_empty() && !wanted.kind.is_of_robot() {
-        let of_robots = Kind::ALL.iter().filter(|(kind, _)| kind.is_of_robot()).map(|(_, name)| *name);
-        let text = format!(
-            "--robot: plot {} shows no single robot; expected with {} only",
-            wanted.kind,
-            of_robots.collect::<Vec<_>>().join(", ")
-        );
-        return Err(Error::usage(text));
-    }
     if wanted.stage.is_some() && wanted.kind != Kind::Progress {
         return Err(Error::usage(format!(
             "--stage: plot {} shows no stages; expected with progress only",
             wanted.kind
         )));
     }
-    let archives = archives(wanted)?;
-    let robots = match wanted.robots.as_slice() {
-        [] => vec![BEST.to_string()],
-        robots => robots.to_vec(),
+    let archives = match wanted.archives.as_slice() {
+        [] if !wanted.kind.is_of_robot() => vec![folder::newest_run()?],
+        archives => archives.to_vec(),
     };
     let count = match wanted.kind {
         Kind::Progress => 1,
-        kind if kind.is_of_robot() => archives.len() * robots.len(),
+        kind if kind.is_of_robot() => wanted.robots.len(),
         _ => archives.len(),
     };
     if count > 1 && wanted.out.is_some() {
@@ -158,7 +148,7 @@ pub fn make(console: &Console, wanted: &Wanted) -> Result<Vec<PathBuf>, Error> {
         Ok(())
     };
     if wanted.kind == Kind::Progress {
-        let paths: Vec<&Path> = archives.iter().flatten().map(PathBuf::as_path).collect();
+        let paths: Vec<&Path> = archives.iter().map(PathBuf::as_path).collect();
         let runs: Vec<RunFile> = paths.iter().map(|path| RunFile::read(path)).collect::<Result<_, _>>()?;
         let named = || paths.iter().copied().zip(&runs);
         different(named())?;
@@ -168,13 +158,16 @@ pub fn make(console: &Console, wanted: &Wanted) -> Result<Vec<PathBuf>, Error> {
         let of_stage = wanted.stage.map_or(String::new(), |stage| format!("stage{stage}"));
         write(Made { figure, stem: stem(paths.first().copied(), wanted.kind, &of_stage) })?;
     } else if wanted.kind.is_of_robot() {
-        for archive in &archives {
-            for robot in &robots {
-                write(of_robot(console, wanted, archive.as_deref(), robot)?)?;
-            }
+        for robot in &wanted.robots {
+            write(of_robot(console, wanted, robot)?)?;
         }
     } else {
-        for path in archives.iter().flatten() {
+        if wanted.kind == Kind::Archive {
+            let runs: Vec<RunFile> =
+                archives.iter().map(|path| RunFile::read(path)).collect::<Result<_, _>>()?;
+            different(archives.iter().map(PathBuf::as_path).zip(&runs))?;
+        }
+        for path in &archives {
             write(Made {
                 figure: of_run(wanted.kind, path)?,
                 stem: stem(Some(path), wanted.kind, &result_name(wanted.kind, path)),
@@ -185,7 +178,10 @@ pub fn make(console: &Console, wanted: &Wanted) -> Result<Vec<PathBuf>, Error> {
 }
 
 /// The formats that a file name asks for.
-fn endings(out: Option<&Path>) -> Result<Vec<&'static str>, Error> {
+///
+/// # Errors
+/// If it is none of a figure.
+pub fn endings(out: Option<&Path>) -> Result<Vec<&'static str>, Error> {
     let Some(path) = out else { return Ok(vec!["svg", "png"]) };
     folder::of_file(path)?;
     match path.extension().map(|ending| ending.to_string_lossy().to_lowercase()).as_deref() {
@@ -206,18 +202,11 @@ fn with_ending(stem: &Path, ending: &str) -> PathBuf {
     PathBuf::from(name)
 }
 
-/// The archives to look at; `None` is the gallery.
-fn archives(wanted: &Wanted) -> Result<Vec<Option<PathBuf>>, Error> {
-    if !wanted.archives.is_empty() {
-        return Ok(wanted.archives.iter().cloned().map(Some).collect());
-    }
-    let published = |robot: &String| Ok(gallery::find(robot)?.is_some());
-    let published: Result<Vec<bool>, Error> = wanted.robots.iter().map(published).collect();
-    let published = published?;
-    if !published.is_empty() && published.iter().all(|is_published| *is_published) {
-        return Ok(vec![None]);
-    }
-    Ok(vec![Some(folder::newest_run()?)])
+/// That a kind of figure shows no robot, where one is named.
+pub fn no_robot(kind: Kind) -> Error {
+    let of_robots = Kind::ALL.iter().filter(|(kind, _)| kind.is_of_robot()).map(|(_, name)| *name);
+    let of_robots = of_robots.collect::<Vec<_>>().join(", ");
+    Error::usage(format!("--robot: plot {kind} shows no single robot; expected with {of_robots} only"))
 }
 
 /// `plot-<kind>[-robot]` beside a run.json, or here.
@@ -226,12 +215,15 @@ fn stem(archive: Option<&Path>, kind: Kind, robot: &str) -> PathBuf {
     archive.map_or_else(|| PathBuf::from(&name), |path| path.with_file_name(&name))
 }
 
-fn of_robot(console: &Console, wanted: &Wanted, archive: Option<&Path>, robot: &str) -> Result<Made, Error> {
-    let options = Options {
-        robot: robot.to_string(),
-        archive: archive.map(Path::to_path_buf),
-        ..wanted.options.clone()
+fn of_robot(console: &Console, wanted: &Wanted, named: &Named) -> Result<Made, Error> {
+    let Named { archive, robot } = named.clone();
+    let options = Options { robot, archive, ..wanted.options.clone() };
+    // Of nobody's archive it is a published one, or of the newest run.
+    let beside = match &options.archive {
+        None if gallery::find(&options.robot)?.is_none() => Some(folder::newest_run()?),
+        given => given.clone(),
     };
+    let archive = beside.as_deref();
     let made = |found: &Found, figure| Made { figure, stem: stem(archive, wanted.kind, &found.name) };
     if wanted.kind == Kind::Body {
         let found = replay::find(&options)?;

@@ -177,7 +177,7 @@ pub(super) fn commands(dossier: &Dossier) -> String {
     if let Some(file) = &found.capacity {
         lines.push(format!("morphcog capacity --eval {eval}{}", settings(file)));
     }
-    lines.push(format!("morphcog report {again}"));
+    lines.push(format!("morphcog report --archive {again}"));
     format!("<pre>{}</pre>\n", escape(&lines.join("\n")))
 }
 

@@ -1,0 +1,52 @@
+//! What commands have in common that take archives, or robots of them: one rule, and the same words of help.
+
+use super::run_json;
+use crate::run::one_by_one::{self, Named};
+use crate::run::robots::Selection;
+use crate::run::{Error, signals};
+use crate::view::console::Console;
+use crate::view::reporters;
+use clap::Args;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+/// Archives, of a command that takes several.
+#[derive(Debug, Args)]
+pub(super) struct Archives {
+    /// A run.json, or its folder; several may follow, and the option may be repeated (default: the newest under runs/).
+    #[arg(short, long, value_name = "FILE", value_parser = run_json(), num_args = 1..)]
+    pub(super) archive: Vec<PathBuf>,
+}
+
+/// What is said of robots, wherever some are chosen.
+pub(super) const ROBOTS: &str = "Which robots: all, top:N or random:N (of each task; of several archives together), \
+best-validation:N (the best of each run and task on validation images), or, separated by commas, ids or beginnings of ids and best (first on \
+validation images if the run ranked robots by them, else the fittest); without --archive also gallery, or names of published robots";
+
+/// The one selection that is meant by those that were given: robots may be named by several.
+pub(super) fn selected(mut given: Vec<Selection>) -> Result<Option<Selection>, Error> {
+    if given.len() < 2 {
+        return Ok(given.pop());
+    }
+    let mut ids = Vec::new();
+    for selection in given {
+        match selection {
+            Selection::Ids(some) => ids.extend(some),
+            _ => {
+                let text = "--robots: expected one selection; only ids and names can be given several times";
+                return Err(Error::usage(text.to_string()));
+            }
+        }
+    }
+    Ok(Some(Selection::Ids(ids)))
+}
+
+/// The robots of a selection, for a command that looks at them one by one.
+pub(super) fn one_by_one(search: &one_by_one::Options, console: &Console) -> Result<Vec<Named>, Error> {
+    // Only a search on validation images is stopped in an orderly way: signals end all else at once.
+    let stop = match search.robots.validated() {
+        Some(_) => signals::stop_flag()?,
+        None => Arc::default(),
+    };
+    one_by_one::named(search, &stop, &reporters::Evaluation::new(console))
+}
