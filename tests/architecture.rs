@@ -278,7 +278,7 @@ fn numbers_for_people_are_made_in_one_place_where_none_is_minus_nothing() {
     let exempt = ["base/number.rs", "run/simulate.rs", "run/metrics.rs"];
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
     for path in sources(&root) {
-        let source = fs::read_to_string(&path).unwrap();
+        let source = std::fs::read_to_string(&path).unwrap();
         let found = own_decimals(&source);
         let is_exempt = exempt.iter().any(|name| path.ends_with(name));
         assert!(is_exempt || found.is_empty(), "{}: base::number has it: {found:?}", path.display());

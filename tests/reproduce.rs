@@ -74,7 +74,7 @@ fn what_cannot_be_is_refused_before_anything_is_done() {
     sandbox.run("reproduce plan.toml --scale 0").ended(2, &["--scale 0"]);
     sandbox.run("reproduce plan.toml --scale nan").ended(2, &["--scale"]);
     sandbox.run("reproduce plan.toml --set seeds=[1,1]").ended(3, &["seeds", "different"]);
-    sandbox.run("reproduce plan.toml --set images=1").ended(3, &["images = 1", "2 or more"]);
+    sandbox.run("reproduce plan.toml --set images=1").ended(3, &["--set images=1: images = 1", "2 or more"]);
     sandbox.run("reproduce plan.toml --set robots=0").ended(3, &["robots"]);
     sandbox.run("reproduce nowhere.toml").ended(3, &["nowhere.toml"]);
     // An override is blamed for what it makes, of an experiment's config, too.

@@ -110,6 +110,12 @@ impl Plan {
                 let seeded = Config { seed, ..config.clone() };
                 seeded.validate().map_err(|error| error.within("seeds"))?;
             }
+            let (images, least) = (self.images, config.classes().len());
+            if images < least {
+                let text =
+                    format!("images = {images}: expected {least} or more, one of each class of {name}");
+                return Err(Error::input(text));
+            }
             experiments.push((name, config));
         }
         Ok(experiments)

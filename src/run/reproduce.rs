@@ -69,14 +69,6 @@ pub fn reproduce(options: &Options, stop: &AtomicBool, observer: &dyn Observer) 
     let plan = options.plan.at(options.scale);
     let job = Job { options, plan: &plan, stop, observer };
     let experiments = plan.experiments()?;
-    for (name, config) in &experiments {
-        let least = config.classes().len();
-        if plan.images < least {
-            let text =
-                format!("images = {}: expected {least} or more, one of each class of {name}", plan.images);
-            return Err(Error::input(text));
-        }
-    }
     let (mut rows, mut capacities) = (Vec::new(), Vec::new());
     for (name, config) in &experiments {
         let Some((found, networks)) = job.experiment(name, config)? else {
