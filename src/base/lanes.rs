@@ -116,11 +116,9 @@ pub trait Lanes:
     fn abs(self) -> Self;
     /// self > other ? self : other (so `other` where one is no number).
     fn max(self, other: Self) -> Self;
-    /// The greater absolute value (`other`'s where self is no number).
-    #[inline(always)]
-    fn max_abs(self, other: Self) -> Self {
-        self.abs().max(other.abs())
-    }
+    /// The greater absolute value; no number where either is none, so that what is no number is not lost in a maximum
+    /// over many. (Without their sign, the bits of numbers are in the order of the numbers, with NaN last.)
+    fn max_abs(self, other: Self) -> Self;
     /// Lanes in which self > other (false where one is no number).
     fn above(self, other: Self) -> Self::Mask;
     /// Where the mask holds `self`, elsewhere `other`.
@@ -166,4 +164,40 @@ pub fn dispatch<K: Kernel>(set: InstructionSet, kernel: K) -> K::Output {
         _ => {}
     }
     kernel.run::<portable::Few>()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    struct MaxAbs([f64; BLOCK], [f64; BLOCK]);
+
+    impl Kernel for MaxAbs {
+        type Output = [f64; BLOCK];
+
+        #[inline(always)]
+        fn run<L: Lanes>(self) -> Self::Output {
+            let mut out = [0.0; BLOCK];
+            for lane in (0..BLOCK).step_by(L::WIDTH) {
+                L::load(&self.0, lane).max_abs(L::load(&self.1, lane)).store(&mut out, lane);
+            }
+            out
+        }
+    }
+
+    #[test]
+    fn max_abs_loses_no_nan_and_is_the_same_on_every_instruction_set() {
+        let values = [0.0, -0.0, 1e-310, -1.0, 1.5, f64::INFINITY, f64::NEG_INFINITY, f64::NAN, -f64::NAN];
+        for set in InstructionSet::ALL.into_iter().filter(|set| set.is_available()) {
+            for a in values {
+                for b in values {
+                    let greatest = if a.is_nan() || b.is_nan() { f64::NAN } else { a.abs().max(b.abs()) };
+                    let found = dispatch(set, MaxAbs([a; BLOCK], [b; BLOCK]));
+                    for lane in found {
+                        assert_eq!(lane.to_bits(), greatest.to_bits(), "{set:?}: {a} and {b}");
+                    }
+                }
+            }
+        }
+    }
 }

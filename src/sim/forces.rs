@@ -38,17 +38,17 @@ impl<L: Lanes> Watch<L> {
         self.stretch = first.max_abs(second).max_abs(self.stretch);
     }
 
-    /// Points that are to be above the floor plane.
+    /// Points that are to be above the floor plane. One that is nowhere (NaN) has springs, which are seen to be irregular.
     #[inline(always)]
     pub fn points(&mut self, y: L) {
         self.depth = (L::splat(0.0) - y).max(self.depth);
     }
 
-    /// Whether all was as it was taken to be.
+    /// Whether all was as it was taken to be; not where a spring's stretch is no number.
     #[inline(always)]
     pub fn regular(self) -> bool {
-        let beyond = self.stretch.above(L::splat(RANGE)) | self.depth.above(L::splat(0.0));
-        !L::any(beyond)
+        let within = L::splat(RANGE.next_up()).above(self.stretch);
+        L::all(within) && !L::any(self.depth.above(L::splat(0.0)))
     }
 }
 

@@ -7,7 +7,7 @@ pub(super) const RANGE: f64 = 1.0 / 64.0;
 
 /// The binomial series of (1 − 1/√(1 + t))/t up to t⁵. Most springs have t near 0, and some bodies amplify what is off
 /// there; so nothing of later terms is spread over these, which would lessen the greatest error and spoil that near 0.
-/// 1 − 1/√(1 + t) is off by no more than 6e-14 anywhere in the range, and by rounding only for |t| < 1/400.
+/// 1 − 1/√(1 + t) is off by no more than 6e-14 anywhere in the range, and by rounding only for |t| up to 1/400.
 pub(super) const TERMS: [f64; 6] =
     [1.0 / 2.0, -3.0 / 8.0, 5.0 / 16.0, -35.0 / 128.0, 63.0 / 256.0, -231.0 / 1024.0];
 
@@ -77,7 +77,7 @@ mod tests {
             let t = 1.0 / 400.0 * f64::from(i) / 1000.0;
             for t in [t, -t, t * 1e-6, -t * 1e-6] {
                 let off = (both([t; BLOCK])[0][0] - exact(t)).abs();
-                assert!(off <= 2.0 * f64::EPSILON * exact(t).abs(), "{t}: {off:e}");
+                assert!(off <= 4.0 * f64::EPSILON * exact(t).abs(), "{t}: {off:e}");
             }
         }
     }

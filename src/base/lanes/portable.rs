@@ -100,6 +100,12 @@ impl Lanes for Few {
     }
 
     #[inline(always)]
+    fn max_abs(self, other: Self) -> Self {
+        let (a, b) = (self.abs(), other.abs());
+        Few(each!(i in [0, 1, 2, 3] => if a.0[i].to_bits() > b.0[i].to_bits() { a.0[i] } else { b.0[i] }))
+    }
+
+    #[inline(always)]
     fn above(self, other: Self) -> Truth {
         Truth(each!(i in [0, 1, 2, 3] => self.0[i] > other.0[i]))
     }

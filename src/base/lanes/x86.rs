@@ -131,6 +131,16 @@ impl Lanes for Four {
     }
 
     #[inline(always)]
+    fn max_abs(self, other: Self) -> Self {
+        let (a, b) = (self.abs().0, other.abs().0);
+        // SAFETY: the processor has the instructions (see the module).
+        unsafe {
+            let greater = _mm256_cmpgt_epi64(_mm256_castpd_si256(a), _mm256_castpd_si256(b));
+            Four(_mm256_blendv_pd(b, a, _mm256_castsi256_pd(greater)))
+        }
+    }
+
+    #[inline(always)]
     fn above(self, other: Self) -> FourTruths {
         // SAFETY: the processor has the instruction (see the module).
         unsafe { FourTruths(_mm256_cmp_pd::<_CMP_GT_OQ>(self.0, other.0)) }
@@ -238,8 +248,11 @@ impl Lanes for Eight {
 
     #[inline(always)]
     fn max_abs(self, other: Self) -> Self {
-        // SAFETY: the processor has the instruction (see the module). Selected: the greater value of the absolute ones.
-        unsafe { Eight(_mm512_range_pd::<0b1011>(self.0, other.0)) }
+        let (a, b) = (self.abs().0, other.abs().0);
+        // SAFETY: the processor has the instruction (see the module).
+        unsafe {
+            Eight(_mm512_castsi512_pd(_mm512_max_epi64(_mm512_castpd_si512(a), _mm512_castpd_si512(b))))
+        }
     }
 
     #[inline(always)]
