@@ -12,13 +12,13 @@ mod serve;
 use crate::base::lanes::InstructionSet;
 use crate::run::capacity_file::CapacityFile;
 use crate::run::data::catalogue::Catalogue;
-use crate::run::data::fetch::{FetchOptions, fetch};
+use crate::run::data::fetch::{FetchError, FetchOptions, fetch};
 use crate::run::folder::IfExists;
 use crate::run::one_by_one::{self, Named};
 use crate::run::plan::{PAPER_TOML, Plan};
 use crate::run::robots::{BEST, Selection};
 use crate::run::{
-    Config, Error, bench, config, data, eval, evolve, folder, gallery, replay, signals, simulate,
+    Config, Error, bench, config, data, error, eval, evolve, folder, gallery, replay, signals, simulate,
 };
 use crate::task::dataset::{Dataset, Split};
 use crate::task::files::places;
@@ -122,6 +122,9 @@ fn run_evolve(args: EvolveArgs, console: &Console) -> Result<(), Error> {
     if !finished.validated.is_empty() {
         summary::validation(console, &finished.validated);
     }
+    if let Some(error) = finished.unwritten {
+        return Err(error);
+    }
     if finished.stopped {
         let done = finished.run.generations;
         let text = match done < finished.run.config.generations {
@@ -181,9 +184,14 @@ fn run_eval(args: EvalArgs, console: &Console) -> Result<(), Error> {
         archives,
     };
     let stop = signals::stop_flag()?;
-    let report = eval::eval(&options, &stop, &reporters::Evaluation::new(console))?;
+    let finished = eval::eval(&options, &stop, &reporters::Evaluation::new(console))?;
+    let eval::Finished { file: report, unwritten } = finished;
     let capacity = CapacityFile::of(&report, &options.out);
-    summary::evaluation(console, &report, capacity.as_ref(), &options.out);
+    let written = unwritten.is_none().then_some(options.out.as_path());
+    summary::evaluation(console, &report, capacity.as_ref(), written);
+    if let Some(error) = unwritten {
+        return Err(error);
+    }
     if report.stopped {
         let text = match report.robots.len() {
             0 => "stopped before the first robot; nothing is written".to_string(),
@@ -268,7 +276,11 @@ fn run_data(command: DataCommand, console: &Console) -> Result<(), Error> {
             let catalogue = Catalogue::named(&dataset).map_err(|error| Error::usage(error.to_string()))?;
             let options = FetchOptions { to, mirror, force };
             let fetched = fetch(&catalogue, &options, &mut reporters::Download::new(console));
-            summary::fetched(console, &fetched.map_err(|error| Error::other(error.to_string()))?);
+            let failed = |error: FetchError| match &error {
+                FetchError::Disk { path, source } if error::is_full(source) => Error::writing(path, source),
+                _ => Error::other(error.to_string()),
+            };
+            summary::fetched(console, &fetched.map_err(failed)?);
         }
         DataCommand::Info(DatasetArgs { dataset, data }) => {
             let found = data::info(&dataset, &given(data.as_deref()));
@@ -286,6 +298,7 @@ fn run_data(command: DataCommand, console: &Console) -> Result<(), Error> {
                 .and_then(|sheet| sheet::write_png(&out, &sheet));
             made.map_err(|error| match error {
                 SheetError::Size { .. } => Error::usage(format!("--samples: {error}")),
+                SheetError::Write { file, source } => Error::writing(&file, &source),
                 error => Error::other(error.to_string()),
             })?;
             console.info(&format!("wrote {}", out.display()));

@@ -1,6 +1,7 @@
 //! The morphcog command.
 
 use clap::Parser;
+use morphcog::base::text::is_unseen;
 use morphcog::cli::{self, Cli};
 use morphcog::run::ErrorKind;
 use morphcog::view::console::{Console, Mode};
@@ -31,11 +32,19 @@ fn main() -> ExitCode {
 
 /// Help, the version, or what is wrong with the command line.
 fn say(help: &clap::Error) -> ExitCode {
+    let code = ExitCode::from(u8::try_from(help.exit_code()).unwrap_or(2));
+    // As names of files that a shell put into the command line.
+    let hides_any = std::env::args_os().any(|argument| argument.to_string_lossy().contains(is_unseen));
+    if help.use_stderr() && hides_any {
+        let text = help.to_string();
+        Console::new(Mode::Human).error(&io::Error::other(text.trim_start_matches("error: ").trim()), None);
+        return code;
+    }
     match help.print() {
         Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
             Console::new(Mode::Human).error(&error, None);
             ExitCode::FAILURE
         }
-        _ => ExitCode::from(u8::try_from(help.exit_code()).unwrap_or(2)),
+        _ => code,
     }
 }

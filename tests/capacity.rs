@@ -160,7 +160,7 @@ fn what_was_found_stays_if_the_next_search_is_stopped_before_it_finds_anything()
         out: sandbox.path("runs/capacity.json"),
         threads: Some(1),
     };
-    let stopped = morphcog::run::capacity::capacity(&options, &AtomicBool::new(true), &Silent).unwrap();
+    let stopped = morphcog::run::capacity::capacity(&options, &AtomicBool::new(true), &Silent).unwrap().file;
     assert!(stopped.stopped && stopped.tasks.is_empty());
     assert_eq!(sandbox.read("runs/capacity.json"), found);
 }

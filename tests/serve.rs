@@ -126,14 +126,20 @@ fn what_is_wrong_is_refused_with_one_line_and_hurts_nothing() {
         refused(&server.send(format!("GET /api/status HTTP/1.1\r\nHost: {host}\r\n\r\n")), 403, "Host");
     }
     refused(&server.send("GET / HTTP/1.1\r\n\r\n"), 400, "Host");
-    refused(&server.send(format!("GET / HTTP/1.1\r\n{own}{own}\r\n")), 400, "Host");
-    let from = |origin: &str| {
+    refused(&server.send(format!("GET / HTTP/1.1\r\n{own}{own}\r\n")), 400, "host");
+    let with = |headers: String| {
         let body = "{\"body\": [[3]]}";
         server.send(format!(
-            "POST /api/body HTTP/1.1\r\n{own}Origin: {origin}\r\nContent-Length: {}\r\n\r\n{body}",
+            "POST /api/body HTTP/1.1\r\n{own}{headers}Content-Length: {}\r\n\r\n{body}",
             body.len()
         ))
     };
+    let from = |origin: &str| with(format!("Origin: {origin}\r\n"));
+    // Two of them: neither is believed.
+    let (ours, others) = (format!("http://127.0.0.1:{port}"), "http://evil.example");
+    for [first, second] in [[&ours, others], [others, &ours], [&ours, &ours]] {
+        refused(&with(format!("Origin: {first}\r\norigin: {second}\r\n")), 400, "origin");
+    }
     for origin in ["http://evil.example", "null", &format!("https://127.0.0.1:{port}"), "http://127.0.0.1"] {
         refused(&from(origin), 403, "Origin");
     }

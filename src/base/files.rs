@@ -41,14 +41,11 @@ pub fn write_atomically(path: &Path, content: &[u8]) -> io::Result<()> {
     let name = path.file_name().filter(|name| name.len() <= 200).unwrap_or_default();
     prefix.extend([name, OsStr::new(".")]);
     let mut builder = tempfile::Builder::new();
-    #[cfg(unix)]
-    {
-        use std::os::unix::fs::PermissionsExt;
-        // What an ordinary file gets (the process's umask still applies), not a temporary file's owner-only.
-        builder.permissions(std::fs::Permissions::from_mode(0o666));
-    }
-    let mut file = builder.prefix(&prefix).suffix(TEMPORARY[1]).tempfile_in(folder)?;
-    file.write_all(content)?;
+    // Opened here: with the permissions of any new file, not a temporary file's owner-only; and so that what the system says
+    // does not name a file that nobody asked for.
+    let open = |name: &Path| File::options().write(true).create_new(true).open(name);
+    let mut file = builder.prefix(&prefix).suffix(TEMPORARY[1]).make_in(folder, open)?;
+    file.as_file_mut().write_all(content)?;
     file.as_file().sync_all()?;
     file.persist(path).map_err(|error| error.error)?;
     sync_folder(folder)
@@ -62,7 +59,10 @@ pub fn check_writable(path: &Path) -> io::Result<()> {
     match std::fs::metadata(path) {
         Ok(found) if found.is_dir() => Err(io::ErrorKind::IsADirectory.into()),
         Ok(found) if !found.is_file() => Ok(()),
-        _ => tempfile::tempfile_in(folder_of(path)).map(|_| ()),
+        _ => {
+            let open = |name: &Path| File::options().write(true).create_new(true).open(name);
+            tempfile::Builder::new().make_in(folder_of(path), open).map(|_| ())
+        }
     }
 }
 
@@ -122,6 +122,21 @@ mod tests {
         assert!(write_atomically(&path, b"new").is_err());
         assert_eq!(std::fs::read(path.join("content")).unwrap(), b"kept");
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn no_error_names_a_temporary_file() {
+        let folder = tempfile::tempdir().unwrap();
+        let nowhere = folder.path().join("none").join("eval.json");
+        let file = folder.path().join("file");
+        std::fs::write(&file, b"").unwrap();
+        for path in [nowhere, file.join("eval.json")] {
+            for error in [write_atomically(&path, b"{}").unwrap_err(), check_writable(&path).unwrap_err()] {
+                let text = error.to_string();
+                assert!(!text.contains("tmp") && !text.contains("none") && !text.contains("path"), "{text}");
+                assert!(error.raw_os_error().is_some(), "what the system says: {text}");
+            }
+        }
     }
 
     #[test]

@@ -1,19 +1,24 @@
 //! [`Grid`]: the only row/column ↔ index arithmetic in the crate.
 
-use serde::{Deserialize, Serialize};
+use serde::de::{DeserializeSeed, Error, SeqAccess, Visitor};
+use serde::{Deserialize, Deserializer, Serialize};
+use std::fmt;
+use std::marker::PhantomData;
 use std::ops::{Index, IndexMut};
 
 /// A dense matrix in row-major order; row 0 is the top row, column 0 the leftmost.
 ///
 /// In files it is a list of rows of equal length.
-#[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(try_from = "Vec<Vec<T>>", into = "Vec<Vec<T>>")]
-#[serde(bound(serialize = "T: Clone + Serialize", deserialize = "T: Deserialize<'de>"))]
+#[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize)]
+#[serde(into = "Vec<Vec<T>>", bound(serialize = "T: Clone + Serialize"))]
 pub struct Grid<T> {
     height: usize,
     width: usize,
     cells: Vec<T>,
 }
+
+/// Most cells of a grid in a file: many times what a body, a stimulus or a drawing has.
+const MOST_CELLS: usize = 1 << 20;
 
 /// Why rows do not make a [`Grid`].
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -21,6 +26,9 @@ pub enum GridError {
     /// There is no cell at all.
     #[error("expected at least one row with at least one cell, found none")]
     Empty,
+    /// There are more cells than any grid in a file needs.
+    #[error("expected at most {MOST_CELLS} cells")]
+    TooLarge,
     /// A row is longer or shorter than the first.
     #[error("row {row} has {found} cells, expected {expected} as in row 0")]
     Ragged {
@@ -132,10 +140,70 @@ impl<T> IndexMut<(usize, usize)> for Grid<T> {
     }
 }
 
-impl<T> TryFrom<Vec<Vec<T>>> for Grid<T> {
-    type Error = GridError;
-    fn try_from(rows: Vec<Vec<T>>) -> Result<Self, GridError> {
-        Grid::from_rows(rows)
+impl<'de, T: Deserialize<'de>> Deserialize<'de> for Grid<T> {
+    /// Cell by cell, so that rows without end are refused before they fill the memory.
+    fn deserialize<D: Deserializer<'de>>(reader: D) -> Result<Self, D::Error> {
+        reader.deserialize_seq(Rows(PhantomData))
+    }
+}
+
+/// Reads the rows of a grid.
+struct Rows<T>(PhantomData<T>);
+
+impl<'de, T: Deserialize<'de>> Visitor<'de> for Rows<T> {
+    type Value = Grid<T>;
+
+    fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.write_str("a list of rows of equal length")
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, mut rows: A) -> Result<Grid<T>, A::Error> {
+        let (mut cells, mut height, mut width) = (Vec::new(), 0, 0);
+        while let Some(found) = rows.next_element_seed(Row(&mut cells))? {
+            if height == 0 {
+                width = found;
+            }
+            if found != width {
+                return Err(A::Error::custom(GridError::Ragged { row: height, found, expected: width }));
+            }
+            if found == 0 {
+                return Err(A::Error::custom(GridError::Empty));
+            }
+            height += 1;
+        }
+        if height == 0 {
+            return Err(A::Error::custom(GridError::Empty));
+        }
+        Ok(Grid { height, width, cells })
+    }
+}
+
+/// Reads a row behind the cells of others; its length.
+struct Row<'c, T>(&'c mut Vec<T>);
+
+impl<'de, T: Deserialize<'de>> DeserializeSeed<'de> for Row<'_, T> {
+    type Value = usize;
+    fn deserialize<D: Deserializer<'de>>(self, reader: D) -> Result<usize, D::Error> {
+        reader.deserialize_seq(self)
+    }
+}
+
+impl<'de, T: Deserialize<'de>> Visitor<'de> for Row<'_, T> {
+    type Value = usize;
+
+    fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.write_str("a row, a list of cells")
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, mut row: A) -> Result<usize, A::Error> {
+        let before = self.0.len();
+        while let Some(cell) = row.next_element()? {
+            if self.0.len() == MOST_CELLS {
+                return Err(A::Error::custom(GridError::TooLarge));
+            }
+            self.0.push(cell);
+        }
+        Ok(self.0.len() - before)
     }
 }
 
@@ -173,5 +241,21 @@ mod tests {
         let text = serde_json::to_string(&grid).unwrap();
         assert_eq!(text, "[[[0,0],[0,1]],[[1,0],[1,1]]]");
         assert_eq!(serde_json::from_str::<Grid<(usize, usize)>>(&text).unwrap(), grid);
+    }
+
+    #[test]
+    fn rows_in_files_are_checked_as_others_and_rows_without_end_are_refused() {
+        let error = |text: &str| serde_json::from_str::<Grid<u8>>(text).unwrap_err().to_string();
+        assert!(error("[[1,2],[3]]").contains("row 1 has 1 cells, expected 2"));
+        assert!(error("[[1],[3,4]]").contains("row 1 has 2 cells, expected 1"));
+        for empty in ["[]", "[[]]", "[[],[]]"] {
+            assert!(error(empty).contains("found none"), "{empty}");
+        }
+        assert!(error("[[1],[300]]").contains("300") && error("7").contains("a list of rows"));
+        for endless in
+            [format!("[{}", "[0],".repeat(MOST_CELLS + 1)), format!("[[{}", "0,".repeat(MOST_CELLS + 1))]
+        {
+            assert!(error(&endless).contains("at most 1048576 cells"), "before its end");
+        }
     }
 }

@@ -1,4 +1,4 @@
-//! Floor 0: what every room stands on (index arithmetic, random generators, hashes, numbers as text).
+//! Floor 0: what every room stands on (index arithmetic, random generators, hashes, files, numbers and lines as text).
 
 pub mod clock;
 pub mod files;
@@ -7,5 +7,6 @@ pub mod hash;
 pub mod lanes;
 pub mod number;
 pub mod random;
+pub mod text;
 
 pub use grid::Grid;

@@ -93,6 +93,9 @@ pub(super) fn run(args: AuditArgs, console: &Console) -> Result<(), Error> {
         };
         let finished = audit::audit(&options, &stop, &reporters::Audit::new(console))?;
         verdicts::audit(console, &finished, &options.out);
+        if let Some(error) = finished.unwritten {
+            return Err(error);
+        }
         if finished.stopped {
             let text = format!("stopped; {} robots are audited and saved", finished.file.robots.len());
             return Err(Error::stopped(text).hint("the same command goes on".to_string()));

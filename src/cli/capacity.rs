@@ -61,11 +61,14 @@ pub(super) fn run(args: CapacityArgs, console: &Console) -> Result<(), Error> {
         eval,
     };
     let stop = signals::stop_flag()?;
-    let file = capacity::capacity(&options, &stop, &reporters::Capacity::new(console))?;
-    networks::capacity(console, &file, &options.out);
+    let finished = capacity::capacity(&options, &stop, &reporters::Capacity::new(console))?;
+    let capacity::Finished { file, unwritten } = finished;
+    networks::capacity(console, &file, unwritten.is_none().then_some(options.out.as_path()));
+    if let Some(error) = unwritten {
+        return Err(error);
+    }
     if !file.tasks.is_empty() {
-        let made = networks::figure(&file, &options.out);
-        let [svg, png] = made.map_err(|error| Error::other(error.to_string()))?;
+        let [svg, png] = networks::figure(&file, &options.out)?;
         console.line(&format!("wrote {} and {}", svg.display(), png.display()));
     }
     if file.stopped {

@@ -58,9 +58,8 @@ pub(super) fn run(args: ReportArgs, console: &Console) -> Result<(), Error> {
         let counter = console.counter("living lives for the page:", content.count() as u64, "lives");
         content.page(&|lived| counter.update(lived))
     };
-    let failed = |error: crate::view::PictureError| Error::other(error.to_string());
-    let page = page.map_err(failed)?;
-    write_whole(&out, page.as_bytes()).map_err(failed)?;
+    let page = page?;
+    write_whole(&out, page.as_bytes())?;
     console.line(&format!("wrote {} ({} MB)", out.display(), number::fixed(page.len() as f64 / 1e6, 1)));
     match args.open {
         true => open::that(&out).map_err(|error| Error::other(format!("cannot open it: {error}"))),

@@ -55,8 +55,11 @@ pub(super) fn run(args: ReproduceArgs, console: &Console) -> Result<(), Error> {
         return Err(Error::stopped(text).hint("the same command goes on".to_string()));
     }
     networks::table(console, &finished);
+    if let Some(error) = finished.unwritten {
+        return Err(error);
+    }
     for (path, file) in &finished.capacities {
-        let made = networks::figure(file, path).map_err(|error| Error::other(error.to_string()))?;
+        let made = networks::figure(file, path)?;
         console.line(&format!("wrote {}", made[1].display()));
     }
     Ok(())

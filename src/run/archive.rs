@@ -117,6 +117,9 @@ pub struct RunFile {
     pub stats: ArchiveStats,
     /// The elites, in the order of their cells.
     pub elites: Vec<Robot>,
+    /// SHA-256 of the bytes of the file that it was read from; none of a run that was not read from its file.
+    #[serde(skip)]
+    pub read_sha256: Option<String>,
 }
 
 impl RunFile {
@@ -136,10 +139,18 @@ impl RunFile {
     pub fn parse(text: &str, name: &str) -> Result<Self, Error> {
         let run: RunFile = super::toml_text::read_versioned(text, name, FORMAT, FORMAT_VERSION)?;
         run.check().map_err(|error| error.within(name))?;
-        Ok(run)
+        Ok(RunFile { read_sha256: Some(sha256_hex(text.as_bytes())), ..run })
     }
 
-    fn check(&self) -> Result<(), Error> {
+    /// Whether it is a run that this program can have made, wherever it was read.
+    ///
+    /// # Errors
+    /// What is wrong with it; without the name of the file.
+    pub(super) fn check(&self) -> Result<(), Error> {
+        if self.format != FORMAT || self.format_version > FORMAT_VERSION {
+            let text = format!("format: expected {FORMAT}, format_version up to {FORMAT_VERSION}");
+            return Err(Error::input(text));
+        }
         self.config.validate()?;
         if self.dimensions != Dimensions::of(&self.config)? {
             return Err(Error::input("dimensions: they are not those of the config".to_string()));
@@ -263,9 +274,9 @@ impl RunFile {
         format!("{head}\n{}\n]}}\n", lines.join(",\n"))
     }
 
-    /// What identifies its content: SHA-256 in hexadecimal digits.
+    /// What identifies it: SHA-256 of the bytes of its file, or of those that would be written, in hexadecimal digits.
     pub fn fingerprint(&self) -> String {
-        sha256_hex(self.to_json().as_bytes())
+        self.read_sha256.clone().unwrap_or_else(|| sha256_hex(self.to_json().as_bytes()))
     }
 
     /// `elites.csv`: what pyribs' `ArchiveDataFrame` reads. `index`: cell; `objective`; `measures_i`: voxel counts (and
@@ -320,4 +331,36 @@ pub fn different<'a>(runs: impl IntoIterator<Item = (&'a Path, &'a RunFile)>) ->
         known.push((path, run));
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::run::samples;
+
+    #[test]
+    fn a_run_is_identified_by_the_bytes_of_its_file() {
+        let mut run = samples::run(&[("a", 1.5), ("b", -0.25)]);
+        run.elites.iter_mut().for_each(|robot| robot.id = robot.genome.id());
+        let text = run.to_json();
+        let read = |text: &str| RunFile::parse(text, "run.json").unwrap();
+        // As it is written, so it is known to whoever made it.
+        assert_eq!(read(&text).fingerprint(), run.fingerprint());
+        // What says the same in other bytes is another file, and its hash is the one that sha256sum says.
+        for other in [text.replace("1.5", "1.50"), format!("{text}\n"), format!("\u{feff}{text}")] {
+            assert_ne!(other, text);
+            assert_eq!(read(&other).to_json(), text);
+            assert_eq!(read(&other).fingerprint(), sha256_hex(other.as_bytes()));
+        }
+        // But no other run.
+        let twice = [(Path::new("a.json"), &read(&text)), (Path::new("b.json"), &read(&format!("{text}\n")))];
+        assert!(different(twice).is_err());
+    }
+
+    #[test]
+    fn an_empty_archive_is_told_with_its_file() {
+        let source = crate::run::robots::Source { path: "runs/a/run.json".into(), run: samples::run(&[]) };
+        let error = crate::run::robots::Selection::All.of(&[source], 1).unwrap_err();
+        assert!(error.message.starts_with("runs/a/run.json: "), "{error}");
+    }
 }

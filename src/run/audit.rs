@@ -5,6 +5,7 @@ use super::audit_file::{AUDIT_JSON, AuditFile, RobotAudit};
 use super::folder::check_out;
 use super::robots::{self, Selection};
 use super::training::{Training, load_dataset_of, see};
+use super::unwritten::Unwritten;
 use super::verdict::{Behaviour, Criteria, PerturbedLife};
 use super::whereabouts::Whereabouts;
 use super::{Config, Error, eval, gallery};
@@ -74,6 +75,8 @@ pub struct Finished {
     pub asked: Vec<String>,
     /// Whether a signal stopped it before the last of them.
     pub stopped: bool,
+    /// Why what was found is not, or not as a whole, in its file, if so.
+    pub unwritten: Option<Error>,
 }
 
 /// A robot to be audited.
@@ -124,6 +127,7 @@ pub fn audit(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> R
     observer.started(open.len(), open.iter().map(|subject| 1 + trial.perturbations(subject).len()).sum());
     let pool = eval::pool(options.threads)?;
     let done = AtomicU64::new(0);
+    let mut unwritten = Unwritten::default();
     for batch in open.chunks(BATCH) {
         let found: Vec<Option<RobotAudit>> = pool.install(|| {
             batch.par_iter().map(|subject| trial.robot(subject, stop, &done, observer)).collect()
@@ -140,13 +144,13 @@ pub fn audit(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> R
         // Another audit of the same run may have written meanwhile.
         file.add_known(&options.out);
         file.robots.sort_by_key(|robot| order.iter().position(|id| *id == robot.id));
-        file.write(&options.out)?;
+        unwritten.tried(file.write(&options.out).map(|_| ()), |text| observer.warning(text));
         if stopped {
-            return Ok(Finished { file, asked, stopped });
+            return Ok(Finished { file, asked, stopped, unwritten: unwritten.error() });
         }
     }
-    file.write(&options.out)?;
-    Ok(Finished { file, asked, stopped: false })
+    unwritten.tried(file.write(&options.out).map(|_| ()), |text| observer.warning(text));
+    Ok(Finished { file, asked, stopped: false, unwritten: unwritten.error() })
 }
 
 type Opened = (Config, Criterion, Training, Vec<Subject>, Vec<String>, AuditFile);
@@ -183,7 +187,7 @@ fn open(options: &Options) -> Result<Opened, Error> {
             let run = &source.run;
             check_out(&options.out, path, AUDIT_JSON)?;
             let whereabouts = Whereabouts::given(data).and_of(path);
-            let training = training_of(run, &whereabouts)?;
+            let training = training_of(run, path, &whereabouts)?;
             // A stage may have shown images otherwise than the protocol says, which is what is judged.
             let is_known = run.follows_protocol() && training.images == run.training_images;
             let subject = |robot: &Robot| Subject {
@@ -208,7 +212,7 @@ fn open(options: &Options) -> Result<Opened, Error> {
 }
 
 /// The images a run's robots were evolved on, of each class the first few. Of other data, verdicts would mean nothing.
-fn training_of(run: &RunFile, whereabouts: &Whereabouts) -> Result<Training, Error> {
+fn training_of(run: &RunFile, path: &Path, whereabouts: &Whereabouts) -> Result<Training, Error> {
     let dataset = load_dataset_of(Some(&run.dataset), &run.config, whereabouts, &[Split::Train])?;
     let mut taken = [0; 256];
     let mut images = run.training_images.clone();
@@ -217,7 +221,10 @@ fn training_of(run: &RunFile, whereabouts: &Whereabouts) -> Result<Training, Err
         *taken += 1;
         *taken <= IMAGES_PER_CLASS
     });
-    let see = |image: &super::training::ImageRef| see(&run.config, &dataset, Split::Train, image.index);
+    let see = |image: &super::training::ImageRef| {
+        let seen = see(&run.config, &dataset, Split::Train, image.index);
+        seen.map_err(|error| error.within("training_images").within(&path.display().to_string()))
+    };
     let (dataset, stimuli) = (run.dataset.clone(), images.iter().map(see).collect::<Result<Vec<_>, Error>>());
     // As in a test, every life is lived under the same conditions, however the robot was trained.
     let conditions = Vec::new();

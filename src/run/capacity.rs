@@ -9,6 +9,7 @@ use super::folder::{RUN_JSON, check_out};
 use super::held_out::HeldOut;
 use super::statistics::standard_deviation;
 use super::trainings::Trainings;
+use super::unwritten::Unwritten;
 use super::{Error, audit_file::AuditFile, eval, gallery};
 use crate::base::files::write_atomically;
 use crate::base::hash::sha256_hex;
@@ -38,6 +39,15 @@ pub struct Options {
     pub threads: Option<usize>,
 }
 
+/// How it ended.
+#[derive(Clone, Debug)]
+pub struct Finished {
+    /// The content of capacity.json.
+    pub file: CapacityFile,
+    /// Why that, or what was trained, is not, or not as a whole, in its file, if so.
+    pub unwritten: Option<Error>,
+}
+
 /// Who is told how it goes.
 pub trait Observer: Sync {
     /// Before the first training: so many in all, so many of them known from before.
@@ -52,11 +62,7 @@ pub trait Observer: Sync {
 ///
 /// # Errors
 /// What is wrong with the evaluation, the data or the settings.
-pub fn capacity(
-    options: &Options,
-    stop: &AtomicBool,
-    observer: &dyn Observer,
-) -> Result<CapacityFile, Error> {
+pub fn capacity(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Result<Finished, Error> {
     let report = EvalFile::read(&options.eval)?;
     let name = options.eval.display();
     let Some(setting) = &report.setting else {
@@ -140,6 +146,7 @@ pub fn capacity(
         stopped: false,
         tasks: Vec::new(),
     };
+    let [mut unkept, mut unwritten] = <[Unwritten; 2]>::default();
     'tasks: for split in splits {
         let of_task: Vec<f64> =
             robots.iter().filter(|robot| robot.task == split.name()).map(|robot| robot.accuracy).collect();
@@ -166,20 +173,20 @@ pub fn capacity(
                 let trained = trained?;
                 if !trained.is_empty() {
                     known.extend(&key, size, &trained);
-                    known.write()?;
+                    unkept.tried(known.write(), |text| observer.warning(text));
                 }
                 points.push(point(size, &known.of(&key, size)[..config.trainings]));
             }
             curves.push(curve_of(kind, points, accuracy));
         }
         file.tasks.push(TaskCapacity { task: split.name(), robots: of_task.len(), accuracy, curves });
-        write(options, &file)?;
+        unwritten.tried(write(options, &file), |text| observer.warning(text));
     }
     // What was found before is better than nothing.
     if !file.tasks.is_empty() {
-        write(options, &file)?;
+        unwritten.tried(write(options, &file), |text| observer.warning(text));
     }
-    Ok(file)
+    Ok(Finished { file, unwritten: unwritten.error().or(unkept.error()) })
 }
 
 fn point(size: usize, trained: &[(f64, usize)]) -> Point {

@@ -29,6 +29,19 @@ pub struct Checkpoint {
     pub relatives: Relatives,
 }
 
+impl Checkpoint {
+    /// As strict as a `run.json` is read: what goes on from here becomes one.
+    fn check(&self) -> Result<(), Error> {
+        self.run.check().map_err(|error| error.within("run"))?;
+        match self.run.elites.iter().find(|robot| !self.known_bodies.0.contains(&robot.body.key())) {
+            Some(robot) => {
+                Err(Error::input(format!("known_bodies: expected the body of elite {} among them", robot.id)))
+            }
+            None => Ok(()),
+        }
+    }
+}
+
 /// Content keys of bodies. In files one text of 32 hexadecimal digits each, in ascending order.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]
@@ -103,9 +116,23 @@ pub fn read(folder: &Path, mut warn: impl FnMut(String)) -> Result<Option<Checkp
     }
 }
 
+/// Puts the checkpoint before into the place of a broken newest one, which would push it out when the next is written.
+///
+/// # Errors
+/// If it cannot be renamed.
+pub(super) fn take_back(folder: &Path) -> Result<(), Error> {
+    let [newest, previous] = NAMES.map(|name| folder.join(name));
+    let renamed = std::fs::rename(&previous, &newest).and_then(|()| sync_folder(folder));
+    renamed.map_err(|error| Error::writing(&newest, &error))
+}
+
 fn read_one(path: &Path) -> Result<Option<Checkpoint>, Error> {
     let Some(content) = content(path)? else { return Ok(None) };
-    toml_text::read_json(&content, &path.display().to_string()).map(Some)
+    let name = path.display().to_string();
+    // The checksum is the second line's, the text the file's second.
+    let checkpoint: Checkpoint = toml_text::read_json(&content, &name)?;
+    checkpoint.check().map_err(|error| error.within(&name))?;
+    Ok(Some(checkpoint))
 }
 
 /// What a checkpoint file holds, if its checksum is right; `None` if there is no such file.
@@ -133,7 +160,11 @@ mod tests {
     fn after(generations: u64) -> Checkpoint {
         let mut known_bodies = KnownBodies::default();
         (0..generations).for_each(|n| assert!(known_bodies.insert([n as u8; 16])));
-        let run = RunFile { generations, ..samples::run(&[("a", 1.5), ("b", -0.25)]) };
+        let mut run = RunFile { generations, ..samples::run(&[("a", 1.5), ("b", -0.25)]) };
+        for robot in &mut run.elites {
+            robot.id = robot.genome.id();
+            known_bodies.insert(robot.body.key());
+        }
         Checkpoint {
             run,
             totals: Totals { evaluations: 20 * generations, ..Totals::default() },
@@ -185,6 +216,34 @@ mod tests {
     }
 
     #[test]
+    fn a_checkpoint_is_checked_as_strictly_as_a_run_and_errors_name_it() {
+        let folder = tempfile::tempdir().unwrap();
+        let folder = folder.path();
+        write(folder, &after(1)).unwrap();
+        type Spoil = fn(&mut Checkpoint);
+        let spoilt: [(&str, Spoil); 6] = [
+            ("voxel counts", |saved| saved.run.elites[1].voxels.muscle += 1),
+            ("id", |saved| saved.run.elites[0].id = "0123456789".to_string()),
+            ("cell", |saved| saved.run.elites[1].cell = saved.run.elites[0].cell.clone()),
+            ("dimensions", |saved| saved.run.dimensions.possible_cells += 1),
+            ("format", |saved| saved.run.format_version += 1),
+            ("known_bodies", |saved| saved.known_bodies = KnownBodies::default()),
+        ];
+        for (word, spoil) in spoilt {
+            let mut wrong = after(2);
+            spoil(&mut wrong);
+            write(folder, &wrong).unwrap();
+            let error = read_one(&folder.join(NAMES[0])).unwrap_err();
+            assert!(error.message.contains(NAMES[0]) && error.message.contains(word), "{error}");
+            // The one before, which is good, is gone on from.
+            assert_eq!(read_quietly(folder), (Some(after(1)), true), "{word}");
+            std::fs::remove_file(folder.join(NAMES[1])).unwrap();
+            write(folder, &after(1)).unwrap();
+            std::fs::remove_file(folder.join(NAMES[1])).unwrap();
+        }
+    }
+
+    #[test]
     fn a_write_that_fails_leaves_a_good_checkpoint() {
         let folder = tempfile::tempdir().unwrap();
         let folder = folder.path();
@@ -211,7 +270,8 @@ mod tests {
 
     #[test]
     fn known_bodies_survive_their_text_form_and_other_texts_are_refused() {
-        let known = after(5).known_bodies;
+        let mut known = KnownBodies::default();
+        (0..5).for_each(|n| assert!(known.insert([n; 16])));
         let text = String::from(known.clone());
         assert_eq!(text.len(), 5 * 32);
         assert_eq!(KnownBodies::try_from(text.clone()), Ok(known));

@@ -14,6 +14,7 @@ use crate::qd::EmitterParams;
 use crate::sim::Physics;
 use crate::task::builtin::BuiltinDigits;
 use crate::task::evaluation::Savings;
+use crate::task::files::check_name;
 use crate::task::grouping::Grouping;
 use crate::task::protocol::{MAX_COLUMN, Protocol};
 use crate::task::stimulus::StimulusParams;
@@ -292,6 +293,7 @@ impl Config {
         self.grouping()?;
         self.physics.validate().map_err(|error| Error::input(format!("physics.{error}")))?;
         self.stimulus.validate().map_err(|error| Error::input(format!("stimulus: {error}")))?;
+        check_name(&self.data.dataset).map_err(|error| Error::input(format!("data.dataset: {error}")))?;
         self.data.builtin.check().map_err(|error| Error::input(format!("data.builtin: {error}")))?;
         for (key, side) in [("body.height", self.body.height), ("body.width", self.body.width)] {
             if side == 0 || side > MAX_SIDE {

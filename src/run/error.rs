@@ -1,6 +1,8 @@
 //! [`Error`]: what a command fails with, and the exit code it means.
 
+use crate::base::text::one_line;
 use std::fmt;
+use std::io;
 use std::path::Path;
 
 /// Kinds of failure; each has an exit code of its own.
@@ -39,7 +41,7 @@ impl ErrorKind {
 pub struct Error {
     /// What kind of failure it is.
     pub kind: ErrorKind,
-    /// One line for the user.
+    /// One line for the user, whatever the files and names in it hold (see [`one_line`]).
     pub message: String,
     /// What to do about it.
     pub hint: Option<String>,
@@ -47,7 +49,7 @@ pub struct Error {
 
 impl Error {
     fn new(kind: ErrorKind, message: String) -> Self {
-        Error { kind, message, hint: None }
+        Error { kind, message: one_line(&message), hint: None }
     }
 
     /// A file the user gave is wrong.
@@ -81,28 +83,43 @@ impl Error {
     }
 
     /// A file the user gave cannot be read.
-    pub fn reading(path: &Path, error: &std::io::Error) -> Self {
+    pub fn reading(path: &Path, error: &io::Error) -> Self {
         Error::input(format!("{}: cannot be read: {error}", path.display()))
     }
 
-    /// A file cannot be written.
-    pub fn writing(path: &Path, error: &std::io::Error) -> Self {
-        Error::other(format!("{}: cannot be written: {error}", path.display()))
+    /// A file cannot be written; if there is no room for it, with what to do.
+    pub fn writing(path: &Path, error: &io::Error) -> Self {
+        let place = match path.parent() {
+            Some(folder) if !folder.as_os_str().is_empty() => folder,
+            _ => Path::new("."),
+        };
+        let full = match error.kind() {
+            io::ErrorKind::FileTooLarge => "raise the limit for the size of files (ulimit -f)".to_string(),
+            _ => format!("make space on the disk that {} is on", place.display()),
+        };
+        let text = Error::other(format!("{}: cannot be written: {error}", path.display()));
+        if is_full(error) { text.hint(format!("{full}, or write elsewhere with --out")) } else { text }
     }
 
     /// The same with what to do.
     #[must_use]
     pub fn hint(mut self, hint: String) -> Self {
-        self.hint = Some(hint);
+        self.hint = Some(one_line(&hint));
         self
     }
 
     /// The same with where it is.
     #[must_use]
     pub fn within(mut self, place: &str) -> Self {
-        self.message = format!("{place}: {}", self.message);
+        self.message = one_line(&format!("{place}: {}", self.message));
         self
     }
+}
+
+/// Whether there is no room: on the disk, in the user's quota, or in a file of the size that the system allows.
+pub fn is_full(error: &io::Error) -> bool {
+    use io::ErrorKind::{FileTooLarge, QuotaExceeded, StorageFull};
+    matches!(error.kind(), StorageFull | QuotaExceeded | FileTooLarge)
 }
 
 impl fmt::Display for Error {

@@ -6,6 +6,7 @@ use super::eval_images::HeldOutImages;
 use super::held_out::HeldOut;
 use super::robots::{Chosen, Selection, Source};
 use super::training::load_dataset_of;
+use super::unwritten::Unwritten;
 use super::validation::{self, Validated};
 use super::whereabouts::Whereabouts;
 use super::{Config, Error, folder::check_out, gallery};
@@ -75,11 +76,20 @@ impl Observer for () {
     fn warning(&self, _text: &str) {}
 }
 
+/// An evaluation's end.
+#[derive(Clone, Debug)]
+pub struct Finished {
+    /// The content of eval.json.
+    pub file: EvalFile,
+    /// Why that is not, or not as a whole, in its file, if so.
+    pub unwritten: Option<Error>,
+}
+
 /// Evaluates robots; results are written after every robot, so that stopping keeps what is finished.
 ///
 /// # Errors
 /// What is wrong with archive, data or selection.
-pub fn eval(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Result<EvalFile, Error> {
+pub fn eval(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Result<Finished, Error> {
     if !(options.threshold >= 0.0 && options.threshold.is_finite()) {
         return Err(Error::usage(format!(
             "--threshold {}: expected 0 or more voxel lengths",
@@ -168,7 +178,7 @@ pub fn eval(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Re
             )?
             else {
                 report.stopped = true;
-                return Ok(report);
+                return Ok(Finished { file: report, unwritten: None });
             };
             best.into_iter().unzip()
         }
@@ -178,6 +188,7 @@ pub fn eval(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Re
     let mut scores = scores.into_iter();
     let mut left = robots.len();
     report.stopped = left > 0;
+    let mut unwritten = Unwritten::default();
     for Chosen { source, robot } in robots {
         let Some(split) = task_of(&grouping, robot) else { continue };
         let Some((displacements, simulated)) = walker.lives(robot, &shown.stimuli) else { break };
@@ -188,9 +199,9 @@ pub fn eval(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Re
         let (validation, of_trial) = (scores.next(), RobotReport::new(&trial, displacements, simulated));
         report.robots.push(RobotReport { run: source, validation, ..of_trial });
         report.conclude();
-        write(options, &report)?;
+        unwritten.tried(write(options, &report), |text| observer.warning(text));
     }
-    Ok(report)
+    Ok(Finished { file: report, unwritten: unwritten.error() })
 }
 
 /// So many threads; `None`: one per core.

@@ -72,7 +72,10 @@ impl<'a> HeldOutImages<'a> {
         let choice = seen(&self.pixel_images()?)?;
         // In another dataset, a run's training images are other ones.
         let is_own = self.dataset.name() == self.config.data.dataset;
-        let of_runs = sources.iter().map(|source| seen(&source.run.training_images));
+        let of_runs = sources.iter().map(|source| {
+            let path = source.path.display().to_string();
+            seen(&source.run.training_images).map_err(|error| error.within("training_images").within(&path))
+        });
         let of_runs = is_own.then(|| of_runs.collect::<Result<Vec<_>, Error>>()).transpose()?;
         let shown = self.stimuli.iter().zip(&self.images);
         let shown: Vec<Labelled> =

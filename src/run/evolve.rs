@@ -16,7 +16,7 @@ use super::start::{Start, StartRef};
 use super::training::Training;
 use super::variation::{Lessons, Mutations};
 use super::whereabouts::{self, Whereabouts};
-use super::{Error, eval, held_out, resume, validation};
+use super::{Error, ErrorKind, eval, held_out, resume, validation};
 use crate::base::files::write_atomically;
 use crate::body::Body;
 use crate::genome::GenomeError;
@@ -91,12 +91,12 @@ pub fn evolve(
         let (path, missing) = (folder.path().join(folder::METRICS).display().to_string(), metrics.missing);
         observer.warning(&format!("{path}: {missing} of {} generations are missing in it", run.generation));
     }
-    pool.install(|| run.live(start, &folder, &mut metrics, stop, observer))?;
-    metrics.flush()?;
-    let file = run.save(&folder)?;
-    let totals = run.totals();
+    pool.install(|| run.live(start, &folder, &mut metrics, stop, observer)).map_err(goes_on)?;
+    let unwritten = metrics.flush().and_then(|()| run.save(&folder)).err().map(goes_on);
+    let (file, totals) = (run.file(), run.totals());
     let is_whole = run.generation >= config.generations;
-    let chooses = is_whole && config.validation.best > 0 && !file.elites.is_empty();
+    // Those of a run that is not in its file would be chosen from another.
+    let chooses = is_whole && unwritten.is_none() && config.validation.best > 0 && !file.elites.is_empty();
     let validated = match chooses {
         true => {
             let archive = folder.path().join(folder::RUN_JSON);
@@ -105,7 +105,18 @@ pub fn evolve(
         false => Some(Vec::new()),
     };
     let stopped = !is_whole || validated.is_none();
-    Ok(Finished { run: file, totals, validated: validated.unwrap_or_default(), stopped })
+    Ok(Finished { run: file, totals, validated: validated.unwrap_or_default(), stopped, unwritten })
+}
+
+/// An error, if it is one of a full disk, with how to go on when there is space again.
+fn goes_on(error: Error) -> Error {
+    match &error.hint {
+        Some(hint) if error.kind == ErrorKind::Other => {
+            let hint = format!("{hint}; with --resume the same command goes on from the last checkpoint");
+            error.hint(hint)
+        }
+        _ => error,
+    }
 }
 
 /// A run under way.

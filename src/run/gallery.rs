@@ -149,6 +149,7 @@ pub fn source(data: Option<&Path>, dataset: Option<&str>) -> Result<Source, Erro
         stats: Archive::<Robot>::new().stats(1, 0.0),
         elites,
         config,
+        read_sha256: None,
     };
     Ok(Source { path: PathBuf::from(ALL), run })
 }

@@ -127,7 +127,7 @@ pub fn subject(options: &Options) -> Result<Subject, Error> {
             .hint("morphcog data fetch mnist, or --dataset builtin for digits the program draws".to_string()),
         false => error,
     };
-    let mut shown = options.images.clone();
+    let (asks, mut shown) = (!options.images.is_empty(), options.images.clone());
     if shown.is_empty() {
         let own = if options.dataset.is_none() { found.training.as_slice() } else { &[] };
         let all = match own {
@@ -151,8 +151,11 @@ pub fn subject(options: &Options) -> Result<Subject, Error> {
     let dataset = load_dataset_of(own, config, &whereabouts, &wanted).map_err(offer)?;
     let mut images = Vec::new();
     for Shown { split, index } in shown {
-        let label =
-            dataset.label(split, index).map_err(|error| Error::usage(format!("--images: {error}")))?;
+        let label = dataset.label(split, index).map_err(|error| match (&options.archive, asks) {
+            (_, true) => Error::usage(format!("--images: {error}")),
+            (Some(path), _) => Error::input(format!("{}: training_images: {error}", path.display())),
+            (None, _) => Error::input(format!("training_images: {error}")),
+        })?;
         images.push((format!("{label} ({split} {index})"), see(config, &dataset, split, index)?));
     }
     config.data.dataset = dataset.name().to_string();

@@ -103,7 +103,7 @@ pub fn gather(
             false => None,
         };
         let whereabouts = Whereabouts::given(data).and_of(path);
-        let images = if with_lives { images(&run, &whereabouts)? } else { Vec::new() };
+        let images = if with_lives { images(&run, path, &whereabouts)? } else { Vec::new() };
         let findings = Findings::read(folder, &[&run], warn);
         runs.push(Dossier { path: path.clone(), run, progress, findings, images });
     }
@@ -119,7 +119,7 @@ pub fn gather(
 }
 
 /// The training images, or one of each class if they are many.
-fn images(run: &RunFile, whereabouts: &Whereabouts) -> Result<Vec<(String, Grid<f64>)>, Error> {
+fn images(run: &RunFile, path: &Path, whereabouts: &Whereabouts) -> Result<Vec<(String, Grid<f64>)>, Error> {
     let hint = |error: Error| match &error.hint {
         None => error.hint("or --lives 0 for a report without moving pictures".to_string()),
         Some(_) => error,
@@ -137,7 +137,9 @@ fn images(run: &RunFile, whereabouts: &Whereabouts) -> Result<Vec<(String, Grid<
     }
     let one = |image: &ImageRef| {
         let label = format!("{} (train {})", image.label, image.index);
-        Ok((label, see(&run.config, &dataset, Split::Train, image.index)?))
+        let seen = see(&run.config, &dataset, Split::Train, image.index);
+        let seen = seen.map_err(|error| error.within("training_images").within(&path.display().to_string()));
+        Ok((label, seen?))
     };
     shown.iter().map(one).collect()
 }

@@ -56,6 +56,8 @@ pub struct Finished {
     pub capacities: Vec<(PathBuf, CapacityFile)>,
     /// Whether a signal stopped it.
     pub stopped: bool,
+    /// Why the table is not, or not as a whole, in its files, if so.
+    pub unwritten: Option<Error>,
 }
 
 /// Does what of a plan is not done yet; what was done by an earlier, interrupted call stays.
@@ -72,13 +74,16 @@ pub fn reproduce(options: &Options, stop: &AtomicBool, observer: &dyn Observer) 
     let (mut rows, mut capacities) = (Vec::new(), Vec::new());
     for (name, config) in &experiments {
         let Some((found, networks)) = job.experiment(name, config)? else {
-            return Ok(Finished { rows, files: Vec::new(), capacities, stopped: true });
+            return Ok(Finished { rows, files: Vec::new(), capacities, stopped: true, unwritten: None });
         };
         rows.extend(found);
         capacities.extend(networks);
     }
-    let files = table::write(&options.out, options.scale, &rows)?;
-    Ok(Finished { rows, files, capacities, stopped: false })
+    let (files, unwritten) = match table::write(&options.out, options.scale, &rows) {
+        Ok(files) => (files, None),
+        Err(error) => (Vec::new(), Some(error)),
+    };
+    Ok(Finished { rows, files, capacities, stopped: false, unwritten })
 }
 
 /// Chosen robots, and by task how many are physical of how many that were audited.
@@ -123,7 +128,8 @@ impl Job<'_> {
             out: self.options.out.join(format!("{name}-capacity.json")),
             threads: self.options.threads,
         };
-        let file = capacity::capacity(&options, self.stop, &*self.observer.capacity())?;
+        let finished = capacity::capacity(&options, self.stop, &*self.observer.capacity())?;
+        let file = written(finished.file, finished.unwritten)?;
         if file.stopped {
             return Ok(None);
         }
@@ -154,7 +160,8 @@ impl Job<'_> {
                 _ => error,
             };
             let evolved = evolve::evolve(&options, self.stop, &mut *self.observer.evolution());
-            if evolved.map_err(otherwise)?.stopped {
+            let evolved = evolved.map_err(otherwise)?;
+            if written(evolved.stopped, evolved.unwritten)? {
                 return Ok(None);
             }
             sources.push(Source::read(&out.join(RUN_JSON))?);
@@ -219,10 +226,11 @@ impl Job<'_> {
                 threads: self.options.threads,
             };
             let finished = audit::audit(&options, self.stop, &*self.observer.audit())?;
+            let file = written(finished.file, finished.unwritten)?;
             if finished.stopped {
                 return Ok(None);
             }
-            files.insert(number, finished.file);
+            files.insert(number, file);
         }
         let verdict = |chosen: &Chosen| Some(files.get(&chosen.source)?.robot(&chosen.robot.id)?.verdict);
         Ok(Some(robots.iter().map(verdict).collect()))
@@ -261,9 +269,21 @@ impl Job<'_> {
             return Ok(Some(known));
         }
         self.observer.step(&format!("{name}: {} robots on {} test images", chosen.len(), self.plan.images));
-        let report = eval::eval(&options, self.stop, &*self.observer.evaluation())?;
+        let finished = eval::eval(&options, self.stop, &*self.observer.evaluation())?;
+        let report = written(finished.file, finished.unwritten)?;
         let is_whole = !report.stopped && !self.stop.load(Ordering::Relaxed);
         Ok(is_whole.then_some(report))
+    }
+}
+
+/// What later steps read from its file, which must be there.
+fn written<T>(found: T, unwritten: Option<Error>) -> Result<T, Error> {
+    match unwritten {
+        None => Ok(found),
+        Some(error) => {
+            let hint = error.hint.clone().map_or(String::new(), |hint| format!("{hint}; "));
+            Err(error.hint(format!("{hint}the same command goes on")))
+        }
     }
 }
 

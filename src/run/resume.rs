@@ -23,12 +23,20 @@ pub(super) fn saved(
     folder: &RunFolder,
     config: &Config,
     dataset: &Dataset,
-    warn: impl FnMut(String),
+    mut warn: impl FnMut(String),
 ) -> Result<Option<Checkpoint>, Error> {
     let place = folder.path().display().to_string();
-    match checkpoint::read(folder.path(), warn)? {
+    let mut is_newest_broken = false;
+    let tell = |text| {
+        is_newest_broken = true;
+        warn(text);
+    };
+    match checkpoint::read(folder.path(), tell)? {
         Some(saved) => {
             compatible(&saved, config, dataset).map_err(|error| error.within(&place))?;
+            if is_newest_broken {
+                checkpoint::take_back(folder.path())?;
+            }
             Ok(Some(saved))
         }
         None if folder.path().join(RUN_JSON).exists() => {

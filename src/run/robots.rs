@@ -140,7 +140,7 @@ impl Selection {
         // Stable: equally fit ones stay in the order of their runs and cells.
         fittest.sort_by(|a, b| b.robot.objective.total_cmp(&a.robot.objective));
         if fittest.is_empty() {
-            let names: Vec<&str> = sources.iter().map(|source| source.run.name.as_str()).collect();
+            let names: Vec<String> = sources.iter().map(|source| source.path.display().to_string()).collect();
             return Err(Error::input(format!("{}: the archive is empty", names.join(", "))));
         }
         self.among(fittest, sources, seed)

@@ -40,5 +40,6 @@ pub fn run(robots: &[(&str, f64)]) -> RunFile {
         stats: Archive::<Robot>::new().stats(1, 0.0),
         elites: robots.iter().enumerate().map(robot).collect(),
         config,
+        read_sha256: None,
     }
 }

@@ -7,7 +7,7 @@ use super::metrics::Totals;
 use super::start::StartRef;
 use super::training::Training;
 use super::validation::Validated;
-use super::{Config, eval};
+use super::{Config, Error, eval};
 use crate::qd::ArchiveStats;
 use std::path::PathBuf;
 
@@ -70,6 +70,8 @@ pub struct Finished {
     pub validated: Vec<Validated>,
     /// Whether a signal stopped it before its end: its last generation, and the choice of robots after that.
     pub stopped: bool,
+    /// Why its end is not, or not as a whole, in its files, if so; it goes on from its last checkpoint.
+    pub unwritten: Option<Error>,
 }
 
 impl Finished {

@@ -6,8 +6,9 @@ use crate::base::files::{read_text, write_atomically};
 use crate::body::Body;
 use crate::sim::{Lattice, Physics, Start, World};
 use crate::task::protocol::MAX_COLUMN;
-use serde::Deserialize;
-use serde::de::IgnoredAny;
+use serde::de::{Error as _, IgnoredAny, SeqAccess, Visitor};
+use serde::{Deserialize, Deserializer};
+use std::fmt;
 use std::path::Path;
 
 /// A body, what it sees, and for how long. The keys of a reference trajectory are understood too; its results are
@@ -20,6 +21,7 @@ pub struct Scenario {
     /// One stimulus for the whole life: H × W in [0, 1].
     stimulus: Option<Grid<f64>>,
     /// Or several, each shown for `switch_every` control steps, again from the first after the last.
+    #[serde(default, deserialize_with = "bounded")]
     stimuli: Option<Vec<Grid<f64>>>,
     switch_every: Option<u64>,
     /// Whether the robot goes back to its initial state at every switch.
@@ -49,6 +51,53 @@ pub struct Scenario {
     _displacement: IgnoredAny,
     #[serde(default, rename = "displacement_voxels_shifted_world")]
     _displacement_shifted: IgnoredAny,
+}
+
+/// Most memory that stimuli may need \[bytes\].
+const MOST_STIMULI: usize = 128 << 20;
+
+/// Reads stimuli as long as they need no more memory than [`MOST_STIMULI`].
+fn bounded<'de, D: Deserializer<'de>>(reader: D) -> Result<Option<Vec<Grid<f64>>>, D::Error> {
+    struct Stimuli;
+    impl<'de> Visitor<'de> for Stimuli {
+        type Value = Vec<Grid<f64>>;
+        fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
+            f.write_str("a list of stimuli")
+        }
+        fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<Self::Value, A::Error> {
+            let (mut stimuli, mut bytes) = (Vec::new(), 0);
+            while let Some(stimulus) = list.next_element::<Grid<f64>>()? {
+                // The pixels and their allocation, and the place in the list, which grows by doubling.
+                bytes += stimulus.area() * size_of::<f64>() + 16 + 2 * size_of::<Grid<f64>>();
+                if bytes > MOST_STIMULI {
+                    let (count, pixels) = (stimuli.len(), stimulus.area());
+                    let (most, each) = (MOST_STIMULI >> 20, if pixels == 1 { "pixel" } else { "pixels" });
+                    return Err(A::Error::custom(format!(
+                        "expected stimuli that need at most {most} MB of memory: {count} of {pixels} {each} do"
+                    )));
+                }
+                stimuli.push(stimulus);
+            }
+            Ok(stimuli)
+        }
+    }
+    struct Perhaps;
+    impl<'de> Visitor<'de> for Perhaps {
+        type Value = Option<Vec<Grid<f64>>>;
+        fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
+            f.write_str("a list of stimuli")
+        }
+        fn visit_none<E>(self) -> Result<Self::Value, E> {
+            Ok(None)
+        }
+        fn visit_unit<E>(self) -> Result<Self::Value, E> {
+            Ok(None)
+        }
+        fn visit_some<D: Deserializer<'de>>(self, reader: D) -> Result<Self::Value, D::Error> {
+            reader.deserialize_seq(Stimuli).map(Some)
+        }
+    }
+    reader.deserialize_option(Perhaps)
 }
 
 fn paper_column() -> i64 {
@@ -242,5 +291,22 @@ mod tests {
         assert!(refused("{\"body\": [[3]], \"stimulus\": [[1.5]]}").contains("expected 0 to 1"));
         assert!(refused("{\"body\": [[3]], \"stimuli\": [[[1]]]}").contains("switch_every"));
         assert!(refused("{\"body\": [[3]], \"start_row\": 1}").contains("start_row"));
+        assert!(refused("{\"body\": [[3]], \"stimuli\": 7}").contains("a list"));
+        let null = Scenario::parse("{\"body\": [[3]], \"stimuli\": null}", "scenario.json").unwrap();
+        assert!(null.stimuli().is_empty());
+    }
+
+    #[test]
+    fn stimuli_are_bounded_by_the_memory_that_they_need() {
+        // As a file of 240 MB: forty million of them took 3.7 GB. Refused while it is read: this one has no end.
+        let many = 2_000_000;
+        let text = format!("{{\"body\": [[3]], \"switch_every\": 1, \"stimuli\": [{}", "[[1]],".repeat(many));
+        let error = Scenario::parse(&text, "scenario.json").unwrap_err().message;
+        assert!(error.starts_with("scenario.json:1: stimuli") && error.contains("128 MB"), "{error}");
+        let some = format!(
+            "{{\"body\": [[3]], \"switch_every\": 1, \"stimuli\": [{}[[1]]]}}",
+            "[[1]],".repeat(99_999)
+        );
+        assert_eq!(Scenario::parse(&some, "scenario.json").unwrap().control_steps(), 100_000);
     }
 }

@@ -142,12 +142,21 @@ pub(super) struct StoredSplit {
     pub fingerprint: String,
 }
 
+/// Whether a dataset can have a name: that of a folder.
+///
+/// # Errors
+/// [`FilesError::Name`] if not.
+pub fn check_name(name: &str) -> Result<(), FilesError> {
+    let allowed = |c: char| c.is_ascii_alphanumeric() || "-_.".contains(c);
+    match name.is_empty() || name.starts_with('.') || !name.chars().all(allowed) {
+        true => Err(FilesError::Name(name.to_string())),
+        false => Ok(()),
+    }
+}
+
 /// The place that is used: the first given one, or else the default; its path is the folder with the files.
 pub(super) fn choose(name: &str, given: &[Place]) -> Result<Place, FilesError> {
-    let allowed = |c: char| c.is_ascii_alphanumeric() || "-_.".contains(c);
-    if name.is_empty() || name.starts_with('.') || !name.chars().all(allowed) {
-        return Err(FilesError::Name(name.to_string()));
-    }
+    check_name(name)?;
     Ok(match given.first() {
         Some(place) => {
             let own = place.path.join(name);

@@ -3,6 +3,7 @@
 
 use super::console::{Console, Mode, lock};
 use super::progress::{Pacer, Progress, count_line};
+use crate::base::text::one_line;
 use indicatif::ProgressBar;
 use serde::Serialize;
 use std::sync::Mutex;
@@ -29,9 +30,9 @@ impl<'c> Line<'c> {
         let seconds = self.begin.elapsed().as_secs_f64();
         if let Some(line) = &self.moving {
             line.set_position(done);
-            line.set_message(text(seconds));
+            line.set_message(one_line(&text(seconds)));
         } else if self.console.mode() == Mode::Human && self.is_due(done, seconds) {
-            self.console.err(&format!("{}\n", text(seconds)));
+            self.console.err(&format!("{}\n", one_line(&text(seconds))));
         }
     }
 

@@ -3,11 +3,15 @@
 pub use super::bar::{Bar, Counter, Live};
 pub use super::progress::Progress;
 use super::table;
+use crate::base::text::{is_unseen, one_line, shortened};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde::Serialize;
 use std::error::Error;
 use std::io::{self, IsTerminal, Write};
 use std::sync::{Mutex, MutexGuard, PoisonError};
+
+/// Most characters of a cell of a table.
+const CELL: usize = 120;
 
 /// For whom the console writes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -85,11 +89,12 @@ impl Console {
         lock(&self.streams).lost
     }
 
-    /// A line of results, to stdout.
+    /// A line of results, to stdout. Like all that people are told, it shows control characters and line breaks, which can
+    /// only come from a file or its name, and obeys none.
     pub fn line(&self, text: &str) {
         match self.mode {
             Mode::Json => self.event("result", &Text { text }),
-            _ => self.out(&format!("{text}\n")),
+            _ => self.out(&format!("{}\n", one_line(text))),
         }
     }
 
@@ -107,7 +112,13 @@ impl Console {
         }
         match self.mode {
             Mode::Json => self.event("table", &Table { headers, rows }),
-            _ => self.out(&(table::align(headers, rows).join("\n") + "\n")),
+            _ => {
+                let headers: Vec<String> = headers.iter().map(|text| shortened(text, CELL)).collect();
+                let headers: Vec<&str> = headers.iter().map(String::as_str).collect();
+                let cells = |row: &Vec<String>| row.iter().map(|text| shortened(text, CELL)).collect();
+                let rows: Vec<Vec<String>> = rows.iter().map(cells).collect();
+                self.out(&(table::align(&headers, &rows).join("\n") + "\n"));
+            }
         }
     }
 
@@ -125,13 +136,18 @@ impl Console {
             Some(fields) => format!(",{fields}"),
             None => format!(",\"value\":{payload}}}"),
         };
+        // Valid JSON that a terminal may take for a command all the same stands in texts only, where it may be written so.
+        let fields: String = match fields.contains(is_unseen) {
+            true => fields.chars().map(in_json).collect(),
+            false => fields,
+        };
         self.out(&format!("{{\"event\":{name}{fields}\n"));
     }
 
     /// A note to people, to stderr (JSON: an event).
     pub fn info(&self, text: &str) {
         match self.mode {
-            Mode::Human => self.err(&format!("{text}\n")),
+            Mode::Human => self.err(&format!("{}\n", one_line(text))),
             Mode::Quiet => {}
             Mode::Json => self.event("info", &Text { text }),
         }
@@ -139,27 +155,27 @@ impl Console {
 
     /// A warning, to stderr, in every mode.
     pub fn warning(&self, text: &str) {
-        self.err(&format!("{} {text}\n", self.paint("warning:", "1;33")));
+        self.err(&format!("{} {}\n", self.paint("warning:", "1;33"), one_line(text)));
     }
 
     /// An error with its causes and perhaps what to do, to stderr, in every mode. A cause that the line above it
     /// already tells is left out.
     pub fn error(&self, error: &(dyn Error + 'static), hint: Option<&str>) {
         let mut told = error.to_string();
-        let mut text = format!("{} {told}\n", self.paint("error:", "1;31"));
+        let mut text = format!("{} {}\n", self.paint("error:", "1;31"), one_line(&told));
         let mut causes = Vec::new();
         let mut source = error.source();
         while let Some(cause) = source {
             let words = cause.to_string();
             if !told.contains(&words) {
-                text += &format!("  caused by: {words}\n");
+                text += &format!("  caused by: {}\n", one_line(&words));
                 told = words.clone();
                 causes.push(words);
             }
             source = cause.source();
         }
         if let Some(hint) = hint {
-            text += &format!("{} {hint}\n", self.paint("hint:", "1"));
+            text += &format!("{} {}\n", self.paint("hint:", "1"), one_line(hint));
         }
         self.err(&text);
         self.event(
@@ -239,6 +255,15 @@ impl Console {
         if let Some(line) = lock(&self.line).take() {
             line.finish_and_clear();
         }
+    }
+}
+
+/// A character of a JSON text, as an escape if it is not to be seen.
+fn in_json(c: char) -> String {
+    let mut units = [0; 2];
+    match is_unseen(c) {
+        true => c.encode_utf16(&mut units).iter().map(|unit| format!("\\u{unit:04x}")).collect(),
+        false => c.to_string(),
     }
 }
 
@@ -334,6 +359,33 @@ pub(super) mod tests {
         let events: Vec<&str> = lines.iter().map(|l| l["event"].as_str().unwrap()).collect();
         assert_eq!(events, ["generation", "list", "done", "result", "table", "info", "error"]);
         assert_eq!((&lines[1]["value"][1], &lines[3]["text"]), (&2.into(), &"a\nb".into()));
+    }
+
+    #[test]
+    fn nothing_that_stands_in_files_commands_the_terminal_or_forges_a_line() {
+        let evil = "id\x1b]0;x\x07\x1b[31m\u{9b}2J\r\nwarning: forged\u{202e}";
+        for mode in [Mode::Human, Mode::Quiet, Mode::Json] {
+            let (console, out, err) = console(mode);
+            console.line(evil);
+            console.info(evil);
+            console.warning(evil);
+            console.error(&crate::run::Error::input(evil.to_string()), Some(evil));
+            console.error(&std::io::Error::other(evil), None);
+            console.table(&["robot", evil], &[vec![evil.to_string(), "x".repeat(100_000)]]);
+            console.event("robot", &serde_json::json!({ "id": evil, "of": "\u{e0041}" }));
+            console.counter(evil, 3, evil).update(3);
+            let (out, err) = (out.read(), err.read());
+            for text in [&out, &err] {
+                assert!(text.chars().all(|c| c == '\n' || !is_unseen(c)), "{text:?}");
+                assert!(text.lines().all(|line| !line.starts_with("warning: forged")), "{text}");
+                assert!(text.lines().all(|line| line.len() < 6000) || mode == Mode::Json, "{}", text.len());
+            }
+            if mode == Mode::Json {
+                let last = out.lines().rfind(|line| line.contains("\"robot\"")).unwrap();
+                let last: serde_json::Value = serde_json::from_str(last).unwrap();
+                assert_eq!((&last["id"], &last["of"]), (&evil.into(), &"\u{e0041}".into()));
+            }
+        }
     }
 
     #[test]

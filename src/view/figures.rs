@@ -302,7 +302,7 @@ fn result_name(kind: Kind, path: &Path) -> String {
 fn failed(error: PictureError) -> Error {
     match error {
         PictureError::Figure { .. } => Error::usage(format!("--dpi: {error}")),
-        error => Error::other(error.to_string()),
+        error => error.into(),
     }
 }
 

@@ -39,6 +39,7 @@ mod wobble;
 pub use stage::Stage;
 pub use walk::Walk;
 
+use crate::run::Error;
 use std::path::{Path, PathBuf};
 
 /// Why there is no picture.
@@ -75,6 +76,21 @@ pub enum PictureError {
         /// What the system said.
         source: std::io::Error,
     },
+}
+
+impl From<PictureError> for Error {
+    fn from(error: PictureError) -> Self {
+        match error {
+            PictureError::Write { path, source } => {
+                let error = Error::writing(&path, &source);
+                match error.hint {
+                    Some(_) => error,
+                    None => error.hint("check that the folder exists and is writable".to_string()),
+                }
+            }
+            error => Error::other(error.to_string()),
+        }
+    }
 }
 
 /// Writes a file in one go: into a temporary file of the same folder, then renamed, so that a reader sees the whole

@@ -10,10 +10,10 @@ use crate::run::published;
 use crate::run::reproduce::Finished;
 use std::path::{Path, PathBuf};
 
-/// The table: task, accuracy and capacity, the paper's beside ours.
-pub fn capacity(console: &Console, file: &CapacityFile, out: &Path) {
+/// The table: task, accuracy and capacity, the paper's beside ours; `out` is the file, if it was written.
+pub fn capacity(console: &Console, file: &CapacityFile, out: Option<&Path>) {
     if console.mode() == Mode::Json {
-        let written = (!file.tasks.is_empty()).then(|| out.display().to_string());
+        let written = out.filter(|_| !file.tasks.is_empty()).map(|out| out.display().to_string());
         let done = serde_json::json!({ "file": written, "stopped": file.stopped, "tasks": file.tasks });
         return console.event("capacity", &done);
     }
@@ -46,7 +46,9 @@ pub fn capacity(console: &Console, file: &CapacityFile, out: &Path) {
         "images of the training split"
     };
     console.line(&format!("{}; early stopping waits on {waits}", file.selected));
-    console.line(&format!("wrote {} and {}", out.display(), out.with_extension("csv").display()));
+    if let Some(out) = out {
+        console.line(&format!("wrote {} and {}", out.display(), out.with_extension("csv").display()));
+    }
 }
 
 /// The paper's table: each task with its robots, their accuracy (0 to 1) and their capacity as far as it is known, the
@@ -144,6 +146,9 @@ pub fn table(console: &Console, finished: &Finished) {
         "paper's",
     ];
     console.table(&headers, &rows.collect::<Vec<_>>());
+    if finished.files.is_empty() {
+        return;
+    }
     let files: Vec<String> = finished.files.iter().map(|file| file.display().to_string()).collect();
     console.line(&format!("wrote {}", files.join(" and ")));
 }

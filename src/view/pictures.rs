@@ -130,7 +130,7 @@ pub fn folder(archive: Option<&Path>, robot: &str) -> Result<PathBuf, Error> {
 pub fn make(console: &Console, replay: &Replay, wanted: &Wanted) -> Result<Vec<PathBuf>, Error> {
     let failed = |error: PictureError| match error {
         PictureError::Size { .. } => Error::usage(format!("--width: {error}")),
-        error => Error::other(error.to_string()),
+        error => error.into(),
     };
     let mut made = Vec::new();
     let recording = &replay.recording;

@@ -1,7 +1,7 @@
 //! Plays a recording in the terminal: the robot's own speed, keys to pause and step, and the terminal as it was at the end.
 
 use super::Walk;
-use super::console::Console;
+use super::console::{Console, Mode};
 use super::terminal::{self, Depth};
 use crate::run::{Error, signals};
 use crossterm::event::{self, Event, KeyCode, KeyEventKind, KeyModifiers};
@@ -73,7 +73,10 @@ pub fn play(console: &Console, walk: &Walk) -> Result<(), Error> {
     let depth = Depth::of(console.has_colour(), &variable("COLORTERM"), &variable("TERM"));
     let Some(mut live) = console.live() else {
         let (columns, rows) = view(USUAL, false);
-        console.line(&terminal::frame(walk, walk.len() - 1, columns, rows, depth));
+        match console.mode() {
+            Mode::Json => console.line(&terminal::frame(walk, walk.len() - 1, columns, rows, Depth::Plain)),
+            _ => console.text(&(terminal::frame(walk, walk.len() - 1, columns, rows, depth) + "\n")),
+        }
         return Ok(());
     };
     let stop = signals::stop_flag()?;

@@ -89,10 +89,8 @@ pub fn evolution(console: &Console, finished: &Finished, out: &Path) {
             .warning("the archive is empty: no robot has walked yet and been as fit as the config wants");
     }
     let archive = out.join(RUN_JSON);
-    console.info(&format!(
-        "next: morphcog replay --robot best --archive {0}\n      morphcog eval --archive {0}",
-        in_shell(&archive)
-    ));
+    console.info(&format!("next: morphcog replay --robot best --archive {}", in_shell(&archive)));
+    console.info(&format!("      morphcog eval --archive {}", in_shell(&archive)));
 }
 
 /// After a validation: the chosen robots.
@@ -108,14 +106,14 @@ pub fn validation(console: &Console, best: &[Validated]) {
 }
 
 /// After an evaluation: a table per robot, the means and the baselines, and the paper's table; `capacity` is what is known
-/// from an analysis of these robots.
-pub fn evaluation(console: &Console, report: &EvalFile, capacity: Option<&CapacityFile>, out: &Path) {
+/// from an analysis of these robots; `out` is the file, if it was written.
+pub fn evaluation(console: &Console, report: &EvalFile, capacity: Option<&CapacityFile>, out: Option<&Path>) {
     if report.robots.is_empty() {
         return console.warning("no robot was evaluated");
     }
     if console.mode() == Mode::Json {
         let done = serde_json::json!({
-            "file": out.display().to_string(), "stopped": report.stopped, "images": report.images.len(), "split": report.split,
+            "file": out.map(|out| out.display().to_string()), "stopped": report.stopped, "images": report.images.len(), "split": report.split,
             "dataset": report.dataset, "trained_on": report.trained_on,
             "means": report.means, "baselines": report.baselines,
             "robots": report.robots.iter().map(RobotReport::without_displacements).collect::<Vec<_>>(),
@@ -188,6 +186,7 @@ pub fn evaluation(console: &Console, report: &EvalFile, capacity: Option<&Capaci
         report.selection(),
         report.threshold
     ));
+    let Some(out) = out else { return };
     console.line(&format!("wrote {} and {}", out.display(), out.with_extension("csv").display()));
     if capacity.is_none() && is_test {
         console.info(&format!("what network are they worth? morphcog capacity --eval {}", in_shell(out)));

@@ -9,12 +9,12 @@ use std::path::Path;
 
 /// After an audit: a line per robot, how many there are of each verdict, and what breaks walks.
 pub fn audit(console: &Console, finished: &Finished, out: &Path) {
-    let Finished { file, asked, stopped } = finished;
+    let Finished { file, asked, stopped, unwritten } = finished;
     let robots: Vec<&RobotAudit> = asked.iter().filter_map(|id| file.robot(id)).collect();
     if console.mode() == Mode::Json {
         let short = |robot: &&RobotAudit| RobotAudit { lives: Vec::new(), ..(*robot).clone() };
         let done = serde_json::json!({
-            "file": out.display().to_string(), "stopped": stopped, "run": file.run, "elites": file.elites,
+            "file": unwritten.is_none().then(|| out.display().to_string()), "stopped": stopped, "run": file.run, "elites": file.elites,
             "robots": robots.iter().map(short).collect::<Vec<_>>(),
         });
         return console.event("audited", &done);
@@ -29,7 +29,9 @@ pub fn audit(console: &Console, finished: &Finished, out: &Path) {
     console.line(&format!("{}: {} robots: {}", file.run, robots.len(), counts.join(", ")));
     breaking(console, &robots);
     let csv = out.with_extension("csv");
-    console.line(&format!("wrote {} and {}", out.display(), csv.display()));
+    if unwritten.is_none() {
+        console.line(&format!("wrote {} and {}", out.display(), csv.display()));
+    }
     if file.robots.len() < file.elites {
         note(console, file);
     }

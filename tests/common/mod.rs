@@ -3,6 +3,7 @@
 
 #[cfg(unix)]
 pub mod browser;
+pub mod hostile;
 pub mod program;
 pub mod server;
 

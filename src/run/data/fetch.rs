@@ -90,7 +90,8 @@ pub enum FetchError {
     /// No mirror had the right file.
     #[error(
         "{file} could not be downloaded; try again later, give another mirror with --mirror, or put the file into \
-         {} yourself{}", folder.display(), attempts.iter().map(|a| format!("\n  {a}")).collect::<String>()
+         {} yourself; tried: {}", folder.display(),
+         attempts.iter().map(ToString::to_string).collect::<Vec<_>>().join("; ")
     )]
     Mirrors {
         /// Name of the file.

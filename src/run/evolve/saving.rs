@@ -9,7 +9,7 @@ use crate::run::folder::{self, RunFolder};
 
 impl Run<'_> {
     /// Writes checkpoint, `run.json` and `elites.csv`.
-    pub(super) fn save(&self, folder: &RunFolder) -> Result<RunFile, Error> {
+    pub(super) fn save(&self, folder: &RunFolder) -> Result<(), Error> {
         let run = self.file();
         let (known_bodies, relatives) = (self.known.clone(), self.relatives.clone());
         let checkpoint = Checkpoint { run, totals: self.totals(), known_bodies, relatives };
@@ -20,10 +20,11 @@ impl Run<'_> {
             let path = folder.path().join(name);
             write_atomically(&path, &content).map_err(|error| Error::writing(&path, &error))?;
         }
-        Ok(run)
+        Ok(())
     }
 
-    fn file(&self) -> RunFile {
+    /// The run as it is now.
+    pub(super) fn file(&self) -> RunFile {
         RunFile {
             format: FORMAT.to_string(),
             format_version: FORMAT_VERSION,
@@ -37,6 +38,7 @@ impl Run<'_> {
             generations: self.generation,
             stats: self.stats(),
             elites: self.search.archive().elites().map(|elite| elite.solution.clone()).collect(),
+            read_sha256: None,
         }
     }
 }

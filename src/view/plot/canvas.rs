@@ -2,8 +2,12 @@
 
 use super::fonts;
 use crate::base::number;
+use crate::base::text::shortened;
 use crate::view::colour::{self, Colour};
 use std::fmt::Write;
+
+/// Most characters of a text.
+const MOST: usize = 400;
 
 /// Size of most words, points: the least that is easily read in print.
 pub const TEXT: f64 = 7.2;
@@ -163,8 +167,9 @@ impl Canvas {
         self.push(format_args!("<circle cx=\"{x}\" cy=\"{y}\" r=\"{radius}\"{}/>", filled(fill)));
     }
 
-    /// A text on its baseline.
+    /// A text on its baseline; no more of it than any figure has room for.
     pub fn text(&mut self, [x, y]: [f64; 2], text: &str, words: Words) {
+        let text = &shortened(text, MOST);
         let [x, y] = [x, y].map(number);
         let anchor = match words.anchor {
             Anchor::Start => "",

@@ -41,10 +41,14 @@ pub fn fitted(text: &str, size: f64, bold: bool, most: f64) -> String {
     if width(text, size, bold) <= most {
         return text.to_string();
     }
-    let letters: Vec<char> = text.chars().collect();
-    let cut = |count: usize| letters[..count].iter().collect::<String>().trim_end().to_string() + "…";
-    let count = (0..letters.len()).rev().find(|&count| width(&cut(count), size, bold) <= most);
-    cut(count.unwrap_or(0))
+    // Letter by letter up to the edge: a name in a file may have millions.
+    let left = most - width("…", size, bold);
+    let mut wide = 0.0;
+    let begin = text.chars().take_while(|letter| {
+        wide += width(letter.encode_utf8(&mut [0; 4]), size, bold);
+        wide <= left
+    });
+    begin.collect::<String>().trim_end().to_string() + "…"
 }
 
 #[cfg(test)]
@@ -65,6 +69,12 @@ mod tests {
         let cut = fitted("a very long name of a very long run", 8.0, false, 60.0);
         assert!(cut.ends_with('…') && width(&cut, 8.0, false) <= 60.0 && cut.len() > 8, "{cut}");
         assert_eq!(fitted("x", 8.0, false, 0.0), "…");
+        // However long it is, at once.
+        let endless = fitted(&"name ".repeat(1_000_000), 8.0, false, 60.0);
+        assert!(
+            endless.starts_with("name name") && endless.ends_with('…') && endless.len() < 40,
+            "{endless}"
+        );
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! As much of HTTP/1.1 as a page on this machine needs: one request per connection, every size and time bounded.
 
+use crate::base::text::one_line;
 use serde::Serialize;
 use std::io::{self, Read, Write};
 use std::net::{Shutdown, TcpStream};
@@ -32,11 +33,17 @@ pub struct Request {
 }
 
 impl Request {
-    /// A header's value; none if it is not there, or more than once.
-    pub fn header(&self, name: &str) -> Option<&str> {
+    /// A header's value; none if it is not there.
+    ///
+    /// # Errors
+    /// If it is there more than once: of several, one could say what is allowed, another what is meant.
+    pub fn header(&self, name: &str) -> Result<Option<&str>, Response> {
         let mut found = self.headers.iter().filter(|(own, _)| own == name);
         let first = found.next().map(|(_, value)| value.as_str());
-        if found.next().is_some() { None } else { first }
+        match found.next() {
+            None => Ok(first),
+            Some(_) => Err(Response::refusal(400, &format!("expected one header {name}, found several"))),
+        }
     }
 
     /// A value of the query, as it stands there.
@@ -77,7 +84,7 @@ impl Response {
 
     /// An error with one line.
     pub fn refusal(status: u16, line: &str) -> Self {
-        let body = format!("{}\n", line.replace(['\n', '\r'], " ")).into_bytes();
+        let body = format!("{}\n", one_line(line)).into_bytes();
         Response { status, content_type: "text/plain; charset=utf-8", body, allow: None }
     }
 
@@ -214,17 +221,16 @@ fn parse(bytes: &[u8]) -> Result<Option<(Request, usize)>, Response> {
 }
 
 fn length(request: &Request) -> Result<usize, Response> {
-    let is_there = |name: &str| request.headers.iter().any(|(own, _)| own == name);
-    if is_there("transfer-encoding") {
+    if request.headers.iter().any(|(own, _)| own == "transfer-encoding") {
         return Err(Response::refusal(411, "expected a body with a Content-Length"));
     }
-    if !is_there("content-length") {
+    let Some(digits) = request.header("content-length")? else {
         return match request.method.as_str() {
             "POST" => Err(Response::refusal(411, "expected a Content-Length")),
             _ => Ok(0),
         };
-    }
-    let digits = request.header("content-length").filter(|text| text.bytes().all(|b| b.is_ascii_digit()));
+    };
+    let digits = Some(digits).filter(|text| text.bytes().all(|b| b.is_ascii_digit()));
     match digits.map(str::parse::<usize>) {
         Some(Ok(length)) if length <= MAX_BODY => Ok(length),
         Some(Ok(_)) => {
@@ -264,7 +270,10 @@ mod tests {
             (request.path.as_str(), request.asked("d"), request.asked("b")),
             ("/a", Some("e"), Some("c"))
         );
-        assert_eq!((request.header("host"), request.header("cookie"), begin), (Some("x"), None, 58));
+        assert_eq!(
+            (request.header("host").unwrap(), request.header("cookie").is_err(), begin),
+            (Some("x"), true, 58)
+        );
         assert_eq!(status("GET / HTTP/1.1\r\nHost"), 0);
         assert_eq!(status("GET / HTTP/1.1\r\n\r\n"), 200);
         assert_eq!(status("\u{1}\u{2}\r\n\r\n"), 400);

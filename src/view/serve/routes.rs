@@ -19,7 +19,7 @@ pub enum Reply {
 
 /// Answers a request to the server at a port.
 pub fn reply(service: &Service, port: u16, request: &Request) -> Reply {
-    if let Some(refusal) = stranger(port, request) {
+    if let Err(refusal) = no_stranger(port, request) {
         return Reply::Whole(refusal);
     }
     let parts: Vec<&str> = request.path.split('/').skip(1).collect();
@@ -83,25 +83,28 @@ pub fn refused(refusal: Refusal) -> Response {
 }
 
 /// Refuses other sites that let a name of theirs point here (DNS rebinding), and requests that other sites' pages send.
-fn stranger(port: u16, request: &Request) -> Option<Response> {
+fn no_stranger(port: u16, request: &Request) -> Result<(), Response> {
     let names = ["127.0.0.1", "localhost"];
     let mut own = names.map(|name| format!("{name}:{port}")).to_vec();
     if port == 80 {
         // HTTP's own port is not named.
         own.extend(names.map(str::to_string));
     }
-    match request.header("host") {
-        None => return Some(Response::refusal(400, "expected one Host header")),
+    match request.header("host")? {
+        None => return Err(Response::refusal(400, "expected a Host header")),
         Some(host) if !own.iter().any(|name| name.eq_ignore_ascii_case(host)) => {
-            return Some(Response::refusal(403, &format!("Host: expected {}", own.join(" or "))));
+            return Err(Response::refusal(403, &format!("Host: expected {}", own.join(" or "))));
         }
         Some(_) => {}
     }
-    let sent = request.header("origin");
+    let sent = request.header("origin")?;
     let is_own = |origin: &str| own.iter().any(|name| origin.eq_ignore_ascii_case(&format!("http://{name}")));
     // Programs like curl send none; browsers always do where it matters.
     let foreign = request.method == "POST" && sent.is_some_and(|origin| !is_own(origin));
-    foreign.then(|| Response::refusal(403, "Origin: requests from other sites are refused"))
+    match foreign {
+        true => Err(Response::refusal(403, "Origin: requests from other sites are refused")),
+        false => Ok(()),
+    }
 }
 
 fn number<T: std::str::FromStr>(text: &str, what: &str) -> Result<T, Refusal> {

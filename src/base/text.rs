@@ -1,0 +1,70 @@
+//! [`one_line`]: text from anywhere as one line that a terminal shows as it is meant.
+
+/// Most characters of a message: more than any of ours has.
+const MOST: usize = 1500;
+
+/// A text as one line of printable characters: a control character, a line break or what turns the direction of writing is
+/// written as `\u{…}` (or `\n`, `\r`, `\t`), so that a file, or a file's name, can neither command the terminal nor forge a
+/// line. Of what is very long, beginning and end stay.
+pub fn one_line(text: &str) -> String {
+    shortened(text, MOST)
+}
+
+/// [`one_line`] of about so many characters at most.
+pub fn shortened(text: &str, most: usize) -> String {
+    let begin: String = text.chars().take(most + 1).map(written).collect();
+    let is_whole = text.chars().nth(most).is_none();
+    // Of what was shortened before, no second piece is taken out.
+    if is_whole && begin.chars().count() <= most || text.contains(CUT) && text.chars().count() <= most + 99 {
+        return text.chars().map(written).collect();
+    }
+    let half = most / 2;
+    let mut last: Vec<char> = text.chars().rev().take(half).collect();
+    last.reverse();
+    let last: Vec<char> = last.into_iter().map(written).collect::<String>().chars().collect();
+    let begin: String = begin.chars().take(half).collect();
+    let end: String = last[last.len().saturating_sub(half)..].iter().collect();
+    format!("{begin}{CUT}{end}")
+}
+
+/// Where a piece is left out.
+const CUT: &str = " … ";
+
+fn written(c: char) -> String {
+    if is_unseen(c) { c.escape_default().collect() } else { c.to_string() }
+}
+
+/// Whether a character does something else than to be seen.
+pub fn is_unseen(c: char) -> bool {
+    c.is_control()
+        || matches!(c,
+            // Marks and overrides of the direction, separators of lines, tags, and what has no width.
+            '\u{61c}' | '\u{180e}' | '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}'
+            | '\u{2060}'..='\u{206f}' | '\u{feff}' | '\u{fff9}'..='\u{fffb}' | '\u{e0000}'..='\u{e007f}')
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_commands_a_terminal_is_written_out_and_anything_else_stays() {
+        assert_eq!(one_line("a\x1b[2Jb\nc\r\td\u{7f}\u{9b}"), "a\\u{1b}[2Jb\\nc\\r\\td\\u{7f}\\u{9b}");
+        assert_eq!(one_line("x\u{202e}y\u{2066}\u{2028}\u{200b}"), "x\\u{202e}y\\u{2066}\\u{2028}\\u{200b}");
+        let plain = "runs/größe/雪: 0|123, −3.2 × \\ \"quoted\"";
+        assert_eq!(one_line(plain), plain);
+        assert_eq!(one_line(&one_line("a\x1b")), one_line("a\x1b"));
+    }
+
+    #[test]
+    fn of_what_is_very_long_beginning_and_end_stay() {
+        let long = format!("begin {} end", "ä".repeat(1_000_000));
+        let line = one_line(&long);
+        assert!(line.starts_with("begin ä") && line.ends_with("ä end") && line.contains(CUT));
+        assert_eq!(line.chars().count(), MOST + 3);
+        assert_eq!(one_line(&line), line);
+        assert_eq!(one_line(&"\x1b".repeat(MOST)).chars().count(), MOST + 3);
+        assert_eq!(shortened("abcdef", 6), "abcdef");
+        assert_eq!(shortened("abcdefg", 4), "ab … fg");
+    }
+}
