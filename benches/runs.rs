@@ -4,6 +4,7 @@ mod processor;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use morphcog::base::random::{Purpose, stream};
+use morphcog::base::stop::NEVER;
 use morphcog::base::{Grid, lanes::InstructionSet};
 use morphcog::body::Body;
 use morphcog::genome::Genome;
@@ -59,7 +60,7 @@ fn lives(criterion: &mut Criterion<Processor>) {
         let lattice = Lattice::new(&specimen.body, &config.physics);
         let stimulus = stimulus(0);
         group.bench_function(specimen.name, |bencher| {
-            bencher.iter(|| fresh_life(&lattice, &config.physics, &config.protocol, &stimulus));
+            bencher.iter(|| fresh_life(&lattice, &config.physics, &config.protocol, &stimulus, &NEVER));
         });
     }
 }
@@ -97,7 +98,8 @@ fn evaluations(criterion: &mut Criterion) {
         for threads in [1, 2] {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads start");
             group.bench_function(format!("{name}, {threads} threads"), |bencher| {
-                let run = || evaluate(&jobs, &images, &[], &config.physics, &config.protocol, savings);
+                let run =
+                    || evaluate(&jobs, &images, &[], &config.physics, &config.protocol, savings, &NEVER);
                 bencher.iter(|| pool.install(run));
             });
         }

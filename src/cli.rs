@@ -136,6 +136,8 @@ fn run_evolve(args: EvolveArgs, console: &Console) -> Result<(), Error> {
     if finished.run.elites.is_empty() {
         return Ok(());
     }
+    // Nothing is left to be saved: from here on a signal ends the process.
+    drop(stop);
     if args.replay {
         let archive = Some(out.join(folder::RUN_JSON));
         let robot = BEST.to_string();

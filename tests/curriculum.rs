@@ -3,6 +3,7 @@
 mod common;
 
 use common::program::{Sandbox, TINY, staged, without_seconds};
+use morphcog::base::stop::NEVER;
 use morphcog::run::Config;
 use morphcog::run::archive::{Robot, RunFile};
 use morphcog::run::curriculum::Period;
@@ -259,7 +260,7 @@ fn a_stage_with_shorter_lives_judges_by_them_and_other_commands_by_whole_ones() 
     let walked = |protocol: &Protocol, robot: &Robot| {
         let lattice = Lattice::new(&robot.body, &run.config.physics);
         let training = Training::of(&run.config, &dataset, run.config.period(6)).unwrap();
-        walk(&lattice, &run.config.physics, protocol, &training.stimuli, false).unwrap().0
+        walk(&lattice, &run.config.physics, protocol, &training.stimuli, false, &NEVER).unwrap().unwrap().0
     };
     for robot in &run.elites {
         assert_eq!(walked(&run.protocol(), robot), robot.displacements, "{}", robot.id);

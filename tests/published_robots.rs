@@ -4,6 +4,7 @@ mod common;
 
 use common::golden;
 use morphcog::base::Grid;
+use morphcog::base::stop::NEVER;
 use morphcog::body::Body;
 use morphcog::run::eval_file::EvalFile;
 use morphcog::run::gallery;
@@ -65,7 +66,8 @@ fn displacements(robot: &Published, stimuli: &[Grid<f64>], physics: &Physics) ->
         }
         "four_digit" => {
             let protocol = protocol(Life::Fresh, 250);
-            let life = |stimulus| fresh_life(&lattice, physics, &protocol, stimulus).unwrap();
+            let life =
+                |stimulus| fresh_life(&lattice, physics, &protocol, stimulus, &NEVER).unwrap().unwrap();
             stimuli.iter().map(life).collect()
         }
         other => panic!("no protocol for {other}"),

@@ -7,6 +7,7 @@ pub mod hash;
 pub mod lanes;
 pub mod number;
 pub mod random;
+pub mod stop;
 pub mod text;
 
 pub use grid::Grid;

@@ -5,4 +5,4 @@ pub mod network;
 pub mod training;
 
 pub use network::{Activation, Kind, Pooling};
-pub use training::{Hyperparameters, Samples, Trained, Watch, train};
+pub use training::{Hyperparameters, Samples, Trained, Untrained, Watch, train};

@@ -3,9 +3,11 @@
 use super::network::{Activation, Kind, Network, Pooling, Shape};
 use crate::base::Grid;
 use crate::base::random::Stream;
+use crate::base::stop::{Stopped, check};
 use candle_core::{D, DType, Device, Result, Tensor};
 use candle_nn::{AdamW, Optimizer, ParamsAdamW};
 use serde::{Deserialize, Serialize};
+use std::sync::atomic::AtomicBool;
 
 /// What training waits for an improvement of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -108,10 +110,27 @@ pub struct Trained {
 /// Images judged at once: what networks make of so many stays in a core's nearest memory.
 const JUDGED_AT_ONCE: usize = 64;
 
+/// Why a training has no result.
+#[derive(Debug, thiserror::Error)]
+pub enum Untrained {
+    /// It was stopped.
+    #[error(transparent)]
+    Stopped(#[from] Stopped),
+    /// The images do not go with each other or with the kernels.
+    #[error(transparent)]
+    Failed(#[from] candle_core::Error),
+}
+
 /// A network's accuracy, and what its training waits for an improvement of; larger is better.
-fn judge(network: &Network, samples: &Samples, watch: Watch) -> Result<(f64, f64)> {
+fn judge(
+    network: &Network,
+    samples: &Samples,
+    watch: Watch,
+    stop: &AtomicBool,
+) -> std::result::Result<(f64, f64), Untrained> {
     let (mut right, mut loss) = (0.0, 0.0);
     for first in (0..samples.len()).step_by(JUDGED_AT_ONCE) {
+        check(stop)?;
         let count = JUDGED_AT_ONCE.min(samples.len() - first);
         let groups = samples.groups.narrow(0, first, count)?;
         let outputs = network.forward(&samples.seen.narrow(1, first, count)?.contiguous()?)?;
@@ -127,10 +146,10 @@ fn judge(network: &Network, samples: &Samples, watch: Watch) -> Result<(f64, f64
 }
 
 /// Trains a network of a size on `training`, waits for improvement on `waiting`, and tests it on `test`: samples for
-/// networks of one kind.
+/// networks of one kind. Unless `stop` is set meanwhile, which is looked at between batches.
 ///
 /// # Errors
-/// If the images do not go with each other or with the kernels.
+/// If it was stopped; if the images do not go with each other or with the kernels.
 pub fn train(
     size: usize,
     hyper: &Hyperparameters,
@@ -138,7 +157,8 @@ pub fn train(
     waiting: &Samples,
     test: &Samples,
     rng: &mut Stream,
-) -> Result<Trained> {
+    stop: &AtomicBool,
+) -> std::result::Result<Trained, Untrained> {
     let Hyperparameters { epochs, patience, watch, .. } = *hyper;
     let network = Network::new(Shape { size, ..training.shape }, rng)?;
     let adam = ParamsAdamW { lr: hyper.learning_rate, weight_decay: 0.0, ..ParamsAdamW::default() };
@@ -153,13 +173,14 @@ pub fn train(
         let order: Vec<u32> =
             rng.sample(training.len(), training.len()).into_iter().map(|index| index as u32).collect();
         for chosen in order.chunks(batch) {
+            check(stop)?;
             let chosen = Tensor::from_vec(chosen.to_vec(), chosen.len(), &Device::Cpu)?;
             let seen = training.seen.index_select(&chosen, 1)?;
             let groups = training.groups.index_select(&chosen, 0)?;
             optimizer.backward_step(&candle_nn::loss::cross_entropy(&network.forward(&seen)?, &groups)?)?;
         }
         done += 1;
-        let (accuracy, value) = judge(&network, waiting, watch)?;
+        let (accuracy, value) = judge(&network, waiting, watch, stop)?;
         present = Some(accuracy);
         if best.as_ref().is_none_or(|(least, _)| value > *least) {
             let kept = if hyper.restore_best {
@@ -180,7 +201,7 @@ pub fn train(
     }
     let accuracy = match present.filter(|_| std::ptr::eq(waiting, test)) {
         Some(known) => known,
-        None => judge(&network, test, Watch::Accuracy)?.0,
+        None => judge(&network, test, Watch::Accuracy, stop)?.0,
     };
     Ok(Trained { accuracy, epochs: done, parameters: network.count() })
 }
@@ -189,6 +210,7 @@ pub fn train(
 mod tests {
     use super::*;
     use crate::base::random::{Purpose, stream};
+    use crate::base::stop::NEVER;
 
     /// Noisy images that are brighter above, or below: more of them than are judged at once.
     fn samples(seed: u64, count: usize, kind: Kind, hyper: &Hyperparameters) -> Samples {
@@ -209,7 +231,7 @@ mod tests {
     fn trained(kind: Kind, hyper: &Hyperparameters, seed: u64) -> Trained {
         let [learn, test] = [(1, 12), (2, 150)].map(|(seed, count)| samples(seed, count, kind, hyper));
         let rng = &mut stream(seed, Purpose::Networks, 1, 0);
-        train(8, hyper, &learn, &test, &test, rng).unwrap()
+        train(8, hyper, &learn, &test, &test, rng, &NEVER).unwrap()
     }
 
     #[test]
@@ -253,9 +275,27 @@ mod tests {
         let groups = samples.groups.to_vec1::<u32>().unwrap();
         let right = answers.iter().zip(&groups).filter(|(answer, group)| answer == group).count();
         let loss = candle_nn::loss::cross_entropy(&outputs, &samples.groups).unwrap();
-        let (accuracy, value) = judge(&network, &samples, Watch::Loss).unwrap();
+        let (accuracy, value) = judge(&network, &samples, Watch::Loss, &NEVER).unwrap();
         assert_eq!(accuracy, right as f64 / 150.0);
         assert!((value / 150.0 + f64::from(loss.to_scalar::<f32>().unwrap())).abs() < 1e-5);
+    }
+
+    #[test]
+    fn a_training_is_stopped_between_batches() {
+        let hyper = Hyperparameters { epochs: 1_000_000, patience: 1_000_000, ..Default::default() };
+        let [learn, test] = [12, 150].map(|count| samples(1, count, Kind::Cnn, &hyper));
+        let rng = &mut stream(1, Purpose::Networks, 1, 0);
+        let stop = AtomicBool::new(false);
+        let begin = std::time::Instant::now();
+        let ended = std::thread::scope(|threads| {
+            threads.spawn(|| {
+                std::thread::sleep(std::time::Duration::from_millis(50));
+                stop.store(true, std::sync::atomic::Ordering::Relaxed);
+            });
+            train(8, &hyper, &learn, &test, &test, rng, &stop)
+        });
+        assert!(matches!(ended, Err(Untrained::Stopped(Stopped))), "{ended:?}");
+        assert!(begin.elapsed().as_secs() < 5, "{:?}", begin.elapsed());
     }
 
     #[test]

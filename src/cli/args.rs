@@ -66,7 +66,7 @@ Examples:
   morphcog evolve --config zero_one.toml --seed 2 --generations 30000 --resume   goes on with that run
   morphcog evolve --config zero_one.toml --set map_elites.parents=40 --out runs/forty
 
-Ctrl-C (or SIGTERM, SIGUSR1) finishes the generation, saves and exits with 75; a second Ctrl-C ends at once.")]
+Ctrl-C (or SIGTERM, SIGUSR1) drops the generation under way, saves and exits with 75; a second Ctrl-C ends at once.")]
     Evolve(EvolveArgs),
     /// Test robots on held-out images.
     #[command(after_help = "\

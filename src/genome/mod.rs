@@ -9,6 +9,7 @@ pub mod mutation;
 pub mod params;
 mod voxels;
 
+use crate::base::stop::{NEVER, Stopped, check};
 use crate::base::{hash, random::Stream};
 use crate::body::{Body, BodyError};
 pub use cppn::Cppn;
@@ -16,6 +17,7 @@ pub use edits::{EditError, Edits};
 pub use file::CppnError;
 pub use params::MutationParams;
 use serde::{Deserialize, Serialize};
+use std::sync::atomic::AtomicBool;
 
 /// What evolution varies: a network that describes a body, and single voxels in which the body differs from that. In files
 /// `{"cppn": …, "edits": …}`, see [`Cppn`] and [`Edits`].
@@ -63,6 +65,9 @@ pub enum GenomeError {
     /// The size is not a body's.
     #[error(transparent)]
     Size(#[from] BodyError),
+    /// It was stopped before there was one.
+    #[error(transparent)]
+    Stopped(#[from] Stopped),
 }
 
 impl Genome {
@@ -112,33 +117,34 @@ impl Genome {
         params: &MutationParams,
         rng: &mut Stream,
     ) -> Result<(Genome, Body), GenomeError> {
-        self.promising_offspring(spec, params, rng, |_| 0.0)
+        self.promising_offspring(spec, params, rng, |_| 0.0, &NEVER)
     }
 
     /// The same; where several voxel mutations are drawn ([`MutationParams::voxel_candidates`]), the one whose body has the
-    /// greatest `promise` (the first of equals).
+    /// greatest `promise` (the first of equals). Unless `stop` is set meanwhile.
     ///
     /// # Errors
-    /// As [`Genome::offspring`].
+    /// [`GenomeError::Stopped`] then; else as [`Genome::offspring`].
     pub fn promising_offspring(
         &self,
         spec: BodySpec,
         params: &MutationParams,
         rng: &mut Stream,
         promise: impl Fn(&Body) -> f64,
+        stop: &AtomicBool,
     ) -> Result<(Genome, Body), GenomeError> {
         // Without voxel mutations, or choice among them, nothing is drawn, and runs are what they were before there were any.
         if params.voxel_mutations == 0.0 || rng.unit() >= params.voxel_mutations {
-            return self.with_mutated_network(spec, params, rng);
+            return self.with_mutated_network(spec, params, rng, stop);
         }
         let described = self.cppn.express(spec.height, spec.width)?;
         let voxels = self.edits.apply(&described);
         if !voxels.cells().iter().any(|material| params.voxel_scope.contains(*material)) {
-            return self.with_mutated_network(spec, params, rng);
+            return self.with_mutated_network(spec, params, rng, stop);
         }
-        match self.with_voxels_changed(&described, spec, params, rng, promise) {
+        match self.with_voxels_changed(&described, spec, params, rng, promise, stop) {
             // On a large body with few voxels that may change, not one was hit in all those draws.
-            Err(GenomeError::NoValidBody { .. }) => self.with_mutated_network(spec, params, rng),
+            Err(GenomeError::NoValidBody { .. }) => self.with_mutated_network(spec, params, rng, stop),
             changed => changed,
         }
     }
@@ -148,11 +154,13 @@ impl Genome {
         spec: BodySpec,
         params: &MutationParams,
         rng: &mut Stream,
+        stop: &AtomicBool,
     ) -> Result<(Genome, Body), GenomeError> {
         let BodySpec { height, width, min_muscles } = spec;
         let mutations = if min_muscles > height.saturating_mul(width) { 0 } else { MAX_MUTATIONS };
         let mut genome = self.clone();
         for _ in 0..mutations {
+            check(stop)?;
             genome.mutate(params, rng);
             let body = genome.body(height, width)?;
             if body.is_valid(min_muscles) {
@@ -171,7 +179,20 @@ impl Genome {
         params: &MutationParams,
         rng: &mut Stream,
     ) -> Result<(Genome, Body), GenomeError> {
-        Genome::initial().with_mutated_network(spec, params, rng)
+        Genome::random_unless(spec, params, rng, &NEVER)
+    }
+
+    /// The same, unless `stop` is set meanwhile.
+    ///
+    /// # Errors
+    /// [`GenomeError::Stopped`] then; else as [`Genome::offspring`].
+    pub fn random_unless(
+        spec: BodySpec,
+        params: &MutationParams,
+        rng: &mut Stream,
+        stop: &AtomicBool,
+    ) -> Result<(Genome, Body), GenomeError> {
+        Genome::initial().with_mutated_network(spec, params, rng, stop)
     }
 }
 

@@ -3,7 +3,9 @@
 use super::params::VoxelScope;
 use super::{BodySpec, Edits, Genome, GenomeError, MAX_MUTATIONS, MutationParams};
 use crate::base::random::Stream;
+use crate::base::stop::check;
 use crate::body::{Body, Material};
+use std::sync::atomic::AtomicBool;
 
 impl Genome {
     /// A copy with as many voxels changed as is drawn ([`MutationParams::voxel_changes`]), each of them chosen among as many
@@ -15,6 +17,7 @@ impl Genome {
         params: &MutationParams,
         rng: &mut Stream,
         promise: impl Fn(&Body) -> f64,
+        stop: &AtomicBool,
     ) -> Result<(Genome, Body), GenomeError> {
         let scope = params.voxel_scope;
         let is_choice = params.voxel_candidates > 1;
@@ -25,10 +28,10 @@ impl Genome {
         let doublings = most_changes.next_power_of_two().ilog2() as usize;
         let changes = if doublings > 0 { most_changes.min(1 << rng.below(doublings + 1)) } else { 1 };
         let chosen = |edits: &Edits, rng: &mut Stream| -> Result<_, GenomeError> {
-            let mut best = one_voxel_changed(edits, described, spec, scope, rng)?;
+            let mut best = one_voxel_changed(edits, described, spec, scope, rng, stop)?;
             let mut most = promise(&best.1);
             for _ in 0..more {
-                let candidate = one_voxel_changed(edits, described, spec, scope, rng)?;
+                let candidate = one_voxel_changed(edits, described, spec, scope, rng, stop)?;
                 let promised = promise(&candidate.1);
                 if promised > most {
                     (best, most) = (candidate, promised);
@@ -55,10 +58,12 @@ fn one_voxel_changed(
     spec: BodySpec,
     scope: VoxelScope,
     rng: &mut Stream,
+    stop: &AtomicBool,
 ) -> Result<(Edits, Body), GenomeError> {
     let BodySpec { height, width, min_muscles } = spec;
     let now = edits.apply(described);
     for _ in 0..MAX_MUTATIONS {
+        check(stop)?;
         let place = (rng.below(height), rng.below(width));
         // One of the six others.
         let step = 1 + rng.below(Material::ALL.len() - 1);
@@ -79,6 +84,7 @@ fn one_voxel_changed(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::base::stop::NEVER;
     use crate::genome::tests::{PAPER, rng};
 
     #[test]
@@ -134,14 +140,15 @@ mod tests {
         let (parent, _) = Genome::random(PAPER, &one, &mut rng(5)).unwrap();
         let sensors = |body: &Body| body.counts().sensor as f64;
         let mean = |params: &MutationParams| -> f64 {
-            let made = |seed| parent.promising_offspring(PAPER, params, &mut rng(seed), sensors).unwrap();
+            let made =
+                |seed| parent.promising_offspring(PAPER, params, &mut rng(seed), sensors, &NEVER).unwrap();
             (0..60).map(|seed| sensors(&made(seed).1)).sum::<f64>() / 60.0
         };
         assert!(mean(&many) > mean(&one) + 0.4, "{} {}", mean(&many), mean(&one));
         for seed in 0..20 {
             // Nothing is asked, and nothing else drawn, where there is but one.
             let asked = |_: &Body| panic!("asked");
-            let lone = parent.promising_offspring(PAPER, &one, &mut rng(seed), asked).unwrap();
+            let lone = parent.promising_offspring(PAPER, &one, &mut rng(seed), asked, &NEVER).unwrap();
             assert_eq!(lone, parent.offspring(PAPER, &one, &mut rng(seed)).unwrap());
             // Where all promise the same, it is the first.
             let same = parent.offspring(PAPER, &many, &mut rng(seed)).unwrap();
@@ -159,7 +166,8 @@ mod tests {
         let blind = MutationParams { voxel_mutations: 1.0, voxel_changes: 12, ..MutationParams::default() };
         let (parent, body) = Genome::random(PAPER, &blind, &mut rng(5)).unwrap();
         let changed = |params: &MutationParams, seed, promise: fn(&Body) -> f64| {
-            let (_, made) = parent.promising_offspring(PAPER, params, &mut rng(seed), promise).unwrap();
+            let (_, made) =
+                parent.promising_offspring(PAPER, params, &mut rng(seed), promise, &NEVER).unwrap();
             assert!(made.is_valid(3));
             body.voxels().cells().iter().zip(made.voxels().cells()).filter(|(a, b)| a != b).count()
         };

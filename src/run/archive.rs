@@ -152,6 +152,11 @@ impl RunFile {
             return Err(Error::input(text));
         }
         self.config.validate()?;
+        let (done, all) = (self.generations, self.config.generations);
+        if done > all {
+            let text = format!("generations = {done}: expected at most config.generations, {all}");
+            return Err(Error::input(text));
+        }
         if self.dimensions != Dimensions::of(&self.config)? {
             return Err(Error::input("dimensions: they are not those of the config".to_string()));
         }

@@ -10,6 +10,7 @@ use super::verdict::{Behaviour, Criteria, PerturbedLife};
 use super::whereabouts::Whereabouts;
 use super::{Config, Error, eval, gallery};
 use crate::base::hash::sha256_hex;
+use crate::base::stop::Stopped;
 use crate::body::Body;
 use crate::sim::{Energy, Lattice};
 use crate::task::dataset::Split;
@@ -253,7 +254,7 @@ impl Trial {
             protocol: self.config.protocol.clone(),
             stimuli: self.training.stimuli.clone(),
         };
-        let plain = (!stop.load(Ordering::Relaxed)).then(|| live(&setting, true))?;
+        let plain = live(&setting, true, stop).ok()?;
         count(1);
         let (displacements, energy) = plain.map_or((None, Energy::default()), |(d, e)| (Some(d), e));
         let classes: Vec<u8> = self.training.images.iter().map(|image| image.label).collect();
@@ -268,10 +269,8 @@ impl Trial {
             displacements.clone().unwrap_or(still),
         );
         let life = |perturbation: &Perturbation| {
-            if stop.load(Ordering::Relaxed) {
-                return None;
-            }
-            let walked = live(&perturbation.apply(&setting), false).map(|(d, _)| perturbation.undo(d));
+            let walked = live(&perturbation.apply(&setting), false, stop).ok()?;
+            let walked = walked.map(|(d, _)| perturbation.undo(d));
             count(1);
             Some(behaviour.compare(perturbation.name(), perturbation.kind, walked))
         };
@@ -308,17 +307,19 @@ impl Trial {
 }
 
 /// Displacements of a life, and energies if they are to be `measured`; `None` if it is unstable.
-fn live(setting: &Setting, measured: bool) -> Option<(Vec<f64>, Energy)> {
+fn live(setting: &Setting, measured: bool, stop: &AtomicBool) -> Result<Option<(Vec<f64>, Energy)>, Stopped> {
     let Setting { body, physics, protocol, stimuli } = setting;
     if measured {
-        return walk(&Lattice::new(body, physics), physics, protocol, stimuli, true).ok();
+        let lattice = Lattice::new(body, physics);
+        return Ok(walk(&lattice, physics, protocol, stimuli, true, stop)?.ok());
     }
     let job = Job { body, order: Vec::new(), may_win: Box::new(|_| true), settled: None, given_up: None };
     let savings = Savings { early_stop: false, ..Savings::default() };
-    match evaluate(&[job], stimuli, &[], physics, protocol, savings).pop()?.outcome {
-        Outcome::Walked(displacements) => Some((displacements, Energy::default())),
-        Outcome::Unstable(_) | Outcome::Stopped(_) => None,
-    }
+    let evaluation = evaluate(&[job], stimuli, &[], physics, protocol, savings, stop)?.pop();
+    Ok(match evaluation.map(|evaluation| evaluation.outcome) {
+        Some(Outcome::Walked(displacements)) => Some((displacements, Energy::default())),
+        Some(Outcome::Unstable(_) | Outcome::Stopped(_)) | None => None,
+    })
 }
 
 #[cfg(test)]

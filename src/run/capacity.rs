@@ -10,7 +10,7 @@ use super::held_out::HeldOut;
 use super::statistics::standard_deviation;
 use super::trainings::Trainings;
 use super::unwritten::Unwritten;
-use super::{Error, audit_file::AuditFile, eval, gallery};
+use super::{Error, ErrorKind, audit_file::AuditFile, eval, gallery};
 use crate::base::files::write_atomically;
 use crate::base::hash::sha256_hex;
 use crate::baseline::{Kind, Pooling, Trained, curve};
@@ -159,21 +159,30 @@ pub fn capacity(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -
             for size in config.sizes() {
                 let open = known.of(&key, size).len()..config.trainings;
                 let train = |number: usize| {
-                    let trained =
-                        (!stop.load(Ordering::Relaxed)).then(|| samples.train(size, config, number));
+                    let trained = samples.train(size, config, number, stop)?;
                     observer.progress(done.fetch_add(1, Ordering::Relaxed) + 1);
-                    trained
+                    Ok(trained)
                 };
-                let trained: Option<Result<Vec<Trained>, Error>> =
+                let trained: Vec<Result<Trained, Error>> =
                     pool.install(|| open.into_par_iter().map(train).collect());
-                let Some(trained) = trained else {
-                    file.stopped = true;
-                    break 'tasks;
-                };
-                let trained = trained?;
-                if !trained.is_empty() {
-                    known.extend(&key, size, &trained);
+                // Trainings are kept in their order: those before the first that was stopped.
+                let mut finished = Vec::new();
+                for trained in trained {
+                    match trained {
+                        Ok(trained) => finished.push(trained),
+                        Err(error) if error.kind == ErrorKind::Stopped => {
+                            file.stopped = true;
+                            break;
+                        }
+                        Err(error) => return Err(error),
+                    }
+                }
+                if !finished.is_empty() {
+                    known.extend(&key, size, &finished);
                     unkept.tried(known.write(), |text| observer.warning(text));
+                }
+                if file.stopped {
+                    break 'tasks;
                 }
                 points.push(point(size, &known.of(&key, size)[..config.trainings]));
             }

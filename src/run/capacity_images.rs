@@ -11,10 +11,11 @@ use super::whereabouts::Whereabouts;
 use crate::base::Grid;
 use crate::base::hash::sha256_hex;
 use crate::base::random::{Purpose, stream};
-use crate::baseline::{Kind, Samples, Trained, train};
+use crate::baseline::{Kind, Samples, Trained, Untrained, train};
 use crate::task::dataset::{Dataset, Split};
 use crate::task::grouping::{self, Group};
 use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
 
 /// The images networks learn from, wait on and are tested on, with their classes.
 pub(super) struct Images {
@@ -133,13 +134,26 @@ impl Task {
     }
 
     /// The training of this number; the runs take turns in lending their images.
-    pub fn train(&self, size: usize, config: &CapacityConfig, number: usize) -> Result<Trained, Error> {
+    ///
+    /// # Errors
+    /// Of kind [`ErrorKind::Stopped`](super::ErrorKind::Stopped) if `stop` is set meanwhile; if networks cannot be trained.
+    pub fn train(
+        &self,
+        size: usize,
+        config: &CapacityConfig,
+        number: usize,
+        stop: &AtomicBool,
+    ) -> Result<Trained, Error> {
         let kind = self.kind;
         let training = &self.training[number % self.training.len()];
         let waiting = self.waiting.as_ref().unwrap_or(&self.test);
         let rng =
             &mut stream(config.seed, Purpose::Networks, ((kind as u64) << 32) + size as u64, number as u64);
-        train(size, config.of(kind), training, waiting, &self.test, rng).map_err(failed)
+        let trained = train(size, config.of(kind), training, waiting, &self.test, rng, stop);
+        trained.map_err(|error| match error {
+            Untrained::Stopped(stopped) => stopped.into(),
+            Untrained::Failed(error) => failed(error),
+        })
     }
 }
 

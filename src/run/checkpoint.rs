@@ -52,6 +52,11 @@ impl KnownBodies {
     pub fn insert(&mut self, key: [u8; 16]) -> bool {
         self.0.insert(key)
     }
+
+    /// Forgets a body's key.
+    pub fn remove(&mut self, key: &[u8; 16]) {
+        self.0.remove(key);
+    }
 }
 
 impl From<KnownBodies> for String {

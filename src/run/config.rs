@@ -16,7 +16,7 @@ use crate::task::builtin::BuiltinDigits;
 use crate::task::evaluation::Savings;
 use crate::task::files::check_name;
 use crate::task::grouping::Grouping;
-use crate::task::protocol::{MAX_COLUMN, Protocol};
+use crate::task::protocol::{MAX_COLUMN, MAX_ROW, MAX_STEPS, Protocol};
 use crate::task::stimulus::StimulusParams;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -325,11 +325,12 @@ impl Config {
                 "1 or more, or map_elites.newcomers above 0",
             );
         }
-        if self.protocol.control_steps == 0 {
-            return refuse("protocol.control_steps", "0".to_string(), "1 or more");
+        if !(1..=MAX_STEPS).contains(&self.protocol.control_steps) {
+            let expected = format!("1 to {MAX_STEPS}");
+            return refuse("protocol.control_steps", self.protocol.control_steps.to_string(), &expected);
         }
-        if self.protocol.start_row < self.physics.ground_row {
-            let expected = format!("{} (on the ground) or more", self.physics.ground_row);
+        if !(self.physics.ground_row..=MAX_ROW).contains(&self.protocol.start_row) {
+            let expected = format!("{} (on the ground) to {MAX_ROW}", self.physics.ground_row);
             return refuse("protocol.start_row", self.protocol.start_row.to_string(), &expected);
         }
         if !(-MAX_COLUMN..=MAX_COLUMN).contains(&self.protocol.start_column) {

@@ -1,5 +1,6 @@
 //! [`Error`]: what a command fails with, and the exit code it means.
 
+use crate::base::stop::Stopped;
 use crate::base::text::one_line;
 use std::fmt;
 use std::io;
@@ -120,6 +121,12 @@ impl Error {
 pub fn is_full(error: &io::Error) -> bool {
     use io::ErrorKind::{FileTooLarge, QuotaExceeded, StorageFull};
     matches!(error.kind(), StorageFull | QuotaExceeded | FileTooLarge)
+}
+
+impl From<Stopped> for Error {
+    fn from(stopped: Stopped) -> Self {
+        Error::stopped(stopped.to_string())
+    }
 }
 
 impl fmt::Display for Error {

@@ -15,7 +15,7 @@ use crate::base::files::write_atomically;
 use crate::sim::Lattice;
 use crate::task::dataset::Split;
 use crate::task::grouping::{self, Grouping};
-use crate::task::protocol::{Life, Protocol};
+use crate::task::protocol::{Life, MAX_STEPS, Protocol};
 use crate::task::rollout::{fresh_life, same_to_sensors};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -151,7 +151,7 @@ pub fn eval(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Re
     }
     let shown = HeldOutImages::draw(config, &sources, &dataset, options)?;
     let test_sha256 = dataset.fingerprint(Split::Test).unwrap_or_default();
-    let steps = control_steps(config, options.cycles);
+    let steps = checked_steps(config, options.cycles)?;
     let mut report = EvalFile::new(&sources, options, steps, &shown.images, test_sha256);
     if let Some(name) = other {
         report.transfer(name, &dataset);
@@ -245,6 +245,20 @@ pub(super) fn control_steps(config: &Config, cycles: u32) -> u32 {
     cycles.saturating_mul(config.physics.cycle_steps)
 }
 
+/// The same, if a robot can be shown an image for so long.
+fn checked_steps(config: &Config, cycles: u32) -> Result<u32, Error> {
+    let steps = control_steps(config, cycles);
+    match steps <= MAX_STEPS {
+        true => Ok(steps),
+        false => {
+            let most = MAX_STEPS / config.physics.cycle_steps;
+            Err(Error::usage(format!(
+                "--cycles {cycles}: expected at most {most}, {MAX_STEPS} control steps"
+            )))
+        }
+    }
+}
+
 /// The recognition task a robot performs; none if it always walks the same way.
 pub(super) fn task_of<'a>(grouping: &'a Grouping, robot: &Robot) -> Option<&'a grouping::Split> {
     grouping.tasks().iter().find(|split| split.name() == robot.task && !split.is_same_way())
@@ -289,10 +303,8 @@ impl Walker<'_> {
         let mut shared = BTreeMap::<usize, u64>::new();
         same_as.iter().for_each(|&first| *shared.entry(first).or_default() += 1);
         let life = |(&image, &count): (&usize, &u64)| {
-            if stop.load(Ordering::Relaxed) {
-                return None;
-            }
-            let displacement = fresh_life(&lattice, &config.physics, &protocol, &stimuli[image]).ok();
+            let displacement =
+                fresh_life(&lattice, &config.physics, &protocol, &stimuli[image], stop).ok()?.ok();
             observer.progress(done.fetch_add(count, Ordering::Relaxed) + count);
             Some((image, displacement))
         };

@@ -14,13 +14,13 @@ use super::robust::{Scored, with_perturbed_lives};
 pub use super::session::{Finished, Observer, Options, Progress};
 use super::start::{Start, StartRef};
 use super::training::Training;
-use super::variation::{Lessons, Mutations};
+use super::variation::{Lessons, Mutations, unmade};
 use super::whereabouts::{self, Whereabouts};
 use super::{Error, ErrorKind, eval, held_out, resume, validation};
 use crate::base::files::write_atomically;
+use crate::base::stop::check;
 use crate::body::Body;
-use crate::genome::GenomeError;
-use crate::qd::{Archive, ArchiveStats, DescriptorSpace, MapElites};
+use crate::qd::{Archive, ArchiveStats, DescriptorSpace, MapElites, Proposal};
 use crate::task::dataset::{Dataset, Split};
 use crate::task::evaluation::{Job, Outcome, evaluate};
 use crate::task::grouping::Grouping;
@@ -33,7 +33,8 @@ use std::time::{Duration, Instant};
 /// enough for nobody to wait long. What is simulated depends on it, so not on the number of threads.
 const LIVES_AT_ONCE: usize = 256;
 
-/// Runs a config, or goes on with a run, and at its end chooses robots on validation images if the config says so. `stop` is looked at after every generation, and more often where a stage begins.
+/// Runs a config, or goes on with a run, and at its end chooses robots on validation images if the config says so. When `stop`
+/// is set, a generation under way, or the beginning of a stage, is dropped: the run is saved as it was before.
 ///
 /// # Errors
 /// What is wrong with config, data or folder; nothing that was there is lost.
@@ -49,11 +50,11 @@ pub fn evolve(
     }
     let dataset = whereabouts.load(&config.data, &[Split::Train])?;
     // Whether there are images and bodies for it is to be known before anything is written.
-    let first = Training::of(config, &dataset, config.period(0))?;
+    let first = Training::unless(config, &dataset, config.period(0), stop)?;
     for stage in (0..config.stage.len()).map(|stage| Period { stage, draw: 0 }) {
-        Training::of(config, &dataset, stage)?;
+        Training::unless(config, &dataset, stage, stop)?;
     }
-    Mutations { seed: config.seed, spec: config.body_spec(), params: &config.genome, lessons: None }
+    Mutations { seed: config.seed, spec: config.body_spec(), params: &config.genome, lessons: None, stop }
         .check()?;
     let resumes = options.if_exists == IfExists::Resume;
     // A run that goes on may have begun, and then has its elites: that is not known before its folder is open.
@@ -140,6 +141,9 @@ struct Run<'a> {
     began: Instant,
 }
 
+/// What a run was before a period began.
+type Before = (Period, Training, Grouping, MapElites<Robot>, KnownBodies, Relatives, Totals);
+
 impl<'a> Run<'a> {
     fn new(
         options: &'a Options,
@@ -206,13 +210,14 @@ impl<'a> Run<'a> {
         if let Some(Start { origin, robots }) = start {
             observer.starting_from(&origin, robots.len());
             self.origin = Some(origin);
-            if !self.begin(self.period, robots, stop)? {
+            if self.begin(self.period, robots, stop)?.is_none() {
                 return Ok(());
             }
             observer.period(self.period, &self.training, &self.progress());
         }
         while self.generation < config.generations && !stop.load(Ordering::Relaxed) {
             let period = config.period(self.generation);
+            let mut before_period = None;
             if period != self.period {
                 // In the order of their cells: of equals that now share a cell the first stays.
                 let mut before = self.search.archive().clone();
@@ -220,12 +225,20 @@ impl<'a> Run<'a> {
                     before.retain_fittest(most, |robot| robot.task.clone());
                 }
                 let elites = before.elites().map(|elite| elite.solution.clone()).collect();
-                if !self.begin(period, elites, stop)? {
+                before_period = self.begin(period, elites, stop)?;
+                if before_period.is_none() {
                     break;
                 }
                 observer.period(period, &self.training, &self.progress());
             }
-            self.next_generation()?;
+            match self.next_generation(stop) {
+                Err(error) if error.kind == ErrorKind::Stopped => {
+                    // What is saved is of the period of its last generation.
+                    before_period.into_iter().for_each(|before| self.go_back(before));
+                    break;
+                }
+                done => done?,
+            }
             let progress = self.progress();
             metrics.write((self.generation - 1, period.stage), &progress.stats, &progress.totals)?;
             observer.generation(&progress);
@@ -238,11 +251,19 @@ impl<'a> Run<'a> {
         Ok(())
     }
 
-    /// Begins a period: other images, perhaps another fitness, and elites of before evaluated anew. Whether that was done:
-    /// if stopped meanwhile, nothing has changed.
-    fn begin(&mut self, period: Period, mut elites: Vec<Robot>, stop: &AtomicBool) -> Result<bool, Error> {
+    /// Begins a period: other images, perhaps another fitness, and elites of before evaluated anew. What there was before; `None`
+    /// if stopped meanwhile: nothing has changed then.
+    fn begin(
+        &mut self,
+        period: Period,
+        mut elites: Vec<Robot>,
+        stop: &AtomicBool,
+    ) -> Result<Option<Before>, Error> {
         let config = &self.options.config;
-        let training = Training::of(config, self.dataset, period)?;
+        let training = match Training::unless(config, self.dataset, period, stop) {
+            Err(error) if error.kind == ErrorKind::Stopped => return Ok(None),
+            training => training?,
+        };
         let grouping = config.grouping()?.with_fitness(config.criterion(self.generation));
         if config.keep(period).is_some() {
             // The fitter ones first: of those who come after, most are told early that they cannot stay.
@@ -263,25 +284,28 @@ impl<'a> Run<'a> {
         let at_once = LIVES_AT_ONCE.div_ceil(self.training.images.len().max(1));
         let mut elites = (0..).zip(elites).map(|(number, robot)| (number, None, robot)).peekable();
         while elites.peek().is_some() {
-            if stop.load(Ordering::Relaxed) {
-                (
-                    self.period,
-                    self.training,
-                    self.grouping,
-                    self.search,
-                    self.known,
-                    self.relatives,
-                    self.totals,
-                ) = before;
-                return Ok(false);
+            match self.evaluate(elites.by_ref().take(at_once).collect(), None, stop) {
+                Err(error) if error.kind == ErrorKind::Stopped => {
+                    self.go_back(before);
+                    return Ok(None);
+                }
+                done => done?,
             }
-            self.evaluate(elites.by_ref().take(at_once).collect(), None)?;
         }
-        Ok(true)
+        Ok(Some(before))
+    }
+
+    /// As it was before a period began.
+    fn go_back(&mut self, before: Before) {
+        (self.period, self.training, self.grouping, self.search, self.known, self.relatives, self.totals) =
+            before;
     }
 
     /// Makes, evaluates and tells one generation.
-    fn next_generation(&mut self) -> Result<(), Error> {
+    ///
+    /// # Errors
+    /// Of kind [`ErrorKind::Stopped`] if it was stopped meanwhile: all is then as it was before.
+    fn next_generation(&mut self, stop: &AtomicBool) -> Result<(), Error> {
         let config = &self.options.config;
         let params = config.mutation_in(self.period);
         let lessons = Some(Lessons {
@@ -290,24 +314,36 @@ impl<'a> Run<'a> {
             physics: &config.physics,
             relatives: &self.relatives,
         });
-        let mutations = Mutations { seed: config.seed, spec: config.body_spec(), params: &params, lessons };
+        let mutations =
+            Mutations { seed: config.seed, spec: config.body_spec(), params: &params, lessons, stop };
         let proposals = self.search.ask(self.generation);
-        let robots: Result<Vec<Robot>, GenomeError> =
-            proposals.par_iter().map(|&proposal| self.search.make(proposal, &mutations)).collect();
-        let robots = robots.map_err(|error| Error::input(format!("body: {error}")))?;
+        let make = |&proposal: &Proposal| {
+            check(stop)?;
+            self.search.make(proposal, &mutations).map_err(unmade)
+        };
+        let robots = proposals.par_iter().map(make).collect::<Result<Vec<Robot>, Error>>()?;
+        let before = self.totals;
         self.totals.evaluations += robots.len() as u64;
 
         let saves_known = config.savings_in(self.period).known_bodies;
-        let (images, mut fresh) = (self.training.stimuli.len() as u64, Vec::new());
+        let (images, mut fresh, mut new) = (self.training.stimuli.len() as u64, Vec::new(), Vec::new());
         for (proposal, robot) in proposals.iter().zip(robots) {
-            let is_new = self.known.insert(robot.body.key());
+            let key = robot.body.key();
+            let is_new = self.known.insert(key);
+            if is_new {
+                new.push(key);
+            }
             if is_new || !saves_known {
                 fresh.push((proposal.child, proposal.parent, robot));
             } else {
                 self.totals.saved_known_bodies += images;
             }
         }
-        self.evaluate(fresh, config.threshold_min(self.period))?;
+        if let Err(error) = self.evaluate(fresh, config.threshold_min(self.period), stop) {
+            self.totals = before;
+            new.iter().for_each(|key| self.known.remove(key));
+            return Err(error);
+        }
         let bodies: Vec<&Body> = self.search.archive().elites().map(|elite| &elite.solution.body).collect();
         self.relatives.keep(&bodies, usize::from(params.voxel_relatives));
         self.generation += 1;
@@ -315,11 +351,12 @@ impl<'a> Run<'a> {
     }
 
     /// Evaluates robots, each with its number and its parent's cell, counts that, and puts those into the archive who walked
-    /// and are fit enough, fitter than `least` in any case.
+    /// and are fit enough, fitter than `least` in any case. If it is stopped meanwhile, nothing is counted or put there.
     fn evaluate(
         &mut self,
         robots: Vec<(u64, Option<usize>, Robot)>,
         least: Option<f64>,
+        stop: &AtomicBool,
     ) -> Result<(), Error> {
         let config = &self.options.config;
         let Training { stimuli, conditions, protocol, .. } = &self.training;
@@ -327,9 +364,9 @@ impl<'a> Run<'a> {
         let jobs = robots.iter().map(|(_, parent, robot)| self.job(*parent, robot, &floors));
         let jobs: Vec<Job> = jobs.collect();
         let savings = config.savings_in(self.period);
-        let evaluations = evaluate(&jobs, stimuli, conditions, &config.physics, protocol, savings);
+        let evaluations = evaluate(&jobs, stimuli, conditions, &config.physics, protocol, savings, stop)?;
         let scored = if config.robust(self.period) {
-            with_perturbed_lives(config, &self.training, &self.grouping, &jobs, evaluations, savings)
+            with_perturbed_lives(config, &self.training, &self.grouping, &jobs, evaluations, savings, stop)?
         } else {
             evaluations.into_iter().map(Scored::from).collect()
         };

@@ -4,7 +4,9 @@
 //! better. Most of what they get wrong lies where the classes meet (docs/experiments.md).
 
 use crate::base::Grid;
+use crate::base::stop::{Stopped, check};
 use rayon::prelude::*;
+use std::sync::atomic::AtomicBool;
 
 /// Of the same class so many of the nearest images say how far away its own kind is: one alone may be a double.
 const OWN: usize = 5;
@@ -12,8 +14,17 @@ const OWN: usize = 5;
 /// Of the images of each class the `per_class` hardest, in their order: those that lie farthest from the nearest of their
 /// own class in proportion to the nearest image of another one, in what sensors see (squared distance; one more in both,
 /// as distances may be 0). `stimuli` go with `labels`.
-pub(super) fn hardest(labels: &[u8], stimuli: &[Grid<f64>], per_class: usize) -> Vec<usize> {
+///
+/// # Errors
+/// [`Stopped`] if `stop` was set meanwhile.
+pub(super) fn hardest(
+    labels: &[u8],
+    stimuli: &[Grid<f64>],
+    per_class: usize,
+    stop: &AtomicBool,
+) -> Result<Vec<usize>, Stopped> {
     let hardness = |number: usize| {
+        check(stop)?;
         let (mut own, mut other) = (Vec::new(), f64::INFINITY);
         for (i, (label, stimulus)) in labels.iter().zip(stimuli).enumerate() {
             if i != number {
@@ -28,10 +39,11 @@ pub(super) fn hardest(labels: &[u8], stimuli: &[Grid<f64>], per_class: usize) ->
         own.sort_by(f64::total_cmp);
         own.truncate(OWN);
         let own = own.iter().sum::<f64>() / own.len().max(1) as f64;
-        (1.0 + own) / (1.0 + other)
+        Ok(((1.0 + own) / (1.0 + other), number))
     };
-    let mut ranked: Vec<(f64, usize)> =
-        (0..labels.len()).into_par_iter().map(|number| (hardness(number), number)).collect();
+    let ranked: Result<Vec<(f64, usize)>, Stopped> =
+        (0..labels.len()).into_par_iter().map(hardness).collect();
+    let mut ranked = ranked?;
     // Stable: of equally hard images the first drawn.
     ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
     let mut taken = [0; 256];
@@ -44,7 +56,7 @@ pub(super) fn hardest(labels: &[u8], stimuli: &[Grid<f64>], per_class: usize) ->
         }
     }
     chosen.sort_unstable();
-    chosen
+    Ok(chosen)
 }
 
 fn distance(a: &Grid<f64>, b: &Grid<f64>) -> f64 {
@@ -54,6 +66,11 @@ fn distance(a: &Grid<f64>, b: &Grid<f64>) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::base::stop::NEVER;
+
+    fn hardest(labels: &[u8], stimuli: &[Grid<f64>], per_class: usize) -> Vec<usize> {
+        super::hardest(labels, stimuli, per_class, &NEVER).unwrap()
+    }
 
     /// Images of one row of pixels, by class.
     fn pool(images: &[(u8, &str)]) -> (Vec<u8>, Vec<Grid<f64>>) {

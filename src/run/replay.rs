@@ -17,6 +17,9 @@ use std::str::FromStr;
 /// Most images in one recording: pictures hold every frame.
 pub const MAX_IMAGES: usize = 20;
 
+/// Most places of points in a recording: some gigabyte.
+const MOST_PLACES: usize = 50_000_000;
+
 /// An image by split and index: `train:3`, `test:17`; without a word, a training image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Shown {
@@ -159,7 +162,22 @@ pub fn subject(options: &Options) -> Result<Subject, Error> {
         images.push((format!("{label} ({split} {index})"), see(config, &dataset, split, index)?));
     }
     config.data.dataset = dataset.name().to_string();
+    check_length(config, images.len())?;
     Ok(Subject { found, images })
+}
+
+/// Whether a life under so many images can be recorded: a recording holds every point at every moment.
+pub(super) fn check_length(config: &Config, images: usize) -> Result<(), Error> {
+    let points = (config.body.height + 1) * (config.body.width + 1);
+    let most = MOST_PLACES / points / images.max(1);
+    let steps = config.protocol.control_steps;
+    match steps as usize > most {
+        true => Err(Error::input(format!(
+            "protocol.control_steps = {steps}: expected at most {most} to record a life under {images} images"
+        ))
+        .hint("show fewer images".to_string())),
+        false => Ok(()),
+    }
 }
 
 /// Training images to show: all, or the first of each class if they are too many.

@@ -7,7 +7,7 @@ use super::eval_file::{EVAL_JSON, EvalFile};
 use super::plot::Progress;
 use super::training::{ImageRef, load_dataset_of, see};
 use super::whereabouts::Whereabouts;
-use super::{Error, folder};
+use super::{Error, folder, replay};
 use crate::base::Grid;
 use crate::task::dataset::Split;
 use crate::task::protocol::Life;
@@ -135,6 +135,7 @@ fn images(run: &RunFile, path: &Path, whereabouts: &Whereabouts) -> Result<Vec<(
             is_first
         });
     }
+    replay::check_length(&run.config, shown.len()).map_err(hint)?;
     let one = |image: &ImageRef| {
         let label = format!("{} (train {})", image.label, image.index);
         let seen = see(&run.config, &dataset, Split::Train, image.index);

@@ -6,12 +6,14 @@
 
 use super::Config;
 use super::training::Training;
+use crate::base::stop::Stopped;
 use crate::body::Body;
 use crate::task::evaluation::{Evaluation, Job, MayWin, Outcome, Savings, evaluate};
 use crate::task::fitness::{ENOUGH, Fitness};
 use crate::task::grouping::Grouping;
 use crate::task::perturbation::{Perturbation, Setting};
 use serde::{Deserialize, Serialize};
+use std::sync::atomic::AtomicBool;
 
 /// How robots are evaluated: section `[evaluation]`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -65,6 +67,9 @@ impl From<Evaluation> for Scored {
 }
 
 /// Lets the robots that may still win live their perturbed lives. Results in the jobs' order.
+///
+/// # Errors
+/// [`Stopped`] if `stop` was set meanwhile.
 pub(super) fn with_perturbed_lives(
     config: &Config,
     training: &Training,
@@ -72,7 +77,8 @@ pub(super) fn with_perturbed_lives(
     jobs: &[Job],
     evaluations: Vec<Evaluation>,
     savings: Savings,
-) -> Vec<Scored> {
+    stop: &AtomicBool,
+) -> Result<Vec<Scored>, Stopped> {
     let mut scored: Vec<Scored> = evaluations.into_iter().map(Scored::from).collect();
     for perturbation in Perturbation::of_evolution() {
         let open: Vec<(usize, usize)> = (0..jobs.len())
@@ -87,9 +93,9 @@ pub(super) fn with_perturbed_lives(
         let lives: Vec<Job> =
             open.iter().map(|&(index, _)| all_of(jobs[index].body, training, grouping)).collect();
         let savings = Savings { early_stop: false, ..savings };
-        for (&(index, task), life) in
-            open.iter().zip(evaluate(&lives, &stimuli, &training.conditions, &physics, &protocol, savings))
-        {
+        let conditions = &training.conditions;
+        let lived = evaluate(&lives, &stimuli, conditions, &physics, &protocol, savings, stop)?;
+        for (&(index, task), life) in open.iter().zip(lived) {
             let robot = &mut scored[index];
             robot.evaluation.simulated += life.simulated;
             robot.evaluation.shared += life.shared;
@@ -102,7 +108,7 @@ pub(super) fn with_perturbed_lives(
             }
         }
     }
-    scored
+    Ok(scored)
 }
 
 /// The task of a robot that walked and is not beaten yet.

@@ -2,6 +2,7 @@
 
 use super::replay::Subject;
 use crate::base::Grid;
+use crate::base::stop::NEVER;
 use crate::sim::Lattice;
 use crate::task::protocol::Life;
 use crate::task::rollout::walk;
@@ -66,7 +67,8 @@ pub fn sensitivity(subject: &Subject, progress: &(dyn Fn(u64) + Sync)) -> Vec<Se
         if let (Some(place), Some(last)) = (flip, shown.last_mut()) {
             *last = flipped(last, place);
         }
-        let displacements = walk(&lattice, &config.physics, &config.protocol, &shown, false);
+        let displacements = walk(&lattice, &config.physics, &config.protocol, &shown, false, &NEVER);
+        let displacements = displacements.expect("nobody sets NEVER");
         progress(done.fetch_add(1, Ordering::Relaxed) + 1);
         displacements.ok().and_then(|(displacements, _)| displacements.last().copied())
     };
@@ -130,7 +132,8 @@ mod tests {
                 Life::Fresh => vec![flip],
                 Life::Sequential => vec![subject.images[0].1.clone(), flip],
             };
-            let (expected, _) = walk(&lattice, &config.physics, &config.protocol, &shown, false).unwrap();
+            let (expected, _) =
+                walk(&lattice, &config.physics, &config.protocol, &shown, false, &NEVER).unwrap().unwrap();
             assert_eq!(found[1].pixels[2].displacement, expected.last().copied());
             assert!(found[1].change(&found[1].pixels[2]).is_some_and(|change| change != 0.0));
         }

@@ -5,7 +5,7 @@ use crate::base::Grid;
 use crate::base::files::{read_text, write_atomically};
 use crate::body::Body;
 use crate::sim::{Lattice, Physics, Start, World};
-use crate::task::protocol::MAX_COLUMN;
+use crate::task::protocol::{MAX_COLUMN, MAX_ROW, MAX_STEPS};
 use serde::de::{Error as _, IgnoredAny, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer};
 use std::fmt;
@@ -166,8 +166,13 @@ impl Scenario {
             }
         }
         let ground = self.physics.ground_row;
-        if self.start_row.is_some_and(|row| row < ground) {
-            return refuse(format!("start_row: expected {ground} (on the ground) or more"));
+        if let Some(row) = self.start_row.filter(|row| !(ground..=MAX_ROW).contains(row)) {
+            return refuse(format!("start_row: {row}, expected {ground} (on the ground) to {MAX_ROW}"));
+        }
+        if self.control_steps() > u64::from(MAX_STEPS) {
+            let key = if self.control_steps.is_some() { "control_steps" } else { "switch_every" };
+            let steps = self.control_steps();
+            return refuse(format!("{key}: {steps} control steps in all, expected at most {MAX_STEPS}"));
         }
         if !(-MAX_COLUMN..=MAX_COLUMN).contains(&self.start_column) {
             return refuse(format!("start_column: expected −{MAX_COLUMN} to {MAX_COLUMN}"));
@@ -308,5 +313,20 @@ mod tests {
             "[[1]],".repeat(99_999)
         );
         assert_eq!(Scenario::parse(&some, "scenario.json").unwrap().control_steps(), 100_000);
+    }
+
+    #[test]
+    fn a_scenario_that_would_not_end_is_refused_with_its_key() {
+        let refused = |keys: &str| refused(&format!("{{\"body\": [[3]], {keys}}}"));
+        let blown = "\"physics\": {\"blow_up_extent\": 1e10, \"time_step\": 0.5}, \"control_steps\": 2";
+        assert!(
+            refused(blown).contains("physics.blow_up_extent = 10000000000: expected at most 1000 times cell")
+        );
+        let substeps = refused("\"physics\": {\"substeps\": 4000000000}");
+        assert!(substeps.contains("physics.substeps = 4000000000: expected a whole number from 1 to 1000"));
+        assert!(refused("\"control_steps\": 1000001").contains("control_steps: 1000001"));
+        let shown = refused("\"stimuli\": [[[1]], [[0]]], \"switch_every\": 600000");
+        assert!(shown.contains("switch_every: 1200000 control steps in all, expected at most 1000000"));
+        assert!(refused("\"start_row\": 4000000000").contains("start_row: 4000000000, expected 2"));
     }
 }

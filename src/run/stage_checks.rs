@@ -3,7 +3,10 @@
 use super::curriculum::Period;
 use super::{Config, Error};
 use crate::genome::params::{MAX_CANDIDATES, MAX_RELATIVES};
-use crate::task::protocol::Life;
+use crate::task::protocol::{Life, MAX_STEPS};
+
+/// Most draws of images in a stage: what a run was trained on is worked out from all of them.
+const MAX_DRAWS: u64 = 100_000;
 
 impl Config {
     /// Checks the stages.
@@ -22,6 +25,22 @@ impl Config {
             }
             if begin > u64::from(u32::MAX) {
                 return refuse(number, format!("it ends with generation {begin}: expected less than 2³²"));
+            }
+            if let Some(steps) = stage.control_steps.filter(|&steps| steps > MAX_STEPS) {
+                let text = format!("control_steps = {steps}: expected 1 to {MAX_STEPS}");
+                return refuse(number, text);
+            }
+            if let Some(every) = stage.redraw.filter(|&every| every > 0) {
+                let lasts = match stage.generations {
+                    Some(generations) if !is_last => generations,
+                    _ => self.generations.saturating_sub(begin - stage.generations.unwrap_or(0)),
+                };
+                if lasts / every > MAX_DRAWS {
+                    let least = lasts.div_ceil(MAX_DRAWS);
+                    let text =
+                        format!("redraw = {every}: expected {least} or more: {MAX_DRAWS} draws at most");
+                    return refuse(number, text);
+                }
             }
             let zeros = [
                 ("images_per_class", stage.images_per_class == Some(0)),

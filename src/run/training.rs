@@ -7,6 +7,7 @@ use super::whereabouts::Whereabouts;
 use super::{Config, Error};
 use crate::base::Grid;
 use crate::base::random::{Purpose, Stream, stream};
+use crate::base::stop::NEVER;
 use crate::task::condition::Condition;
 use crate::task::dataset::{Dataset, DatasetError, Split};
 use crate::task::protocol::Protocol;
@@ -14,6 +15,7 @@ use crate::task::score::Answer;
 use crate::task::stimulus::{StimulusParams, stimulus};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
+use std::sync::atomic::AtomicBool;
 
 /// An image by its place in a dataset.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -143,6 +145,15 @@ impl Training {
     /// # Errors
     /// As [`Training::drawn`].
     pub fn indices(config: &Config, dataset: &Dataset, period: Period) -> Result<Vec<usize>, Error> {
+        Training::indices_unless(config, dataset, period, &NEVER)
+    }
+
+    fn indices_unless(
+        config: &Config,
+        dataset: &Dataset,
+        period: Period,
+        stop: &AtomicBool,
+    ) -> Result<Vec<usize>, Error> {
         let mut drawn = Training::drawn(config, dataset, period)?;
         let drawn_in = config.drawn_in(period);
         let per_class = config.drawn_per_class(drawn_in);
@@ -153,7 +164,10 @@ impl Training {
                 labels.map_err(|error| Error::input(format!("stage {}: pool: {error}", period.stage + 1)))?;
             let stimulus = |&index: &usize| see(config, dataset, Split::Train, index);
             let stimuli = drawn.iter().map(stimulus).collect::<Result<Vec<_>, Error>>()?;
-            drawn = hardest(&labels, &stimuli, per_class).into_iter().map(|number| drawn[number]).collect();
+            drawn = hardest(&labels, &stimuli, per_class, stop)?
+                .into_iter()
+                .map(|number| drawn[number])
+                .collect();
         }
         if per_class.is_none() && config.data.train_images.is_some() {
             return Ok(drawn);
@@ -169,9 +183,22 @@ impl Training {
     /// # Errors
     /// As [`Training::load`].
     pub fn of(config: &Config, dataset: &Dataset, period: Period) -> Result<Self, Error> {
+        Training::unless(config, dataset, period, &NEVER)
+    }
+
+    /// The same, unless `stop` is set meanwhile: to find the hardest of a large pool takes long.
+    ///
+    /// # Errors
+    /// Of kind [`ErrorKind::Stopped`](super::ErrorKind::Stopped) then, or as [`Training::load`].
+    pub fn unless(
+        config: &Config,
+        dataset: &Dataset,
+        period: Period,
+        stop: &AtomicBool,
+    ) -> Result<Self, Error> {
         let refuse = |error: DatasetError| Error::input(format!("data.train_images: {error}"));
         let classes = config.classes();
-        let indices = Training::indices(config, dataset, period)?;
+        let indices = Training::indices_unless(config, dataset, period, stop)?;
         let mut images = Vec::new();
         let mut stimuli = Vec::new();
         for index in indices {

@@ -12,6 +12,7 @@ use crate::sim::Physics;
 use crate::task::grouping::Grouping;
 use crate::task::surrogate::Surrogate;
 use std::cell::LazyCell;
+use std::sync::atomic::AtomicBool;
 
 /// How genomes vary in this run.
 pub(super) struct Mutations<'a> {
@@ -20,6 +21,8 @@ pub(super) struct Mutations<'a> {
     pub params: &'a MutationParams,
     /// Where there are none, candidates all promise the same.
     pub lessons: Option<Lessons<'a>>,
+    /// Once set, no more are made.
+    pub stop: &'a AtomicBool,
 }
 
 /// What tells how parents answer.
@@ -51,10 +54,18 @@ fn newborn((genome, body): (Genome, Body), generation: u64, parent: Option<&Robo
     }
 }
 
+/// Why there is no robot.
+pub(super) fn unmade(error: GenomeError) -> Error {
+    match error {
+        GenomeError::Stopped(stopped) => stopped.into(),
+        error => Error::input(format!("body: {error}")),
+    }
+}
+
 impl Mutations<'_> {
     /// Whether there can be robots at all: to be known before an earlier run is deleted.
     pub fn check(&self) -> Result<(), Error> {
-        self.newcomer(0, 0).map(drop).map_err(|error| Error::input(format!("body: {error}")))
+        self.newcomer(0, 0).map(drop).map_err(unmade)
     }
 
     fn surrogate<'b>(&'b self, parent: &'b Robot) -> Option<Surrogate<'b>> {
@@ -80,7 +91,7 @@ impl Variation<Robot> for Mutations<'_> {
 
     fn newcomer(&self, generation: u64, child: u64) -> Result<Robot, GenomeError> {
         let rng = &mut stream(self.seed, Purpose::Newcomer, generation, child);
-        Ok(newborn(Genome::random(self.spec, self.params, rng)?, generation, None))
+        Ok(newborn(Genome::random_unless(self.spec, self.params, rng, self.stop)?, generation, None))
     }
 
     fn offspring(&self, parent: &Robot, generation: u64, child: u64) -> Result<Robot, GenomeError> {
@@ -88,7 +99,7 @@ impl Variation<Robot> for Mutations<'_> {
         // Fitted when first asked: most runs never do.
         let surrogate = LazyCell::new(|| self.surrogate(parent));
         let promise = |body: &Body| surrogate.as_ref().map_or(0.0, |surrogate| surrogate.worth(body));
-        let made = parent.genome.promising_offspring(self.spec, self.params, rng, promise)?;
+        let made = parent.genome.promising_offspring(self.spec, self.params, rng, promise, self.stop)?;
         Ok(newborn(made, generation, Some(parent)))
     }
 }

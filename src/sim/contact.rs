@@ -5,7 +5,7 @@
 use super::geometry::{Bounds, Vector, cross, inside};
 use super::lattice::{Lattice, SIDES, SurfaceVoxel};
 use super::neighbours::{Candidate, Neighbours, place, quad};
-use super::params::Physics;
+use super::params::{MOST_CELLS, Physics};
 use super::state::{Pair, State, X, Y};
 
 /// For each corner (clockwise from the top left) the corners at the far ends of the two sides that meet there.
@@ -13,6 +13,10 @@ const FAR_ENDS: [[usize; 2]; 4] = [[1, 3], [0, 2], [3, 1], [2, 0]];
 
 /// A point this far out of a voxel's box \[wu\] is not inside, whatever rounding may do to the exact test.
 const CLEAR: f64 = 1e-9;
+
+/// Most columns that a voxel reaches over: as many as the widest that has not blown up, and room for its way since the last
+/// look.
+const MOST_COLUMNS: i64 = MOST_CELLS as i64 + 8;
 
 /// The edge of a voxel that pushes a point out, with the depth of the point below it.
 struct Edge {
@@ -160,9 +164,10 @@ impl Contacts<'_> {
             return;
         }
         let vertex = |column: i64| column as f64 * cell;
-        let first = (bounds.low.x / cell).floor() as i64 - 1;
-        let last = (bounds.high.x / cell).floor() as i64 + 1;
-        for column in first..=last {
+        let first = ((bounds.low.x / cell).floor() as i64).saturating_sub(1);
+        let last = ((bounds.high.x / cell).floor() as i64).saturating_add(1);
+        // A voxel that is wider has blown up in valid physics; whatever the physics, this ends.
+        for column in first..=last.min(first.saturating_add(MOST_COLUMNS)) {
             let (left, right) = (vertex(column), vertex(column + 1));
             if left > bounds.high.x || right < bounds.low.x {
                 continue;
@@ -170,7 +175,7 @@ impl Contacts<'_> {
             let ground = [(left, top), (right, top), (right, bottom), (left, bottom)];
             let ground = ground.map(|(x, y)| Vector::new(x, y));
             let ground_bounds = Bounds { low: ground[3], high: ground[1] };
-            let has_peg = (start_column + column).rem_euclid(i64::from(physics.peg_spacing)) == 0;
+            let has_peg = start_column.wrapping_add(column).rem_euclid(i64::from(physics.peg_spacing)) == 0;
             for corner in 0..4 {
                 let far = |quad: &[Vector; 4]| FAR_ENDS[corner].map(|end| quad[end]);
                 let (p, g) = (robot[corner], ground[corner]);

@@ -10,10 +10,15 @@ use super::geometry::{Bounds, Vector};
 use super::lattice::{FAMILIES, Lattice, SurfaceVoxel};
 use super::params::Physics;
 use super::state::{Pair, State, X, Y, slices};
+use super::world::UnstableReason;
 use crate::base::lanes::{BLOCK, Buffer, Lanes, each};
 
 /// How far a point may move before the lists are made anew \[voxel lengths\].
 const BUDGET: f64 = 0.2;
+
+/// More candidates than this for each surface voxel are a heap of voxels within each other, whatever
+/// `Physics::unstable_ratio` says: a substep would take seconds. A life that is stable with EvoGym's ratio stays far below.
+const MOST_CANDIDATES: usize = 256;
 
 /// A corner of one surface voxel that may come to lie inside another.
 #[derive(Clone, Copy, Debug)]
@@ -39,10 +44,6 @@ pub(super) struct Neighbours {
     /// The same for wide lanes, in whole blocks: low x, low y, high x, high y. Behind the last box there is no number.
     sides: [Buffer; 4],
 }
-
-/// A voxel is larger than the physics allows, or a coordinate is not a number.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct BlownUp;
 
 /// Where a point is.
 #[inline]
@@ -99,7 +100,7 @@ impl Neighbours {
         lattice: &Lattice,
         physics: &Physics,
         state: &State,
-    ) -> Result<(), BlownUp> {
+    ) -> Result<(), UnstableReason> {
         if self.made[X].len() == lattice.len {
             let budget = L::splat(BUDGET * physics.cell_size);
             let walked = lattice.points.first().map_or(0.0, |&(p, _)| state.position[X][p] - self.made[X][p]);
@@ -120,7 +121,12 @@ impl Neighbours {
     }
 
     #[inline(always)]
-    fn make<L: Lanes>(&mut self, lattice: &Lattice, physics: &Physics, state: &State) -> Result<(), BlownUp> {
+    fn make<L: Lanes>(
+        &mut self,
+        lattice: &Lattice,
+        physics: &Physics,
+        state: &State,
+    ) -> Result<(), UnstableReason> {
         let slack = 2.0 * BUDGET * physics.cell_size;
         if self.made[X].len() == lattice.len {
             // `clone_from` would ask for new memory.
@@ -138,7 +144,7 @@ impl Neighbours {
             self.sides = each!(_side in [0, 1, 2, 3] => Buffer::filled(blocks, f64::NAN));
         }
         if !short_sides::<L>(lattice, physics, state) && !sane(lattice, physics, state) {
-            return Err(BlownUp);
+            return Err(UnstableReason::BlownUp);
         }
         self.bounds.clear();
         self.bounds.extend(lattice.surface.iter().map(|voxel| Bounds::of(&quad(voxel, state))));
@@ -151,6 +157,9 @@ impl Neighbours {
         self.candidates.clear();
         self.distant.clear();
         for mover in 0..lattice.surface.len() {
+            if self.candidates.len() > MOST_CANDIDATES * lattice.surface.len() {
+                return Err(UnstableReason::Overlaps);
+            }
             if self.bounds[mover].low.y <= ground_top + slack {
                 self.low.push(mover);
             }

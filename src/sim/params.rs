@@ -2,6 +2,19 @@
 
 use serde::{Deserialize, Serialize};
 
+/// Most substeps in a control step, so that one ends soon enough for whoever waits for it: a body of 64 × 64 voxels takes
+/// about a quarter of a second.
+pub const MOST_SUBSTEPS: u32 = 1000;
+
+/// Most control steps in an actuation cycle.
+pub const MOST_CYCLE_STEPS: u32 = 100_000;
+
+/// Highest row of the ground \[grid rows\].
+pub const MOST_ROWS: u32 = 1_000_000;
+
+/// Most voxel lengths that `Physics::blow_up_extent` may be: contacts are looked for in every cell under a voxel.
+pub const MOST_CELLS: u32 = 1000;
+
 /// The constants of the physics. Defaults are EvoGym's (simulator v2.2.5), as `physics.md` states them.
 ///
 /// Units: a *world unit* (wu) is ten voxel lengths; masses are in units of a point's mass; a *second* is 10⁴ default
@@ -223,15 +236,19 @@ impl Physics {
         check(&not_negative, |v| v >= 0.0, "a finite number, 0 or above")?;
         check(&finite, |_| true, "a finite number")?;
         let counts = [
-            ("substeps", self.substeps, 1, "a whole number from 1"),
-            ("cycle_steps", self.cycle_steps, 2, "a whole number from 2"),
-            ("ground_row", self.ground_row, 1, "a whole number from 1"),
-            ("peg_spacing", self.peg_spacing, 1, "a whole number from 1"),
+            ("substeps", self.substeps, 1..=MOST_SUBSTEPS, "a whole number from 1 to 1000"),
+            ("cycle_steps", self.cycle_steps, 2..=MOST_CYCLE_STEPS, "a whole number from 2 to 100000"),
+            ("ground_row", self.ground_row, 1..=MOST_ROWS, "a whole number from 1 to 1000000"),
+            ("peg_spacing", self.peg_spacing, 1..=u32::MAX, "a whole number from 1"),
         ];
-        let bad = counts.iter().find(|(_, count, least, _)| count < least);
-        bad.map_or(Ok(()), |&(name, count, _, expected)| {
-            Err(PhysicsError { name, value: f64::from(count), expected })
+        let bad = counts.iter().find(|(_, count, range, _)| !range.contains(count));
+        bad.map_or(Ok(()), |(name, count, _, expected)| {
+            Err(PhysicsError { name, value: f64::from(*count), expected })
         })?;
+        if self.blow_up_extent > f64::from(MOST_CELLS) * self.cell_size {
+            let expected = "at most 1000 times cell_size";
+            return Err(PhysicsError { name: "blow_up_extent", value: self.blow_up_extent, expected });
+        }
         let ordered = [
             ("target_max", self.target_max, self.target_min, "a number not below target_min"),
             ("limit_high", self.limit_high, self.limit_low, "a number not below limit_low"),
@@ -265,5 +282,11 @@ mod tests {
         assert_eq!(refused(|p| p.gravity = f64::NAN), "gravity");
         assert_eq!(refused(|p| p.cycle_steps = 1), "cycle_steps");
         assert_eq!(refused(|p| p.target_max = 0.5), "target_max");
+        // What would make a substep, or a control step, last without end.
+        assert_eq!(refused(|p| p.blow_up_extent = 1e10), "blow_up_extent");
+        assert_eq!(refused(|p| p.cell_size = 1e-6), "blow_up_extent");
+        assert_eq!(refused(|p| p.substeps = 4_000_000_000), "substeps");
+        assert_eq!(refused(|p| p.cycle_steps = u32::MAX), "cycle_steps");
+        assert_eq!(refused(|p| p.ground_row = u32::MAX), "ground_row");
     }
 }

@@ -10,6 +10,8 @@ use super::params::Physics;
 use super::state::{Scratch, State, X, Y};
 use crate::base::Grid;
 use crate::base::lanes::{InstructionSet, Kernel, Lanes, dispatch};
+use crate::base::stop::{NEVER, Stopped, check};
+use std::sync::atomic::AtomicBool;
 
 /// Where a life begins: the grid cell of the lower left corner of the body's box (empty rows and columns count).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -112,21 +114,33 @@ impl<'a> World<'a> {
     /// # Errors
     /// [`Unstable`] if the life ends in it; the state is then of no use.
     pub fn step(&mut self) -> Result<(), Unstable> {
+        self.step_unless(&NEVER).expect("nobody sets NEVER")
+    }
+
+    /// One control step, which ends within a substep or two when `stop` is set.
+    ///
+    /// # Errors
+    /// [`Stopped`] then; within, [`Unstable`] if the life ends in it. The state is of no use in either case.
+    pub fn step_unless(&mut self, stop: &AtomicBool) -> Result<Result<(), Unstable>, Stopped> {
         let (lattice, physics, control_step) = (self.lattice, self.physics, self.state.control_step);
         self.scratch.begin();
         let goals = &mut self.scratch.goals;
         actuation::set_goals(lattice, physics, control_step, &self.pixels, &mut self.targets, goals);
         self.meter.iter_mut().for_each(|meter| meter.drive(&self.scratch.goals, &self.state.position));
         let (state, scratch, meter) = (&mut self.state, &mut self.scratch, self.meter.as_mut());
-        let steps = ControlStep { lattice, physics, start_column: self.start.column, state, scratch, meter };
-        let outcome = dispatch(self.instructions, steps);
-        outcome.map_err(|reason| Unstable { control_step, reason })?;
+        let start_column = self.start.column;
+        let steps = ControlStep { lattice, physics, start_column, state, scratch, meter, stop };
+        match dispatch(self.instructions, steps) {
+            Ok(()) => {}
+            Err(Ended::Stopped) => return Err(Stopped),
+            Err(Ended::Unstable(reason)) => return Ok(Err(Unstable { control_step, reason })),
+        }
         // What a substep leaves behind is looked at by the next; here, at the end, by nobody else.
         if !self.centre_of_mass().iter().all(|coordinate| coordinate.is_finite()) {
-            return Err(Unstable { control_step, reason: UnstableReason::BlownUp });
+            return Ok(Err(Unstable { control_step, reason: UnstableReason::BlownUp }));
         }
         self.state.control_step += 1;
-        Ok(())
+        Ok(Ok(()))
     }
 
     /// Control steps lived.
@@ -170,16 +184,25 @@ struct ControlStep<'a> {
     state: &'a mut State,
     scratch: &'a mut Scratch,
     meter: Option<&'a mut Meter>,
+    stop: &'a AtomicBool,
+}
+
+/// Why a control step ended early.
+enum Ended {
+    Unstable(UnstableReason),
+    Stopped,
 }
 
 impl Kernel for ControlStep<'_> {
-    type Output = Result<(), UnstableReason>;
+    type Output = Result<(), Ended>;
 
     #[inline(always)]
     fn run<L: Lanes>(self) -> Self::Output {
-        let ControlStep { lattice, physics, start_column, state, scratch, mut meter } = self;
+        let ControlStep { lattice, physics, start_column, state, scratch, mut meter, stop } = self;
         for _ in 0..physics.substeps {
-            substep::<L>(lattice, physics, start_column, state, scratch, meter.as_deref_mut())?;
+            check(stop).map_err(|Stopped| Ended::Stopped)?;
+            substep::<L>(lattice, physics, start_column, state, scratch, meter.as_deref_mut())
+                .map_err(Ended::Unstable)?;
         }
         Ok(())
     }
@@ -195,7 +218,7 @@ fn substep<L: Lanes>(
     scratch: &mut Scratch,
     mut meter: Option<&mut Meter>,
 ) -> Result<(), UnstableReason> {
-    scratch.neighbours.refresh::<L>(lattice, physics, state).map_err(|_| UnstableReason::BlownUp)?;
+    scratch.neighbours.refresh::<L>(lattice, physics, state)?;
     let unstable = scratch.neighbours.too_many_overlaps(lattice, physics, state);
 
     scratch.contact.iter_mut().for_each(|axis| axis.fill(0.0));

@@ -4,6 +4,7 @@ use super::condition::Condition;
 use super::protocol::{Life, Protocol};
 use super::rollout::{Rollout, fresh_life, same_to_sensors};
 use crate::base::Grid;
+use crate::base::stop::{Stopped, check};
 use crate::body::Body;
 use crate::sim::{Lattice, Physics, Unstable};
 use rayon::prelude::*;
@@ -95,6 +96,9 @@ pub struct Job<'a> {
 /// All lives of all jobs are one list of work: first every robot's first image, then every second one, and so on, large
 /// bodies first so that no core waits long at the end. A life whose robot has dropped out by then is passed over. One
 /// that was begun before that was known is simply not counted.
+///
+/// # Errors
+/// [`Stopped`] if `stop` was set before all was known.
 pub fn evaluate(
     jobs: &[Job],
     images: &[Grid<f64>],
@@ -102,11 +106,12 @@ pub fn evaluate(
     physics: &Physics,
     protocol: &Protocol,
     savings: Savings,
-) -> Vec<Evaluation> {
+    stop: &AtomicBool,
+) -> Result<Vec<Evaluation>, Stopped> {
     let without_limits = physics.without_limits();
-    let setup = Setup { images, conditions, physics, without_limits: &without_limits, protocol };
-    let candidate = |job| Candidate::new(job, setup, savings);
-    let candidates: Vec<Candidate> = jobs.iter().map(candidate).collect();
+    let setup = Setup { images, conditions, physics, without_limits: &without_limits, protocol, stop };
+    let candidate = |job| check(stop).map(|()| Candidate::new(job, setup, savings));
+    let candidates: Vec<Candidate> = jobs.iter().map(candidate).collect::<Result<_, Stopped>>()?;
     let mut work: Vec<(usize, &Candidate)> = candidates
         .iter()
         .flat_map(|candidate| (0..candidate.lives()).map(move |place| (place, candidate)))
@@ -116,11 +121,13 @@ pub fn evaluate(
     let next = AtomicUsize::new(0);
     let worker = |_| {
         while let Some((place, candidate)) = work.get(next.fetch_add(1, Ordering::Relaxed)) {
-            candidate.live(*place);
+            candidate.live(*place)?;
         }
+        Ok(())
     };
-    (0..rayon::current_num_threads().min(work.len())).into_par_iter().with_max_len(1).for_each(worker);
-    candidates.iter().map(Candidate::evaluation).collect()
+    let workers = (0..rayon::current_num_threads().min(work.len())).into_par_iter().with_max_len(1);
+    workers.map(worker).collect::<Result<Vec<()>, Stopped>>()?;
+    Ok(candidates.iter().map(Candidate::evaluation).collect())
 }
 
 /// A life that was lived: one image's if fresh; if sequential all images', up to where the robot dropped out.
@@ -167,6 +174,7 @@ struct Setup<'a> {
     /// The same without length limits.
     without_limits: &'a Physics,
     protocol: &'a Protocol,
+    stop: &'a AtomicBool,
 }
 
 impl Setup<'_> {
@@ -175,14 +183,14 @@ impl Setup<'_> {
     }
 
     /// A fresh life under an image and its condition.
-    fn fresh_life(&self, lattice: &Lattice, image: usize) -> Result<f64, Unstable> {
+    fn fresh_life(&self, lattice: &Lattice, image: usize) -> Result<Result<f64, Unstable>, Stopped> {
         let Condition { raised, without_limits } = self.condition(image);
         let start_row = self.protocol.start_row.saturating_add(raised);
         let protocol = Protocol { start_row, ..self.protocol.clone() };
         let physics = if without_limits { self.without_limits } else { self.physics };
-        let displacement = fresh_life(lattice, physics, &protocol, &self.images[image]);
+        let displacement = fresh_life(lattice, physics, &protocol, &self.images[image], self.stop)?;
         // A body that needs a stop, as any material has one, is not refused for that.
-        if without_limits { displacement.or(Ok(0.0)) } else { displacement }
+        Ok(if without_limits { displacement.or(Ok(0.0)) } else { displacement })
     }
 }
 
@@ -248,17 +256,17 @@ impl<'a> Candidate<'a> {
     }
 
     /// Lives one life, unless the robot has dropped out.
-    fn live(&self, place: usize) {
+    fn live(&self, place: usize) -> Result<(), Stopped> {
         if self.is_over.load(Ordering::Relaxed) {
-            return;
+            return Ok(());
         }
         let mut lived = Lived { displacements: Vec::new(), unstable: None };
         match self.setup.protocol.life {
-            Life::Fresh => lived.add(self.setup.fresh_life(&self.lattice, self.order[place])),
+            Life::Fresh => lived.add(self.setup.fresh_life(&self.lattice, self.order[place])?),
             Life::Sequential => {
                 let mut rollout = Rollout::new(&self.lattice, self.setup.physics, self.setup.protocol);
                 for image in self.setup.images {
-                    lived.add(rollout.show(image, |_| ()));
+                    lived.add(rollout.show_unless(image, self.setup.stop)?);
                     if lived.unstable.is_some() || self.outcome(&lived.displacements).is_some() {
                         break;
                     }
@@ -271,6 +279,7 @@ impl<'a> Candidate<'a> {
         if lives.verdict.is_some() {
             self.is_over.store(true, Ordering::Relaxed);
         }
+        Ok(())
     }
 
     /// How it ends for a robot with these displacements, in the order of showing, whatever the rest may be; `None` if that matters.

@@ -1,4 +1,5 @@
 use super::*;
+use crate::base::stop::NEVER;
 use crate::body::Material;
 use crate::sim::UnstableReason;
 use std::collections::BTreeSet;
@@ -41,7 +42,8 @@ fn run_until(
     let protocol = Protocol { life, control_steps: 8, ..Protocol::default() };
     let body = body();
     let job = Job { body: &body, order: order.to_vec(), may_win, settled, given_up: None };
-    let mut evaluations = evaluate(&[job], &images(rows), &[], &physics(), &protocol, savings);
+    let mut evaluations =
+        evaluate(&[job], &images(rows), &[], &physics(), &protocol, savings, &NEVER).unwrap();
     assert_eq!(evaluations.len(), 1);
     let evaluation = evaluations.remove(0);
     let Evaluation { simulated, shared, stopped, .. } = evaluation;
@@ -143,7 +145,7 @@ fn a_raised_start_is_another_life_even_under_the_same_image() {
     let lattice = Lattice::new(&body, &physics);
     let live = |image: usize, rows: u32| {
         let raised = Protocol { start_row: protocol.start_row + rows, ..protocol.clone() };
-        fresh_life(&lattice, &physics, &raised, &images[image]).unwrap()
+        fresh_life(&lattice, &physics, &raised, &images[image], &NEVER).unwrap().unwrap()
     };
     // Images 1 and 3, and 0 and 4, show the sensors the same; of the last pair, the start is, too.
     let raised = [1, 0, 1, 2];
@@ -160,7 +162,7 @@ fn a_raised_start_is_another_life_even_under_the_same_image() {
                 settled: None,
                 given_up: None,
             };
-            evaluate(&[job], &images, &conditions, &physics, &protocol, savings).remove(0)
+            evaluate(&[job], &images, &conditions, &physics, &protocol, savings, &NEVER).unwrap().remove(0)
         };
         let evaluation = evaluated(&raised);
         assert_eq!((evaluation.outcome, evaluation.simulated), (Outcome::Walked(expected.to_vec()), 5));
@@ -179,12 +181,14 @@ fn a_life_without_limits_is_another_life_and_leads_nowhere_where_it_becomes_unst
         let body = body();
         let may_win = Box::new(|_: &[Option<f64>]| true);
         let job = Job { body: &body, order: Vec::new(), may_win, settled: None, given_up: None };
-        evaluate(&[job], &images, &conditions, physics, &protocol, Savings::default()).remove(0)
+        evaluate(&[job], &images, &conditions, physics, &protocol, Savings::default(), &NEVER)
+            .unwrap()
+            .remove(0)
     };
     // A sensor at rest is as far below its goal as tight limits keep it.
     let tight = Physics { limit_high: 1.02, limit_low: 0.98, ..physics() };
     let expected = |physics: &Physics, image: usize| {
-        fresh_life(&Lattice::new(&body(), physics), physics, &protocol, &images[image])
+        fresh_life(&Lattice::new(&body(), physics), physics, &protocol, &images[image], &NEVER).unwrap()
     };
     let calm = Physics { blow_up_extent: 1.0, ..tight.clone() };
     let mixed = [true, false, false, true, true];
@@ -247,5 +251,27 @@ fn what_is_not_needed_is_not_simulated_and_cannot_spoil_what_is() {
                 }
             }
         }
+    }
+}
+
+#[test]
+fn what_is_stopped_is_no_evaluation_and_ends_in_the_middle_of_a_life() {
+    let (body, images) = (body(), images(&CALM));
+    // A life that lasts for minutes.
+    for life in [Life::Fresh, Life::Sequential] {
+        let protocol = Protocol { life, control_steps: 10_000_000, ..Protocol::default() };
+        let may_win = Box::new(|_: &[Option<f64>]| true);
+        let job = Job { body: &body, order: Vec::new(), may_win, settled: None, given_up: None };
+        let stop = AtomicBool::new(false);
+        let begin = std::time::Instant::now();
+        let ended = std::thread::scope(|threads| {
+            threads.spawn(|| {
+                std::thread::sleep(std::time::Duration::from_millis(50));
+                stop.store(true, Ordering::Relaxed);
+            });
+            evaluate(&[job], &images, &[], &Physics::default(), &protocol, Savings::default(), &stop)
+        });
+        assert_eq!(ended, Err(Stopped));
+        assert!(begin.elapsed().as_secs() < 5, "{:?}", begin.elapsed());
     }
 }

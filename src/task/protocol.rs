@@ -5,6 +5,12 @@ use serde::{Deserialize, Serialize};
 /// Farthest start column either way \[voxels\]: world coordinates stay exact to far below a voxel.
 pub const MAX_COLUMN: i64 = 1_000_000;
 
+/// Most control steps that an image, or a scenario, lasts: twenty thousand actuation cycles of the paper's.
+pub const MAX_STEPS: u32 = 1_000_000;
+
+/// Highest row of a start \[voxels\].
+pub const MAX_ROW: u32 = 2_000_000;
+
 /// Whether images share a life.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]

@@ -3,8 +3,10 @@
 use super::protocol::{Life, Protocol};
 use super::recording::{Frame, Phase, Recording, VoxelCorners};
 use crate::base::Grid;
+use crate::base::stop::Stopped;
 use crate::body::Body;
 use crate::sim::{Energy, Lattice, Physics, Start, Unstable, World};
+use std::sync::atomic::AtomicBool;
 
 /// World units → voxel lengths: distances are reported in voxel lengths, as in the paper.
 fn voxel_lengths(world_units: f64, physics: &Physics) -> f64 {
@@ -43,6 +45,24 @@ impl<'a> Rollout<'a> {
         Ok(self.moved())
     }
 
+    /// The same, unless `stop` is set meanwhile; nobody watches.
+    ///
+    /// # Errors
+    /// [`Stopped`] then; within, [`Unstable`] if the life ends.
+    pub fn show_unless(
+        &mut self,
+        stimulus: &Grid<f64>,
+        stop: &AtomicBool,
+    ) -> Result<Result<f64, Unstable>, Stopped> {
+        self.look_at(stimulus);
+        for _ in 0..self.protocol.control_steps {
+            if let Err(unstable) = self.step_unless(stop)? {
+                return Ok(Err(unstable));
+            }
+        }
+        Ok(Ok(self.moved()))
+    }
+
     /// Shows an image from now on, until the next.
     pub fn look_at(&mut self, stimulus: &Grid<f64>) {
         self.world.set_stimulus(stimulus);
@@ -55,6 +75,14 @@ impl<'a> Rollout<'a> {
     /// [`Unstable`] if the life ends in it.
     pub fn step(&mut self) -> Result<(), Unstable> {
         self.world.step()
+    }
+
+    /// One control step, which ends soon when `stop` is set.
+    ///
+    /// # Errors
+    /// [`Stopped`] then; within, [`Unstable`] if the life ends in it.
+    pub fn step_unless(&mut self, stop: &AtomicBool) -> Result<Result<(), Unstable>, Stopped> {
+        self.world.step_unless(stop)
     }
 
     /// Displacement of the centre of mass along x since the present image is shown, in voxel lengths, right positive.
@@ -82,31 +110,33 @@ impl<'a> Rollout<'a> {
     }
 }
 
-/// One fresh life under one image: its displacement in voxel lengths.
+/// One fresh life under one image, unless `stop` is set meanwhile: its displacement in voxel lengths.
 ///
 /// # Errors
-/// [`Unstable`] if the life ends early.
+/// [`Stopped`] then; within, [`Unstable`] if the life ends early.
 pub fn fresh_life(
     lattice: &Lattice,
     physics: &Physics,
     protocol: &Protocol,
     stimulus: &Grid<f64>,
-) -> Result<f64, Unstable> {
-    Rollout::new(lattice, physics, protocol).show(stimulus, |_| ())
+    stop: &AtomicBool,
+) -> Result<Result<f64, Unstable>, Stopped> {
+    Rollout::new(lattice, physics, protocol).show_unless(stimulus, stop)
 }
 
 /// A robot shown images as the protocol has it, in fresh lives or one: its displacement under each in voxel lengths, and
-/// the energies that were put into it if they are to be `measured`.
+/// the energies that were put into it if they are to be `measured`. Unless `stop` is set meanwhile.
 ///
 /// # Errors
-/// [`Unstable`] if a life ends early.
+/// [`Stopped`] then; within, [`Unstable`] if a life ends early.
 pub fn walk(
     lattice: &Lattice,
     physics: &Physics,
     protocol: &Protocol,
     stimuli: &[Grid<f64>],
     measured: bool,
-) -> Result<(Vec<f64>, Energy), Unstable> {
+    stop: &AtomicBool,
+) -> Result<Result<(Vec<f64>, Energy), Unstable>, Stopped> {
     let mut rollout = Rollout::new(lattice, physics, protocol);
     if measured {
         rollout.world = rollout.world.with_energy_meter();
@@ -116,9 +146,12 @@ pub fn walk(
         if protocol.life == Life::Fresh {
             rollout.reset();
         }
-        displacements.push(rollout.show(stimulus, |_| ())?);
+        match rollout.show_unless(stimulus, stop)? {
+            Ok(displacement) => displacements.push(displacement),
+            Err(unstable) => return Ok(Err(unstable)),
+        }
     }
-    Ok((displacements, rollout.world.energy()))
+    Ok(Ok((displacements, rollout.world.energy())))
 }
 
 /// For each stimulus the first one (its index) that shows the body's sensors the same pixels: those are one life.
@@ -186,6 +219,7 @@ pub fn record(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::base::stop::NEVER;
 
     const STEPS: u32 = 12;
 
@@ -216,7 +250,7 @@ mod tests {
         assert_ne!(rollout.show(&image(1.0, 0.0), |_| ()).unwrap(), first);
         rollout.reset();
         assert_eq!(rollout.show(&image(1.0, 0.0), |_| ()).unwrap(), first);
-        assert_eq!(fresh_life(&lattice, &physics, &protocol, &image(1.0, 0.0)), Ok(first));
+        assert_eq!(fresh_life(&lattice, &physics, &protocol, &image(1.0, 0.0), &NEVER), Ok(Ok(first)));
     }
 
     #[test]
@@ -230,9 +264,19 @@ mod tests {
         // Lives under images that are the same to the sensors are the same life.
         let (physics, protocol) = (Physics::default(), protocol());
         let lattice = Lattice::new(&body(), &physics);
-        let live = |image| fresh_life(&lattice, &physics, &protocol, image).unwrap();
+        let live = |image| fresh_life(&lattice, &physics, &protocol, image, &NEVER).unwrap().unwrap();
         assert_eq!(live(&images[1]), live(&images[3]));
         assert_ne!(live(&images[0]), live(&images[1]));
+    }
+
+    #[test]
+    fn a_life_that_is_stopped_has_no_displacement() {
+        let (physics, protocol) = (Physics::default(), protocol());
+        let lattice = Lattice::new(&body(), &physics);
+        let stop = AtomicBool::new(true);
+        let image = image(1.0, 0.0);
+        assert_eq!(fresh_life(&lattice, &physics, &protocol, &image, &stop), Err(Stopped));
+        assert_eq!(walk(&lattice, &physics, &protocol, &[image], false, &stop), Err(Stopped));
     }
 
     fn recorded(fresh: bool, physics: &Physics) -> Recording {
@@ -273,8 +317,8 @@ mod tests {
         assert_eq!(fresh.frames[1 + steps], fresh.frames[0]);
         assert_eq!(fresh.frames[..1 + steps], continuous.frames[..1 + steps]);
         let lattice = Lattice::new(&body(), &physics);
-        let alone = fresh_life(&lattice, &physics, &protocol(), &image(1.0, 0.0)).unwrap();
-        assert_eq!(fresh.phases[1].displacement, alone);
+        let alone = fresh_life(&lattice, &physics, &protocol(), &image(1.0, 0.0), &NEVER);
+        assert_eq!(alone, Ok(Ok(fresh.phases[1].displacement)));
     }
 
     #[test]
@@ -283,8 +327,8 @@ mod tests {
         let images = [image(0.0, 0.0), image(1.0, 0.0)];
         for life in [Life::Fresh, Life::Sequential] {
             let protocol = Protocol { life, ..protocol() };
-            let (plain, nothing) = walk(&lattice, &physics, &protocol, &images, false).unwrap();
-            let (measured, energy) = walk(&lattice, &physics, &protocol, &images, true).unwrap();
+            let walk = |measured| walk(&lattice, &physics, &protocol, &images, measured, &NEVER);
+            let [(plain, nothing), (measured, energy)] = [false, true].map(|m| walk(m).unwrap().unwrap());
             let recorded = recorded(life == Life::Fresh, &physics).phases;
             assert_eq!(plain, recorded.iter().map(|phase| phase.displacement).collect::<Vec<_>>());
             assert_eq!((plain, nothing), (measured, Energy::default()));

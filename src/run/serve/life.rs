@@ -14,6 +14,8 @@ pub const STEPS_PER_SECOND: f64 = 50.0;
 const BATCH: u32 = 20;
 /// Time from one telling to the next in real time.
 const TICK: Duration = Duration::from_millis(40);
+/// What takes longer is told in parts.
+const MOST_AT_ONCE: Duration = Duration::from_millis(100);
 /// How often a life that stands still says that it is there; so it learns, too, that nobody listens any more.
 const HEARTBEAT: Duration = Duration::from_millis(400);
 /// A life that cannot keep its pace does not try to make up for more than this.
@@ -102,9 +104,13 @@ pub fn live(slot: &Slot, plan: &Plan, mut tell: impl FnMut(Event) -> Result<(), 
             }
         };
         frames.clear();
+        let begin = Instant::now();
         for _ in 0..due {
             let before = rollout.moved();
-            if let Err(unstable) = rollout.step() {
+            let Ok(stepped) = rollout.step_unless(&slot.control.over) else {
+                return tell(Event::End { step, answer: answer(judge, before), unstable: None });
+            };
+            if let Err(unstable) = stepped {
                 let answer = answer(judge, before);
                 if !frames.is_empty() {
                     tell(Event::Lived { step, frames: &frames, answer: answer.clone() })?;
@@ -113,6 +119,10 @@ pub fn live(slot: &Slot, plan: &Plan, mut tell: impl FnMut(Event) -> Result<(), 
             }
             step += 1;
             frames.push(rollout.frame());
+            // Large bodies are told of as they live.
+            if begin.elapsed() > MOST_AT_ONCE {
+                break;
+            }
         }
         if !frames.is_empty() {
             tell(Event::Lived { step, frames: &frames, answer: answer(judge, rollout.moved()) })?;
@@ -170,7 +180,44 @@ impl Clock {
 
 #[cfg(test)]
 mod tests {
+    use super::super::lives::Lives;
+    use super::super::request::Who;
     use super::*;
+    use crate::base::Grid;
+    use crate::sim::Physics;
+    use crate::task::protocol::Protocol;
+    use crate::task::stimulus::StimulusParams;
+
+    #[test]
+    fn a_life_ends_in_the_middle_of_a_control_step_when_it_is_to_end() {
+        let who = Who {
+            body: "3434/4343".parse().unwrap(),
+            // A control step of a quarter of an hour.
+            physics: Physics { substeps: u32::MAX, ..Physics::default() },
+            protocol: Protocol::default(),
+            encoding: StimulusParams::default(),
+            judge: None,
+        };
+        let seen = Seen { stimulus: Grid::filled(2, 4, 0.0), label: None };
+        let plan = Plan { who: who.clone(), seen, pace: Pace::Free };
+        let lives = Lives::default();
+        let slot = lives.begin(who).unwrap();
+        let begin = Instant::now();
+        let mut ends = 0;
+        std::thread::scope(|threads| {
+            threads.spawn(|| {
+                std::thread::sleep(Duration::from_millis(50));
+                lives.close();
+            });
+            live(&slot, &plan, |event| {
+                ends += u32::from(matches!(event, Event::End { step: 0, .. }));
+                Ok(())
+            })
+            .unwrap();
+        });
+        assert_eq!(ends, 1);
+        assert!(begin.elapsed().as_secs() < 5, "{:?}", begin.elapsed());
+    }
 
     #[test]
     fn a_clock_keeps_its_pace_and_forgives_what_cannot_be_made_up_for() {

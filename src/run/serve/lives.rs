@@ -3,6 +3,7 @@
 use super::Refusal;
 use super::request::{Pace, Seen, Who};
 use std::collections::BTreeMap;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
@@ -20,7 +21,6 @@ struct Wishes {
     pace: Option<Pace>,
     paused: Option<bool>,
     seen: Option<Seen>,
-    end: bool,
 }
 
 /// The way to a life that runs in another thread.
@@ -29,6 +29,8 @@ pub struct Control {
     pub who: Who,
     wishes: Mutex<Wishes>,
     changed: Condvar,
+    /// Whether it is to end: looked at in every substep.
+    pub(super) over: AtomicBool,
 }
 
 /// What has been asked of a life since it last looked.
@@ -53,9 +55,17 @@ impl Control {
         self.changed.notify_all();
     }
 
-    fn end(&self) {
-        lock(&self.wishes).end = true;
+    /// Asks it to end, at once.
+    pub fn end(&self) {
+        let wishes = lock(&self.wishes);
+        self.over.store(true, Ordering::Relaxed);
+        drop(wishes);
         self.changed.notify_all();
+    }
+
+    /// Whether it was asked to.
+    pub fn is_over(&self) -> bool {
+        self.over.load(Ordering::Relaxed)
     }
 
     pub(super) fn news(&self) -> News {
@@ -64,14 +74,14 @@ impl Control {
             pace: wishes.pace.take(),
             paused: wishes.paused.take(),
             seen: wishes.seen.take(),
-            end: wishes.end,
+            end: self.is_over(),
         }
     }
 
     /// Waits, but not if something is asked for.
     pub(super) fn wait(&self, time: Duration) {
         let idle = |wishes: &mut Wishes| {
-            wishes.pace.is_none() && wishes.paused.is_none() && wishes.seen.is_none() && !wishes.end
+            wishes.pace.is_none() && wishes.paused.is_none() && wishes.seen.is_none() && !self.is_over()
         };
         drop(self.changed.wait_timeout_while(lock(&self.wishes), time, idle));
     }
@@ -112,8 +122,12 @@ impl Lives {
         }
         running.begun += 1;
         let id = running.begun;
-        let control =
-            Arc::new(Control { who, wishes: Mutex::new(Wishes::default()), changed: Condvar::new() });
+        let control = Arc::new(Control {
+            who,
+            wishes: Mutex::new(Wishes::default()),
+            changed: Condvar::new(),
+            over: AtomicBool::new(false),
+        });
         running.lives.insert(id, Arc::clone(&control));
         Ok(Slot { lives: self, id, control })
     }

@@ -8,10 +8,11 @@ mod stream;
 use crate::run::Error;
 use crate::run::serve::Service;
 use crate::run::serve::life::{Gone, live};
+use crate::run::serve::lives::Control;
 use crate::run::serve::request::Plan;
 use http::Response;
 use routes::Reply;
-use std::io::Write;
+use std::io::{self, ErrorKind, Write};
 use std::net::{Ipv4Addr, SocketAddr, TcpListener, TcpStream};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -134,15 +135,12 @@ fn life(service: &Service, plan: &Plan, stream: &mut TcpStream) -> Option<Respon
         Ok(slot) => slot,
         Err(refusal) => return Some(routes::refused(refusal)),
     };
-    let begun = http::begin_events(stream).map_err(|_| Gone);
+    let begun = http::begin_events(stream).and_then(|()| end_with(stream, &slot.control)).map_err(|_| Gone);
     let told = begun.and_then(|()| {
-        live(&slot, plan, |event| {
-            if closed(stream) {
-                return Err(Gone);
-            }
-            stream.write_all(stream::text(&event).as_bytes()).map_err(|_| Gone)
-        })
+        live(&slot, plan, |event| stream.write_all(stream::text(&event).as_bytes()).map_err(|_| Gone))
     });
+    // Whoever watches the connection has nothing left to do.
+    slot.control.end();
     drop(slot);
     if told.is_ok() {
         http::close(stream);
@@ -150,14 +148,20 @@ fn life(service: &Service, plan: &Plan, stream: &mut TcpStream) -> Option<Respon
     None
 }
 
-/// Whether the other side has closed: without this, a life would go on until two more writes have failed.
-fn closed(stream: &TcpStream) -> bool {
-    let mut byte = [0];
-    let looked = stream.set_nonblocking(true).and_then(|()| stream.peek(&mut byte));
-    let usable = stream.set_nonblocking(false);
-    let gone = match looked {
-        Ok(count) => count == 0,
-        Err(error) => error.kind() != std::io::ErrorKind::WouldBlock,
+/// Ends a life when the other side closes its connection: a write would fail only after that, and in between the life would go on.
+fn end_with(stream: &TcpStream, control: &Arc<Control>) -> io::Result<()> {
+    let (stream, control) = (stream.try_clone()?, Arc::clone(control));
+    stream.set_read_timeout(Some(LOOK))?;
+    let watch = move || {
+        while !control.is_over() {
+            match stream.peek(&mut [0]) {
+                // Somebody who talks on.
+                Ok(count) if count > 0 => std::thread::sleep(LOOK),
+                Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => {}
+                Err(error) if error.kind() == ErrorKind::Interrupted => {}
+                Ok(_) | Err(_) => control.end(),
+            }
+        }
     };
-    gone || usable.is_err()
+    std::thread::Builder::new().name("watch".to_string()).spawn(watch).map(|_| ())
 }

@@ -1,0 +1,278 @@
+//! Whatever a command computes, it ends soon when it is to, and what would not end is refused before it begins.
+#![cfg(unix)]
+
+mod common;
+
+use common::program::{Sandbox, TINY, files, staged, without_seconds};
+use common::server::Server;
+use morphcog::run::curriculum::Period;
+use morphcog::run::evolve::{Observer, Options, Progress, evolve};
+use morphcog::run::folder::{IfExists, RunFolder};
+use morphcog::run::start::StartRef;
+use morphcog::run::training::Training;
+use morphcog::run::{Config, ErrorKind};
+use std::process::{Child, Command, ExitStatus};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+/// An image lasts a million control steps, the most there can be: a life of a minute or more.
+const LONG: &str = "--set protocol.control_steps=1000000";
+/// It takes some hundredths of a second; the rest is for machines that have other things to do.
+const SOON: Duration = Duration::from_secs(6);
+
+/// Sends a signal after a while, in which the program does not end by itself; then it ends soon.
+#[track_caller]
+fn stopped(child: &mut Child, signal: &str) -> ExitStatus {
+    std::thread::sleep(Duration::from_millis(1500));
+    assert!(child.try_wait().unwrap().is_none(), "it has ended before it was stopped");
+    let sent = Command::new("kill").args(["-s", signal, &child.id().to_string()]).status().unwrap();
+    assert!(sent.success());
+    let begin = Instant::now();
+    loop {
+        if let Some(status) = child.try_wait().unwrap() {
+            return status;
+        }
+        if begin.elapsed() > SOON {
+            child.kill().unwrap();
+            child.wait().unwrap();
+            panic!("still running {SOON:?} after {signal}");
+        }
+        std::thread::sleep(Duration::from_millis(5));
+    }
+}
+
+/// A run whose robots live long, as its `run.json` says.
+fn patient_run(control_steps: u32) -> Sandbox {
+    let sandbox = Sandbox::tiny();
+    sandbox.run("evolve -q -c tiny.toml -o run").ended(0, &[]);
+    let text = sandbox.read("run/run.json");
+    let long = text.replace("\"control_steps\":20", &format!("\"control_steps\":{control_steps}"));
+    assert_ne!(text, long);
+    sandbox.write("run/run.json", long);
+    sandbox
+}
+
+#[test]
+fn a_generation_that_lasts_for_minutes_is_dropped_when_a_signal_comes() {
+    let sandbox = Sandbox::tiny();
+    for signal in ["INT", "TERM", "USR1"] {
+        let mut child = sandbox.start(&format!("evolve -q -c tiny.toml {LONG} -o {signal}"));
+        assert_eq!(stopped(&mut child, signal).code(), Some(75), "{signal}");
+        let saved = sandbox.run_file(signal);
+        assert_eq!((saved.generations, saved.elites.len()), (0, 0), "{signal}");
+        assert_eq!(sandbox.read(&format!("{signal}/metrics.csv")).lines().count(), 1, "{signal}");
+    }
+}
+
+#[test]
+fn a_stage_that_begins_with_long_lives_is_stopped_and_the_stage_before_is_kept() {
+    let sandbox = Sandbox::tiny();
+    let stages = "\n[[stage]]\ngenerations = 2\n[[stage]]\ncontrol_steps = 1000000\n";
+    sandbox.write("staged.toml", format!("{TINY}{stages}"));
+    let mut child = sandbox.start("evolve -q -c staged.toml -o run");
+    assert_eq!(stopped(&mut child, "TERM").code(), Some(75));
+    sandbox.run("evolve -q -c staged.toml -o before -g 2").ended(0, &[]);
+    assert_eq!(sandbox.run_file("run").generations, 2);
+    assert_eq!(sandbox.run_file("run").elites, sandbox.run_file("before").elites);
+}
+
+#[test]
+fn eval_audit_validation_and_capacity_end_soon_and_leave_nothing_half_done() {
+    let sandbox = patient_run(1_000_000);
+    let before = files(&sandbox.path("run"));
+    for command in [
+        "eval -q -a run/run.json --images 40 --cycles 10000",
+        "audit -q -a run/run.json",
+        "audit -q -a run/run.json --set perturbations.time_step=[64]",
+    ] {
+        let mut child = sandbox.start(command);
+        assert_eq!(stopped(&mut child, "INT").code(), Some(75), "{command}");
+        // An audit's file says of whom nothing is known yet.
+        let mut after = files(&sandbox.path("run"));
+        for name in ["audit.json", "audit.csv"] {
+            if let Some(audit) = after.remove(name) {
+                assert!(!String::from_utf8(audit).unwrap().contains("\"verdict\""), "{command}");
+            }
+        }
+        assert_eq!(after, before, "{command}");
+        let _ = std::fs::remove_file(sandbox.path("run/audit.json"));
+    }
+    let validates = "--set validation.best=1 --set validation.images=40 --set physics.cycle_steps=100000";
+    let mut child = sandbox.start(&format!("evolve -q -c tiny.toml -o validated {validates}"));
+    assert_eq!(stopped(&mut child, "TERM").code(), Some(75));
+    assert_eq!(sandbox.run_file("validated").generations, 12);
+    assert!(!sandbox.path("validated/validation.json").exists());
+
+    sandbox.run("evolve -q -c tiny.toml -o short").ended(0, &[]);
+    sandbox.run("eval -q -a short/run.json --images 40 --cycles 1 --robots top:4").ended(0, &[]);
+    let endless = "--set mlp.epochs=1000000000 --set mlp.patience=1000000000 --set networks=[\"mlp\"]";
+    let capacity =
+        format!("capacity -q --eval short/eval.json --set trainings=2 --set sizes=[1,2] {endless}");
+    let mut child = sandbox.start(&capacity);
+    assert_eq!(stopped(&mut child, "INT").code(), Some(75));
+    assert!(!sandbox.path("short/capacity.json").exists());
+}
+
+#[test]
+fn commands_that_have_nothing_to_save_are_ended_by_the_signal_and_leave_no_file() {
+    // More could not be recorded.
+    let sandbox = patient_run(600_000);
+    sandbox.write("long.json", "{\"body\": [[3, 4, 3], [4, 0, 4]], \"control_steps\": 1000000}");
+    let before = files(&sandbox.path("run"));
+    for command in [
+        "simulate long.json -o long.csv",
+        "replay -q -a run/run.json --robot best --format gif",
+        "plot -q sensitivity -a run/run.json",
+        "plot -q spacetime -a run/run.json",
+        "report -q run/run.json",
+        "bench",
+    ] {
+        let mut child = sandbox.start(command);
+        assert_eq!(stopped(&mut child, "TERM").code(), None, "{command}");
+        assert_eq!(files(&sandbox.path("run")), before, "{command}");
+        assert!(!sandbox.path("long.csv").exists());
+    }
+}
+
+#[test]
+fn a_life_that_is_watched_ends_with_its_tab_and_with_the_server() {
+    let sandbox = Sandbox::new();
+    let server = Server::start(&sandbox, "");
+    let body: Vec<Vec<u8>> =
+        (0..64).map(|row| (0..64).map(|c| 3 + ((row + c) % 2) as u8).collect()).collect();
+    let life = serde_json::json!({ "subject": { "body": body }, "control_steps": 5000, "speed": 0 });
+    let running = || server.get("/api/status").body;
+    let mut events = server.events("/api/lives", &life);
+    events.next().unwrap();
+    assert!(running().contains("\"lives\":1"), "{}", running());
+    drop(events);
+    let begin = Instant::now();
+    while !running().contains("\"lives\":0") {
+        assert!(begin.elapsed() < SOON, "{}", running());
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    let mut events = server.events("/api/lives", &life);
+    events.next().unwrap();
+    server.ended_by("TERM");
+}
+
+/// Says nothing.
+struct Silent;
+
+impl Observer for Silent {
+    fn started(&mut self, _: &RunFolder, _: &Training, _: &Progress) {}
+    fn starting_from(&mut self, _: &StartRef, _: usize) {}
+    fn period(&mut self, _: Period, _: &Training, _: &Progress) {}
+    fn generation(&mut self, _: &Progress) {}
+    fn warning(&mut self, _: &str) {}
+}
+
+#[test]
+fn a_run_stopped_at_any_moments_goes_on_to_the_same_bytes() {
+    let sandbox = Sandbox::new();
+    let robust = format!("{TINY}\n[evaluation]\nrobust = true\n");
+    for (name, text) in [("staged", staged()), ("robust", robust)] {
+        let text = text.replace("control_steps = 20", "control_steps = 60");
+        sandbox.write(&format!("{name}.toml"), &text);
+        sandbox.run(&format!("evolve -q -c {name}.toml -o {name}-whole")).ended(0, &[]);
+        let options = Options {
+            config: Config::parse(&text, "run.toml", &[]).unwrap(),
+            name: name.to_string(),
+            out: sandbox.path(name),
+            if_exists: IfExists::Resume,
+            data: None,
+            threads: Some(2),
+        };
+        let (mut random, mut stops) = (9_u64, 0);
+        loop {
+            let stop = AtomicBool::new(false);
+            random = random.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+            // Long enough for some generations in the end, however slow the machine is at the moment.
+            let patience = Duration::from_micros((random >> 33) % (20_000 + 3_000 * stops));
+            let finished = std::thread::scope(|threads| {
+                threads.spawn(|| {
+                    std::thread::sleep(patience);
+                    stop.store(true, Ordering::Relaxed);
+                });
+                evolve(&options, &stop, &mut Silent)
+            });
+            match finished {
+                Ok(finished) if !finished.stopped => break,
+                Ok(_) => {}
+                // Before there was anything to save.
+                Err(error) => assert_eq!(error.kind, ErrorKind::Stopped, "{error}"),
+            }
+            stops += 1;
+            assert!(stops < 400, "it does not get on");
+        }
+        assert!(stops > 0);
+        let result = |folder: &str| {
+            let read = |file: &str| sandbox.read(&format!("{folder}/{file}"));
+            (read("run.json"), without_seconds(&read("metrics.csv")))
+        };
+        assert_eq!(result(name), result(&format!("{name}-whole")), "{name}");
+    }
+}
+
+#[test]
+fn what_would_not_end_is_refused_with_its_key_wherever_it_stands() {
+    let sandbox = Sandbox::tiny();
+    sandbox.run("evolve -q -c tiny.toml -o run").ended(0, &[]);
+    let good = sandbox.read("run/run.json");
+    let hostile = [
+        (
+            "\"blow_up_extent\":10.0",
+            "\"blow_up_extent\":1e10",
+            "physics.blow_up_extent = 10000000000: expected at most",
+        ),
+        (
+            "\"substeps\":30",
+            "\"substeps\":4000000000",
+            "physics.substeps = 4000000000: expected a whole number from 1 to",
+        ),
+        ("\"cycle_steps\":50", "\"cycle_steps\":4000000000", "physics.cycle_steps = 4000000000: expected"),
+        (
+            "\"control_steps\":20",
+            "\"control_steps\":4000000000",
+            "protocol.control_steps = 4000000000: expected 1 to",
+        ),
+        ("\"start_row\":2", "\"start_row\":4000000000", "protocol.start_row = 4000000000: expected 2"),
+        (
+            "\"generations\":12,\"stats\"",
+            "\"generations\":4000000000,\"stats\"",
+            "generations = 4000000000: expected at most",
+        ),
+    ];
+    for (from, to, expected) in hostile {
+        assert!(good.contains(from), "{from}");
+        sandbox.write("run/run.json", good.replace(from, to));
+        for command in ["eval", "audit", "plot sensitivity", "report", "replay -r best", "serve --no-open"] {
+            let archive = if command == "report" { "run/run.json" } else { "-a run/run.json" };
+            sandbox.run(&format!("{command} {archive}")).ended(3, &["run/run.json", expected]);
+        }
+        let assignment =
+            format!("{}={}", expected.split(' ').next().unwrap(), to.rsplit(':').next().unwrap());
+        if !assignment.starts_with("generations") {
+            sandbox.run(&format!("evolve -c tiny.toml -o new --set {assignment}")).ended(3, &[expected]);
+        }
+    }
+    sandbox.write("run/run.json", good.replace("\"cycle_steps\":50", "\"cycle_steps\":100000"));
+    sandbox
+        .run("eval -a run/run.json --cycles 11")
+        .ended(2, &["--cycles 11: expected at most 10, 1000000 control"]);
+    sandbox.write("run/run.json", good.replace("\"control_steps\":20", "\"control_steps\":1000000"));
+    for command in ["plot spacetime -a run/run.json", "replay -r best -a run/run.json", "report run/run.json"]
+    {
+        let expected = "protocol.control_steps = 1000000: expected at most 694444 to record";
+        sandbox.run(command).ended(3, &[expected]);
+    }
+    let drawn = "--set stage=[{images_per_class=1,redraw=1}] -g 200000";
+    sandbox
+        .run(&format!("evolve -c tiny.toml -o new {drawn}"))
+        .ended(3, &["stage 1: redraw = 1: expected 2 or more"]);
+    let scenario = |keys: &str| sandbox.write("a.json", format!("{{\"body\": [[3]], {keys}}}"));
+    scenario("\"physics\": {\"blow_up_extent\": 1e10, \"time_step\": 0.5}, \"control_steps\": 2");
+    sandbox.run("simulate a.json").ended(3, &["a.json: physics.blow_up_extent"]);
+    scenario("\"physics\": {\"substeps\": 4000000000}");
+    sandbox.run("simulate a.json").ended(3, &["a.json: physics.substeps"]);
+}
