@@ -270,6 +270,16 @@ fn what_would_not_end_is_refused_with_its_key_wherever_it_stands() {
     sandbox
         .run(&format!("evolve -c tiny.toml -o new {drawn}"))
         .ended(3, &["stage 1: redraw = 1: expected 2 or more"]);
+    sandbox.write("run/run.json", &good);
+    sandbox.run("eval -q -a run/run.json --images 40 --cycles 1").ended(0, &[]);
+    let report = sandbox.read("run/eval.json");
+    let wide =
+        report.replace("\"body\":{\"height\":5,\"width\":5", "\"body\":{\"height\":5,\"width\":4000000000");
+    assert_ne!(report, wide);
+    sandbox.write("run/eval.json", wide);
+    sandbox
+        .run("capacity --eval run/eval.json")
+        .ended(3, &["run/eval.json: setting: body.width = 4000000000: expected 1 to 64"]);
     let scenario = |keys: &str| sandbox.write("a.json", format!("{{\"body\": [[3]], {keys}}}"));
     scenario("\"physics\": {\"blow_up_extent\": 1e10, \"time_step\": 0.5}, \"control_steps\": 2");
     sandbox.run("simulate a.json").ended(3, &["a.json: physics.blow_up_extent"]);

@@ -156,7 +156,7 @@ mod tests {
             let _ = (rng.unit(), rng.below(40));
             let described = parent.cppn.express(14, 14).unwrap();
             let (edits, body) =
-                one_voxel_changed(&parent.edits, &described, PAPER, VoxelScope::All, rng).unwrap();
+                one_voxel_changed(&parent.edits, &described, PAPER, VoxelScope::All, rng, &NEVER).unwrap();
             assert_eq!(same, (Genome { cppn: parent.cppn.clone(), edits }, body));
         }
     }

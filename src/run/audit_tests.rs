@@ -1,5 +1,6 @@
 use super::*;
 use crate::base::Grid;
+use crate::base::stop::NEVER;
 use crate::run::config::BUILT_IN;
 use crate::run::training::{DatasetRef, ImageRef};
 use crate::run::verdict::Verdict;
@@ -85,13 +86,13 @@ fn images_that_are_the_same_to_the_sensors_are_one_life_with_the_same_end() {
     let stimuli = vec![image(0.0, 0.0), image(1.0, 0.0), image(0.0, 1.0), image(1.0, 1.0), image(0.0, 0.5)];
     let Trial { config, .. } = trial(4, 6, Physics::default());
     let setting = Setting { body, physics: config.physics, protocol: config.protocol, stimuli };
-    let (displacements, _) = live(&setting, false).unwrap();
-    let (all, _) = live(&setting, true).unwrap();
+    let (displacements, _) = live(&setting, false, &NEVER).unwrap().unwrap();
+    let (all, _) = live(&setting, true, &NEVER).unwrap().unwrap();
     assert_eq!(displacements, all);
     assert_ne!(all[0], all[1], "it sees something");
     let sequential =
         Setting { protocol: Protocol { life: Life::Sequential, ..setting.protocol.clone() }, ..setting };
-    let (displacements, _) = live(&sequential, false).unwrap();
+    let (displacements, _) = live(&sequential, false, &NEVER).unwrap().unwrap();
     assert_eq!(displacements.len(), 5);
     assert_ne!(displacements[0], displacements[2], "what comes later begins elsewhere");
 }

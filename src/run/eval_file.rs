@@ -309,7 +309,10 @@ impl EvalFile {
     /// What is wrong with the file, with its line and key.
     pub fn read(path: &Path) -> Result<Self, Error> {
         let text = read_text(path).map_err(|error| Error::reading(path, &error))?;
-        toml_text::read_versioned(&text, &path.display().to_string(), FORMAT, FORMAT_VERSION)
+        let name = path.display().to_string();
+        let file: EvalFile = toml_text::read_versioned(&text, &name, FORMAT, FORMAT_VERSION)?;
+        let checked = file.setting.as_ref().map_or(Ok(()), Setting::check);
+        checked.map(|()| file).map_err(|error| error.within(&name))
     }
 
     /// Its text, one line.

@@ -1,8 +1,17 @@
 //! What evaluations say of the runs they are of: enough to show others the same images.
 
 use super::archive::RunFile;
-use super::config::{BodyConfig, DataConfig, TaskConfig};
+use super::config::{ArchiveConfig, BodyConfig, CheckpointConfig, DataConfig, TaskConfig};
+use super::robust::EvaluationConfig;
+use super::start::StartConfig;
 use super::training::ImageRef;
+use super::validation::ValidationConfig;
+use super::{Config, Error};
+use crate::genome::MutationParams;
+use crate::qd::EmitterParams;
+use crate::sim::Physics;
+use crate::task::evaluation::Savings;
+use crate::task::protocol::Protocol;
 use crate::task::stimulus::StimulusParams;
 use serde::{Deserialize, Serialize};
 
@@ -57,5 +66,29 @@ impl Setting {
             stimulus: run.config.stimulus,
             train_sha256: run.dataset.train_sha256.clone(),
         }
+    }
+
+    /// Checks what a type cannot: all that is here stands in a config, which must be valid.
+    pub(super) fn check(&self) -> Result<(), Error> {
+        let config = Config {
+            seed: 1,
+            generations: 1,
+            body: self.body,
+            task: self.task.clone(),
+            data: self.data.clone(),
+            stimulus: self.stimulus,
+            protocol: Protocol::default(),
+            map_elites: EmitterParams::default(),
+            archive: ArchiveConfig::default(),
+            genome: MutationParams::default(),
+            savings: Savings::default(),
+            checkpoint: CheckpointConfig::default(),
+            stage: Vec::new(),
+            evaluation: EvaluationConfig::default(),
+            start: StartConfig::default(),
+            validation: ValidationConfig::default(),
+            physics: Physics::default(),
+        };
+        config.validate().map_err(|error| error.within("setting"))
     }
 }

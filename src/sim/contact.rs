@@ -168,7 +168,7 @@ impl Contacts<'_> {
         let last = ((bounds.high.x / cell).floor() as i64).saturating_add(1);
         // A voxel that is wider has blown up in valid physics; whatever the physics, this ends.
         for column in first..=last.min(first.saturating_add(MOST_COLUMNS)) {
-            let (left, right) = (vertex(column), vertex(column + 1));
+            let (left, right) = (vertex(column), vertex(column.saturating_add(1)));
             if left > bounds.high.x || right < bounds.low.x {
                 continue;
             }
@@ -196,5 +196,43 @@ impl Contacts<'_> {
                 }
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sim::{Start, UnstableReason, World};
+
+    #[test]
+    fn a_voxel_that_reaches_over_any_number_of_cells_is_soon_done_with() {
+        // Not valid: nothing here has ever blown up.
+        let physics = Physics { blow_up_extent: 1e10, time_step: 0.5, ..Physics::default() };
+        let lattice = Lattice::new(&"3".parse().unwrap(), &physics);
+        let mut world = World::new(&lattice, &physics, Start { column: 493, row: 2 });
+        let begin = std::time::Instant::now();
+        let ended = (0..2).try_for_each(|_| world.step());
+        assert!(begin.elapsed().as_secs() < 5, "{ended:?} after {:?}", begin.elapsed());
+    }
+
+    #[test]
+    fn a_heap_of_voxels_within_each_other_is_unstable_whatever_the_ratio() {
+        // Springs as long as their goals, up to 90 voxel lengths.
+        let physics = Physics {
+            unstable_ratio: 1e9,
+            limit_low: 0.01,
+            limit_high: 90.0,
+            target_max: 90.0,
+            muscle_swing: 90.0,
+            servo_gain: 0.1,
+            ..Physics::default()
+        };
+        physics.validate().unwrap();
+        let comb: Vec<String> =
+            (0..64).map(|row| if row == 0 { "34".repeat(32) } else { "30".repeat(32) }).collect();
+        let lattice = Lattice::new(&comb.join("/").parse().unwrap(), &physics);
+        let mut world = World::new(&lattice, &physics, Start { column: 493, row: 2 });
+        let ended = (0..5).find_map(|_| world.step().err());
+        assert_eq!(ended.map(|unstable| unstable.reason), Some(UnstableReason::Overlaps));
     }
 }
