@@ -65,7 +65,7 @@ pub fn evolve(
     }
     let folder = RunFolder::open(&options.out, options.if_exists)?;
     let saved = match resumes {
-        true => resume::saved(&folder, config, &dataset, |text| observer.warning(&text))?,
+        true => resume::saved(&folder, config, &dataset, stop, |text| observer.warning(&text))?,
         false => None,
     };
     // One without a generation has counted nothing that counts: its start is evaluated again.
@@ -86,7 +86,7 @@ pub fn evolve(
     }
     whereabouts::remember(&folder, &dataset)?;
     let pool = eval::pool(options.threads)?;
-    let mut run = Run::new(options, &dataset, first, saved)?;
+    let mut run = Run::new(options, &dataset, first, saved, stop)?;
     let mut metrics = Metrics::open(folder.path(), run.generation)?;
     if metrics.missing > 0 {
         let (path, missing) = (folder.path().join(folder::METRICS).display().to_string(), metrics.missing);
@@ -150,6 +150,7 @@ impl<'a> Run<'a> {
         dataset: &'a Dataset,
         first: Training,
         saved: Option<Checkpoint>,
+        stop: &AtomicBool,
     ) -> Result<Self, Error> {
         let config = &options.config;
         let (archive, known, relatives, totals, generation, origin) = match saved {
@@ -162,7 +163,7 @@ impl<'a> Run<'a> {
         let period = config.period(latest);
         let grouping = config.grouping()?.with_fitness(config.criterion(latest));
         let training =
-            if period == config.period(0) { first } else { Training::of(config, dataset, period)? };
+            if period == config.period(0) { first } else { Training::unless(config, dataset, period, stop)? };
         Ok(Run {
             options,
             dataset,

@@ -9,6 +9,7 @@ use super::training::Training;
 use super::{Config, Error};
 use crate::task::dataset::Dataset;
 use std::collections::BTreeMap;
+use std::sync::atomic::AtomicBool;
 
 /// The key of the archive that a run starts from.
 const START: &str = "start.archive";
@@ -23,6 +24,7 @@ pub(super) fn saved(
     folder: &RunFolder,
     config: &Config,
     dataset: &Dataset,
+    stop: &AtomicBool,
     mut warn: impl FnMut(String),
 ) -> Result<Option<Checkpoint>, Error> {
     let place = folder.path().display().to_string();
@@ -33,7 +35,7 @@ pub(super) fn saved(
     };
     match checkpoint::read(folder.path(), tell)? {
         Some(saved) => {
-            compatible(&saved, config, dataset).map_err(|error| error.within(&place))?;
+            compatible(&saved, config, dataset, stop).map_err(|error| error.within(&place))?;
             if is_newest_broken {
                 checkpoint::take_back(folder.path())?;
             }
@@ -48,7 +50,12 @@ pub(super) fn saved(
 }
 
 /// Whether a saved run can be gone on with under a config: all that its results depend on must be the same.
-fn compatible(saved: &Checkpoint, config: &Config, dataset: &Dataset) -> Result<(), Error> {
+fn compatible(
+    saved: &Checkpoint,
+    config: &Config,
+    dataset: &Dataset,
+    stop: &AtomicBool,
+) -> Result<(), Error> {
     let hint = || format!("resume with the config it was started with, or {ANEW}");
     let (theirs, ours) = (&saved.run.program_version, env!("CARGO_PKG_VERSION"));
     if theirs != ours {
@@ -74,7 +81,7 @@ fn compatible(saved: &Checkpoint, config: &Config, dataset: &Dataset) -> Result<
         let text = format!("{text}: so many of it have been done in this folder");
         return Err(Error::input(text).hint(hint()));
     }
-    let training = Training::of(config, dataset, config.period(last))?;
+    let training = Training::unless(config, dataset, config.period(last), stop)?;
     if saved.run.dataset != training.dataset || saved.run.training_images != training.images {
         let text =
             "data: the run in this folder was made with other images: the dataset has changed".to_string();
