@@ -1,6 +1,7 @@
 //! What commands have in common that take archives, or robots of them: one rule, and the same words of help.
 
 use super::run_json;
+use crate::base::stop::NEVER;
 use crate::run::one_by_one::{self, Named};
 use crate::run::robots::Selection;
 use crate::run::{Error, signals};
@@ -8,7 +9,6 @@ use crate::view::console::Console;
 use crate::view::reporters;
 use clap::Args;
 use std::path::PathBuf;
-use std::sync::Arc;
 
 /// Archives, of a command that takes several.
 #[derive(Debug, Args)]
@@ -44,9 +44,9 @@ pub(super) fn selected(mut given: Vec<Selection>) -> Result<Option<Selection>, E
 /// The robots of a selection, for a command that looks at them one by one.
 pub(super) fn one_by_one(search: &one_by_one::Options, console: &Console) -> Result<Vec<Named>, Error> {
     // Only a search on validation images is stopped in an orderly way: signals end all else at once.
-    let stop = match search.robots.validated() {
-        Some(_) => signals::stop_flag()?,
-        None => Arc::default(),
-    };
-    one_by_one::named(search, &stop, &reporters::Evaluation::new(console))
+    let observer = reporters::Evaluation::new(console);
+    match search.robots.validated() {
+        Some(_) => one_by_one::named(search, &*signals::stop_flag()?, &observer),
+        None => one_by_one::named(search, &NEVER, &observer),
+    }
 }
