@@ -13,7 +13,7 @@ use morphcog::run::held_out::{HeldOut, images};
 use morphcog::run::start::StartRef;
 use morphcog::run::training::{Training, load_dataset};
 use morphcog::task::dataset::Split;
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// A run with redrawn images, so that it was trained on more than it ends with.
 fn sandbox() -> Sandbox {
@@ -238,7 +238,7 @@ fn a_run_that_will_leave_too_few_of_them_is_refused_before_it_begins() {
     let refused = ["validation.images = 40", "20 images of class", "ask for at most", "validation.best"];
     sandbox.run("evolve -q -c run.toml -o run").ended(3, &refused);
     // However many generations: images run out soon.
-    sandbox.run("evolve -q -c run.toml -o run -g 4000000000").ended(3, &refused);
+    sandbox.run("evolve -q -c run.toml -o run -g 200000").ended(3, &refused);
     assert!(!sandbox.path("run").exists());
     // Who does not choose any needs none.
     sandbox.run("evolve -q -c run.toml -o run -g 1 --set validation.best=0").ended(0, &[]);
@@ -266,12 +266,15 @@ fn those_that_are_best_on_validation_images_can_be_audited_by_themselves() {
 
 #[test]
 fn evolve_itself_chooses_robots_at_its_end_and_so_whatever_calls_it() {
-    struct Quiet;
-    impl Observer for Quiet {
+    /// Sets the flag, if there is one, after the first generation.
+    struct Quiet<'a>(Option<&'a AtomicBool>);
+    impl Observer for Quiet<'_> {
         fn started(&mut self, _: &RunFolder, _: &Training, _: &Progress) {}
         fn starting_from(&mut self, _: &StartRef, _: usize) {}
         fn period(&mut self, _: Period, _: &Training, _: &Progress) {}
-        fn generation(&mut self, _: &Progress) {}
+        fn generation(&mut self, _: &Progress) {
+            self.0.iter().for_each(|stop| stop.store(true, Ordering::Relaxed));
+        }
         fn warning(&mut self, text: &str) {
             panic!("{text}");
         }
@@ -287,7 +290,7 @@ fn evolve_itself_chooses_robots_at_its_end_and_so_whatever_calls_it() {
         data: None,
         threads: Some(1),
     };
-    let finished = evolve(&options("library"), &AtomicBool::new(false), &mut Quiet).unwrap();
+    let finished = evolve(&options("library"), &AtomicBool::new(false), &mut Quiet(None)).unwrap();
     assert!(!finished.stopped);
     assert_eq!(finished.validated.len(), 2);
     let first = &finished.validated[0];
@@ -297,7 +300,8 @@ fn evolve_itself_chooses_robots_at_its_end_and_so_whatever_calls_it() {
     sandbox.run("evolve -q -c run.toml -o program").ended(0, &[]);
     assert_eq!(sandbox.read("library/validation.json"), sandbox.read("program/validation.json"));
     // Stopped before its last generation, a run chooses none.
-    let stopped = evolve(&options("stopped"), &AtomicBool::new(true), &mut Quiet).unwrap();
+    let stop = AtomicBool::new(false);
+    let stopped = evolve(&options("stopped"), &stop, &mut Quiet(Some(&stop))).unwrap();
     assert!(stopped.stopped && stopped.validated.is_empty());
     assert!(!sandbox.path("stopped/validation.json").exists());
 }
