@@ -69,8 +69,8 @@ pub fn load_dataset_of(
     data: &Whereabouts,
     wanted: &[Split],
 ) -> Result<Dataset, Error> {
-    let loaded = data.load(&config.data, wanted)?;
-    let Some(run) = run else { return Ok(loaded) };
+    let Some(run) = run else { return data.load(&config.data, wanted) };
+    let loaded = data.load(&config.data, wanted).map_err(|error| data.asked_by(error))?;
     let train = match loaded.fingerprint(Split::Train) {
         None => data.load(&config.data, &[Split::Train]).ok().and_then(|set| set.fingerprint(Split::Train)),
         known => known,
@@ -82,7 +82,7 @@ pub fn load_dataset_of(
                 "{}: the training images here are not those the run was made with (another SHA-256)",
                 loaded.place()
             );
-            Err(Error::input(text).hint("name their folder with --data".to_string()))
+            Err(data.asked_by(Error::input(text)).hint("name their folder with --data".to_string()))
         }
     }
 }

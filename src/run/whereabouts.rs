@@ -35,19 +35,30 @@ pub struct Whereabouts {
     data: Option<PathBuf>,
     /// Files that may say where a run's images were.
     remembered: Vec<PathBuf>,
+    /// The run.json, or the first of several, for messages.
+    run_json: Option<PathBuf>,
 }
 
 impl Whereabouts {
     /// What is known without a run: `data` is the folder that the command line says.
     pub fn given(data: Option<&Path>) -> Self {
-        Whereabouts { data: data.map(Path::to_path_buf), remembered: Vec::new() }
+        Whereabouts { data: data.map(Path::to_path_buf), remembered: Vec::new(), run_json: None }
     }
 
     /// What is known with a run.json, or another file beside one.
     #[must_use]
     pub fn and_of(mut self, run_json: &Path) -> Self {
         self.remembered.push(run_json.with_file_name(DATA_FOLDER));
+        self.run_json.get_or_insert_with(|| run_json.to_path_buf());
         self
+    }
+
+    /// An error about the images that a run asks for, with the file that does.
+    pub(super) fn asked_by(&self, error: Error) -> Error {
+        match &self.run_json {
+            Some(path) => error.within(&path.display().to_string()),
+            None => error,
+        }
     }
 
     /// Loads the dataset of a section `[data]`.
