@@ -34,11 +34,13 @@ use std::net::{Shutdown, TcpStream};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, mpsc};
 use std::time::{Duration, Instant};
 
 /// No input may take longer: many times what the slowest takes on an idle machine.
 const LIMIT: Duration = Duration::from_secs(20);
+/// Lives may last as long as their file says; so long they are waited for, and then stopped.
+const PATIENCE: Duration = Duration::from_millis(500);
 /// Without a word from the user, so long all together.
 const SECONDS: f64 = 3.0;
 
@@ -104,6 +106,8 @@ impl Case {
                 self.outcome += "ok ";
                 Some(found)
             }
+            // As it was asked for.
+            Err(error) if error.kind == ErrorKind::Stopped => None,
             Err(error) => {
                 self.outcome += &format!("{error} ");
                 assert!(error.message.contains(file), "names no file: {error:?}");
@@ -232,11 +236,11 @@ fn scenario(world: &World, dice: &mut Dice, case: &mut Case) {
     let path = world.sandbox.write("scenario.json", &case.input);
     let Some(scenario) = case.check(Scenario::read(&path), "scenario.json") else { return };
     // As many rows as somebody reads who then goes.
-    let mut rows = 0;
+    let (mut rows, begin) = (0, Instant::now());
     let gone = || Error::unstable("scenario.json: nobody reads on".to_string());
     let row = |_| {
         rows += 1;
-        if rows < 50 { Ok(()) } else { Err(gone()) }
+        if rows < 50 && begin.elapsed() < PATIENCE { Ok(()) } else { Err(gone()) }
     };
     let lived = simulate(&scenario, row).map_err(|error| error.within("scenario.json"));
     case.check(lived, "scenario.json");
@@ -263,9 +267,7 @@ fn run(world: &World, dice: &mut Dice, case: &mut Case) {
     case.input = world.json("run", dice);
     let folder = world.with("run.json", &case.input);
     let archive = folder.join("run.json");
-    if case.check(RunFile::read(&archive), "run.json").is_none() {
-        return;
-    }
+    let Some(run) = case.check(RunFile::read(&archive), "run.json") else { return };
     let options = eval::Options {
         archives: vec![archive.clone()],
         robots: Selection::Top(1),
@@ -280,9 +282,23 @@ fn run(world: &World, dice: &mut Dice, case: &mut Case) {
         out: folder.join("other.json"),
         threads: Some(1),
     };
-    case.check(eval::eval(&options, &AtomicBool::new(false), &Silent), "run.json");
+    let stop = Arc::new(AtomicBool::new(false));
+    let ended = {
+        let stop = Arc::clone(&stop);
+        let (done, waits) = mpsc::channel::<()>();
+        std::thread::spawn(move || {
+            let _ = waits.recv_timeout(PATIENCE);
+            stop.store(true, Ordering::Relaxed);
+        });
+        done
+    };
+    case.check(eval::eval(&options, &stop, &Silent), "run.json");
+    drop(ended);
     world.plot(case, Kind::Archive, &archive, "run.json");
-    world.plot(case, Kind::Spacetime, &archive, "run.json");
+    let substeps = run.config.protocol.control_steps as f64 * f64::from(run.config.physics.substeps);
+    if substeps < 1e5 {
+        world.plot(case, Kind::Spacetime, &archive, "run.json");
+    }
     case.check(Service::open(&serve::Options { archives: vec![archive.clone()], data: None }), "run.json");
 }
 
