@@ -490,7 +490,7 @@ fn mutated_inputs_are_refused_or_used_and_nothing_else_ever_happens() {
             let outcome: String = case.outcome.chars().filter(|c| !c.is_ascii_digit()).take(80).collect();
             *outcomes.entry(format!("{name}: {outcome}")).or_default() += 1;
         }
-        slowest.sort_by(|a, b| b.0.cmp(&a.0));
+        slowest.sort_by_key(|(time, ..)| std::cmp::Reverse(*time));
         slowest.truncate(12);
         if Instant::now() > until || failures.len() > 20 {
             break;
