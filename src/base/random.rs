@@ -35,6 +35,10 @@ pub enum Purpose {
     Waiting = 24,
     /// Which pixels of training images are inverted.
     InvertedPixels = 25,
+    /// Pixels of random images, under which a gait's response is measured.
+    RandomImages = 26,
+    /// Training of designs: the order in which places are tried, and images shown.
+    Training = 27,
 }
 
 /// One stream of random numbers.

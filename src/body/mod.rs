@@ -136,6 +136,13 @@ impl Body {
         hash::content_key(self.to_string().as_bytes())
     }
 
+    /// The body in which every soft voxel and every sensor is an expanding sensor: what each of those places does when
+    /// its voxel grows can be seen in it.
+    pub fn probe(&self) -> Self {
+        let is_place = |material: Material| material == Material::Soft || material.is_sensor();
+        Body(self.0.map(|&material| if is_place(material) { Material::SensorExpand } else { material }))
+    }
+
     /// The body mirrored left to right.
     pub fn mirrored(&self) -> Self {
         Body(self.0.mirrored())

@@ -35,7 +35,7 @@ pub struct Robot {
     /// Its fitness, in the fitness's [unit](crate::task::fitness::Fitness::unit).
     pub objective: f64,
     /// Displacement under each training image, voxel lengths, right positive; with `until_…_wrong` under those that it
-    /// had to be shown, the first.
+    /// had to be shown, the first; with `response` those of its probe under as many random images.
     pub displacements: Vec<f64>,
     /// Its voxels by kind.
     pub voxels: VoxelCounts,
@@ -234,11 +234,12 @@ impl RunFile {
         answers(&self.training_images, robot.displacements.iter().copied().map(Some))
     }
 
-    /// Whether its displacements are those of lives as the config's protocol has them: of no other length, from no raised starts,
-    /// with the length limits, without inverted pixels.
+    /// Whether its displacements are those of its bodies' lives under the training images as the config's protocol has them: of no
+    /// other length, from no raised starts, with the length limits, without inverted or shuffled pixels.
     pub fn follows_protocol(&self) -> bool {
         let period = self.config.period(self.latest());
-        let changed = self.config.raised_starts(period) > 0
+        let changed = self.config.measures_response(period)
+            || self.config.raised_starts(period) > 0
             || self.config.without_limits(period)
             || self.config.inverted_pixels(period) > 0;
         !changed && self.protocol() == self.config.protocol

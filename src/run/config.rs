@@ -22,7 +22,7 @@ use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
 /// Configs that are part of the program: name and text.
-pub const BUILT_IN: [(&str, &str); 8] = [
+pub const BUILT_IN: [(&str, &str); 9] = [
     ("quickstart.toml", include_str!("../../configs/quickstart.toml")),
     ("zero_one.toml", include_str!("../../configs/zero_one.toml")),
     ("zero_one_published.toml", include_str!("../../configs/zero_one_published.toml")),
@@ -31,6 +31,7 @@ pub const BUILT_IN: [(&str, &str); 8] = [
     ("zero_one_curriculum.toml", include_str!("../../configs/zero_one_curriculum.toml")),
     ("walkers.toml", include_str!("../../configs/walkers.toml")),
     ("four_digit_curriculum.toml", include_str!("../../configs/four_digit_curriculum.toml")),
+    ("gaits.toml", include_str!("../../configs/gaits.toml")),
 ];
 
 /// Largest whole number of a config, its seed's, too: TOML's are signed.
@@ -311,6 +312,7 @@ impl Config {
         if self.evaluation.enough == 0 {
             return refuse("evaluation.enough", "0".to_string(), "1 or more (voxel lengths)");
         }
+        self.validate_response()?;
         if self.validation.images < validation::LEAST {
             let expected = format!("{} or more", validation::LEAST);
             return refuse("validation.images", self.validation.images.to_string(), &expected);

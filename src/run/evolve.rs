@@ -362,8 +362,13 @@ impl<'a> Run<'a> {
         let config = &self.options.config;
         let Training { stimuli, conditions, protocol, .. } = &self.training;
         let floors = Floors::of(self.search.archive(), &self.grouping, config.keep(self.period), least);
+        let probes: Vec<Body> = match config.measures_response(self.period) {
+            true => robots.iter().map(|(_, _, robot)| robot.body.probe()).collect(),
+            false => Vec::new(),
+        };
         let jobs = robots.iter().map(|(_, parent, robot)| self.job(*parent, robot, &floors));
-        let jobs: Vec<Job> = jobs.collect();
+        let mut jobs: Vec<Job> = jobs.collect();
+        jobs.iter_mut().zip(&probes).for_each(|(job, probe)| job.body = probe);
         let savings = config.savings_in(self.period);
         let evaluations = evaluate(&jobs, stimuli, conditions, &config.physics, protocol, savings, stop)?;
         let scored = if config.robust(self.period) {

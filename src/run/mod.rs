@@ -33,6 +33,7 @@ pub mod relatives;
 pub mod replay;
 pub mod report;
 pub mod reproduce;
+mod response;
 mod resume;
 pub mod robots;
 pub mod robust;

@@ -4,7 +4,7 @@ use super::config::BodyConfig;
 use super::curriculum::Period;
 use super::hardest::hardest;
 use super::whereabouts::Whereabouts;
-use super::{Config, Error};
+use super::{Config, Error, response};
 use crate::base::Grid;
 use crate::base::random::{Purpose, Stream, stream};
 use crate::base::stop::NEVER;
@@ -42,7 +42,7 @@ pub struct Training {
     pub dataset: DatasetRef,
     /// The images, in the order in which a sequential life sees them.
     pub images: Vec<ImageRef>,
-    /// What the sensors see of each: H × W in [0, 1].
+    /// What the sensors see of each: H × W in [0, 1]. Where a response is measured, as many images of their pixels.
     pub stimuli: Vec<Grid<f64>>,
     /// Under what each is shown, in a fresh life.
     pub conditions: Vec<Condition>,
@@ -224,8 +224,12 @@ impl Training {
         let train_sha256 = dataset.fingerprint(Split::Train).unwrap_or_default();
         let dataset = DatasetRef { name: dataset.name().to_string(), train_sha256 };
         let classes = images.iter().map(|image| image.label);
-        let conditions =
-            Condition::by_turns(classes, config.raised_starts(period), config.without_limits(period));
+        let conditions = if config.measures_response(period) {
+            stimuli = response::shuffled(&stimuli, config.seed, period);
+            Condition::OF_RESPONSE.into_iter().cycle().take(images.len()).collect()
+        } else {
+            Condition::by_turns(classes, config.raised_starts(period), config.without_limits(period))
+        };
         Ok(Training { dataset, images, stimuli, conditions, protocol: config.protocol_in(period) })
     }
 

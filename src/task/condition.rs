@@ -11,6 +11,11 @@ pub struct Condition {
 }
 
 impl Condition {
+    /// Those under which a response is measured, by turns: as ever; and raised by a row and without length limits, so that
+    /// luck at the first touch of the ground, or at a limit, is no response.
+    pub const OF_RESPONSE: [Condition; 2] =
+        [Condition { raised: 0, without_limits: false }, Condition { raised: 1, without_limits: true }];
+
     /// Conditions of images of these classes. Within each class for itself, by turns: starts raised by no row up to `most`, and
     /// then the same again without length limits, if such lives are wanted.
     pub fn by_turns(classes: impl Iterator<Item = u8>, most: u32, without_limits: bool) -> Vec<Self> {

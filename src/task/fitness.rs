@@ -1,5 +1,6 @@
 //! [`Fitness`]: how good a robot's answers to several images are together.
 
+use super::condition::Condition;
 use super::grouping::Group;
 use serde::{Deserialize, Serialize};
 
@@ -45,13 +46,18 @@ pub enum Fitness {
     /// The same up to the twentieth wrong answer: for robots that know so little that up to the fifth they are shown a dozen
     /// images, and told by luck.
     UntilTwentiethWrong,
+    /// How strongly a gait responds to what its voxels see, whatever its task: the standard deviation of the displacements
+    /// \[voxel lengths\] within each of [the conditions](Condition::OF_RESPONSE) that images are shown under by turns,
+    /// pooled. A run measures it on the body's [probe](crate::body::Body::probe), under shuffled images. Both ways to
+    /// assign sides are worth the same.
+    Response,
 }
 
 impl Fitness {
     /// What it is measured in; a mean of shares in nothing.
     pub fn unit(self) -> Option<&'static str> {
         match self {
-            Fitness::Min => Some("voxel lengths"),
+            Fitness::Min | Fitness::Response => Some("voxel lengths"),
             Fitness::MeanClipped | Fitness::MeanHinge => None,
             Fitness::RightThenMargin
             | Fitness::RightThenMin
@@ -95,6 +101,10 @@ impl Criterion {
         self,
         answers: impl Iterator<Item = (Group, Option<f64>)> + Clone,
     ) -> Assignments {
+        if self.fitness == Fitness::Response {
+            let response = response(answers.map(|(_, d)| d));
+            return (response, response);
+        }
         let margins = margins(answers);
         if self.fitness == Fitness::Min {
             let nothing = (f64::INFINITY, f64::INFINITY);
@@ -159,6 +169,26 @@ impl Criterion {
         self.last_wrong().is_some_and(|last| {
             run(margins.clone(), weights, 1.0, last).1 && run(margins, weights, -1.0, last).1
         })
+    }
+}
+
+/// Pooled standard deviation of displacements within the conditions they take turns in. Infinite while one is to come, since
+/// it may be any, and without any.
+fn response(displacements: impl Iterator<Item = Option<f64>> + Clone) -> f64 {
+    let conditions = Condition::OF_RESPONSE.len();
+    let (mut squares, mut images) = (0.0, 0);
+    for turn in 0..conditions {
+        let within: Option<Vec<f64>> = displacements.clone().skip(turn).step_by(conditions).collect();
+        let Some(within) = within else { return f64::INFINITY };
+        let Some(&first) = within.first() else { continue };
+        // From the first on: where all are the same, no rounding of their mean makes a difference.
+        let mean = within.iter().map(|d| d - first).sum::<f64>() / within.len() as f64;
+        squares += within.iter().map(|d| (d - first - mean) * (d - first - mean)).sum::<f64>();
+        images += within.len();
+    }
+    match images {
+        0 => f64::INFINITY,
+        _ => (squares / images.saturating_sub(conditions).max(1) as f64).sqrt(),
     }
 }
 

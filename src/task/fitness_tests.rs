@@ -2,13 +2,14 @@ use super::*;
 use Group::{A, B};
 use proptest::prelude::*;
 
-const MANY: [Fitness; 6] = [
+const MANY: [Fitness; 7] = [
     Fitness::MeanClipped,
     Fitness::MeanHinge,
     Fitness::RightThenMargin,
     Fitness::RightThenMin,
     Fitness::UntilFifthWrong,
     Fitness::UntilTwentiethWrong,
+    Fitness::Response,
 ];
 
 fn fitness(kind: Fitness, answers: &[(Group, f64)]) -> f64 {
@@ -52,6 +53,31 @@ fn how_far_is_enough_is_a_matter_of_the_criterion() {
     let (short, long) = ([(A, 12.0), (B, -12.0)], [(A, 36.0), (B, -36.0)]);
     assert_eq!(mean(Fitness::MeanHinge, ENOUGH, &short), mean(Fitness::MeanHinge, ENOUGH, &long));
     assert!(mean(Fitness::MeanHinge, 40, &short) < mean(Fitness::MeanHinge, 40, &long));
+}
+
+#[test]
+fn a_response_is_the_standard_deviation_within_two_conditions_that_take_turns() {
+    let response = |d: &[f64]| {
+        let answers: Vec<(Group, f64)> =
+            d.iter().zip([A, B, B].iter().cycle()).map(|(&d, &g)| (g, d)).collect();
+        fitness(Fitness::Response, &answers)
+    };
+    // 1, 5 and 3 around 3, and 100 and 104 around 102: (4 + 4 + 0 + 4 + 4)/(5 − 2).
+    assert_eq!(response(&[1.0, 100.0, 5.0, 104.0, 3.0]), (16.0_f64 / 3.0).sqrt());
+    // What the conditions differ by is no response, nor is which way the robot walks.
+    assert_eq!(response(&[7.0, -100.0, 11.0, -104.0, 9.0]), (16.0_f64 / 3.0).sqrt());
+    assert_eq!(response(&[2.0, -2.0, 2.0, -2.0]), 0.0);
+    // Exactly: ten times 0.1 is not 1 in binary.
+    assert_eq!(response(&[0.1; 20]).to_bits(), 0.0_f64.to_bits());
+    assert!(response(&[1.0, 2.0, f64::NAN, 2.0]).is_nan());
+    // Too few to say anything, and none.
+    assert_eq!((response(&[1.0, 9.0]), response(&[1.0]), response(&[])), (0.0, 0.0, f64::INFINITY));
+    // What is to come may be anything.
+    let some = [(A, Some(1.0)), (B, None), (A, Some(1.0)), (B, Some(1.0))];
+    let response = Criterion::from(Fitness::Response);
+    assert_eq!(better(response.of_assignments(some.iter().copied())), f64::INFINITY);
+    assert_eq!(Fitness::Response.unit(), Some("voxel lengths"));
+    assert!(!response.is_mean() && response.last_wrong().is_none());
 }
 
 #[test]

@@ -192,7 +192,8 @@ proptest! {
             Just(Fitness::RightThenMargin),
             Just(Fitness::RightThenMin),
             Just(Fitness::UntilFifthWrong),
-            Just(Fitness::UntilTwentiethWrong)
+            Just(Fitness::UntilTwentiethWrong),
+            Just(Fitness::Response)
         ],
         images in prop::collection::vec((0..5u8, displacement(), prop::bool::weighted(0.7)), 1..24),
         one_each: bool,

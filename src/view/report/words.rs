@@ -74,6 +74,11 @@ pub(super) fn methods(dossier: &Dossier) -> String {
             );
             &of_means
         }
+        Fitness::Response => {
+            "the standard deviation of the distance walked by the body with all soft voxels and sensors made expanding sensors, \
+             when each pixel was shuffled between the images, pooled over the images as described and every second one, with a \
+             start one voxel higher and without length limits"
+        }
         Fitness::RightThenMargin => {
             "the number of images answered right, both groups weighing the same, ties broken by how far it walked"
         }

@@ -1,0 +1,101 @@
+//! `fitness = "response"`: the body's probe is measured under shuffled images, the run is the same bits however it is run, and
+//! what reads a run reads this one.
+
+mod common;
+
+use common::program::{Sandbox, TINY, without_seconds};
+use morphcog::body::{Body, Material};
+use morphcog::run::archive::RunFile;
+use morphcog::run::training::Training;
+use morphcog::task::evaluation::{Job, Outcome, Savings, evaluate};
+use std::path::Path;
+use std::sync::atomic::AtomicBool;
+
+/// Two classes, three images of each, half of the offspring changed in voxels.
+fn sandbox() -> Sandbox {
+    let tiny = TINY
+        .replace("train_images = [0, 1]", "images_per_class = 3")
+        .replace("control_steps = 20", "control_steps = 60");
+    let sandbox = Sandbox::new();
+    let more = "[evaluation]\nfitness = \"response\"\n[genome]\nvoxel_mutations = 0.5\nvoxel_changes = 4\n";
+    sandbox.write("response.toml", format!("{tiny}\n{more}"));
+    sandbox
+}
+
+fn evolve(sandbox: &Sandbox, out: &str, more: &str) -> RunFile {
+    sandbox.run(&format!("evolve -q -c response.toml -o {out} {more}")).ended(0, &[]);
+    sandbox.run_file(out)
+}
+
+#[test]
+fn a_robot_is_as_fit_as_its_probe_varies_under_shuffled_images() {
+    let sandbox = sandbox();
+    let run = evolve(&sandbox, "run", "");
+    let training = Training::load(&run.config, None::<&Path>).unwrap();
+    let mut moved = 0;
+    for robot in &run.elites {
+        // Bodies stay as their genomes say.
+        let probe = robot.body.voxels().map(|material| match material {
+            Material::Soft | Material::SensorShrink => Material::SensorExpand,
+            other => *other,
+        });
+        let probe = Body::new(probe).unwrap();
+        let places = probe.counts().sensor;
+        let job =
+            Job { body: &probe, order: vec![], may_win: Box::new(|_| true), settled: None, given_up: None };
+        let Training { stimuli, conditions, protocol, .. } = &training;
+        let physics = &run.config.physics;
+        let (savings, stop) = (Savings::default(), AtomicBool::new(false));
+        let evaluation = evaluate(&[job], stimuli, conditions, physics, protocol, savings, &stop).unwrap();
+        let Outcome::Walked(d) = &evaluation[0].outcome else { panic!("{}: unstable", robot.id) };
+        assert_eq!(d, &robot.displacements, "{}", robot.id);
+        let spread = |d: [f64; 3]| {
+            let mean = d.iter().sum::<f64>() / 3.0;
+            d.iter().map(|d| (d - mean).powi(2)).sum::<f64>()
+        };
+        let response = ((spread([d[0], d[2], d[4]]) + spread([d[1], d[3], d[5]])) / 4.0).sqrt();
+        assert!((response - robot.objective).abs() < 1e-9, "{}: {response}", robot.id);
+        if places == 0 {
+            assert_eq!(robot.objective, 0.0, "{}", robot.id);
+        }
+        moved += usize::from(robot.objective > 0.01);
+    }
+    assert!(moved >= 3, "{moved} of {} respond", run.elites.len());
+    assert!(run.elites.iter().any(|robot| robot.body != robot.body.probe()));
+    assert!(!run.follows_protocol());
+}
+
+#[test]
+fn it_is_the_same_on_threads_without_savings_and_resumed() {
+    let sandbox = sandbox();
+    let read = |out: &str| {
+        (
+            sandbox.read(&format!("{out}/run.json")),
+            without_seconds(&sandbox.read(&format!("{out}/metrics.csv"))),
+        )
+    };
+    let run = evolve(&sandbox, "one", "--threads 1");
+    evolve(&sandbox, "two", "--threads 2");
+    assert_eq!(read("two"), read("one"));
+    let off =
+        "--set savings.early_stop=false --set savings.known_bodies=false --set savings.shared_lives=false";
+    assert_eq!(evolve(&sandbox, "slow", off).elites, run.elites);
+    evolve(&sandbox, "again", "--generations 5 --threads 2");
+    evolve(&sandbox, "again", "--generations 12 --resume");
+    assert_eq!(read("again"), read("one"));
+}
+
+#[test]
+fn what_reads_a_run_reads_this_one() {
+    let sandbox = sandbox();
+    let run = evolve(&sandbox, "run", "");
+    let best = &run.best().unwrap().id;
+    sandbox.run("eval -q -a run/run.json -n 20 --cycles 1 --robots top:1").ended(0, &[]);
+    // It lives its training images anew: those of the run are another body's, under other images.
+    let audit = sandbox.run("audit -a run/run.json --set threshold=0").ended(0, &[]);
+    assert!(!audit.err.contains("walks otherwise"), "{}", audit.err);
+    sandbox.run(&format!("replay -a run/run.json --robot {best} -o replay.png")).ended(0, &[]);
+    sandbox.run("plot archive -a run/run.json -o archive.svg").ended(0, &[]);
+    sandbox.run("report run").ended(0, &[]);
+    assert!(sandbox.read("run/report.html").contains("the standard deviation of the distance walked"));
+}
