@@ -103,6 +103,19 @@ impl Genome {
         if self.edits.is_empty() { Ok(described) } else { Body::new(self.edits.apply(&described)) }
     }
 
+    /// A copy whose body is this one: what its network does not say is edited.
+    ///
+    /// # Errors
+    /// [`BodyError`] if the size is not a body's.
+    pub fn with_body(&self, body: &Body) -> Result<Self, BodyError> {
+        let described = self.cppn.express(body.height(), body.width())?;
+        let mut edits = Edits::default();
+        body.voxels()
+            .iter()
+            .for_each(|(place, material)| edits.set(place, *material, described.voxels()[place]));
+        Ok(Genome { cppn: self.cppn.clone(), edits })
+    }
+
     /// A short id, the same for the same genome: the first ten hexadecimal digits of its content's hash.
     pub fn id(&self) -> String {
         let content = [self.cppn.canonical_bytes(), self.edits.canonical_bytes()].concat();

@@ -130,6 +130,25 @@ pub fn evaluate(
     Ok(candidates.iter().map(Candidate::evaluation).collect())
 }
 
+/// Fresh rollouts of a body, one under each image and its condition (the default where one is missing): displacements in voxel
+/// lengths, in the images' order.
+///
+/// # Errors
+/// [`Stopped`] if `stop` was set meanwhile; within, [`Unstable`] for a rollout that ended early.
+pub fn fresh_rollouts(
+    body: &Body,
+    images: &[Grid<f64>],
+    conditions: &[Condition],
+    physics: &Physics,
+    protocol: &Protocol,
+    stop: &AtomicBool,
+) -> Result<Vec<Result<f64, Unstable>>, Stopped> {
+    let without_limits = physics.without_limits();
+    let setup = Setup { images, conditions, physics, without_limits: &without_limits, protocol, stop };
+    let lattice = Lattice::new(body, physics);
+    (0..images.len()).into_par_iter().with_max_len(1).map(|image| setup.fresh_life(&lattice, image)).collect()
+}
+
 /// A life that was lived: one image's if fresh; if sequential all images', up to where the robot dropped out.
 struct Lived {
     /// Displacement under each image shown, voxel lengths; none for the one under which it became unstable.
