@@ -8,6 +8,7 @@ mod plot;
 mod report;
 mod reproduce;
 mod serve;
+mod train;
 
 use crate::base::lanes::InstructionSet;
 use crate::run::capacity_file::CapacityFile;
@@ -47,6 +48,7 @@ pub fn run(cli: Cli, console: &Console) -> Result<(), Error> {
     match cli.command {
         Command::Evolve(args) => run_evolve(args, console),
         Command::Eval(args) => run_eval(args, console),
+        Command::Train(args) => train::run(args, console),
         Command::Audit(args) => audit::run(args, console),
         Command::Capacity(args) => capacity::run(args, console),
         Command::Report(args) => report::run(args, console),

@@ -8,6 +8,7 @@ use super::report::{self, ReportArgs};
 use super::reproduce::{self, ReproduceArgs};
 use super::run_json;
 use super::serve::{self, ServeArgs};
+use super::train::{self, TrainArgs};
 use crate::run::held_out::HeldOut;
 use crate::run::replay::Shown;
 use crate::run::robots::Selection;
@@ -68,6 +69,9 @@ Examples:
 
 Ctrl-C (or SIGTERM, SIGUSR1) drops the generation under way, saves and exits with 75; a second Ctrl-C ends at once.")]
     Evolve(EvolveArgs),
+    /// Teach the gaits of an archive to tell two groups of images apart.
+    #[command(after_help = train::EXAMPLES)]
+    Train(TrainArgs),
     /// Test robots on held-out images.
     #[command(after_help = "\
 Examples:

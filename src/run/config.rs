@@ -6,6 +6,7 @@ use super::robust::EvaluationConfig;
 use super::start::StartConfig;
 pub use super::task_config::TaskConfig;
 use super::toml_text::{self, Format};
+use super::train_config::TrainConfig;
 use super::validation::{self, ValidationConfig};
 use crate::base::files::read_text;
 use crate::body::MAX_SIDE;
@@ -90,6 +91,9 @@ pub struct Config {
     /// How robots are chosen on images that they were not trained on. Left out of files where it is the default.
     #[serde(default, skip_serializing_if = "ValidationConfig::is_default")]
     pub validation: ValidationConfig,
+    /// How gaits are taught by `morphcog train`. Left out of files where it is the default.
+    #[serde(default, skip_serializing_if = "TrainConfig::is_default")]
+    pub train: TrainConfig,
     /// Constants of the simulator.
     #[serde(default)]
     pub physics: Physics,
@@ -302,6 +306,7 @@ impl Config {
             }
         }
         self.validate_stages()?;
+        self.train.validate()?;
         if self.body.min_muscles > self.body.height * self.body.width {
             return refuse(
                 "body.min_muscles",

@@ -4,6 +4,7 @@ use super::archive::RunFile;
 use super::audit_file::AUDIT_JSON;
 use super::capacity_file::CAPACITY_JSON;
 use super::eval_file::{EVAL_JSON, EVAL_VALIDATION_JSON};
+use super::train::TRAINING_JSON;
 use super::validation::VALIDATION_JSON;
 use super::whereabouts::DATA_FOLDER;
 use super::{Error, checkpoint};
@@ -92,9 +93,9 @@ impl RunFolder {
     }
 
     /// Names of the files of a run.
-    pub(super) fn files() -> [&'static str; 7] {
+    pub(super) fn files() -> [&'static str; 8] {
         let [newest, previous] = checkpoint::NAMES;
-        [RUN_JSON, CONFIG, ELITES, METRICS, DATA_FOLDER, newest, previous]
+        [RUN_JSON, CONFIG, ELITES, METRICS, DATA_FOLDER, TRAINING_JSON, newest, previous]
     }
 }
 

@@ -51,6 +51,8 @@ pub mod statistics;
 pub mod table;
 pub mod task_config;
 mod toml_text;
+pub mod train;
+mod train_config;
 pub mod training;
 mod trainings;
 mod unwritten;

@@ -4,6 +4,7 @@ use super::archive::RunFile;
 use super::config::{ArchiveConfig, BodyConfig, CheckpointConfig, DataConfig, TaskConfig};
 use super::robust::EvaluationConfig;
 use super::start::StartConfig;
+use super::train_config::TrainConfig;
 use super::training::ImageRef;
 use super::validation::ValidationConfig;
 use super::{Config, Error};
@@ -86,6 +87,7 @@ impl Setting {
             stage: Vec::new(),
             evaluation: EvaluationConfig::default(),
             start: StartConfig::default(),
+            train: TrainConfig::default(),
             validation: ValidationConfig::default(),
             physics: Physics::default(),
         };

@@ -8,7 +8,9 @@ use crate::run::data::fetch::{Attempt, FetchObserver};
 use crate::run::folder::RunFolder;
 use crate::run::start::StartRef;
 use crate::run::training::{ImageRef, Training};
-use crate::run::{audit, capacity, eval, evolve, reproduce};
+use crate::run::{audit, capacity, eval, evolve, reproduce, train};
+use crate::task::response::{Gait, Response};
+use crate::task::teach::{Plan, Round};
 use std::sync::{OnceLock, RwLock};
 
 /// Shows an evolution.
@@ -85,6 +87,58 @@ impl evolve::Observer for Evolution<'_> {
 
     fn warning(&mut self, text: &str) {
         self.console.warning(text);
+    }
+}
+
+/// Shows a training.
+pub struct Teaching<'c> {
+    console: &'c Console,
+    counter: Option<Counter<'c>>,
+}
+
+impl<'c> Teaching<'c> {
+    /// Shows it on a console.
+    pub fn new(console: &'c Console) -> Self {
+        Teaching { console, counter: None }
+    }
+}
+
+impl train::Observer for Teaching<'_> {
+    fn started(&mut self, folder: &RunFolder, gaits: usize, images: usize) {
+        let folder = folder.path().display();
+        self.console.info(&format!("training in {folder}: {gaits} gaits, {images} training images"));
+    }
+
+    fn response(&mut self, robot: &str, gait: &Gait, response: &Response) {
+        let (places, share) = (gait.places().len(), number::fixed(100.0 * response.r_squared, 0));
+        let noise = number::fixed(response.noise, 1);
+        let text = format!(
+            "{robot}: {places} soft voxels and sensors explain {share} % of its response; the rest is {noise} voxel lengths"
+        );
+        self.console.info(&text);
+    }
+
+    fn tried(&mut self, robot: &str, objective: f64) {
+        self.console.info(&format!("{robot}: taught a little, fitness {}", number::fixed(objective, 3)));
+    }
+
+    fn round(&mut self, round: &Round, plan: &Plan) {
+        let Round { images, objective, accuracy, rollouts, .. } = round;
+        if self.counter.is_none() {
+            self.counter = Some(self.console.counter("teaching:", plan.rollouts as u64, "rollouts"));
+        }
+        if let Some(counter) = &self.counter {
+            counter.update((*rollouts).min(plan.rollouts) as u64);
+        }
+        self.console.event("round", &serde_json::json!({
+            "round": round.round, "rollouts": rollouts, "images": images, "objective": objective, "accuracy": accuracy,
+            "radius": round.radius, "changed": round.changed, "predicted": round.predicted, "proposed": round.proposed,
+        }));
+    }
+
+    fn validation(&mut self) -> Box<dyn eval::Observer + '_> {
+        self.counter = None;
+        Box::new(Evaluation::new(self.console))
     }
 }
 

@@ -15,6 +15,7 @@ use crate::run::folder::{RUN_JSON, in_shell};
 use crate::run::gallery::Published;
 use crate::run::held_out::HeldOut;
 use crate::run::published;
+use crate::run::train;
 use crate::run::training::ImageRef;
 use crate::run::validation::Validated;
 use std::path::Path;
@@ -93,7 +94,29 @@ pub fn evolution(console: &Console, finished: &Finished, out: &Path) {
     console.info(&format!("      morphcog eval --archive {}", in_shell(&archive)));
 }
 
-/// After a validation: the chosen robots.
+/// After a training: the robot.
+pub fn training(console: &Console, finished: &train::Finished, out: &Path) {
+    let train::Finished { run, rollouts, .. } = finished;
+    let Some(robot) = run.best() else { return };
+    if console.mode() == Mode::Json {
+        let done = serde_json::json!({
+            "folder": out.display().to_string(), "robot": robot.id, "task": robot.task, "objective": robot.objective,
+            "gait_of": robot.parent, "images": run.training_images.len(), "rollouts": rollouts,
+        });
+        return console.event("trained", &done);
+    }
+    let gait = robot.parent.as_deref().unwrap_or("none");
+    console.line(&format!(
+        "{}: {} with the gait of {gait}, fitness {} on {} hard training images, after {rollouts} rollouts",
+        robot.id,
+        robot.task,
+        number::fixed(robot.objective, 3),
+        run.training_images.len()
+    ));
+    console.line(&format!("wrote {}", out.display()));
+}
+
+/// After robots were chosen on validation images: how the best did.
 pub fn validation(console: &Console, best: &[Validated]) {
     if console.mode() == Mode::Json {
         return console.event("validated", &best);

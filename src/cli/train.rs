@@ -1,0 +1,126 @@
+//! `morphcog train`: its words, and what it calls.
+
+use super::choice::{ROBOTS, selected};
+use super::run_json;
+use crate::run::audit_file::AUDIT_JSON;
+use crate::run::folder::{self, IfExists};
+use crate::run::robots::Selection;
+use crate::run::train::{self, Finished, Options, groups};
+use crate::run::verdict::Criteria;
+use crate::run::{Error, audit, config, signals};
+use crate::view::console::Console;
+use crate::view::{reporters, summary, verdicts};
+use clap::Args;
+use std::path::PathBuf;
+
+pub(super) const EXAMPLES: &str = "\
+Examples:
+  morphcog evolve --config gaits.toml
+  morphcog train --archive runs/gaits-seed1 --task \"4|9\"
+  morphcog train --task \"0|123\" --robots top:1 --set train.rollouts=8000
+then
+  morphcog eval --archive runs/gaits-seed1-4v9 --robots best
+
+The response of each gait is measured under random images; the gait that learns most at first is taught with many training
+images; the robot is validated on images that it was not trained on, and audited. Ctrl-C stops it; --resume goes on.";
+
+/// Two groups of classes.
+type Groups = [Vec<u8>; 2];
+
+#[derive(Debug, Args)]
+pub(super) struct TrainArgs {
+    /// The run.json (or its folder) whose robots walk (default: the newest under runs/).
+    #[arg(short, long, value_name = "FILE", value_parser = run_json())]
+    archive: Option<PathBuf>,
+    /// Two groups of classes, as 4|9, 0|123 or 10,11|3.
+    #[arg(short, long, value_name = "A|B", value_parser = groups)]
+    task: Groups,
+    #[arg(short, long, visible_aliases = ["robot", "select"], default_value = "top:4", help = ROBOTS)]
+    robots: Vec<Selection>,
+    /// Seed of all chance (default: that of the archive's run).
+    #[arg(long, value_parser = clap::value_parser!(u64).range(..=config::MAX_NUMBER))]
+    seed: Option<u64>,
+    /// Change a key, as in train.rollouts=8000 or data.dataset=fashion-mnist; may be given several times.
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<String>,
+    /// Folder with the images.
+    #[arg(long, value_name = "DIR")]
+    data: Option<PathBuf>,
+    /// Run folder (default: the archive's folder and the task, as runs/gaits-seed1-4v9).
+    #[arg(short, long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Go on with the training in the folder; start it if there is none.
+    #[arg(long, conflicts_with = "force")]
+    resume: bool,
+    /// Replace the run in the folder.
+    #[arg(long)]
+    force: bool,
+    /// Threads (default: one per core); the result does not depend on it.
+    #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    threads: Option<u16>,
+}
+
+pub(super) fn run(args: TrainArgs, console: &Console) -> Result<(), Error> {
+    let archive = args.archive.map_or_else(folder::newest_run, Ok)?;
+    let robots = selected(args.robots)?.unwrap_or(Selection::Top(4));
+    let suffix = args.task.each_ref().map(|group| {
+        let separator = if group.iter().any(|class| *class > 9) { "," } else { "" };
+        group.iter().map(u8::to_string).collect::<Vec<_>>().join(separator)
+    });
+    let suffix = suffix.join("v");
+    let of = archive.parent().unwrap_or(std::path::Path::new(""));
+    let of = of.file_name().map_or("run".to_string(), |name| name.to_string_lossy().into_owned());
+    let seed = args.seed.map_or(String::new(), |seed| format!("-seed{seed}"));
+    let name = format!("{of}-{suffix}{seed}");
+    let beside = archive.parent().and_then(|folder| folder.parent()).map(|folder| folder.join(&name));
+    let out = args.out.or(beside).unwrap_or_else(|| PathBuf::from(&name));
+    let if_exists = match (args.resume, args.force) {
+        (true, _) => IfExists::Resume,
+        (_, true) => IfExists::Overwrite,
+        _ => IfExists::Refuse,
+    };
+    let threads = args.threads.map(usize::from);
+    let options = Options {
+        archive,
+        robots,
+        groups: args.task,
+        seed: args.seed,
+        set: args.set,
+        name,
+        out: out.clone(),
+        if_exists,
+        data: args.data.clone(),
+        threads,
+    };
+    let stop = signals::stop_flag()?;
+    let finished = train::train(&options, &stop, &mut reporters::Teaching::new(console))?;
+    let Finished { validated, .. } = &finished;
+    summary::training(console, &finished, &out);
+    let goes_on = || "the same command with --resume goes on".to_string();
+    let Some(validated) = validated else {
+        let text = "stopped while validating; the run is saved".to_string();
+        return Err(Error::stopped(text).hint(goes_on()));
+    };
+    if !validated.is_empty() {
+        summary::validation(console, validated);
+    }
+    let archive = out.join(folder::RUN_JSON);
+    let options = audit::Options {
+        robots: Selection::All,
+        seed: 1,
+        criteria: Criteria::load(None, &[])?,
+        data: args.data,
+        out: archive.with_file_name(AUDIT_JSON),
+        threads,
+        source: audit::Source::Archive(archive),
+    };
+    let audited = audit::audit(&options, &stop, &reporters::Audit::new(console))?;
+    verdicts::audit(console, &audited, &options.out);
+    if let Some(error) = audited.unwritten {
+        return Err(error);
+    }
+    if audited.stopped {
+        return Err(Error::stopped("stopped while auditing; the run is saved".to_string()).hint(goes_on()));
+    }
+    Ok(())
+}

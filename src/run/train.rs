@@ -1,0 +1,567 @@
+//! `morphcog train`: the gaits of an archive are taught to tell two groups of images apart.
+//!
+//! [`teach`] says how. Everything that is simulated is kept in `training.json` beside `run.json`; a training that goes on
+//! takes from there what was simulated before, so that it ends with the same bits.
+
+use super::archive::{Dimensions, FORMAT, FORMAT_VERSION, Robot, RunFile};
+use super::config::DataConfig;
+use super::curriculum::Period;
+use super::folder::{self, IfExists, RunFolder};
+use super::metrics::{Metrics, Totals};
+use super::robots::{Selection, Source};
+use super::robust::EvaluationConfig;
+use super::start::{StartConfig, StartRef};
+use super::task_config::TaskConfig;
+use super::training::{ImageRef, Training};
+use super::validation::{self, Validated, ValidationConfig};
+use super::whereabouts::{self, Whereabouts};
+use super::{Config, Error, eval, held_out, toml_text};
+use crate::base::Grid;
+use crate::base::files::{read_text, write_atomically};
+use crate::base::hash::sha256_hex;
+use crate::base::random::{Purpose, stream};
+use crate::body::{Body, Material};
+use crate::qd::{Archive, DescriptorSpace, Elite};
+use crate::task::condition::Condition;
+use crate::task::dataset::{Dataset, Split};
+use crate::task::evaluation::fresh_rollouts;
+use crate::task::fitness::Fitness;
+use crate::task::protocol::{Life, Protocol};
+use crate::task::response::{Example, Gait, Response, Shown, frequencies, random_image};
+use crate::task::teach::{Image, Plan, Rollouts, Round, Taught, teach};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::sync::atomic::AtomicBool;
+use std::time::{Duration, Instant};
+
+/// What a training keeps of its rollouts, beside `run.json`.
+pub const TRAINING_JSON: &str = "training.json";
+
+/// What the file calls itself, and the version of its schema.
+const FILE: (&str, u32) = ("morphcog-training", 1);
+
+/// How often the rollouts are saved. A power cut costs as much.
+const SAVE_EVERY: Duration = Duration::from_secs(5);
+
+/// Least number of training images of a class.
+const LEAST_PER_CLASS: usize = 2;
+
+/// What to train and where to.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// The run.json whose robots walk.
+    pub archive: PathBuf,
+    /// Which of them are tried; the one that learns most at first is taught.
+    pub robots: Selection,
+    /// The two groups of classes.
+    pub groups: [Vec<u8>; 2],
+    /// Seed of all chance; `None`: that of the run.
+    pub seed: Option<u64>,
+    /// Keys of the config that differ from those of the run, as `train.rollouts=1000`.
+    pub set: Vec<String>,
+    /// Name of the run that is made.
+    pub name: String,
+    /// Its folder.
+    pub out: PathBuf,
+    /// What to do if there is a run in it.
+    pub if_exists: IfExists,
+    /// Where the data are, if the command line says.
+    pub data: Option<PathBuf>,
+    /// Number of threads; `None`: one per core.
+    pub threads: Option<usize>,
+}
+
+/// What is told how a training goes.
+pub trait Observer {
+    /// Before the first rollout: the folder, how many gaits are tried, and how many training images there are.
+    fn started(&mut self, folder: &RunFolder, gaits: usize, images: usize);
+    /// The response of a robot's gait is known.
+    fn response(&mut self, robot: &str, gait: &Gait, response: &Response);
+    /// A gait was taught a little: its fitness on the first images.
+    fn tried(&mut self, robot: &str, objective: f64);
+    /// A design was proposed.
+    fn round(&mut self, round: &Round, plan: &Plan);
+    /// What is told how the robot is validated.
+    fn validation(&mut self) -> Box<dyn eval::Observer + '_> {
+        Box::new(())
+    }
+}
+
+/// How a training ended.
+#[derive(Clone, Debug)]
+pub struct Finished {
+    /// The run as it stands in `run.json`.
+    pub run: RunFile,
+    /// Rollouts simulated in all, validation left out.
+    pub rollouts: usize,
+    /// How the robot did on validation images; `None` if that was stopped.
+    pub validated: Option<Vec<Validated>>,
+}
+
+/// Reads two groups of classes, as in "4|9", "0|123" or "10,11|3".
+///
+/// # Errors
+/// What was expected.
+pub fn groups(text: &str) -> Result<[Vec<u8>; 2], String> {
+    let expected = || format!("{text}: expected two groups of classes, as in 4|9, 0|123 or 10,11|3");
+    let group = |part: &str| -> Result<Vec<u8>, String> {
+        let classes: Option<Vec<u8>> = match part.contains(',') {
+            true => part.split(',').map(|class| class.trim().parse().ok()).collect(),
+            false => part.trim().chars().map(|c| c.to_digit(10).and_then(|d| u8::try_from(d).ok())).collect(),
+        };
+        classes.filter(|classes| !classes.is_empty()).ok_or_else(expected)
+    };
+    let (a, b) = text.split_once('|').ok_or_else(expected)?;
+    let groups = [group(a)?, group(b)?];
+    crate::task::grouping::Grouping::two_groups(&groups[0], &groups[1])
+        .map_err(|error| format!("{text}: {error}"))?;
+    Ok(groups)
+}
+
+/// A gait to be tried.
+struct Walker<'a> {
+    robot: &'a Robot,
+    gait: Gait,
+}
+
+/// Trains a robot, and validates it.
+///
+/// # Errors
+/// What is wrong with archive, options, data or folder; that it was stopped (the same with
+/// [`IfExists::Resume`] goes on). Nothing that was there is lost.
+pub fn train(
+    options: &Options,
+    stop: &AtomicBool,
+    observer: &mut (dyn Observer + Send),
+) -> Result<Finished, Error> {
+    let source = Source::read(&options.archive)?;
+    let whereabouts = Whereabouts::given(options.data.as_deref())
+        .and_of(&options.out.join(folder::RUN_JSON))
+        .and_of(&options.archive);
+    let config = config(&source.run.config, options)?;
+    let dataset = whereabouts.load(&config.data, &[Split::Train])?;
+    let config = with_images(config, &dataset)?;
+    let period = Period { stage: 0, draw: 0 };
+    let training = Training::unless(&config, &dataset, period, stop)?;
+    let origin = origin(&source, &dataset)?;
+    held_out::check(&config, Some(&origin), &dataset)?;
+    let walkers = walkers(&source, &options.robots, config.seed)?;
+    let folder = RunFolder::open(&options.out, options.if_exists)?;
+    let write = |name: &str, content: &[u8]| {
+        let path = folder.path().join(name);
+        write_atomically(&path, content).map_err(|error| Error::writing(&path, &error))
+    };
+    let key = key(&config, &walkers, &training);
+    let mut log = Log::open(folder.path().join(TRAINING_JSON), key, stop)?;
+    write(folder::CONFIG, config.to_toml().as_bytes())?;
+    whereabouts::remember(&folder, &dataset)?;
+    let pool = eval::pool(options.threads)?;
+    let began = Instant::now();
+    observer.started(&folder, walkers.len(), training.images.len());
+    let taught =
+        pool.install(|| Trainer { config: &config, training: &training }.train(&walkers, &mut log, observer));
+    // What was simulated is kept, however it ended.
+    let saved = log.save();
+    let (walker, taught) = taught?;
+    saved?;
+    let run = run_file(options, &config, &training, origin, walker, &taught)?;
+    let seconds = began.elapsed().as_secs_f64();
+    let totals = Totals { evaluations: 1, simulated: log.simulated as u64, seconds, ..Totals::default() };
+    let csv = run.to_csv().map_err(|error| Error::other(error.to_string()))?;
+    let mut metrics = Metrics::open(folder.path(), 0)?;
+    metrics.write((0, 0), &run.stats, &totals)?;
+    metrics.flush()?;
+    write(folder::ELITES, &csv)?;
+    write(folder::RUN_JSON, run.to_json().as_bytes())?;
+    let archive = folder.path().join(folder::RUN_JSON);
+    let validated = match config.validation.best {
+        0 => Some(Vec::new()),
+        _ => validation::at_end(&archive, &dataset, &pool, stop, &*observer.validation())?,
+    };
+    Ok(Finished { run, rollouts: log.simulated, validated })
+}
+
+/// The config of the run that is made: that of the walkers' run with another task.
+fn config(of_walkers: &Config, options: &Options) -> Result<Config, Error> {
+    let evaluation = EvaluationConfig { fitness: Fitness::MeanClipped, ..EvaluationConfig::default() };
+    let base = Config {
+        seed: options.seed.unwrap_or(of_walkers.seed),
+        generations: 1,
+        task: TaskConfig { groups: Some(options.groups.clone()), ..TaskConfig::default() },
+        data: DataConfig { train_images: None, ..of_walkers.data.clone() },
+        protocol: Protocol { life: Life::Fresh, ..of_walkers.protocol.clone() },
+        stage: Vec::new(),
+        evaluation,
+        start: StartConfig::default(),
+        validation: ValidationConfig { best: 1, ..ValidationConfig::default() },
+        ..of_walkers.clone()
+    };
+    toml_text::changed(base, &options.set, |config: &Config| config.validate(), |error| error)
+}
+
+/// The same with its training images as a stage, as many as there are beside those that validate.
+fn with_images(config: Config, dataset: &Dataset) -> Result<Config, Error> {
+    let mut fewest = usize::MAX;
+    for class in config.classes() {
+        let count = dataset.indices_of(Split::Train, class).len();
+        if count < LEAST_PER_CLASS {
+            let text = format!(
+                "--task: class {class}: expected {LEAST_PER_CLASS} training images or more, found {count}"
+            );
+            let classes = dataset.classes(Split::Train);
+            return Err(Error::input(text).hint(format!("{} has the classes {classes:?}", dataset.name())));
+        }
+        fewest = fewest.min(count);
+    }
+    let per_class = config.train.images_per_class.min((fewest * 3 / 4).max(1));
+    let stage = vec![config.train.stage(per_class)];
+    let config = Config { stage, ..config };
+    config.validate()?;
+    Ok(config)
+}
+
+/// What the walkers were trained on: not for validation.
+fn origin(source: &Source, dataset: &Dataset) -> Result<StartRef, Error> {
+    let run = &source.run;
+    let is_same = dataset.fingerprint(Split::Train).is_some_and(|sha256| sha256 == run.dataset.train_sha256);
+    let trained_on = if is_same { held_out::trained_on(run, dataset)? } else { Default::default() };
+    Ok(StartRef {
+        name: run.name.clone(),
+        generations: run.generations,
+        sha256: run.fingerprint(),
+        trained_on: trained_on.into_iter().collect(),
+    })
+}
+
+/// The gaits of the chosen robots, each once.
+fn walkers<'a>(source: &'a Source, robots: &Selection, seed: u64) -> Result<Vec<Walker<'a>>, Error> {
+    let mut walkers: Vec<Walker> = Vec::new();
+    for chosen in robots.of(std::slice::from_ref(source), seed)? {
+        let Some(gait) = Gait::of(&chosen.robot.body) else { continue };
+        if walkers.iter().all(|other| other.gait.probe() != gait.probe()) {
+            walkers.push(Walker { robot: chosen.robot, gait });
+        }
+    }
+    if walkers.is_empty() {
+        let text = format!(
+            "{}: none of the chosen robots has a soft voxel or a sensor: there is nothing to train",
+            source.path.display()
+        );
+        return Err(Error::input(text).hint("choose others with --robots".to_string()));
+    }
+    Ok(walkers)
+}
+
+/// Of all that rollouts depend on.
+fn key(config: &Config, walkers: &[Walker], training: &Training) -> String {
+    let bodies: Vec<String> = walkers.iter().map(|walker| walker.robot.body.to_string()).collect();
+    let images: Vec<usize> = training.images.iter().map(|image| image.index).collect();
+    let essence = config.essence().to_toml();
+    let train = config.train;
+    let text = format!(
+        "{} {essence} {train:?} {bodies:?} {} {images:?}",
+        env!("CARGO_PKG_VERSION"),
+        training.dataset.train_sha256
+    );
+    sha256_hex(text.as_bytes())
+}
+
+/// Displacements that were simulated together, in the order of the images; `None` where unstable.
+type Batch = Vec<Option<f64>>;
+
+/// The content of `training.json`.
+#[derive(Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct File {
+    format: String,
+    format_version: u32,
+    /// SHA-256 of all that the rollouts depend on.
+    key: String,
+    /// Rollouts in the order in which they were asked for.
+    rollouts: Vec<Batch>,
+}
+
+/// What is simulated, and was in sessions before.
+struct Log<'a> {
+    path: PathBuf,
+    key: String,
+    batches: Vec<Batch>,
+    /// Batches asked for so far.
+    asked: usize,
+    /// Rollouts in them.
+    simulated: usize,
+    saved: (usize, Instant),
+    stop: &'a AtomicBool,
+}
+
+impl<'a> Log<'a> {
+    fn open(path: PathBuf, key: String, stop: &'a AtomicBool) -> Result<Self, Error> {
+        let mut batches = Vec::new();
+        if path.exists() {
+            let text = read_text(&path).map_err(|error| Error::reading(&path, &error))?;
+            let name = path.display().to_string();
+            let anew = || "train anew with --force".to_string();
+            let file: File =
+                toml_text::read_versioned(&text, &name, FILE.0, FILE.1).map_err(|e| e.hint(anew()))?;
+            if file.key != key {
+                let text = format!(
+                    "{name}: expected the training that began here: other robots, images or settings"
+                );
+                return Err(Error::usage(text).hint(
+                    "go on with those, write elsewhere with --out, or train anew with --force".to_string(),
+                ));
+            }
+            batches = file.rollouts;
+        }
+        let saved = (batches.len(), Instant::now());
+        Ok(Log { path, key, batches, asked: 0, simulated: 0, saved, stop })
+    }
+
+    /// Rollouts of a body under stimuli and conditions.
+    fn rollouts(
+        &mut self,
+        body: &Body,
+        stimuli: &[Grid<f64>],
+        conditions: &[Condition],
+        config: &Config,
+    ) -> Result<Batch, Error> {
+        let number = self.asked;
+        self.asked += 1;
+        self.simulated += stimuli.len();
+        if let Some(batch) = self.batches.get(number) {
+            return match batch.len() == stimuli.len() {
+                true => Ok(batch.clone()),
+                false => {
+                    let text = format!(
+                        "{}: rollouts {number}: expected {}, found {}",
+                        self.path.display(),
+                        stimuli.len(),
+                        batch.len()
+                    );
+                    Err(Error::input(text).hint("train anew with --force".to_string()))
+                }
+            };
+        }
+        let found = fresh_rollouts(body, stimuli, conditions, &config.physics, &config.protocol, self.stop);
+        let found = found.map_err(|_| {
+            Error::stopped("stopped; what was simulated is saved".to_string())
+                .hint("the same command with --resume goes on".to_string())
+        })?;
+        let batch: Batch = found.into_iter().map(Result::ok).collect();
+        self.batches.push(batch.clone());
+        if self.saved.1.elapsed() >= SAVE_EVERY {
+            self.save()?;
+        }
+        Ok(batch)
+    }
+
+    fn save(&mut self) -> Result<(), Error> {
+        if self.saved.0 == self.batches.len() && self.path.exists() {
+            return Ok(());
+        }
+        let file = File {
+            format: FILE.0.to_string(),
+            format_version: FILE.1,
+            key: self.key.clone(),
+            rollouts: self.batches.clone(),
+        };
+        let text = serde_json::to_string(&file).expect("numbers are finite and keys are text") + "\n";
+        write_atomically(&self.path, text.as_bytes()).map_err(|error| Error::writing(&self.path, &error))?;
+        self.saved = (self.batches.len(), Instant::now());
+        Ok(())
+    }
+}
+
+/// What all gaits are trained with.
+struct Trainer<'a> {
+    config: &'a Config,
+    training: &'a Training,
+}
+
+/// Displacements by design and images; `None` where a rollout was unstable.
+type Known = BTreeMap<(Vec<Material>, Vec<usize>), Option<Vec<f64>>>;
+
+/// Rollouts of one gait's designs. The same design under the same images is simulated once.
+struct OfGait<'a, 'b> {
+    trainer: &'a Trainer<'a>,
+    gait: &'a Gait,
+    log: &'a mut Log<'b>,
+    known: &'a mut Known,
+}
+
+impl Rollouts for OfGait<'_, '_> {
+    type Error = Error;
+
+    fn roll(&mut self, design: &[Material], images: &[usize]) -> Result<Option<Vec<f64>>, Error> {
+        let key = (design.to_vec(), images.to_vec());
+        if let Some(known) = self.known.get(&key) {
+            return Ok(known.clone());
+        }
+        let Trainer { config, training } = self.trainer;
+        let stimuli: Vec<Grid<f64>> = images.iter().map(|image| training.stimuli[*image].clone()).collect();
+        let conditions: Vec<Condition> = images.iter().map(|image| training.conditions[*image]).collect();
+        let batch = self.log.rollouts(&self.gait.built(design), &stimuli, &conditions, config)?;
+        let found: Option<Vec<f64>> = batch.into_iter().collect();
+        self.known.insert(key, found.clone());
+        Ok(found)
+    }
+}
+
+impl Trainer<'_> {
+    /// Every condition that there is, in the order of their numbers.
+    fn conditions(&self) -> Vec<Condition> {
+        let mut all: Vec<Condition> = Vec::new();
+        self.training.conditions.iter().for_each(|condition| {
+            if !all.contains(condition) {
+                all.push(*condition);
+            }
+        });
+        all
+    }
+
+    /// Measures a gait's response; `None` if most of its rollouts are unstable.
+    fn response(&self, gait: &Gait, log: &mut Log) -> Result<Option<Response>, Error> {
+        let Trainer { config, training } = self;
+        let frequencies = frequencies(&training.stimuli);
+        let all = self.conditions();
+        let count = config.train.random_images;
+        let image = |number: usize| {
+            random_image(&frequencies, &mut stream(config.seed, Purpose::RandomImages, 0, number as u64))
+        };
+        let stimuli: Vec<Grid<f64>> = (0..count).map(image).collect();
+        let conditions: Vec<Condition> = (0..count).map(|number| all[number % all.len()]).collect();
+        let probe = gait.probe();
+        let design = vec![Material::SensorExpand; gait.places().len()];
+        let batch = log.rollouts(&probe, &stimuli, &conditions, config)?;
+        let shown =
+            batch.iter().zip(&stimuli).enumerate().filter_map(|(number, (displacement, stimulus))| {
+                let widths = gait.widths(&design, stimulus, &config.physics);
+                Some(Shown { widths, displacement: (*displacement)?, condition: number % all.len() })
+            });
+        let shown: Vec<Shown> = shown.collect();
+        Ok(if 2 * shown.len() > count { Response::of(&shown) } else { None })
+    }
+
+    /// The training images as a gait sees them; both groups weigh the same.
+    fn images(&self, gait: &Gait) -> Vec<Image> {
+        let Trainer { config, training } = self;
+        let all = self.conditions();
+        let [a, b] = config.task.groups.as_ref().expect("a training has two groups");
+        let of =
+            |classes: &[u8]| training.images.iter().filter(|image| classes.contains(&image.label)).count();
+        let (of_a, of_b) = (of(a) as f64, of(b) as f64);
+        let image = |((image, stimulus), condition): ((&ImageRef, &Grid<f64>), &Condition)| {
+            let is_a = a.contains(&image.label);
+            let (right, weight) = if is_a { (1.0, 0.5 / of_a) } else { (-1.0, 0.5 / of_b) };
+            let condition = all.iter().position(|other| other == condition).expect("it is one of all");
+            Image {
+                example: Example { right, weight, ..Example::new(gait, stimulus, &config.physics) },
+                condition,
+            }
+        };
+        training.images.iter().zip(&training.stimuli).zip(&training.conditions).map(image).collect()
+    }
+
+    fn plan(&self) -> Plan {
+        let train = &self.config.train;
+        Plan {
+            seed: self.config.seed,
+            images: train.images,
+            most_images: train.most_images,
+            rollouts: train.rollouts,
+            enough: f64::from(self.config.evaluation.enough),
+        }
+    }
+
+    /// Tries all gaits, and teaches the one that learns most at first.
+    fn train<'w>(
+        &self,
+        walkers: &'w [Walker<'w>],
+        log: &mut Log,
+        observer: &mut (dyn Observer + Send),
+    ) -> Result<(&'w Walker<'w>, Taught), Error> {
+        let plan = self.plan();
+        let trial = Plan { rollouts: 2 * plan.images, ..plan };
+        let mut best: Option<(f64, &Walker, Response, Known)> = None;
+        for walker in walkers {
+            let Some(response) = self.response(&walker.gait, log)? else { continue };
+            observer.response(&walker.robot.id, &walker.gait, &response);
+            let (images, mut known) = (self.images(&walker.gait), Known::new());
+            let mut rollouts = OfGait { trainer: self, gait: &walker.gait, log, known: &mut known };
+            // One gait needs no comparison.
+            let objective = match walkers.len() {
+                1 => 0.0,
+                _ => teach(&walker.gait, &response, &images, &trial, &mut rollouts, |_| ())?.objective,
+            };
+            if walkers.len() > 1 {
+                observer.tried(&walker.robot.id, objective);
+            }
+            if best.as_ref().is_none_or(|best| objective > best.0) {
+                best = Some((objective, walker, response, known));
+            }
+        }
+        let Some((_, walker, response, mut known)) = best else {
+            let text = "none of the chosen robots is stable under random images: there is nothing to train";
+            return Err(Error::input(text.to_string()).hint("choose others with --robots".to_string()));
+        };
+        let images = self.images(&walker.gait);
+        let mut rollouts = OfGait { trainer: self, gait: &walker.gait, log, known: &mut known };
+        let taught = teach(&walker.gait, &response, &images, &plan, &mut rollouts, |round| {
+            observer.round(round, &plan)
+        })?;
+        Ok((walker, taught))
+    }
+}
+
+/// The run with the robot that was taught.
+fn run_file(
+    options: &Options,
+    config: &Config,
+    training: &Training,
+    origin: StartRef,
+    walker: &Walker,
+    taught: &Taught,
+) -> Result<RunFile, Error> {
+    let body = walker.gait.built(&taught.design);
+    let genome = walker.robot.genome.with_body(&body).map_err(|error| Error::other(error.to_string()))?;
+    let training_images: Vec<ImageRef> = taught.shown.iter().map(|image| training.images[*image]).collect();
+    let grouping = config.grouping()?.with_fitness(config.criterion(0));
+    let answers = super::training::answers(&training_images, taught.displacements.iter().copied().map(Some));
+    let score = grouping.score(&answers);
+    let mut robot = Robot {
+        id: genome.id(),
+        cell: Vec::new(),
+        task: grouping.tasks()[score.task].name(),
+        objective: score.fitness,
+        displacements: taught.displacements.clone(),
+        voxels: body.counts(),
+        generation: 0,
+        parent: Some(walker.robot.id.clone()),
+        body,
+        genome,
+    };
+    robot.cell = robot.bins();
+    let dimensions = Dimensions::of(config)?;
+    let space = DescriptorSpace::voxel_counts(grouping.tasks().len());
+    let cell = space.index(&robot.cell).expect("bins of voxel counts are a cell of one task's archive");
+    let mut archive = Archive::new();
+    let elite = Elite { cell, objective: robot.objective, solution: robot };
+    archive.insert(elite).map_err(|error| Error::other(error.to_string()))?;
+    let stats = archive.stats(dimensions.possible_cells, config.archive.qd_offset);
+    Ok(RunFile {
+        format: FORMAT.to_string(),
+        format_version: FORMAT_VERSION,
+        program_version: env!("CARGO_PKG_VERSION").to_string(),
+        name: options.name.clone(),
+        config: config.clone(),
+        dataset: training.dataset.clone(),
+        training_images,
+        dimensions,
+        start: Some(origin),
+        generations: 1,
+        stats,
+        elites: archive.elites().map(|elite| elite.solution.clone()).collect(),
+        read_sha256: None,
+    })
+}

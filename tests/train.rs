@@ -1,0 +1,110 @@
+//! Training of gaits: a run like any other, the same bits on any threads, exact after a stop, clear errors.
+
+mod common;
+
+use common::program::{Sandbox, TINY, files};
+use morphcog::run::Config;
+
+/// A little of everything: seconds in place of minutes.
+const LITTLE: &str = "--set train.random_images=40 --set train.images=16 --set train.most_images=30 \
+--set train.rollouts=120 --set validation.images=40";
+
+/// A run whose robots walk a little.
+fn sandbox() -> Sandbox {
+    let sandbox = Sandbox::new();
+    sandbox.write("run.toml", TINY);
+    sandbox.run("evolve -q -c run.toml -o walkers").ended(0, &[]);
+    sandbox
+}
+
+#[test]
+fn a_training_is_a_run_that_every_command_understands() {
+    let sandbox = sandbox();
+    let train = format!("train -q -a walkers --task 3|14 --robots top:3 {LITTLE} -o taught");
+    sandbox.run(&train).ended(0, &[]);
+    let run = sandbox.run_file("taught");
+    let [robot] = &run.elites[..] else { panic!("{} robots", run.elites.len()) };
+    assert_eq!((robot.task.as_str(), run.training_images.len()), ("3|14", robot.displacements.len()));
+    assert!((16..=30).contains(&run.training_images.len()));
+    assert!(run.training_images.iter().all(|image| [1, 3, 4].contains(&image.label)));
+    // What walks is what walked before; only soft voxels and sensors were chosen anew.
+    let walkers = sandbox.run_file("walkers");
+    let parent = walkers.elites.iter().find(|elite| Some(&elite.id) == robot.parent.as_ref()).unwrap();
+    let passive = |code: u8| matches!(code, 2 | 5 | 6);
+    for (place, before) in parent.body.voxels().iter() {
+        let (before, after) = (before.code(), robot.body.voxels()[place].code());
+        assert!(before == after || passive(before) && passive(after), "{place:?}: {before} became {after}");
+    }
+    // It says on what, and whether the robot is physical.
+    let audit: serde_json::Value = serde_json::from_str(&sandbox.read("taught/audit.json")).unwrap();
+    assert_eq!(audit["robots"][0]["id"], robot.id);
+    assert!(run.start.is_some_and(|start| start.sha256.len() == 64));
+    for command in [
+        "eval -q -a taught --images 12 --cycles 1",
+        "replay -q -a taught --robot best -o taught.png",
+        "plot body -q -a taught -o body.svg",
+        "report -q -a taught -o taught.html",
+    ] {
+        sandbox.run(command).ended(0, &[]);
+    }
+    // Its config is one that can be read, and asks for the same again.
+    Config::load(&sandbox.path("taught/config.toml").to_string_lossy(), &[]).unwrap();
+}
+
+#[test]
+fn a_training_ends_with_the_same_bytes_on_any_threads_and_after_any_stop() {
+    let sandbox = sandbox();
+    let train = |out: &str, more: &str| {
+        format!("train -q -a walkers --task 0|1 --robots top:2 {LITTLE} -o {out} {more}")
+    };
+    sandbox.run(&train("one", "--threads 1")).ended(0, &[]);
+    sandbox.run(&train("two", "--threads 2")).ended(0, &[]);
+    let same = ["run.json", "elites.csv", "training.json", "validation.json"];
+    for file in same {
+        let (one, two) = (sandbox.read(&format!("one/{file}")), sandbox.read(&format!("two/{file}")));
+        assert!(one.replace("\"name\":\"one\"", "") == two.replace("\"name\":\"two\"", ""), "{file}");
+    }
+    // Killed at any moment, it has some of its rollouts; there may be no run.json yet.
+    let whole: serde_json::Value = serde_json::from_str(&sandbox.read("one/training.json")).unwrap();
+    let count = whole["rollouts"].as_array().unwrap().len();
+    assert!(count > 5, "{count}");
+    for kept in [0, 1, count / 2, count - 1] {
+        let mut cut = whole.clone();
+        cut["rollouts"].as_array_mut().unwrap().truncate(kept);
+        for name in ["run.json", "elites.csv", "validation.json", "audit.json", "audit.csv"] {
+            _ = std::fs::remove_file(sandbox.path("two").join(name));
+        }
+        sandbox.write("two/training.json", cut.to_string());
+        sandbox.run(&train("two", "--resume")).ended(0, &[]);
+        for file in same {
+            assert!(
+                sandbox.read(&format!("one/{file}")) == sandbox.read(&format!("two/{file}")),
+                "{kept}: {file}"
+            );
+        }
+    }
+    assert!(files(&sandbox.path("two")).keys().all(|name| !name.contains("tmp")));
+    // Another training is not mixed with it.
+    let other = train("two", "--resume --seed 9");
+    sandbox.run(&other).ended(2, &["training.json", "--force"]);
+}
+
+#[test]
+fn what_cannot_be_trained_is_one_clear_error_and_writes_nothing() {
+    let sandbox = sandbox();
+    let refused = |options: &str, code: i32, words: &[&str]| {
+        sandbox.run(&format!("train -q -a walkers -o refused {options}")).ended(code, words);
+        assert!(!sandbox.path("refused/run.json").exists(), "{options}");
+    };
+    refused("--task 4", 2, &["4|9"]);
+    refused("--task 4|", 2, &["4|9"]);
+    refused("--task 4|4", 2, &["4|4"]);
+    refused("--task a|b", 2, &["a|b"]);
+    refused("--task 3|10,11", 3, &["class 10", "found 0"]);
+    refused("--task 0|1 --set train.rollouts=3", 3, &["train.rollouts = 3", "--set"]);
+    refused("--task 0|1 --set train.random_images=5", 3, &["train.random_images = 5"]);
+    refused("--task 0|1 --set train.rounds=5", 2, &["rounds"]);
+    refused("--task 0|1 --set validation.images=100000", 3, &["100000"]);
+    refused("--task 0|1 --robots nobody", 3, &["nobody"]);
+    sandbox.run("train -q -a walkers --task 0|1 -o walkers").ended(5, &["--out"]);
+}
