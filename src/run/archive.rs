@@ -22,6 +22,9 @@ pub const FORMAT: &str = "morphcog-run";
 /// Version of its schema; a reader refuses newer ones.
 pub const FORMAT_VERSION: u32 = 1;
 
+/// Why a value becomes JSON.
+const JSON: &str = "JSON has all of it: keys are texts, and nothing fails to be written";
+
 /// A robot: a genome, its body, and what it did on the training images.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -258,7 +261,8 @@ impl RunFile {
         let space = self.space();
         let mut archive = Archive::new();
         for robot in &self.elites {
-            let cell = space.index(&robot.cell).unwrap_or_default();
+            let cell =
+                space.index(&robot.cell).expect("elites are in cells of their archive: a file's are checked");
             if archive.get(cell).is_some() {
                 return Err(Error::input(format!("elite {}: another one is in its cell", robot.id)));
             }
@@ -271,10 +275,9 @@ impl RunFile {
     /// Its text: the head on one line, then one line per elite.
     pub fn to_json(&self) -> String {
         let head = RunFile { elites: Vec::new(), ..self.clone() };
-        // Numbers are finite and keys are text: JSON has all of it.
-        let head = serde_json::to_string(&head).unwrap_or_default();
+        let head = serde_json::to_string(&head).expect(JSON);
         let lines: Vec<String> =
-            self.elites.iter().map(|robot| serde_json::to_string(robot).unwrap_or_default()).collect();
+            self.elites.iter().map(|robot| serde_json::to_string(robot).expect(JSON)).collect();
         // `elites` is the last key.
         let head = head.strip_suffix("]}").unwrap_or(&head);
         format!("{head}\n{}\n]}}\n", lines.join(",\n"))
@@ -303,7 +306,8 @@ impl RunFile {
         let mut writer = csv::Writer::from_writer(Vec::new());
         writer.write_record(&header)?;
         for robot in &self.elites {
-            let index = space.index(&robot.cell).unwrap_or_default();
+            let index =
+                space.index(&robot.cell).expect("elites are in cells of their archive: a file's are checked");
             let VoxelCounts { muscle, sensor, total } = robot.voxels;
             let mut row = vec![index.to_string(), robot.objective.to_string()];
             row.extend([muscle, sensor, total].map(|count| count.to_string()));

@@ -169,9 +169,12 @@ impl AuditFile {
     pub fn to_json(&self) -> String {
         let head = AuditFile { robots: Vec::new(), ..self.clone() };
         // Numbers are finite and keys are text: JSON has all of it.
-        let head = serde_json::to_string(&head).unwrap_or_default();
-        let lines: Vec<String> =
-            self.robots.iter().map(|robot| serde_json::to_string(robot).unwrap_or_default()).collect();
+        let head = serde_json::to_string(&head).expect("JSON has all of it");
+        let lines: Vec<String> = self
+            .robots
+            .iter()
+            .map(|robot| serde_json::to_string(robot).expect("JSON has all of it"))
+            .collect();
         format!("{}\n{}\n]}}\n", head.strip_suffix("]}").unwrap_or(&head), lines.join(",\n"))
     }
 

@@ -120,7 +120,7 @@ pub fn capacity(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -
     let mut known = Trainings::read(&options.out);
     let jobs = splits.iter().flat_map(|split| config.networks.iter().map(move |&kind| (*split, kind)));
     let key = |split: &grouping::Split, kind: Kind| {
-        let hyper = serde_json::to_string(config.of(kind)).unwrap_or_default();
+        let hyper = serde_json::to_string(config.of(kind)).expect("JSON has all of it");
         sha256_hex(
             format!("{} {} {hyper} {} {}", split.name(), kind.name(), images.key, config.seed).as_bytes(),
         )

@@ -146,7 +146,7 @@ impl CapacityFile {
     /// Its text.
     pub fn to_json(&self) -> String {
         // Numbers are finite, keys are text: JSON has all of it.
-        serde_json::to_string_pretty(self).unwrap_or_default() + "\n"
+        serde_json::to_string_pretty(self).expect("JSON has all of it") + "\n"
     }
 }
 

@@ -221,7 +221,7 @@ impl Training {
                 "data.train_images: expected an image of class {class}, found none"
             )));
         }
-        let train_sha256 = dataset.fingerprint(Split::Train).unwrap_or_default();
+        let train_sha256 = dataset.fingerprint(Split::Train).expect("its images were read just now");
         let dataset = DatasetRef { name: dataset.name().to_string(), train_sha256 };
         let classes = images.iter().map(|image| image.label);
         let conditions = if config.measures_response(period) {

@@ -234,7 +234,7 @@ pub(super) fn best<'a>(
     let images = images(&[run], dataset, "--validation", wanted.images)?;
     // Whoever asks for fewer than the run's end has found gets the first of those.
     let searched = &Wanted { count: wanted.count.max(run.config.validation.best), ..*wanted };
-    let shown = (dataset.fingerprint(Split::Train).unwrap_or_default(), &images[..]);
+    let shown = (dataset.fingerprint(Split::Train).expect("its images were drawn just now"), &images[..]);
     let key = key(run, &robots, searched, shown, walker.control_steps);
     let path = source.path.with_file_name(VALIDATION_JSON);
     let known = ValidationFile::read(&path);

@@ -221,7 +221,7 @@ impl Dataset {
                 Images::Stored(stored) => (stored.images.height, stored.images.width, stored.files.clone()),
                 Images::Drawn(_) => (BuiltinDigits::SIDE, BuiltinDigits::SIDE, Vec::new()),
             };
-            let fingerprint = self.fingerprint(split).unwrap_or_default();
+            let fingerprint = self.fingerprint(split).expect("the split is loaded");
             let per_class = loaded.by_class.iter().map(|(&class, indices)| (class, indices.len())).collect();
             (split, SplitInfo { images: loaded.labels.len(), height, width, fingerprint, per_class, files })
         };

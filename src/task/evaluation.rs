@@ -251,7 +251,10 @@ impl<'a> Candidate<'a> {
                 order.push(image);
             }
         }
-        let places = same_as.iter().map(|&image| places[image].unwrap_or_default()).collect();
+        let places = same_as
+            .iter()
+            .map(|&image| places[image].expect("every image is in the order, or the one it is the same as"))
+            .collect();
         let lives = if is_fresh { order.len() } else { 1 };
         Candidate {
             job,

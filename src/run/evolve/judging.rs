@@ -68,8 +68,7 @@ impl Run<'_> {
         displacements.truncate(self.grouping.settled_by(&answers).unwrap_or(displacements.len()));
         let score = self.grouping.score(&answers);
         let coordinates = self.cell(robot.bins(), score.task);
-        // The coordinates are bins of this very space.
-        let cell = self.space.index(&coordinates).unwrap_or_default();
+        let cell = self.space.index(&coordinates).expect("the coordinates are bins of this very space");
         let task = self.grouping.tasks()[score.task].name();
         let objective = score.fitness.min(at_most);
         let solution = Robot { cell: coordinates, task, objective, displacements, ..robot };
