@@ -107,4 +107,10 @@ fn what_cannot_be_trained_is_one_clear_error_and_writes_nothing() {
     refused("--task 0|1 --set validation.images=100000", 3, &["100000"]);
     refused("--task 0|1 --robots nobody", 3, &["nobody"]);
     sandbox.run("train -q -a walkers --task 0|1 -o walkers").ended(5, &["--out"]);
+    // A run and a training do not go on with each other.
+    let before = files(&sandbox.path("walkers"));
+    sandbox.run("train -q -a walkers --task 0|1 -o walkers --resume").ended(5, &["no training"]);
+    assert_eq!(files(&sandbox.path("walkers")), before);
+    std::fs::write(sandbox.path("walkers").join("training.json"), "{}").unwrap();
+    sandbox.run("evolve -q -c run.toml -o walkers --resume").ended(5, &["is a training", "train --resume"]);
 }

@@ -13,6 +13,7 @@ use super::relatives::Relatives;
 use super::robust::{Scored, with_perturbed_lives};
 pub use super::session::{Finished, Observer, Options, Progress};
 use super::start::{Start, StartRef};
+use super::train::TRAINING_JSON;
 use super::training::Training;
 use super::variation::{Lessons, Mutations, unmade};
 use super::whereabouts::{self, Whereabouts};
@@ -44,6 +45,10 @@ pub fn evolve(
     observer: &mut (dyn Observer + Send),
 ) -> Result<Finished, Error> {
     let config = &options.config;
+    if options.if_exists == IfExists::Resume && options.out.join(TRAINING_JSON).exists() {
+        let text = format!("{}: the run in this folder is a training", options.out.display());
+        return Err(Error::occupied(text).hint("go on with it by morphcog train --resume".to_string()));
+    }
     let mut whereabouts = Whereabouts::given(options.data.as_deref());
     if options.if_exists == IfExists::Resume {
         whereabouts = whereabouts.and_of(&options.out.join(folder::RUN_JSON));

@@ -147,13 +147,20 @@ pub fn train(
     let origin = origin(&source, &dataset)?;
     held_out::check(&config, Some(&origin), &dataset)?;
     let walkers = walkers(&source, &options.robots, config.seed)?;
+    let [log, run] = [TRAINING_JSON, folder::RUN_JSON].map(|name| options.out.join(name));
+    if options.if_exists == IfExists::Resume && run.exists() && !log.exists() {
+        let text = format!("{}: the run in this folder is no training", options.out.display());
+        return Err(
+            Error::occupied(text).hint("write elsewhere with --out, or replace it by --force".to_string())
+        );
+    }
     let folder = RunFolder::open(&options.out, options.if_exists)?;
     let write = |name: &str, content: &[u8]| {
         let path = folder.path().join(name);
         write_atomically(&path, content).map_err(|error| Error::writing(&path, &error))
     };
     let key = key(&config, &walkers, &training);
-    let mut log = Log::open(folder.path().join(TRAINING_JSON), key, stop)?;
+    let mut log = Log::open(log, key, stop)?;
     write(folder::CONFIG, config.to_toml().as_bytes())?;
     whereabouts::remember(&folder, &dataset)?;
     let pool = eval::pool(options.threads)?;

@@ -146,11 +146,6 @@ impl Moments {
         self.widths += widths;
     }
 
-    /// Rollouts added.
-    pub fn count(&self) -> usize {
-        self.count as usize
-    }
-
     /// Mean displacement \[voxel lengths\]; 0 of no rollout.
     pub fn mean(&self) -> f64 {
         if self.count > 0.0 { self.displacement / self.count } else { 0.0 }
@@ -432,11 +427,6 @@ impl Lesson {
     /// The present design.
     pub fn design(&self) -> Design {
         self.design.iter().map(|choice| CHOICES[*choice]).collect()
-    }
-
-    /// The displacement of each example under the present design \[voxel lengths\].
-    pub fn displacements(&self) -> Vec<f64> {
-        self.margins.iter().zip(&self.right).map(|(margin, right)| margin * right).collect()
     }
 
     /// The objective with another material at a place.

@@ -107,7 +107,7 @@ pub fn training(console: &Console, finished: &train::Finished, out: &Path) {
     }
     let gait = robot.parent.as_deref().unwrap_or("none");
     console.line(&format!(
-        "{}: {} with the gait of {gait}, fitness {} on {} hard training images, after {rollouts} rollouts",
+        "{}: {} with the gait of {gait}, fitness {} on {} training images, after {rollouts} rollouts",
         robot.id,
         robot.task,
         number::fixed(robot.objective, 3),
