@@ -3,9 +3,9 @@
 mod processor;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
+use morphcog::base::Grid;
 use morphcog::base::random::{Purpose, stream};
 use morphcog::base::stop::NEVER;
-use morphcog::base::{Grid, lanes::InstructionSet};
 use morphcog::body::Body;
 use morphcog::genome::Genome;
 use morphcog::run::checkpoint::{self, Checkpoint, KnownBodies};
@@ -18,10 +18,11 @@ use morphcog::run::relatives::Relatives;
 use morphcog::run::start::StartRef;
 use morphcog::run::training::Training;
 use morphcog::run::{archive::RunFile, bench};
-use morphcog::sim::Lattice;
+use morphcog::sim::{InstructionSet, System};
 use morphcog::task::evaluation::{Job, Savings, evaluate};
 use morphcog::task::rollout::fresh_life;
 use processor::Processor;
+use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 /// The paper's bodies and lives, on built-in digits.
@@ -57,10 +58,10 @@ fn lives(criterion: &mut Criterion<Processor>) {
     let mut group = criterion.benchmark_group("rollout, 500 control steps");
     group.sample_size(10);
     for specimen in bench::specimens() {
-        let lattice = Lattice::new(&specimen.body, &config.physics);
+        let system = Arc::new(System::new(&specimen.body, config.physics.clone()));
         let stimulus = stimulus(0);
         group.bench_function(specimen.name, |bencher| {
-            bencher.iter(|| fresh_life(&lattice, &config.physics, &config.protocol, &stimulus, &NEVER));
+            bencher.iter(|| fresh_life(&system, &config.protocol, &stimulus, &NEVER));
         });
     }
 }

@@ -4,10 +4,10 @@ mod processor;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use morphcog::base::Grid;
-use morphcog::base::lanes::InstructionSet;
 use morphcog::run::bench::specimens;
-use morphcog::sim::{Lattice, Physics, Start, World};
+use morphcog::sim::{InstructionSet, Physics, Start, System, World};
 use processor::Processor;
+use std::sync::Arc;
 
 fn steps(criterion: &mut Criterion<Processor>) {
     let physics = Physics::default();
@@ -16,13 +16,13 @@ fn steps(criterion: &mut Criterion<Processor>) {
         if (9.0..30.0).contains(&square) { 1.0 } else { 0.0 }
     });
     for specimen in specimens() {
-        let lattice = Lattice::new(&specimen.body, &physics);
+        let system = Arc::new(System::new(&specimen.body, physics.clone()));
         let mut group = criterion.benchmark_group(specimen.name);
         // So that times are read per substep.
         group.throughput(Throughput::Elements(u64::from(physics.substeps)));
         for set in InstructionSet::ALL.into_iter().filter(|set| set.is_available()) {
             let start = Start { column: 493, row: physics.ground_row };
-            let mut world = World::new(&lattice, &physics, start).with_instructions(set);
+            let mut world = World::new(Arc::clone(&system), start).with_instructions(set);
             world.set_stimulus(&stimulus);
             (0..30).for_each(|_| world.step().expect("the life is stable"));
             group.bench_function(set.name(), |bencher| bencher.iter(|| world.step()));

@@ -10,7 +10,6 @@ mod reproduce;
 mod serve;
 mod train;
 
-use crate::base::lanes::InstructionSet;
 use crate::run::capacity_file::CapacityFile;
 use crate::run::data::catalogue::Catalogue;
 use crate::run::data::fetch::{FetchError, FetchOptions, fetch};
@@ -21,6 +20,7 @@ use crate::run::robots::{BEST, Selection};
 use crate::run::{
     Config, Error, bench, config, data, error, eval, evolve, folder, gallery, replay, signals, simulate,
 };
+use crate::sim::InstructionSet;
 use crate::task::dataset::{Dataset, Split};
 use crate::task::files::places;
 use crate::view::console::Console;

@@ -6,13 +6,13 @@
 //!
 //! # The map of the house
 //!
-//! The house has floors; a room uses only rooms on lower floors, never one beside it.
+//! The house has floors; a room uses only rooms on lower floors, never one beside it. Below all of them is a crate of its own, the
+//! simulator: [`sim`] (`morphcog-sim`), the physics and nothing else. Begin there with [`sim::World`].
 //!
 //! | floor | room | what is in it | begin with |
 //! |---|---|---|---|
-//! | 0 | [`base`] | grids, random streams, hashes, wide lanes, whole-file writes | [`base::Grid`] |
-//! | 1 | [`body`] | materials and bodies | [`body::Body`] |
-//! | 2 | [`sim`] | the physics, and nothing else | [`sim::World`] |
+//! | 0 | [`base`] | random streams, hashes, whole-file writes, numbers as text | [`base::random`] |
+//! | 1 | [`body`] | bodies, which are the simulator's, and what they are known by | [`body::Body`] |
 //! | 2 | [`genome`] | CPPNs and their mutations | [`genome::Genome`] |
 //! | 2 | [`qd`] | archives and MAP-Elites over any type of solution | [`qd::MapElites`] |
 //! | 2 | [`baseline`] | networks that robots are compared with | [`baseline::train`] |
@@ -21,26 +21,26 @@
 //! | 5 | [`view`] | pictures, the terminal, the page of `serve` | [`view::pictures`] |
 //! | 6 | [`cli`] | the command line | [`cli::Cli`] |
 //!
-//! # A life
+//! # A rollout
 //!
 //! ```
 //! use morphcog::base::Grid;
-//! use morphcog::body::Body;
-//! use morphcog::sim::{Lattice, Physics, Start, World};
+//! use morphcog::sim::{Body, Physics, System};
+//! use morphcog::task::protocol::Protocol;
+//! use morphcog::task::rollout::Rollout;
+//! use std::sync::Arc;
 //!
 //! // Two rows from the top: muscles in phase (3) and antiphase (4), an expanding sensor (6).
 //! let body: Body = "336/446".parse()?;
-//! let physics = Physics::default();
-//! let lattice = Lattice::new(&body, &physics);
-//! let mut world = World::new(&lattice, &physics, Start { column: 0, row: 2 });
-//! world.set_stimulus(&Grid::from_fn(2, 3, |_, column| if column == 2 { 1.0 } else { 0.0 }));
-//! for _ in 0..50 {
-//!     world.step()?;
-//! }
-//! let [x, _] = world.centre_of_mass();
-//! println!("after one actuation cycle at {:.2} voxel lengths", 10.0 * x);
+//! let system = Arc::new(System::new(&body, Physics::default()));
+//! let protocol = Protocol { control_steps: 50, ..Protocol::default() };
+//! let mut rollout = Rollout::new(&system, &protocol);
+//! let image = Grid::from_fn(2, 3, |_, column| if column == 2 { 1.0 } else { 0.0 });
+//! println!("walked {:.2} voxel lengths", rollout.show(&image, |_| ())?);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
+
+#![forbid(unsafe_code)]
 
 pub mod base;
 pub mod baseline;
@@ -49,6 +49,7 @@ pub mod cli;
 pub mod genome;
 pub mod qd;
 pub mod run;
-pub mod sim;
 pub mod task;
 pub mod view;
+
+pub use morphcog_sim as sim;

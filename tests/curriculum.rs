@@ -11,7 +11,7 @@ use morphcog::run::evolve::{Observer, Options, Progress, evolve};
 use morphcog::run::folder::{IfExists, RunFolder};
 use morphcog::run::start::StartRef;
 use morphcog::run::training::{Training, load_dataset};
-use morphcog::sim::Lattice;
+use morphcog::sim::System;
 use morphcog::task::dataset::Split;
 use morphcog::task::fitness::Fitness;
 use morphcog::task::protocol::Protocol;
@@ -258,9 +258,9 @@ fn a_stage_with_shorter_lives_judges_by_them_and_other_commands_by_whole_ones() 
     assert_eq!((run.protocol().control_steps, run.config.protocol.control_steps), (15, 20));
     let dataset = load_dataset(&run.config, None, &[Split::Train]).unwrap();
     let walked = |protocol: &Protocol, robot: &Robot| {
-        let lattice = Lattice::new(&robot.body, &run.config.physics);
+        let system = Arc::new(System::new(&robot.body, run.config.physics.clone()));
         let training = Training::of(&run.config, &dataset, run.config.period(6)).unwrap();
-        walk(&lattice, &run.config.physics, protocol, &training.stimuli, false, &NEVER).unwrap().unwrap().0
+        walk(&system, protocol, &training.stimuli, false, &NEVER).unwrap().unwrap().0
     };
     for robot in &run.elites {
         assert_eq!(walked(&run.protocol(), robot), robot.displacements, "{}", robot.id);

@@ -8,7 +8,7 @@ mod common;
 use common::program::{Sandbox, TINY, staged};
 use common::{Reference, references, sensitive};
 use morphcog::base::hash::sha256_hex;
-use morphcog::sim::{Lattice, Physics, World};
+use morphcog::sim::{Physics, World};
 use rayon::prelude::*;
 use serde_json::{Map, Value};
 use std::fmt::Write;
@@ -43,13 +43,7 @@ const SEQUENTIAL_RUN: &str = "38e9052e5c9f95a3bd20ccd9b52f8b46c803f55a0e0a28dce0
 const STAGED_RUN: &str = "fdb5f2768e103d324278ad43254fbbeb8501ff2e0a2b45fb128c53f48f8f4e92";
 
 /// The bits of all points before the first control step and after each, until the simulation becomes unstable.
-fn bits<'a>(
-    lattice: &'a Lattice,
-    physics: &'a Physics,
-    life: &Reference,
-) -> impl Iterator<Item = Vec<u8>> + use<'a> {
-    let mut world = World::new(lattice, physics, life.start());
-    world.set_stimulus(&life.stimulus);
+fn bits(mut world: World) -> impl Iterator<Item = Vec<u8>> {
     let mut begun = false;
     std::iter::from_fn(move || {
         if std::mem::replace(&mut begun, true) {
@@ -64,7 +58,7 @@ fn every_point_of_the_golden_simulations_has_the_same_bits_after_every_control_s
     let physics = Physics::default();
     let hash = |life: &Reference| {
         let steps = life.control_steps as usize + 1;
-        let all: Vec<u8> = bits(&life.lattice(&physics), &physics, life).take(steps).flatten().collect();
+        let all: Vec<u8> = bits(life.world(&physics)).take(steps).flatten().collect();
         (life.name.clone(), sha256_hex(&all))
     };
     let lives: Vec<Reference> = references().into_iter().chain(sensitive()).collect();
@@ -107,9 +101,8 @@ fn the_golden_simulations_feel_the_least_change_of_every_constant_or_its_bits_ar
         let changed = nudged(&constants, name);
         assert_ne!(changed, physics, "{name}");
         lives.iter().any(|life| {
-            let (lattice, other) = (life.lattice(&physics), life.lattice(&changed));
-            let ours = bits(&lattice, &physics, life).take(steps);
-            !ours.eq(bits(&other, &changed, life).take(steps))
+            let ours = bits(life.world(&physics)).take(steps);
+            !ours.eq(bits(life.world(&changed)).take(steps))
         })
     };
     let names: Vec<&String> = constants.keys().collect();

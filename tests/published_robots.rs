@@ -8,7 +8,7 @@ use morphcog::base::stop::NEVER;
 use morphcog::body::Body;
 use morphcog::run::eval_file::EvalFile;
 use morphcog::run::gallery;
-use morphcog::sim::{Lattice, Physics};
+use morphcog::sim::{Physics, System};
 use morphcog::task::dataset::{Dataset, Split};
 use morphcog::task::files::places;
 use morphcog::task::grouping::Group::{A, B};
@@ -18,6 +18,7 @@ use morphcog::task::score::two_group_fitness;
 use morphcog::task::stimulus::{Encoding, Reduction, StimulusParams, stimulus};
 use serde::Deserialize;
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 #[derive(Deserialize)]
 struct Published {
@@ -56,18 +57,17 @@ fn stimuli() -> Vec<Grid<f64>> {
 
 /// Displacements under the protocol of the robot's task.
 fn displacements(robot: &Published, stimuli: &[Grid<f64>], physics: &Physics) -> Vec<f64> {
-    let lattice = Lattice::new(&robot.body, physics);
+    let system = Arc::new(System::new(&robot.body, physics.clone()));
     let protocol = |life, control_steps| Protocol { life, control_steps, start_row: 2, start_column: 493 };
     match robot.task.as_str() {
         "zero_one" => {
             let protocol = protocol(Life::Sequential, 500);
-            let mut rollout = Rollout::new(&lattice, physics, &protocol);
+            let mut rollout = Rollout::new(&system, &protocol);
             stimuli[..2].iter().map(|stimulus| rollout.show(stimulus, |_| ()).unwrap()).collect()
         }
         "four_digit" => {
             let protocol = protocol(Life::Fresh, 250);
-            let life =
-                |stimulus| fresh_life(&lattice, physics, &protocol, stimulus, &NEVER).unwrap().unwrap();
+            let life = |stimulus| fresh_life(&system, &protocol, stimulus, &NEVER).unwrap().unwrap();
             stimuli.iter().map(life).collect()
         }
         other => panic!("no protocol for {other}"),

@@ -3,7 +3,7 @@
 mod common;
 
 use common::program::{Sandbox, TINY, said, without_seconds};
-use morphcog::base::lanes::InstructionSet;
+use morphcog::sim::InstructionSet;
 
 /// Configs that differ in what could depend on timing: kind of life, tasks, images per class.
 fn configs() -> Vec<(&'static str, String)> {

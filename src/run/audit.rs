@@ -12,7 +12,7 @@ use super::{Config, Error, eval, gallery};
 use crate::base::hash::sha256_hex;
 use crate::base::stop::Stopped;
 use crate::body::Body;
-use crate::sim::{Energy, Lattice};
+use crate::sim::{Energy, System};
 use crate::task::dataset::Split;
 use crate::task::evaluation::{Job, Outcome, Savings, evaluate};
 use crate::task::fitness::{Criterion, Fitness};
@@ -21,6 +21,7 @@ use crate::task::perturbation::{Perturbation, Setting};
 use crate::task::rollout::walk;
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 /// Robots whose lives are lived side by side; what is finished is saved after so many.
@@ -310,8 +311,8 @@ impl Trial {
 fn live(setting: &Setting, measured: bool, stop: &AtomicBool) -> Result<Option<(Vec<f64>, Energy)>, Stopped> {
     let Setting { body, physics, protocol, stimuli } = setting;
     if measured {
-        let lattice = Lattice::new(body, physics);
-        return Ok(walk(&lattice, physics, protocol, stimuli, true, stop)?.ok());
+        let system = Arc::new(System::new(body, physics.clone()));
+        return Ok(walk(&system, protocol, stimuli, true, stop)?.ok());
     }
     let job = Job { body, order: Vec::new(), may_win: Box::new(|_| true), settled: None, given_up: None };
     let savings = Savings { early_stop: false, ..Savings::default() };

@@ -2,9 +2,8 @@
 
 use crate::base::Grid;
 use crate::base::clock::{CLOCK, thread_time};
-use crate::base::lanes::InstructionSet;
 use crate::body::{Body, Material};
-use crate::sim::{Lattice, Physics, Start, World};
+use crate::sim::{InstructionSet, Physics, Start, System, World};
 use serde::Serialize;
 use std::time::Duration;
 
@@ -78,9 +77,9 @@ const WARM_UP: u32 = 50;
 /// life, fewer if they take longer than two seconds.
 pub fn measure(specimen: &Specimen, set: InstructionSet, repetitions: usize) -> Speed {
     let physics = Physics::default();
-    let lattice = Lattice::new(&specimen.body, &physics);
     let start = Start { column: 493, row: physics.ground_row };
-    let mut world = World::new(&lattice, &physics, start).with_instructions(set);
+    let system = System::new(&specimen.body, physics.clone());
+    let mut world = World::new(system, start).with_instructions(set);
     let stimulus = |r: usize, c: usize| if (r + c).is_multiple_of(3) { 1.0 } else { 0.0 };
     world.set_stimulus(&Grid::from_fn(specimen.body.height(), specimen.body.width(), stimulus));
     let mut live = |steps: u32| {
@@ -135,9 +134,9 @@ mod tests {
         assert!(list.iter().all(|specimen| specimen.body.is_valid(3)));
         let rigid = list[3].body.voxels().cells().iter().filter(|m| **m == Material::Rigid).count();
         assert_eq!(rigid, 131);
-        let lattice = |i: usize| Lattice::new(&list[i].body, &Physics::default()).point_count();
+        let points = |i: usize| System::new(&list[i].body, Physics::default()).point_count();
         // 24 gaps, none of which takes a whole vertex away; at each of 12 corner contacts one point more.
-        assert!(lattice(4) > lattice(0), "{} {}", lattice(4), lattice(0));
+        assert!(points(4) > points(0), "{} {}", points(4), points(0));
     }
 
     #[test]

@@ -6,6 +6,7 @@ use super::relatives::Relatives;
 use super::{Error, toml_text};
 use crate::base::files::{sync_folder, write_atomically};
 use crate::base::hash::sha256_hex;
+use crate::body;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 use std::io::ErrorKind;
@@ -33,7 +34,7 @@ impl Checkpoint {
     /// As strict as a `run.json` is read: what goes on from here becomes one.
     fn check(&self) -> Result<(), Error> {
         self.run.check().map_err(|error| error.within("run"))?;
-        match self.run.elites.iter().find(|robot| !self.known_bodies.0.contains(&robot.body.key())) {
+        match self.run.elites.iter().find(|robot| !self.known_bodies.0.contains(&body::key(&robot.body))) {
             Some(robot) => {
                 Err(Error::input(format!("known_bodies: expected the body of elite {} among them", robot.id)))
             }
@@ -168,7 +169,7 @@ mod tests {
         let mut run = RunFile { generations, ..samples::run(&[("a", 1.5), ("b", -0.25)]) };
         for robot in &mut run.elites {
             robot.id = robot.genome.id();
-            known_bodies.insert(robot.body.key());
+            known_bodies.insert(body::key(&robot.body));
         }
         Checkpoint {
             run,

@@ -12,7 +12,7 @@ use super::whereabouts::Whereabouts;
 use super::{Config, Error, folder::check_out, gallery};
 use crate::base::Grid;
 use crate::base::files::write_atomically;
-use crate::sim::Lattice;
+use crate::sim::System;
 use crate::task::dataset::Split;
 use crate::task::grouping::{self, Grouping};
 use crate::task::protocol::{Life, MAX_STEPS, Protocol};
@@ -20,6 +20,7 @@ use crate::task::rollout::{fresh_life, same_to_sensors};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 /// Displacements up to this count as wrong in the paper's test \[voxel lengths\].
@@ -297,14 +298,13 @@ impl Walker<'_> {
         let Walker { config, stop, observer, done, .. } = self;
         let protocol =
             Protocol { life: Life::Fresh, control_steps: self.control_steps, ..config.protocol.clone() };
-        let lattice = Lattice::new(&robot.body, &config.physics);
+        let system = Arc::new(System::new(&robot.body, config.physics.clone()));
         let views: Vec<&Grid<f64>> = stimuli.iter().collect();
         let same_as = same_to_sensors(&robot.body, &views);
         let mut shared = BTreeMap::<usize, u64>::new();
         same_as.iter().for_each(|&first| *shared.entry(first).or_default() += 1);
         let life = |(&image, &count): (&usize, &u64)| {
-            let displacement =
-                fresh_life(&lattice, &config.physics, &protocol, &stimuli[image], stop).ok()?.ok();
+            let displacement = fresh_life(&system, &protocol, &stimuli[image], stop).ok()?.ok();
             observer.progress(done.fetch_add(count, Ordering::Relaxed) + count);
             Some((image, displacement))
         };

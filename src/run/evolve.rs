@@ -20,7 +20,7 @@ use super::whereabouts::{self, Whereabouts};
 use super::{Error, ErrorKind, eval, held_out, resume, validation};
 use crate::base::files::write_atomically;
 use crate::base::stop::check;
-use crate::body::Body;
+use crate::body::{self, Body};
 use crate::qd::{Archive, ArchiveStats, DescriptorSpace, MapElites, Proposal};
 use crate::task::dataset::{Dataset, Split};
 use crate::task::evaluation::{Job, Outcome, evaluate};
@@ -285,7 +285,7 @@ impl<'a> Run<'a> {
             take(&mut self.relatives),
             self.totals,
         );
-        elites.iter().for_each(|robot| _ = self.known.insert(robot.body.key()));
+        elites.iter().for_each(|robot| _ = self.known.insert(body::key(&robot.body)));
         self.totals.evaluations += elites.len() as u64;
         let at_once = LIVES_AT_ONCE.div_ceil(self.training.images.len().max(1));
         let mut elites = (0..).zip(elites).map(|(number, robot)| (number, None, robot)).peekable();
@@ -334,7 +334,7 @@ impl<'a> Run<'a> {
         let saves_known = config.savings_in(self.period).known_bodies;
         let (images, mut fresh, mut new) = (self.training.stimuli.len() as u64, Vec::new(), Vec::new());
         for (proposal, robot) in proposals.iter().zip(robots) {
-            let key = robot.body.key();
+            let key = body::key(&robot.body);
             let is_new = self.known.insert(key);
             if is_new {
                 new.push(key);

@@ -3,10 +3,11 @@
 use super::replay::Subject;
 use crate::base::Grid;
 use crate::base::stop::NEVER;
-use crate::sim::Lattice;
+use crate::sim::System;
 use crate::task::protocol::Life;
 use crate::task::rollout::walk;
 use rayon::prelude::*;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// What flipping pixels of an image does to a robot.
@@ -52,7 +53,7 @@ pub fn lives(subject: &Subject) -> usize {
 /// as they are. `progress` is told after every life how many are done.
 pub fn sensitivity(subject: &Subject, progress: &(dyn Fn(u64) + Sync)) -> Vec<Sensitivity> {
     let config = &subject.found.config;
-    let lattice = Lattice::new(&subject.found.body, &config.physics);
+    let system = Arc::new(System::new(&subject.found.body, config.physics.clone()));
     let sensors = sensors(subject);
     let images: Vec<Grid<f64>> = subject.images.iter().map(|(_, image)| image.clone()).collect();
     let flips = std::iter::once(None).chain(sensors.iter().copied().map(Some));
@@ -67,7 +68,7 @@ pub fn sensitivity(subject: &Subject, progress: &(dyn Fn(u64) + Sync)) -> Vec<Se
         if let (Some(place), Some(last)) = (flip, shown.last_mut()) {
             *last = flipped(last, place);
         }
-        let displacements = walk(&lattice, &config.physics, &config.protocol, &shown, false, &NEVER);
+        let displacements = walk(&system, &config.protocol, &shown, false, &NEVER);
         let displacements = displacements.expect("nobody sets NEVER");
         progress(done.fetch_add(1, Ordering::Relaxed) + 1);
         displacements.ok().and_then(|(displacements, _)| displacements.last().copied())
@@ -126,14 +127,13 @@ mod tests {
             let places: Vec<_> = found[1].pixels.iter().map(|pixel| pixel.place).collect();
             assert_eq!(places, [(0, 1), (0, 2), (1, 3), (2, 3)]);
             let config = &subject.found.config;
-            let lattice = Lattice::new(&subject.found.body, &config.physics);
+            let system = Arc::new(System::new(&subject.found.body, config.physics.clone()));
             let flip = flipped(&subject.images[1].1, (1, 3));
             let shown = match life {
                 Life::Fresh => vec![flip],
                 Life::Sequential => vec![subject.images[0].1.clone(), flip],
             };
-            let (expected, _) =
-                walk(&lattice, &config.physics, &config.protocol, &shown, false, &NEVER).unwrap().unwrap();
+            let (expected, _) = walk(&system, &config.protocol, &shown, false, &NEVER).unwrap().unwrap();
             assert_eq!(found[1].pixels[2].displacement, expected.last().copied());
             assert!(found[1].change(&found[1].pixels[2]).is_some_and(|change| change != 0.0));
         }

@@ -4,7 +4,7 @@ use super::{Error, folder, toml_text};
 use crate::base::Grid;
 use crate::base::files::{read_text, write_atomically};
 use crate::body::Body;
-use crate::sim::{Lattice, Physics, Start, World};
+use crate::sim::{Physics, Start, System, World};
 use crate::task::protocol::{MAX_COLUMN, MAX_ROW, MAX_STEPS};
 use serde::de::{Error as _, IgnoredAny, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer};
@@ -206,9 +206,9 @@ pub fn simulate(scenario: &Scenario, mut line: impl FnMut(String) -> Result<(), 
     line("step,com_x,com_y\n".to_string())?;
     let mut row = |step: u64, [x, y]: [f64; 2]| line(format!("{step},{},{}\n", digits17(x), digits17(y)));
     let physics = &scenario.physics;
-    let lattice = Lattice::new(&scenario.body, physics);
     let start_row = scenario.start_row.unwrap_or(physics.ground_row);
-    let mut world = World::new(&lattice, physics, Start { column: scenario.start_column, row: start_row });
+    let start = Start { column: scenario.start_column, row: start_row };
+    let mut world = World::new(System::new(&scenario.body, physics.clone()), start);
     let offset = scenario.start_column as f64 * physics.cell_size;
     let place = |world: &World| {
         let [x, y] = world.centre_of_mass();

@@ -6,13 +6,13 @@ use super::rollout::{Rollout, fresh_life, same_to_sensors};
 use crate::base::Grid;
 use crate::base::stop::{Stopped, check};
 use crate::body::Body;
-use crate::sim::{Lattice, Physics, Unstable};
+use crate::sim::{Physics, System, Unstable};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::cmp::Reverse;
 use std::collections::HashMap;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// Savings that change no archive; keys of a config's section `[savings]`. All on by default.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -108,8 +108,7 @@ pub fn evaluate(
     savings: Savings,
     stop: &AtomicBool,
 ) -> Result<Vec<Evaluation>, Stopped> {
-    let without_limits = physics.without_limits();
-    let setup = Setup { images, conditions, physics, without_limits: &without_limits, protocol, stop };
+    let setup = Setup { images, conditions, physics, protocol, stop };
     let candidate = |job| check(stop).map(|()| Candidate::new(job, setup, savings));
     let candidates: Vec<Candidate> = jobs.iter().map(candidate).collect::<Result<_, Stopped>>()?;
     let mut work: Vec<(usize, &Candidate)> = candidates
@@ -117,7 +116,7 @@ pub fn evaluate(
         .flat_map(|candidate| (0..candidate.lives()).map(move |place| (place, candidate)))
         .collect();
     // Stable: equally large bodies stay in the jobs' order.
-    work.sort_by_key(|(place, candidate)| (*place, Reverse(candidate.lattice.point_count())));
+    work.sort_by_key(|(place, candidate)| (*place, Reverse(candidate.systems.as_ever.point_count())));
     let next = AtomicUsize::new(0);
     let worker = |_| {
         while let Some((place, candidate)) = work.get(next.fetch_add(1, Ordering::Relaxed)) {
@@ -143,10 +142,9 @@ pub fn fresh_rollouts(
     protocol: &Protocol,
     stop: &AtomicBool,
 ) -> Result<Vec<Result<f64, Unstable>>, Stopped> {
-    let without_limits = physics.without_limits();
-    let setup = Setup { images, conditions, physics, without_limits: &without_limits, protocol, stop };
-    let lattice = Lattice::new(body, physics);
-    (0..images.len()).into_par_iter().with_max_len(1).map(|image| setup.fresh_life(&lattice, image)).collect()
+    let setup = Setup { images, conditions, physics, protocol, stop };
+    let systems = setup.systems(body);
+    (0..images.len()).into_par_iter().with_max_len(1).map(|image| setup.fresh_life(&systems, image)).collect()
 }
 
 /// A life that was lived: one image's if fresh; if sequential all images', up to where the robot dropped out.
@@ -190,24 +188,41 @@ struct Setup<'a> {
     images: &'a [Grid<f64>],
     conditions: &'a [Condition],
     physics: &'a Physics,
-    /// The same without length limits.
-    without_limits: &'a Physics,
     protocol: &'a Protocol,
     stop: &'a AtomicBool,
 }
 
+/// A body under the physics that the conditions ask for.
+struct Systems {
+    as_ever: Arc<System>,
+    /// If some condition asks for it.
+    without_limits: Option<Arc<System>>,
+}
+
 impl Setup<'_> {
+    fn systems(&self, body: &Body) -> Systems {
+        let system = |physics: Physics| Arc::new(System::new(body, physics));
+        let is_asked_for = self.conditions.iter().any(|condition| condition.without_limits);
+        Systems {
+            as_ever: system(self.physics.clone()),
+            without_limits: is_asked_for.then(|| system(self.physics.without_limits())),
+        }
+    }
+
     fn condition(&self, image: usize) -> Condition {
         self.conditions.get(image).copied().unwrap_or_default()
     }
 
     /// A fresh life under an image and its condition.
-    fn fresh_life(&self, lattice: &Lattice, image: usize) -> Result<Result<f64, Unstable>, Stopped> {
+    fn fresh_life(&self, systems: &Systems, image: usize) -> Result<Result<f64, Unstable>, Stopped> {
         let Condition { raised, without_limits } = self.condition(image);
         let start_row = self.protocol.start_row.saturating_add(raised);
         let protocol = Protocol { start_row, ..self.protocol.clone() };
-        let physics = if without_limits { self.without_limits } else { self.physics };
-        let displacement = fresh_life(lattice, physics, &protocol, &self.images[image], self.stop)?;
+        let system = match &systems.without_limits {
+            Some(system) if without_limits => system,
+            _ => &systems.as_ever,
+        };
+        let displacement = fresh_life(system, &protocol, &self.images[image], self.stop)?;
         // A body that needs a stop, as any material has one, is not refused for that.
         Ok(if without_limits { displacement.or(Ok(0.0)) } else { displacement })
     }
@@ -218,7 +233,7 @@ struct Candidate<'a> {
     job: &'a Job<'a>,
     setup: Setup<'a>,
     early_stop: bool,
-    lattice: Lattice,
+    systems: Systems,
     /// The images that need showing, in order.
     order: Vec<usize>,
     /// For each image its place in that order, or that of the image whose life it shares.
@@ -230,7 +245,7 @@ struct Candidate<'a> {
 
 impl<'a> Candidate<'a> {
     fn new(job: &'a Job<'a>, setup: Setup<'a>, savings: Savings) -> Self {
-        let Setup { images, physics, protocol, .. } = setup;
+        let Setup { images, protocol, .. } = setup;
         let all: Vec<usize> = (0..images.len()).collect();
         let is_fresh = protocol.life == Life::Fresh;
         let same_as = match is_fresh && savings.shared_lives {
@@ -260,7 +275,7 @@ impl<'a> Candidate<'a> {
             job,
             setup,
             early_stop: savings.early_stop,
-            lattice: Lattice::new(job.body, physics),
+            systems: setup.systems(job.body),
             order,
             places,
             lives: Mutex::new(Lives { lived: (0..lives).map(|_| None).collect(), ..Lives::default() }),
@@ -284,9 +299,9 @@ impl<'a> Candidate<'a> {
         }
         let mut lived = Lived { displacements: Vec::new(), unstable: None };
         match self.setup.protocol.life {
-            Life::Fresh => lived.add(self.setup.fresh_life(&self.lattice, self.order[place])?),
+            Life::Fresh => lived.add(self.setup.fresh_life(&self.systems, self.order[place])?),
             Life::Sequential => {
-                let mut rollout = Rollout::new(&self.lattice, self.setup.physics, self.setup.protocol);
+                let mut rollout = Rollout::new(&self.systems.as_ever, self.setup.protocol);
                 for image in self.setup.images {
                     lived.add(rollout.show_unless(image, self.setup.stop)?);
                     if lived.unstable.is_some() || self.outcome(&lived.displacements).is_some() {

@@ -3,7 +3,6 @@ use crate::base::stop::NEVER;
 use crate::body::Material;
 use crate::sim::UnstableReason;
 use std::collections::BTreeSet;
-use std::sync::Arc;
 
 /// A sensor that expands at both ends: under a bright image it is wider than `Physics::blow_up_extent` here allows.
 fn body() -> Body {
@@ -142,10 +141,10 @@ fn every_life_is_looked_at_once() {
 fn a_raised_start_is_another_life_even_under_the_same_image() {
     let protocol = Protocol { life: Life::Fresh, control_steps: 30, ..Protocol::default() };
     let (body, physics, images) = (body(), physics(), images(&CALM));
-    let lattice = Lattice::new(&body, &physics);
+    let system = Arc::new(System::new(&body, physics.clone()));
     let live = |image: usize, rows: u32| {
         let raised = Protocol { start_row: protocol.start_row + rows, ..protocol.clone() };
-        fresh_life(&lattice, &physics, &raised, &images[image], &NEVER).unwrap().unwrap()
+        fresh_life(&system, &raised, &images[image], &NEVER).unwrap().unwrap()
     };
     // Images 1 and 3, and 0 and 4, show the sensors the same; of the last pair, the start is, too.
     let raised = [1, 0, 1, 2];
@@ -188,7 +187,8 @@ fn a_life_without_limits_is_another_life_and_leads_nowhere_where_it_becomes_unst
     // A sensor at rest is as far below its goal as tight limits keep it.
     let tight = Physics { limit_high: 1.02, limit_low: 0.98, ..physics() };
     let expected = |physics: &Physics, image: usize| {
-        fresh_life(&Lattice::new(&body(), physics), physics, &protocol, &images[image], &NEVER).unwrap()
+        let system = Arc::new(System::new(&body(), physics.clone()));
+        fresh_life(&system, &protocol, &images[image], &NEVER).unwrap()
     };
     let calm = Physics { blow_up_extent: 1.0, ..tight.clone() };
     let mixed = [true, false, false, true, true];

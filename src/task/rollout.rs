@@ -5,7 +5,8 @@ use super::recording::{Frame, Phase, Recording, VoxelCorners};
 use crate::base::Grid;
 use crate::base::stop::Stopped;
 use crate::body::Body;
-use crate::sim::{Energy, Lattice, Physics, Start, Unstable, World};
+use crate::sim::{Energy, Physics, Start, System, Unstable, World};
+use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 /// World units → voxel lengths: distances are reported in voxel lengths, as in the paper.
@@ -15,8 +16,7 @@ fn voxel_lengths(world_units: f64, physics: &Physics) -> f64 {
 
 /// A robot on the ground, ready to be shown images.
 pub struct Rollout<'a> {
-    world: World<'a>,
-    physics: &'a Physics,
+    world: World,
     protocol: &'a Protocol,
     /// Where along x the centre of mass was when the present image was first shown \[world units\].
     begin: f64,
@@ -24,10 +24,14 @@ pub struct Rollout<'a> {
 
 impl<'a> Rollout<'a> {
     /// A robot at its start.
-    pub fn new(lattice: &'a Lattice, physics: &'a Physics, protocol: &'a Protocol) -> Self {
+    pub fn new(system: &Arc<System>, protocol: &'a Protocol) -> Self {
         let start = Start { column: protocol.start_column, row: protocol.start_row };
-        let world = World::new(lattice, physics, start);
-        Rollout { begin: world.centre_of_mass()[0], world, physics, protocol }
+        let world = World::new(Arc::clone(system), start);
+        Rollout { begin: world.centre_of_mass()[0], world, protocol }
+    }
+
+    fn physics(&self) -> &Physics {
+        self.world.system().physics()
     }
 
     /// Shows an image for the protocol's control steps and goes on living from the present state; the displacement
@@ -87,14 +91,14 @@ impl<'a> Rollout<'a> {
 
     /// Displacement of the centre of mass along x since the present image is shown, in voxel lengths, right positive.
     pub fn moved(&self) -> f64 {
-        voxel_lengths(self.world.centre_of_mass()[0] - self.begin, self.physics)
+        voxel_lengths(self.world.centre_of_mass()[0] - self.begin, self.physics())
     }
 
     /// The moment, for pictures.
     pub fn frame(&self) -> Frame {
-        let ground = f64::from(self.physics.ground_row) * self.physics.cell_size;
-        let place =
-            |[x, y]: [f64; 2]| [voxel_lengths(x, self.physics), voxel_lengths(y - ground, self.physics)];
+        let physics = self.physics();
+        let ground = f64::from(physics.ground_row) * physics.cell_size;
+        let place = |[x, y]: [f64; 2]| [voxel_lengths(x, physics), voxel_lengths(y - ground, physics)];
         Frame { points: self.world.points().map(place).collect(), centre: place(self.world.centre_of_mass()) }
     }
 
@@ -115,13 +119,12 @@ impl<'a> Rollout<'a> {
 /// # Errors
 /// [`Stopped`] then; within, [`Unstable`] if the life ends early.
 pub fn fresh_life(
-    lattice: &Lattice,
-    physics: &Physics,
+    system: &Arc<System>,
     protocol: &Protocol,
     stimulus: &Grid<f64>,
     stop: &AtomicBool,
 ) -> Result<Result<f64, Unstable>, Stopped> {
-    Rollout::new(lattice, physics, protocol).show_unless(stimulus, stop)
+    Rollout::new(system, protocol).show_unless(stimulus, stop)
 }
 
 /// A robot shown images as the protocol has it, in fresh lives or one: its displacement under each in voxel lengths, and
@@ -130,14 +133,13 @@ pub fn fresh_life(
 /// # Errors
 /// [`Stopped`] then; within, [`Unstable`] if a life ends early.
 pub fn walk(
-    lattice: &Lattice,
-    physics: &Physics,
+    system: &Arc<System>,
     protocol: &Protocol,
     stimuli: &[Grid<f64>],
     measured: bool,
     stop: &AtomicBool,
 ) -> Result<Result<(Vec<f64>, Energy), Unstable>, Stopped> {
-    let mut rollout = Rollout::new(lattice, physics, protocol);
+    let mut rollout = Rollout::new(system, protocol);
     if measured {
         rollout.world = rollout.world.with_energy_meter();
     }
@@ -174,8 +176,8 @@ pub fn record(
     fresh: bool,
     images: &[(String, Grid<f64>)],
 ) -> Recording {
-    let lattice = Lattice::new(body, physics);
-    let mut rollout = Rollout::new(&lattice, physics, protocol);
+    let system = Arc::new(System::new(body, physics.clone()));
+    let mut rollout = Rollout::new(&system, protocol);
     let mut recording = Recording {
         robot: robot.to_string(),
         body: body.clone(),
@@ -231,6 +233,10 @@ mod tests {
         "4663/4005/3305".parse().unwrap()
     }
 
+    fn system() -> Arc<System> {
+        Arc::new(System::new(&body(), Physics::default()))
+    }
+
     /// An image of one brightness but for a pixel over the empty middle.
     fn image(brightness: f64, middle: f64) -> Grid<f64> {
         Grid::from_fn(3, 4, |r, c| if (r, c) == (1, 1) { middle } else { brightness })
@@ -238,9 +244,8 @@ mod tests {
 
     #[test]
     fn a_displacement_is_the_way_of_the_centre_of_mass_in_voxel_lengths() {
-        let (physics, protocol) = (Physics::default(), protocol());
-        let lattice = Lattice::new(&body(), &physics);
-        let mut rollout = Rollout::new(&lattice, &physics, &protocol);
+        let (system, protocol) = (system(), protocol());
+        let mut rollout = Rollout::new(&system, &protocol);
         let mut way = Vec::new();
         let start = rollout.world.centre_of_mass()[0];
         let first = rollout.show(&image(1.0, 0.0), |world| way.push(world.centre_of_mass()[0])).unwrap();
@@ -250,7 +255,7 @@ mod tests {
         assert_ne!(rollout.show(&image(1.0, 0.0), |_| ()).unwrap(), first);
         rollout.reset();
         assert_eq!(rollout.show(&image(1.0, 0.0), |_| ()).unwrap(), first);
-        assert_eq!(fresh_life(&lattice, &physics, &protocol, &image(1.0, 0.0), &NEVER), Ok(Ok(first)));
+        assert_eq!(fresh_life(&system, &protocol, &image(1.0, 0.0), &NEVER), Ok(Ok(first)));
     }
 
     #[test]
@@ -262,21 +267,19 @@ mod tests {
         assert_eq!(same_to_sensors(&blind, &views), [0; 5]);
         assert!(same_to_sensors(&blind, &[]).is_empty());
         // Lives under images that are the same to the sensors are the same life.
-        let (physics, protocol) = (Physics::default(), protocol());
-        let lattice = Lattice::new(&body(), &physics);
-        let live = |image| fresh_life(&lattice, &physics, &protocol, image, &NEVER).unwrap().unwrap();
+        let (system, protocol) = (system(), protocol());
+        let live = |image| fresh_life(&system, &protocol, image, &NEVER).unwrap().unwrap();
         assert_eq!(live(&images[1]), live(&images[3]));
         assert_ne!(live(&images[0]), live(&images[1]));
     }
 
     #[test]
     fn a_life_that_is_stopped_has_no_displacement() {
-        let (physics, protocol) = (Physics::default(), protocol());
-        let lattice = Lattice::new(&body(), &physics);
+        let (system, protocol) = (system(), protocol());
         let stop = AtomicBool::new(true);
         let image = image(1.0, 0.0);
-        assert_eq!(fresh_life(&lattice, &physics, &protocol, &image, &stop), Err(Stopped));
-        assert_eq!(walk(&lattice, &physics, &protocol, &[image], false, &stop), Err(Stopped));
+        assert_eq!(fresh_life(&system, &protocol, &image, &stop), Err(Stopped));
+        assert_eq!(walk(&system, &protocol, &[image], false, &stop), Err(Stopped));
     }
 
     fn recorded(fresh: bool, physics: &Physics) -> Recording {
@@ -316,18 +319,17 @@ mod tests {
         assert_eq!(fresh.phases[1].first_frame, 1 + steps);
         assert_eq!(fresh.frames[1 + steps], fresh.frames[0]);
         assert_eq!(fresh.frames[..1 + steps], continuous.frames[..1 + steps]);
-        let lattice = Lattice::new(&body(), &physics);
-        let alone = fresh_life(&lattice, &physics, &protocol(), &image(1.0, 0.0), &NEVER);
+        let alone = fresh_life(&system(), &protocol(), &image(1.0, 0.0), &NEVER);
         assert_eq!(alone, Ok(Ok(fresh.phases[1].displacement)));
     }
 
     #[test]
     fn a_walk_is_what_the_protocol_says() {
-        let (physics, lattice) = (Physics::default(), Lattice::new(&body(), &Physics::default()));
+        let (physics, system) = (Physics::default(), system());
         let images = [image(0.0, 0.0), image(1.0, 0.0)];
         for life in [Life::Fresh, Life::Sequential] {
             let protocol = Protocol { life, ..protocol() };
-            let walk = |measured| walk(&lattice, &physics, &protocol, &images, measured, &NEVER);
+            let walk = |measured| walk(&system, &protocol, &images, measured, &NEVER);
             let [(plain, nothing), (measured, energy)] = [false, true].map(|m| walk(m).unwrap().unwrap());
             let recorded = recorded(life == Life::Fresh, &physics).phases;
             assert_eq!(plain, recorded.iter().map(|phase| phase.displacement).collect::<Vec<_>>());

@@ -3,9 +3,10 @@
 use super::judge::{Answer, answer};
 use super::lives::{Control, Slot};
 use super::request::{MAX_STEPS, Pace, Plan, Seen};
-use crate::sim::Lattice;
+use crate::sim::System;
 use crate::task::recording::{Frame, VoxelCorners};
 use crate::task::rollout::Rollout;
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 /// Control steps in a second of a robot's own time.
@@ -76,8 +77,8 @@ pub struct Gone;
 pub fn live(slot: &Slot, plan: &Plan, mut tell: impl FnMut(Event) -> Result<(), Gone>) -> Result<(), Gone> {
     let who = &plan.who;
     let judge = who.judge.as_ref();
-    let lattice = Lattice::new(&who.body, &who.physics);
-    let mut rollout = Rollout::new(&lattice, &who.physics, &who.protocol);
+    let system = Arc::new(System::new(&who.body, who.physics.clone()));
+    let mut rollout = Rollout::new(&system, &who.protocol);
     rollout.look_at(&plan.seen.stimulus);
     tell(Event::Begin { id: slot.id, plan, voxels: rollout.voxels(), frame: rollout.frame() })?;
     let shown_for = who.protocol.control_steps;

@@ -1,7 +1,6 @@
 //! The tables of a report.
 
 use super::words;
-use crate::base::lanes::InstructionSet;
 use crate::base::number::{self, percent};
 use crate::baseline::curve::Crossing;
 use crate::run::audit_file::AuditFile;
@@ -11,6 +10,7 @@ use crate::run::held_out::HeldOut;
 use crate::run::published;
 use crate::run::report::Dossier;
 use crate::run::verdict::Verdict;
+use crate::sim::InstructionSet;
 use crate::view::html::escape;
 use crate::view::networks::size;
 use crate::view::progress::duration;

@@ -3,7 +3,7 @@
 mod common;
 
 use common::references;
-use morphcog::sim::{Physics, World};
+use morphcog_sim::Physics;
 
 /// In which the lists of possible contacts reach their greatest length.
 const WARM_UP: u64 = 200;
@@ -12,9 +12,7 @@ const WARM_UP: u64 = 200;
 fn a_control_step_allocates_nothing() {
     let physics = Physics::default();
     for life in references() {
-        let lattice = life.lattice(&physics);
-        let mut world = World::new(&lattice, &physics, life.start());
-        world.set_stimulus(&life.stimulus);
+        let mut world = life.world(&physics);
         if (0..WARM_UP.min(life.control_steps)).try_for_each(|_| world.step()).is_err() {
             continue;
         }

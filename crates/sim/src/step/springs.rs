@@ -12,15 +12,15 @@
 //!
 //! Within a substep t is small, and a short series does ([`super::series`]): neither root nor division.
 
-use super::lattice::FAMILIES;
-use super::series::{RANGE, briefly, carefully};
-use super::state::{X, Y};
-use crate::base::lanes::{BLOCK, Lanes, each};
+use crate::lattice::FAMILIES;
+use crate::simd::{BLOCK, Lanes, each};
+use crate::state::{X, Y};
+use crate::step::series::{RANGE, briefly, carefully};
 
 /// What a sweep looks out for while it takes everything for regular. A branch in every block would cost more than the
 /// rare second sweep that treats each irregular spring and point as it must be.
 #[derive(Clone, Copy)]
-pub(super) struct Watch<L> {
+pub(crate) struct Watch<L> {
     stretch: L,
     depth: L,
 }
@@ -53,12 +53,12 @@ impl<L: Lanes> Watch<L> {
 }
 
 /// A number for each slot of a block.
-pub(super) type Wide = [f64; BLOCK];
+pub(crate) type Wide = [f64; BLOCK];
 
 /// What is known of four springs each of a block of slots from one substep to the next.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
-pub(super) struct Springs {
+pub(crate) struct Springs {
     /// 1/d₀ of the latest substep. Within a control step the next substep's is found from it by the series; the
     /// first substep of each control step starts from 0, which is out of the series' range, and so from root and
     /// division: a life continued from its state is the same bits.
@@ -70,7 +70,7 @@ pub(super) struct Springs {
 /// What the later stages of a substep need to know of the springs of a block.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
-pub(super) struct Pulls {
+pub(crate) struct Pulls {
     /// 1/d₀², and see the module \[1/s²\].
     inverse_square: [Wide; FAMILIES],
     initial: [Wide; FAMILIES],
@@ -157,11 +157,11 @@ impl Springs {
 }
 
 /// The vectors of a slot's four springs, by axis.
-pub(super) type Vectors<L> = [[L; FAMILIES]; 2];
+pub(crate) type Vectors<L> = [[L; FAMILIES]; 2];
 
 /// The vectors of a slot's springs at some positions.
 #[inline(always)]
-pub(super) fn vectors<L: Lanes>(position: [&[f64]; 2], slot: usize, pitch: usize) -> Vectors<L> {
+pub(crate) fn vectors<L: Lanes>(position: [&[f64]; 2], slot: usize, pitch: usize) -> Vectors<L> {
     each!(axis in [X, Y] => {
         let of = position[axis];
         let (own, right) = (L::load(of, slot), L::load(of, slot + 1));
@@ -172,13 +172,13 @@ pub(super) fn vectors<L: Lanes>(position: [&[f64]; 2], slot: usize, pitch: usize
 
 /// Their squared lengths.
 #[inline(always)]
-pub(super) fn squares<L: Lanes>([x, y]: &Vectors<L>) -> [L; FAMILIES] {
+pub(crate) fn squares<L: Lanes>([x, y]: &Vectors<L>) -> [L; FAMILIES] {
     each!(i in [0, 1, 2, 3] => x[i].mul_add(x[i], y[i] * y[i]))
 }
 
 /// Sums on the points of what their own springs and those of slots gone by do to them. What slots gone by do to
 /// points below waits in `passing`, by point; zeros in the first row.
-pub(super) struct Gather<'a, L> {
+pub(crate) struct Gather<'a, L> {
     passing: [&'a mut [f64]; 2],
     pitch: usize,
     /// What the springs of the block before do to points at their right: in their own row, and in the row below.

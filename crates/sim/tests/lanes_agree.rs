@@ -3,8 +3,7 @@
 mod common;
 
 use common::references;
-use morphcog::base::lanes::InstructionSet;
-use morphcog::sim::{Physics, World};
+use morphcog_sim::{InstructionSet, Physics};
 
 #[test]
 fn whole_lives_are_bitwise_equal_on_every_instruction_set() {
@@ -12,10 +11,9 @@ fn whole_lives_are_bitwise_equal_on_every_instruction_set() {
     let sets: Vec<_> = InstructionSet::ALL.into_iter().filter(|set| set.is_available()).collect();
     println!("instruction sets of this machine: {sets:?}");
     for life in references() {
-        let lattice = life.lattice(&physics);
+        let world = life.world(&physics);
         let end = |set| {
-            let mut world = World::new(&lattice, &physics, life.start()).with_instructions(set);
-            world.set_stimulus(&life.stimulus);
+            let mut world = world.clone().with_instructions(set);
             let outcome = (0..life.control_steps).try_for_each(|_| world.step());
             (outcome, world.points().map(|p| p.map(f64::to_bits)).collect::<Vec<_>>())
         };

@@ -1,13 +1,74 @@
 //! Plane geometry of contacts: is a point in a voxel, do two segments cross.
 
-use nalgebra::Vector2;
+use std::ops::{Add, Div, Mul, Sub};
 
 /// A point or direction in the plane \[wu\].
-pub(super) type Vector = Vector2<f64>;
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Vector {
+    pub x: f64,
+    pub y: f64,
+}
+
+impl Vector {
+    pub const ZERO: Vector = Vector::new(0.0, 0.0);
+
+    #[inline]
+    pub const fn new(x: f64, y: f64) -> Self {
+        Vector { x, y }
+    }
+
+    #[inline]
+    pub fn dot(self, other: Vector) -> f64 {
+        self.x * other.x + self.y * other.y
+    }
+
+    /// The cross product.
+    #[inline]
+    pub fn perp(self, other: Vector) -> f64 {
+        self.x * other.y - self.y * other.x
+    }
+
+    #[inline]
+    pub fn norm(self) -> f64 {
+        self.dot(self).sqrt()
+    }
+}
+
+impl Add for Vector {
+    type Output = Vector;
+    #[inline]
+    fn add(self, other: Vector) -> Vector {
+        Vector::new(self.x + other.x, self.y + other.y)
+    }
+}
+
+impl Sub for Vector {
+    type Output = Vector;
+    #[inline]
+    fn sub(self, other: Vector) -> Vector {
+        Vector::new(self.x - other.x, self.y - other.y)
+    }
+}
+
+impl Mul<f64> for Vector {
+    type Output = Vector;
+    #[inline]
+    fn mul(self, factor: f64) -> Vector {
+        Vector::new(self.x * factor, self.y * factor)
+    }
+}
+
+impl Div<f64> for Vector {
+    type Output = Vector;
+    #[inline]
+    fn div(self, divisor: f64) -> Vector {
+        Vector::new(self.x / divisor, self.y / divisor)
+    }
+}
 
 /// Axis-parallel bounding box \[wu\].
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Bounds {
+pub(crate) struct Bounds {
     pub low: Vector,
     pub high: Vector,
 }
@@ -46,26 +107,26 @@ impl Bounds {
 /// Whether `p` lies in the quad (corners clockwise from the top left), boundary included: it is split into the
 /// triangles TL-TR-BR and TL-BR-BL (physics.md, "Inside test").
 #[inline]
-pub(super) fn inside(p: Vector, quad: &[Vector; 4]) -> bool {
+pub(crate) fn inside(p: Vector, quad: &[Vector; 4]) -> bool {
     let [tl, tr, br, bl] = quad.map(|corner| corner - p);
-    let (a, b, c) = (tl.perp(&tr), tr.perp(&br), br.perp(&tl));
+    let (a, b, c) = (tl.perp(tr), tr.perp(br), br.perp(tl));
     if c * a >= 0.0 && c * b >= 0.0 {
         return true;
     }
-    let (d, e) = (tl.perp(&bl), bl.perp(&br));
+    let (d, e) = (tl.perp(bl), bl.perp(br));
     c * d >= 0.0 && c * e >= 0.0
 }
 
 /// Whether the segments a–b and p–q cross, ends included; those with a cross product below `epsilon` are parallel
 /// and never do.
 #[inline]
-pub(super) fn cross(a: Vector, b: Vector, p: Vector, q: Vector, epsilon: f64) -> bool {
+pub(crate) fn cross(a: Vector, b: Vector, p: Vector, q: Vector, epsilon: f64) -> bool {
     let (r, s, w) = (b - a, q - p, p - a);
-    let product = r.perp(&s);
+    let product = r.perp(s);
     if product.abs() < epsilon {
         return false;
     }
-    let (along_ab, along_pq) = (w.perp(&s) / product, w.perp(&r) / product);
+    let (along_ab, along_pq) = (w.perp(s) / product, w.perp(r) / product);
     (0.0..=1.0).contains(&along_ab) && (0.0..=1.0).contains(&along_pq)
 }
 

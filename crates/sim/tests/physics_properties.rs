@@ -1,8 +1,6 @@
 //! What must hold for any body and any stimulus.
 
-use morphcog::base::Grid;
-use morphcog::body::{Body, Material};
-use morphcog::sim::{Lattice, Physics, Start, Unstable, World};
+use morphcog_sim::{Body, Grid, Material, Physics, Start, System, Unstable, World};
 use proptest::prelude::*;
 
 /// Any matrix of materials of the given kinds, with at least one voxel; it need not hang together.
@@ -30,8 +28,7 @@ fn live(
     steps: u32,
     physics: &Physics,
 ) -> Result<Vec<[f64; 2]>, Unstable> {
-    let lattice = Lattice::new(body, physics);
-    let mut world = World::new(&lattice, physics, start);
+    let mut world = World::new(System::new(body, physics.clone()), start);
     world.set_stimulus(stimulus);
     let mut path = vec![world.centre_of_mass()];
     for _ in 0..steps {
@@ -142,8 +139,7 @@ proptest! {
         row in 2u32..4,
     ) {
         let physics = Physics::default();
-        let lattice = Lattice::new(&body, &physics);
-        let mut world = World::new(&lattice, &physics, Start { column: 0, row });
+        let mut world = World::new(System::new(&body, physics.clone()), Start { column: 0, row });
         world.set_stimulus(&stimulus);
         while world.control_step() < 100 && world.step().is_ok() {
             let points: Vec<[f64; 2]> = world.points().collect();

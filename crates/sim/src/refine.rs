@@ -12,7 +12,7 @@
 //! gravity, contacts and the floor are forces already, per time, and stay. Displacements converge as n grows
 //! (`docs/audit.md`).
 
-use super::params::Physics;
+use crate::physics::Physics;
 
 /// The share to be removed in each of `by` passes that together remove `share`.
 fn spread_out(share: f64, by: f64) -> f64 {
@@ -68,7 +68,7 @@ impl Physics {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sim::{Lattice, Start, World};
+    use crate::{Start, System, World};
 
     #[test]
     fn a_refined_material_has_the_same_stiffness_viscosity_and_limits() {
@@ -89,8 +89,7 @@ mod tests {
     fn the_walk_of_a_plain_walker_converges_with_the_time_step() {
         let body = "444422/444422/333311/330011".parse().unwrap();
         let walk = |physics: &Physics| {
-            let lattice = Lattice::new(&body, physics);
-            let mut world = World::new(&lattice, physics, Start { column: 0, row: 2 });
+            let mut world = World::new(System::new(&body, physics.clone()), Start { column: 0, row: 2 });
             let start = world.centre_of_mass()[0];
             (0..250).for_each(|_| world.step().unwrap());
             10.0 * (world.centre_of_mass()[0] - start)

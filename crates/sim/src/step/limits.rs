@@ -3,16 +3,16 @@
 //! A spring beyond a limit l is corrected by (1 − l/d) of its vector; with t = d²/l² − 1, which is small, that is
 //! 1 − 1/√(1 + t) again: mostly neither root nor division.
 
-use super::forces::{Gather, squares, vectors};
-use super::lattice::{FAMILIES, Lattice};
-use super::params::Physics;
-use super::series::{RANGE, TERMS, briefly, carefully};
-use super::state::{Pair, X, Y, slices, slices_mut};
-use crate::base::lanes::{BLOCK, Lanes, each};
+use crate::lattice::FAMILIES;
+use crate::simd::{BLOCK, Lanes, each};
+use crate::state::{Pair, X, Y, slices, slices_mut};
+use crate::step::series::{RANGE, TERMS, briefly, carefully};
+use crate::step::springs::{Gather, squares, vectors};
+use crate::system::System;
 
 /// Limits of springs of one length at rest.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Limits {
+pub(crate) struct Limits {
     /// Squares of the least and of the greatest length.
     squares: [f64; 2],
     /// Middle and half width of the range between them.
@@ -43,7 +43,7 @@ impl Limits {
 
 /// What a sweep has to reckon with: the rest costs time, and is mostly not there.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) enum Reach {
+pub(crate) enum Reach {
     /// Only horizontal springs, the ones that are actuated, are beyond their limits.
     #[default]
     Horizontal,
@@ -56,9 +56,8 @@ pub(super) enum Reach {
 /// All springs at once: corrections from the same positions, then added up. `reach` is a guess, from the substep before,
 /// and then what it was; it makes no difference to the result.
 #[inline(always)]
-pub(super) fn limit_all<L: Lanes>(
-    lattice: &Lattice,
-    physics: &Physics,
+pub(crate) fn limit_all<L: Lanes>(
+    system: &System,
     from: &Pair,
     to: &mut Pair,
     passing: &mut Pair,
@@ -66,9 +65,9 @@ pub(super) fn limit_all<L: Lanes>(
 ) {
     loop {
         let found = match *reach {
-            Reach::Horizontal => limit_horizontal::<L>(lattice, physics, from, to),
-            Reach::Any => limit_any::<L, false>(lattice, physics, from, to, passing),
-            Reach::Far => limit_any::<L, true>(lattice, physics, from, to, passing),
+            Reach::Horizontal => limit_horizontal::<L>(system, from, to),
+            Reach::Any => limit_any::<L, false>(system, from, to, passing),
+            Reach::Far => limit_any::<L, true>(system, from, to, passing),
         };
         let enough = found <= *reach;
         *reach = found;
@@ -92,13 +91,14 @@ fn reach<L: Lanes>(any: L::Mask, far: L::Mask) -> Reach {
 
 /// Limits of the families' springs.
 #[inline(always)]
-fn limits(lattice: &Lattice, physics: &Physics) -> [Limits; FAMILIES] {
+fn limits(System { lattice, physics }: &System) -> [Limits; FAMILIES] {
     each!(i in [0, 1, 2, 3] => Limits::new(lattice.lengths[i], physics.limit_low, physics.limit_high))
 }
 
 #[inline(always)]
-fn limit_horizontal<L: Lanes>(lattice: &Lattice, physics: &Physics, from: &Pair, to: &mut Pair) -> Reach {
-    let limits = limits(lattice, physics);
+fn limit_horizontal<L: Lanes>(system: &System, from: &Pair, to: &mut Pair) -> Reach {
+    let System { lattice, physics } = system;
+    let limits = limits(system);
     let share = L::splat(physics.limit_share / 2.0);
     let (exists, _) = lattice.exists.as_chunks::<{ FAMILIES * BLOCK }>();
     let (from, to) = (slices(from, lattice.len), slices_mut(to, lattice.len));
@@ -126,13 +126,13 @@ fn limit_horizontal<L: Lanes>(lattice: &Lattice, physics: &Physics, from: &Pair,
 
 #[inline(always)]
 fn limit_any<L: Lanes, const FAR: bool>(
-    lattice: &Lattice,
-    physics: &Physics,
+    system: &System,
     from: &Pair,
     to: &mut Pair,
     passing: &mut Pair,
 ) -> Reach {
-    let limits = limits(lattice, physics);
+    let System { lattice, physics } = system;
+    let limits = limits(system);
     let share = L::splat(physics.limit_share / 2.0);
     let (exists, _) = lattice.exists.as_chunks::<{ FAMILIES * BLOCK }>();
     let (from, to) = (slices(from, lattice.len), slices_mut(to, lattice.len));
@@ -170,7 +170,7 @@ fn limit_any<L: Lanes, const FAR: bool>(
 
 /// Brings links of the rigid pass that have nothing to do with each other together, so that the processor can work on
 /// several at once. Links that share a point stay in their order: results are the same bits.
-pub(super) fn in_rounds(links: &[[usize; 2]], points: usize) -> Vec<[usize; 2]> {
+pub(crate) fn in_rounds(links: &[[usize; 2]], points: usize) -> Vec<[usize; 2]> {
     let mut taken = vec![0; points];
     let mut round = |&[a, b]: &[usize; 2]| {
         // After every earlier link at either end.
@@ -184,7 +184,7 @@ pub(super) fn in_rounds(links: &[[usize; 2]], points: usize) -> Vec<[usize; 2]> 
 }
 
 /// The sides of rigid voxels, one after the other on current positions; a side shared by two comes up twice.
-pub(super) fn limit_rigid(lattice: &Lattice, physics: &Physics, [x, y]: &mut Pair) {
+pub(crate) fn limit_rigid(System { lattice, physics }: &System, [x, y]: &mut Pair) {
     let limits = Limits::new(physics.cell_size, physics.rigid_limit_low, physics.rigid_limit_high);
     let [low, high] = limits.squares;
     let share = physics.rigid_limit_share / 2.0;
@@ -216,8 +216,8 @@ fn shrink_scalar(t: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::lattice::SIDES;
     use super::*;
+    use crate::lattice::SIDES;
 
     #[test]
     fn rounds_hold_every_link_and_keep_the_order_of_those_that_share_a_point() {

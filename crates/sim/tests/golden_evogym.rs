@@ -3,7 +3,7 @@
 mod common;
 
 use common::{Reference, golden, references, sensitive};
-use morphcog::sim::{Physics, UnstableReason, World};
+use morphcog_sim::{Physics, UnstableReason, World};
 
 /// 1e-6 voxel lengths in world units.
 const TOLERANCE: f64 = 1e-7;
@@ -12,9 +12,7 @@ const TOLERANCE: f64 = 1e-7;
 fn every_reference_life_agrees_at_every_control_step_and_stored_point() {
     let physics = Physics::default();
     for life in references().iter().filter(|life| life.unstable_at < 0) {
-        let lattice = life.lattice(&physics);
-        let mut world = World::new(&lattice, &physics, life.start());
-        world.set_stimulus(&life.stimulus);
+        let mut world = life.world(&physics);
         assert_eq!(life.com.len() as u64, life.control_steps + 1);
         let mut worst = compare(&world, life);
         for _ in 0..life.control_steps {
@@ -48,9 +46,7 @@ fn sensitive_lives_agree_within_three_times_the_spread_of_evogym_itself() {
     let physics = Physics::default();
     for life in sensitive() {
         let spread = life.spread();
-        let lattice = life.lattice(&physics);
-        let mut world = World::new(&lattice, &physics, life.start());
-        world.set_stimulus(&life.stimulus);
+        let mut world = life.world(&physics);
         let start = world.centre_of_mass();
         let mut worst = 0f64;
         for theirs in &life.com[1..] {
@@ -69,9 +65,7 @@ fn sensitive_lives_agree_within_three_times_the_spread_of_evogym_itself() {
 fn the_unstable_life_ends_in_the_same_control_step() {
     let physics = Physics::default();
     let life: Reference = golden("unstable_comb");
-    let lattice = life.lattice(&physics);
-    let mut world = World::new(&lattice, &physics, life.start());
-    world.set_stimulus(&life.stimulus);
+    let mut world = life.world(&physics);
     let mut worst = compare(&world, &life);
     let end = loop {
         match world.step() {

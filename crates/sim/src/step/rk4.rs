@@ -5,33 +5,31 @@
 //! and the new positions are x₀ + hv₀ + (h²/6)(a₁ + a₂ + a₃). One sweep over the springs a stage: two in one would need
 //! more registers than there are, and what is spilled fills the queue of stores.
 
-use super::extra::Extra;
-use super::forces::{Gather, Watch, squares, vectors};
-use super::lattice::Lattice;
-use super::limits::limit_all;
-use super::params::Physics;
-use super::state::{Scratch, State, Work, X, Y, slices, slices_mut};
-use crate::base::lanes::{BLOCK, Lanes, each};
+use crate::lattice::Lattice;
+use crate::physics::Physics;
+use crate::scratch::{Scratch, Work};
+use crate::simd::{BLOCK, Lanes, each};
+use crate::state::{State, X, Y, slices, slices_mut};
+use crate::step::limits::limit_all;
+use crate::step::off_lattice::Extra;
+use crate::step::springs::{Gather, Watch, squares, vectors};
+use crate::system::System;
 
 /// Advances velocities by one substep, contact forces held constant; the new positions are in `scratch`.
 #[inline(always)]
-pub(super) fn integrate<L: Lanes>(
-    lattice: &Lattice,
-    physics: &Physics,
-    state: &mut State,
-    scratch: &mut Scratch,
-) {
+pub(crate) fn integrate<L: Lanes>(system: &System, state: &mut State, scratch: &mut Scratch) {
+    let System { lattice, physics } = system;
     if let Some(extra) = &mut scratch.extra {
         let goals = &scratch.goals[lattice.len..];
         extra.first_stage::<L>(lattice, goals, physics.servo_gain, &state.position);
     }
     // The first substep of a control step knows no lengths yet.
     let anew = std::mem::take(&mut scratch.anew);
-    if anew || !first_stage::<L, false>(lattice, physics, state, scratch) {
-        first_stage::<L, true>(lattice, physics, state, scratch);
+    if anew || !first_stage::<L, false>(system, state, scratch) {
+        first_stage::<L, true>(system, state, scratch);
     }
-    if !later_stages::<L, false>(lattice, physics, state, scratch) {
-        later_stages::<L, true>(lattice, physics, state, scratch);
+    if !later_stages::<L, false>(system, state, scratch) {
+        later_stages::<L, true>(system, state, scratch);
     }
     std::mem::swap(&mut state.velocity, &mut scratch.velocity);
 }
@@ -39,17 +37,12 @@ pub(super) fn integrate<L: Lanes>(
 /// Limits the lengths of all springs at the new positions. The positions at the start of the substep become the
 /// previous ones.
 #[inline(always)]
-pub(super) fn limit<L: Lanes>(
-    lattice: &Lattice,
-    physics: &Physics,
-    state: &mut State,
-    scratch: &mut Scratch,
-) {
+pub(crate) fn limit<L: Lanes>(system: &System, state: &mut State, scratch: &mut Scratch) {
     let Scratch { position: new, passing, extra, reach, .. } = scratch;
-    limit_all::<L>(lattice, physics, new, &mut state.previous, passing, reach);
+    limit_all::<L>(system, new, &mut state.previous, passing, reach);
     if let Some(extra) = extra {
-        extra.limit::<L>(lattice, physics, new);
-        extra.feed(lattice, &mut state.previous);
+        extra.limit::<L>(system, new);
+        extra.feed(&system.lattice, &mut state.previous);
     }
     std::mem::swap(&mut state.position, &mut state.previous);
 }
@@ -58,17 +51,17 @@ pub(super) fn limit<L: Lanes>(
 /// the first and in the last stage: between them springs hardly stretch, and points hardly fall, any further.
 #[inline(always)]
 fn later_stages<L: Lanes, const CAREFUL: bool>(
-    lattice: &Lattice,
-    physics: &Physics,
+    system: &System,
     state: &State,
     scratch: &mut Scratch,
 ) -> bool {
+    let lattice = &system.lattice;
     extra_stage::<L>(lattice, scratch, 0);
-    second_stage::<L, CAREFUL>(lattice, physics, state, scratch);
+    second_stage::<L, CAREFUL>(system, state, scratch);
     extra_stage::<L>(lattice, scratch, 1);
-    third_stage::<L, CAREFUL>(lattice, physics, state, scratch);
+    third_stage::<L, CAREFUL>(system, state, scratch);
     extra_stage::<L>(lattice, scratch, 2);
-    fourth_stage::<L, CAREFUL>(lattice, physics, state, scratch)
+    fourth_stage::<L, CAREFUL>(system, state, scratch)
 }
 
 /// The extra springs' part of the second stage or a later one.
@@ -91,8 +84,7 @@ fn load_of<L: Lanes>(work: &Work, extra: Option<&Extra>, slot: usize) -> [L; 2] 
 /// all was regular.
 #[inline(always)]
 fn first_stage<L: Lanes, const CAREFUL: bool>(
-    lattice: &Lattice,
-    physics: &Physics,
+    System { lattice, physics }: &System,
     state: &State,
     scratch: &mut Scratch,
 ) -> bool {
@@ -140,8 +132,7 @@ fn first_stage<L: Lanes, const CAREFUL: bool>(
 /// The second stage; leaves the positions of the third and of the fourth.
 #[inline(always)]
 fn second_stage<L: Lanes, const CAREFUL: bool>(
-    lattice: &Lattice,
-    physics: &Physics,
+    System { lattice, physics }: &System,
     state: &State,
     scratch: &mut Scratch,
 ) {
@@ -181,8 +172,7 @@ fn second_stage<L: Lanes, const CAREFUL: bool>(
 /// The third stage, after which the new positions are known.
 #[inline(always)]
 fn third_stage<L: Lanes, const CAREFUL: bool>(
-    lattice: &Lattice,
-    physics: &Physics,
+    System { lattice, physics }: &System,
     state: &State,
     scratch: &mut Scratch,
 ) {
@@ -222,8 +212,7 @@ fn third_stage<L: Lanes, const CAREFUL: bool>(
 /// The fourth stage, after which the new velocities are known. Gives whether all was regular.
 #[inline(always)]
 fn fourth_stage<L: Lanes, const CAREFUL: bool>(
-    lattice: &Lattice,
-    physics: &Physics,
+    System { lattice, physics }: &System,
     state: &State,
     scratch: &mut Scratch,
 ) -> bool {

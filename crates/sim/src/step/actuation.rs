@@ -1,11 +1,11 @@
 //! Material, time and stimulus → goal lengths (physics.md, "Actuation").
 
-use super::lattice::Lattice;
-use super::params::Physics;
 use crate::body::Material;
+use crate::physics::Physics;
+use crate::system::System;
 
 /// Target width of an active voxel at a control step \[rest widths\]; `pixel` in [0, 1] matters to sensors only.
-pub(super) fn target(material: Material, control_step: u64, pixel: f64, physics: &Physics) -> f64 {
+pub(crate) fn target(material: Material, control_step: u64, pixel: f64, physics: &Physics) -> f64 {
     let phase = match material {
         Material::MuscleInPhase => 0.0,
         Material::MuscleAntiphase => physics.antiphase,
@@ -33,9 +33,8 @@ pub fn width(material: Material, pixel: f64, physics: &Physics) -> f64 {
 
 /// Writes the goals of all actuated sides for a control step. `pixels` holds each active voxel's pixel,
 /// `targets` is memory for one number each.
-pub(super) fn set_goals(
-    lattice: &Lattice,
-    physics: &Physics,
+pub(crate) fn set_goals(
+    System { lattice, physics }: &System,
     control_step: u64,
     pixels: &[f64],
     targets: &mut [f64],

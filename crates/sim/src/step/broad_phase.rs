@@ -5,13 +5,13 @@
 //! lists were made, no other pair can have met. So the lists change nothing but the time it takes. Motion along x
 //! counts relative to one of the points: the ground is the same everywhere, and a walk wears no list out.
 
-use super::forces::vectors;
-use super::geometry::{Bounds, Vector};
-use super::lattice::{FAMILIES, Lattice, SurfaceVoxel};
-use super::params::Physics;
-use super::state::{Pair, State, X, Y, slices};
-use super::world::UnstableReason;
-use crate::base::lanes::{BLOCK, Buffer, Lanes, each};
+use crate::lattice::{FAMILIES, Lattice, SurfaceVoxel};
+use crate::simd::{BLOCK, Buffer, Lanes, each};
+use crate::state::{Pair, State, X, Y, slices};
+use crate::step::geometry::{Bounds, Vector};
+use crate::step::springs::vectors;
+use crate::system::System;
+use crate::world::UnstableReason;
 
 /// How far a point may move before the lists are made anew \[voxel lengths\].
 const BUDGET: f64 = 0.2;
@@ -22,7 +22,7 @@ const MOST_CANDIDATES: usize = 256;
 
 /// A corner of one surface voxel that may come to lie inside another.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Candidate {
+pub(crate) struct Candidate {
     /// The voxel whose corner it is, and the corner (clockwise from the top left).
     pub mover: usize,
     pub corner: usize,
@@ -32,7 +32,7 @@ pub(super) struct Candidate {
 
 /// The lists, and the positions at which they were made.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Neighbours {
+pub(crate) struct Neighbours {
     made: Pair,
     /// Surface voxels that may touch the ground, in order.
     pub low: Vec<usize>,
@@ -47,31 +47,32 @@ pub(super) struct Neighbours {
 
 /// Where a point is.
 #[inline]
-pub(super) fn place(point: usize, state: &State) -> Vector {
+pub(crate) fn place(point: usize, state: &State) -> Vector {
     Vector::new(state.position[X][point], state.position[Y][point])
 }
 
 /// The corners of a surface voxel, clockwise from the top left.
 #[inline]
-pub(super) fn quad(voxel: &SurfaceVoxel, state: &State) -> [Vector; 4] {
+pub(crate) fn quad(voxel: &SurfaceVoxel, state: &State) -> [Vector; 4] {
     voxel.corners.map(|point| place(point, state))
 }
 
 /// Whether no voxel is larger than the physics allows, and all coordinates are numbers.
 #[cold]
-fn sane(lattice: &Lattice, physics: &Physics, state: &State) -> bool {
+fn sane(System { lattice, physics }: &System, state: &State) -> bool {
     lattice.voxels.iter().all(|(_, corners)| {
         let bounds = Bounds::of(&corners.map(|point| place(point, state)));
         let extent = bounds.high - bounds.low;
         let small = extent.x <= physics.blow_up_extent && extent.y <= physics.blow_up_extent;
-        small && corners.iter().all(|&point| place(point, state).iter().all(|v| v.is_finite()))
+        let is_number = |point: Vector| point.x.is_finite() && point.y.is_finite();
+        small && corners.iter().all(|&point| is_number(place(point, state)))
     })
 }
 
 /// Whether all sides of all voxels are numbers and so short that every voxel is [`sane`]: the way from any of its corners
 /// to any other is two sides long.
 #[inline(always)]
-fn short_sides<L: Lanes>(lattice: &Lattice, physics: &Physics, state: &State) -> bool {
+fn short_sides<L: Lanes>(System { lattice, physics }: &System, state: &State) -> bool {
     if !lattice.extra_springs.is_empty() {
         return false;
     }
@@ -95,12 +96,8 @@ fn short_sides<L: Lanes>(lattice: &Lattice, physics: &Physics, state: &State) ->
 impl Neighbours {
     /// Makes the lists anew if a point has moved too far since they were made.
     #[inline(always)]
-    pub fn refresh<L: Lanes>(
-        &mut self,
-        lattice: &Lattice,
-        physics: &Physics,
-        state: &State,
-    ) -> Result<(), UnstableReason> {
+    pub fn refresh<L: Lanes>(&mut self, system: &System, state: &State) -> Result<(), UnstableReason> {
+        let System { lattice, physics } = system;
         if self.made[X].len() == lattice.len {
             let budget = L::splat(BUDGET * physics.cell_size);
             let walked = lattice.points.first().map_or(0.0, |&(p, _)| state.position[X][p] - self.made[X][p]);
@@ -117,16 +114,12 @@ impl Neighbours {
                 return Ok(());
             }
         }
-        self.make::<L>(lattice, physics, state)
+        self.make::<L>(system, state)
     }
 
     #[inline(always)]
-    fn make<L: Lanes>(
-        &mut self,
-        lattice: &Lattice,
-        physics: &Physics,
-        state: &State,
-    ) -> Result<(), UnstableReason> {
+    fn make<L: Lanes>(&mut self, system: &System, state: &State) -> Result<(), UnstableReason> {
+        let System { lattice, physics } = system;
         let slack = 2.0 * BUDGET * physics.cell_size;
         if self.made[X].len() == lattice.len {
             // `clone_from` would ask for new memory.
@@ -143,7 +136,7 @@ impl Neighbours {
             let blocks = surface.next_multiple_of(BLOCK);
             self.sides = each!(_side in [0, 1, 2, 3] => Buffer::filled(blocks, f64::NAN));
         }
-        if !short_sides::<L>(lattice, physics, state) && !sane(lattice, physics, state) {
+        if !short_sides::<L>(system, state) && !sane(system, state) {
             return Err(UnstableReason::BlownUp);
         }
         self.bounds.clear();
@@ -207,7 +200,7 @@ impl Neighbours {
     }
 
     /// Whether so many distant surface voxels overlap that the life is unstable (physics.md, "Instability").
-    pub fn too_many_overlaps(&self, lattice: &Lattice, physics: &Physics, state: &State) -> bool {
+    pub fn too_many_overlaps(&self, System { lattice, physics }: &System, state: &State) -> bool {
         let most = physics.unstable_ratio * lattice.surface.len() as f64;
         // Ordered pairs: each counts twice. Mostly the list itself is too short to be worth looking through.
         if (2 * self.distant.len()) as f64 <= most {

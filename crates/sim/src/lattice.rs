@@ -5,33 +5,33 @@
 //! the lattice. So each of the four spring families (sides and diagonals) joins points a fixed offset apart and
 //! is a plain sweep over arrays; the few springs that end in an extra are kept in a list.
 
-use super::limits::in_rounds;
-use super::params::Physics;
-use crate::base::Grid;
-use crate::base::lanes::{BLOCK, Buffer};
 use crate::body::{Body, Material};
+use crate::grid::Grid;
+use crate::physics::Physics;
+use crate::simd::{BLOCK, Buffer};
+use crate::step::limits::in_rounds;
 use std::ops::Range;
 
 /// Sides of a voxel in the order in which they are visited: top, right, bottom, left. Each runs clockwise, so
 /// that its outward normal is its direction turned left.
-pub(super) const SIDES: [(usize, usize); 4] = [(0, 1), (1, 2), (2, 3), (3, 0)];
+pub(crate) const SIDES: [(usize, usize); 4] = [(0, 1), (1, 2), (2, 3), (3, 0)];
 
 /// Neighbouring cell across each side, in the order of [`SIDES`].
 const ACROSS: [(isize, isize); 4] = [(-1, 0), (0, 1), (1, 0), (0, -1)];
 
 /// The four families of springs: horizontal, vertical, falling and rising diagonals.
-pub(super) const FAMILIES: usize = 4;
+pub(crate) const FAMILIES: usize = 4;
 
 /// Where the spring of a family that belongs to a slot is in the arrays over all springs: by blocks of slots, in a
 /// block by families, so that a sweep over the slots reads them from front to back.
 #[inline(always)]
-pub(super) fn spring_index(slot: usize, family: usize) -> usize {
+pub(crate) fn spring_index(slot: usize, family: usize) -> usize {
     (slot / BLOCK * FAMILIES + family) * BLOCK + slot % BLOCK
 }
 
 /// A spring with an end at an extra point.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct ExtraSpring {
+pub(crate) struct ExtraSpring {
     pub ends: [usize; 2],
     pub length: f64,
     pub stiffness: f64,
@@ -39,7 +39,7 @@ pub(super) struct ExtraSpring {
 
 /// A horizontal side that active voxels actuate.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct ActuatedSide {
+pub(crate) struct ActuatedSide {
     /// Index into the goals: a slot of the horizontal family, or (`len` + index of the extra spring).
     pub goal: usize,
     /// The one or two active voxels that share it, as indices into [`Lattice::active`].
@@ -48,7 +48,7 @@ pub(super) struct ActuatedSide {
 
 /// A voxel that actuates.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct ActiveVoxel {
+pub(crate) struct ActiveVoxel {
     pub material: Material,
     /// Its place in the body, and so its pixel.
     pub place: (usize, usize),
@@ -56,7 +56,7 @@ pub(super) struct ActiveVoxel {
 
 /// A voxel with a side to the outside.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct SurfaceVoxel {
+pub(crate) struct SurfaceVoxel {
     pub row: usize,
     pub column: usize,
     /// Its points clockwise from the top left.
@@ -67,37 +67,37 @@ pub(super) struct SurfaceVoxel {
 
 /// A body's points, springs and surface.
 #[derive(Clone, Debug)]
-pub struct Lattice {
+pub(crate) struct Lattice {
     /// Slots from one row to the next.
-    pub(super) pitch: usize,
+    pub(crate) pitch: usize,
     /// Slots of the lattice proper.
     lattice_slots: usize,
     /// Slots, those of the extras included; a whole number of blocks.
-    pub(super) slots: usize,
+    pub(crate) slots: usize,
     /// Length of all per-point arrays: slots, and room for the sweeps to look ahead.
-    pub(super) len: usize,
+    pub(crate) len: usize,
     /// Where a slot has a point 1, elsewhere 0.
-    pub(super) present: Buffer,
+    pub(crate) present: Buffer,
     /// The slots with a point or a spring, in whole blocks: the others need no work.
-    pub(super) runs: Vec<Range<usize>>,
+    pub(crate) runs: Vec<Range<usize>>,
     /// Length at rest of each family's springs [wu].
-    pub(super) lengths: [f64; FAMILIES],
+    pub(crate) lengths: [f64; FAMILIES],
     /// Stiffness of every spring ([`spring_index`]), 0 where there is none.
-    pub(super) stiffness: Buffer,
+    pub(crate) stiffness: Buffer,
     /// Where there is a spring a number of all bits but the sign's, elsewhere 0 (see [`Lanes::bits_and`]).
-    pub(super) exists: Buffer,
-    pub(super) extra_springs: Vec<ExtraSpring>,
-    pub(super) actuated: Vec<ActuatedSide>,
-    pub(super) active: Vec<ActiveVoxel>,
+    pub(crate) exists: Buffer,
+    pub(crate) extra_springs: Vec<ExtraSpring>,
+    pub(crate) actuated: Vec<ActuatedSide>,
+    pub(crate) active: Vec<ActiveVoxel>,
     /// Sides of rigid voxels in an order of equal results to the rigid pass's.
-    pub(super) rigid_links: Vec<[usize; 2]>,
-    pub(super) surface: Vec<SurfaceVoxel>,
+    pub(crate) rigid_links: Vec<[usize; 2]>,
+    pub(crate) surface: Vec<SurfaceVoxel>,
     /// Grid vertex (row, column) in the body of every point that exists, in EvoGym's order of creation.
-    pub(super) points: Vec<(usize, (usize, usize))>,
+    pub(crate) points: Vec<(usize, (usize, usize))>,
     /// Non-empty voxels, row-major, with their points clockwise from the top left.
-    pub(super) voxels: Vec<((usize, usize), [usize; 4])>,
+    pub(crate) voxels: Vec<((usize, usize), [usize; 4])>,
     /// Rows of the body, empty ones included.
-    pub(super) body_rows: usize,
+    pub(crate) body_rows: usize,
 }
 
 impl Lattice {
@@ -133,16 +133,6 @@ impl Lattice {
         lattice.rigid_links = in_rounds(&lattice.rigid_links, lattice.len);
         lattice.find_runs();
         lattice
-    }
-
-    /// Number of points.
-    pub fn point_count(&self) -> usize {
-        self.points.len()
-    }
-
-    /// Number of voxels that are not empty.
-    pub fn voxel_count(&self) -> usize {
-        self.voxels.len()
     }
 
     /// Every point once, in EvoGym's order of creation: voxels row-major; in a voxel top left, top right,

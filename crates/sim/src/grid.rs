@@ -1,16 +1,13 @@
-//! [`Grid`]: the only row/column ↔ index arithmetic in the crate.
+//! [`Grid`]: the only row/column ↔ index arithmetic there is.
 
-use serde::de::{DeserializeSeed, Error, SeqAccess, Visitor};
-use serde::{Deserialize, Deserializer, Serialize};
-use std::fmt;
-use std::marker::PhantomData;
 use std::ops::{Index, IndexMut};
 
 /// A dense matrix in row-major order; row 0 is the top row, column 0 the leftmost.
 ///
 /// In files it is a list of rows of equal length.
-#[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize)]
-#[serde(into = "Vec<Vec<T>>", bound(serialize = "T: Clone + Serialize"))]
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[cfg_attr(feature = "serde", serde(into = "Vec<Vec<T>>", bound(serialize = "T: Clone + serde::Serialize")))]
 pub struct Grid<T> {
     height: usize,
     width: usize,
@@ -140,76 +137,84 @@ impl<T> IndexMut<(usize, usize)> for Grid<T> {
     }
 }
 
-impl<'de, T: Deserialize<'de>> Deserialize<'de> for Grid<T> {
-    /// Cell by cell, so that rows without end are refused before they fill the memory.
-    fn deserialize<D: Deserializer<'de>>(reader: D) -> Result<Self, D::Error> {
-        reader.deserialize_seq(Rows(PhantomData))
-    }
-}
-
-/// Reads the rows of a grid.
-struct Rows<T>(PhantomData<T>);
-
-impl<'de, T: Deserialize<'de>> Visitor<'de> for Rows<T> {
-    type Value = Grid<T>;
-
-    fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        f.write_str("a list of rows of equal length")
-    }
-
-    fn visit_seq<A: SeqAccess<'de>>(self, mut rows: A) -> Result<Grid<T>, A::Error> {
-        let (mut cells, mut height, mut width) = (Vec::new(), 0, 0);
-        while let Some(found) = rows.next_element_seed(Row(&mut cells))? {
-            if height == 0 {
-                width = found;
-            }
-            if found != width {
-                return Err(A::Error::custom(GridError::Ragged { row: height, found, expected: width }));
-            }
-            if found == 0 {
-                return Err(A::Error::custom(GridError::Empty));
-            }
-            height += 1;
-        }
-        if height == 0 {
-            return Err(A::Error::custom(GridError::Empty));
-        }
-        Ok(Grid { height, width, cells })
-    }
-}
-
-/// Reads a row behind the cells of others; its length.
-struct Row<'c, T>(&'c mut Vec<T>);
-
-impl<'de, T: Deserialize<'de>> DeserializeSeed<'de> for Row<'_, T> {
-    type Value = usize;
-    fn deserialize<D: Deserializer<'de>>(self, reader: D) -> Result<usize, D::Error> {
-        reader.deserialize_seq(self)
-    }
-}
-
-impl<'de, T: Deserialize<'de>> Visitor<'de> for Row<'_, T> {
-    type Value = usize;
-
-    fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        f.write_str("a row, a list of cells")
-    }
-
-    fn visit_seq<A: SeqAccess<'de>>(self, mut row: A) -> Result<usize, A::Error> {
-        let before = self.0.len();
-        while let Some(cell) = row.next_element()? {
-            if self.0.len() == MOST_CELLS {
-                return Err(A::Error::custom(GridError::TooLarge));
-            }
-            self.0.push(cell);
-        }
-        Ok(self.0.len() - before)
-    }
-}
-
 impl<T: Clone> From<Grid<T>> for Vec<Vec<T>> {
     fn from(grid: Grid<T>) -> Self {
         grid.rows().map(<[T]>::to_vec).collect()
+    }
+}
+
+#[cfg(feature = "serde")]
+mod reading {
+    use super::{Grid, GridError, MOST_CELLS};
+    use serde::de::{Deserialize, DeserializeSeed, Deserializer, Error, SeqAccess, Visitor};
+    use std::fmt;
+    use std::marker::PhantomData;
+
+    impl<'de, T: Deserialize<'de>> Deserialize<'de> for Grid<T> {
+        /// Cell by cell, so that rows without end are refused before they fill the memory.
+        fn deserialize<D: Deserializer<'de>>(reader: D) -> Result<Self, D::Error> {
+            reader.deserialize_seq(Rows(PhantomData))
+        }
+    }
+
+    /// Reads the rows of a grid.
+    struct Rows<T>(PhantomData<T>);
+
+    impl<'de, T: Deserialize<'de>> Visitor<'de> for Rows<T> {
+        type Value = Grid<T>;
+
+        fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
+            f.write_str("a list of rows of equal length")
+        }
+
+        fn visit_seq<A: SeqAccess<'de>>(self, mut rows: A) -> Result<Grid<T>, A::Error> {
+            let (mut cells, mut height, mut width) = (Vec::new(), 0, 0);
+            while let Some(found) = rows.next_element_seed(Row(&mut cells))? {
+                if height == 0 {
+                    width = found;
+                }
+                if found != width {
+                    return Err(A::Error::custom(GridError::Ragged { row: height, found, expected: width }));
+                }
+                if found == 0 {
+                    return Err(A::Error::custom(GridError::Empty));
+                }
+                height += 1;
+            }
+            if height == 0 {
+                return Err(A::Error::custom(GridError::Empty));
+            }
+            Ok(Grid { height, width, cells })
+        }
+    }
+
+    /// Reads a row behind the cells of others; its length.
+    struct Row<'c, T>(&'c mut Vec<T>);
+
+    impl<'de, T: Deserialize<'de>> DeserializeSeed<'de> for Row<'_, T> {
+        type Value = usize;
+        fn deserialize<D: Deserializer<'de>>(self, reader: D) -> Result<usize, D::Error> {
+            reader.deserialize_seq(self)
+        }
+    }
+
+    impl<'de, T: Deserialize<'de>> Visitor<'de> for Row<'_, T> {
+        type Value = usize;
+
+        fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
+            f.write_str("a row, a list of cells")
+        }
+
+        fn visit_seq<A: SeqAccess<'de>>(self, mut row: A) -> Result<usize, A::Error> {
+            let before = self.0.len();
+            while let Some(cell) = row.next_element()? {
+                if self.0.len() == MOST_CELLS {
+                    return Err(A::Error::custom(GridError::TooLarge));
+                }
+                self.0.push(cell);
+            }
+            Ok(self.0.len() - before)
+        }
     }
 }
 
@@ -235,6 +240,7 @@ mod tests {
         assert_eq!(grid.mirrored().cells(), [2, 1, 0, 12, 11, 10]);
     }
 
+    #[cfg(feature = "serde")]
     #[test]
     fn json_is_a_list_of_rows() {
         let grid = Grid::from_fn(2, 2, |r, c| (r, c));
@@ -243,6 +249,7 @@ mod tests {
         assert_eq!(serde_json::from_str::<Grid<(usize, usize)>>(&text).unwrap(), grid);
     }
 
+    #[cfg(feature = "serde")]
     #[test]
     fn rows_in_files_are_checked_as_others_and_rows_without_end_are_refused() {
         let error = |text: &str| serde_json::from_str::<Grid<u8>>(text).unwrap_err().to_string();

@@ -5,14 +5,13 @@
 //! limits move points and leave their velocities alone, so what they change of that energy nobody pays for. They move
 //! both ends of a spring by as much, so that gravity's part of the change is 0 but for rounding.
 
-use super::lattice::{FAMILIES, Lattice, spring_index};
-use super::params::Physics;
-use super::state::{Pair, X, Y};
-use serde::{Deserialize, Serialize};
+use crate::lattice::{FAMILIES, spring_index};
+use crate::state::{Pair, X, Y};
+use crate::system::System;
 
 /// Energies put into a robot \[mass·wu²/s²\].
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
 pub struct Energy {
     /// By the actuators, whose goals move while the springs are as they are.
     pub drive: f64,
@@ -33,7 +32,7 @@ struct Spring {
 
 /// Measures a life. It only looks: the life is the same bits as without it.
 #[derive(Clone, Debug)]
-pub(super) struct Meter {
+pub(crate) struct Meter {
     springs: Vec<Spring>,
     points: Vec<usize>,
     /// Weight of a point.
@@ -45,7 +44,7 @@ pub(super) struct Meter {
 }
 
 impl Meter {
-    pub fn new(lattice: &Lattice, physics: &Physics) -> Self {
+    pub fn new(System { lattice, physics }: &System) -> Self {
         let half = physics.servo_gain / 2.0;
         // From a slot to the ends of its springs, by family.
         let ends = [[0, 1], [0, lattice.pitch], [0, lattice.pitch + 1], [1, lattice.pitch]];
@@ -117,30 +116,28 @@ impl Meter {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sim::{Start, World};
+    use crate::{Physics, Start, World};
 
-    fn lived(body: &str, physics: &Physics) -> (Energy, [f64; 2]) {
-        let body = body.parse().unwrap();
-        let lattice = Lattice::new(&body, physics);
-        let start = Start { column: 0, row: 20 };
-        let mut world = World::new(&lattice, physics, start).with_energy_meter();
+    fn lived(body: &str, physics: Physics) -> (Energy, [f64; 2]) {
+        let system = System::new(&body.parse().unwrap(), physics);
+        let mut world = World::new(system, Start { column: 0, row: 20 }).with_energy_meter();
         (0..50).for_each(|_| world.step().unwrap());
         (world.energy(), world.centre_of_mass())
     }
 
     #[test]
     fn a_passive_body_in_free_fall_is_given_no_energy() {
-        let (energy, _) = lived("111/202", &Physics::default());
+        let (energy, _) = lived("111/202", Physics::default());
         assert_eq!(energy.drive, 0.0);
         assert!(energy.limits.abs() < 1e-6, "{energy:?}");
     }
 
     #[test]
     fn muscles_give_energy_and_limits_only_where_they_are_reached() {
-        let (driven, _) = lived("344/044", &Physics::default());
+        let (driven, _) = lived("344/044", Physics::default());
         assert!(driven.drive > 1.0 && driven.limits > 0.0, "{driven:?}");
         let wide = Physics { limit_low: 0.0, limit_high: 9.0, ..Physics::default() };
-        let (free, _) = lived("344/044", &wide);
+        let (free, _) = lived("344/044", wide);
         assert!(free.drive > 1.0 && free.limits.abs() < 1e-6, "{free:?}");
     }
 
@@ -148,8 +145,8 @@ mod tests {
     fn the_drive_of_one_step_is_the_energy_of_the_springs_it_stretches() {
         // One in-phase muscle at rest; at step 0 its target is 1.1 rest widths, of two sides.
         let physics = Physics::default();
-        let lattice = Lattice::new(&"3".parse().unwrap(), &physics);
-        let mut world = World::new(&lattice, &physics, Start { column: 0, row: 20 }).with_energy_meter();
+        let system = System::new(&"3".parse().unwrap(), physics.clone());
+        let mut world = World::new(system, Start { column: 0, row: 20 }).with_energy_meter();
         world.step().unwrap();
         let expected = 2.0 * 0.5 * physics.active_stiffness * physics.servo_gain * 0.01 * 0.01;
         let drive = world.energy().drive;
@@ -158,11 +155,9 @@ mod tests {
 
     #[test]
     fn a_measured_life_is_the_same_bits() {
-        let physics = Physics::default();
-        let lattice = Lattice::new(&"3443/1044/3005".parse().unwrap(), &physics);
-        let start = Start { column: 0, row: 2 };
-        let mut plain = World::new(&lattice, &physics, start);
-        let mut measured = World::new(&lattice, &physics, start).with_energy_meter();
+        let system = System::new(&"3443/1044/3005".parse().unwrap(), Physics::default());
+        let mut plain = World::new(system, Start { column: 0, row: 2 });
+        let mut measured = plain.clone().with_energy_meter();
         for _ in 0..60 {
             plain.step().unwrap();
             measured.step().unwrap();

@@ -1,24 +1,118 @@
-//! Floor 1: bodies. A [`Body`] is a grid of [`Material`]s; it knows nothing of physics or evolution.
+//! [`Body`]: a grid of voxels, each of a [`Material`].
 
-pub mod material;
-
-use crate::base::{Grid, hash};
-pub use material::Material;
-use serde::{Deserialize, Serialize};
+use crate::grid::{Grid, GridError};
 use std::fmt;
 use std::str::FromStr;
+
+/// What a voxel is made of; the numbers are those of the paper and of all files.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(try_from = "u8", into = "u8"))]
+#[repr(u8)]
+pub enum Material {
+    /// No voxel.
+    Empty = 0,
+    /// Passive and stiff.
+    Rigid = 1,
+    /// Passive and soft.
+    Soft = 2,
+    /// Oscillates in width with phase 0.
+    MuscleInPhase = 3,
+    /// Oscillates in width with phase π.
+    MuscleAntiphase = 4,
+    /// Sensor that gets narrower with its pixel's intensity.
+    SensorShrink = 5,
+    /// Sensor that gets wider with its pixel's intensity.
+    SensorExpand = 6,
+}
+
+impl Material {
+    /// All materials, in the order of their numbers.
+    pub const ALL: [Material; 7] = [
+        Material::Empty,
+        Material::Rigid,
+        Material::Soft,
+        Material::MuscleInPhase,
+        Material::MuscleAntiphase,
+        Material::SensorShrink,
+        Material::SensorExpand,
+    ];
+
+    /// Its number, 0…6.
+    pub fn code(self) -> u8 {
+        self as u8
+    }
+
+    /// The material with a number, `None` above 6.
+    pub fn from_code(code: u8) -> Option<Self> {
+        Material::ALL.get(usize::from(code)).copied()
+    }
+
+    /// Whether there is no voxel.
+    pub fn is_empty(self) -> bool {
+        self == Material::Empty
+    }
+
+    /// Whether it oscillates ("active voxels" in the paper's descriptor).
+    pub fn is_muscle(self) -> bool {
+        matches!(self, Material::MuscleInPhase | Material::MuscleAntiphase)
+    }
+
+    /// Whether it follows a pixel.
+    pub fn is_sensor(self) -> bool {
+        matches!(self, Material::SensorShrink | Material::SensorExpand)
+    }
+
+    /// Whether its width is actuated: muscles and sensors.
+    pub fn is_active(self) -> bool {
+        self.is_muscle() || self.is_sensor()
+    }
+
+    /// Its name in pictures and tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Material::Empty => "empty",
+            Material::Rigid => "rigid",
+            Material::Soft => "soft",
+            Material::MuscleInPhase => "muscle, in phase",
+            Material::MuscleAntiphase => "muscle, antiphase",
+            Material::SensorShrink => "sensor, shrinks",
+            Material::SensorExpand => "sensor, expands",
+        }
+    }
+}
+
+/// A number that is not a material's.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{0} is not a material; expected 0…6 (0 empty, 1 rigid, 2 soft, 3 and 4 muscle, 5 and 6 sensor)")]
+pub struct UnknownMaterial(pub u8);
+
+impl TryFrom<u8> for Material {
+    type Error = UnknownMaterial;
+    fn try_from(code: u8) -> Result<Self, UnknownMaterial> {
+        Material::from_code(code).ok_or(UnknownMaterial(code))
+    }
+}
+
+impl From<Material> for u8 {
+    fn from(material: Material) -> u8 {
+        material.code()
+    }
+}
 
 /// Largest height and width of a body in voxels.
 pub const MAX_SIDE: usize = 64;
 
 /// A robot's body: H × W voxels, row 0 on top. Empty rows and columns count: pixel (row, column) of a stimulus
 /// drives voxel (row, column). In files it is a list of rows of numbers 0…6 (see [`Material`]).
-#[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(try_from = "Grid<Material>", into = "Grid<Material>")]
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(try_from = "Grid<Material>", into = "Grid<Material>"))]
 pub struct Body(Grid<Material>);
 
 /// How many voxels of a kind a body has: what the archive's descriptor is made of (paper, section "MAP-Elites").
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct VoxelCounts {
     /// Muscle voxels ("active" in the paper), both phases.
     pub muscle: usize,
@@ -33,7 +127,7 @@ pub struct VoxelCounts {
 pub enum BodyError {
     /// The rows do not form a grid.
     #[error("a body is a list of rows of equal length: {0}")]
-    Shape(#[from] crate::base::grid::GridError),
+    Shape(#[from] GridError),
     /// The body is larger than [`MAX_SIDE`] on a side.
     #[error("the body is {height} × {width} voxels, at most {MAX_SIDE} × {MAX_SIDE} are possible")]
     TooLarge {
@@ -126,16 +220,6 @@ impl Body {
         self.counts().muscle >= min_muscles && self.is_connected()
     }
 
-    /// A short id, the same for the same body: the first ten hexadecimal digits of the hash of its text form.
-    pub fn id(&self) -> String {
-        hash::sha256_hex(self.to_string().as_bytes())[..10].to_string()
-    }
-
-    /// The content hash of the body: equal bodies, and only those, have equal keys.
-    pub fn key(&self) -> [u8; 16] {
-        hash::content_key(self.to_string().as_bytes())
-    }
-
     /// The body in which every soft voxel and every sensor is an expanding sensor: what each of those places does when
     /// its voxel grows can be seen in it.
     pub fn probe(&self) -> Self {
@@ -208,16 +292,22 @@ mod tests {
         let b = body("0123\n4560");
         assert_eq!(b.to_string(), "0123\n4560");
         assert_eq!(body(".123/456."), b);
+    }
+
+    #[cfg(feature = "serde")]
+    #[test]
+    fn json_is_a_list_of_rows_of_numbers() {
+        let b = body("0123\n4560");
         assert_eq!(serde_json::to_string(&b).unwrap(), "[[0,1,2,3],[4,5,6,0]]");
         assert_eq!(serde_json::from_str::<Body>("[[0,1,2,3],[4,5,6,0]]").unwrap(), b);
+        let error = serde_json::from_str::<Body>("[[0,7]]").unwrap_err().to_string();
+        assert!(error.contains('7') && error.contains("0…6"), "{error}");
     }
 
     #[test]
     fn what_is_not_a_body_is_refused_with_its_place() {
         let error = "012\n078".parse::<Body>().unwrap_err();
         assert_eq!(error, BodyError::Voxel { row: 1, column: 1, found: '7' });
-        let error = serde_json::from_str::<Body>("[[0,7]]").unwrap_err().to_string();
-        assert!(error.contains('7') && error.contains("0…6"), "{error}");
         assert!(matches!("01\n0".parse::<Body>(), Err(BodyError::Shape(_))));
         let row = "2".repeat(65);
         assert!(matches!(row.parse::<Body>(), Err(BodyError::TooLarge { height: 1, width: 65 })));
@@ -239,12 +329,8 @@ mod tests {
     }
 
     #[test]
-    fn counts_and_ids() {
+    fn voxels_are_counted_by_kind() {
         let b = body("0123456");
         assert_eq!(b.counts(), VoxelCounts { muscle: 2, sensor: 2, total: 6 });
-        assert_eq!(b.id(), body("0123456").id());
-        assert_ne!(b.id(), b.mirrored().id());
-        // The shape counts: the same digits in another arrangement are another body.
-        assert_ne!(body("0123/4560").key(), body("01/23/45/60").key());
     }
 }

@@ -2,11 +2,12 @@
 //!
 //! The ground never moves, so it is not simulated: its cells are worked out where a voxel comes down to it.
 
-use super::geometry::{Bounds, Vector, cross, inside};
-use super::lattice::{Lattice, SIDES, SurfaceVoxel};
-use super::neighbours::{Candidate, Neighbours, place, quad};
-use super::params::{MOST_CELLS, Physics};
-use super::state::{Pair, State, X, Y};
+use crate::lattice::{Lattice, SIDES, SurfaceVoxel};
+use crate::physics::{MOST_CELLS, Physics};
+use crate::state::{Pair, State, X, Y};
+use crate::step::broad_phase::{Candidate, Neighbours, place, quad};
+use crate::step::geometry::{Bounds, Vector, cross, inside};
+use crate::system::System;
 
 /// For each corner (clockwise from the top left) the corners at the far ends of the two sides that meet there.
 const FAR_ENDS: [[usize; 2]; 4] = [[1, 3], [0, 2], [3, 1], [2, 0]];
@@ -45,7 +46,7 @@ fn nearest_edge(
         }
         let along = b - a;
         let length = along.norm();
-        let depth = along.perp(&(p - a)).abs() / length;
+        let depth = along.perp(p - a).abs() / length;
         if nearest.as_ref().is_none_or(|edge| depth < edge.depth) {
             let unit = along / length;
             nearest = Some(Edge { ends, normal: Vector::new(-unit.y, unit.x), depth });
@@ -67,7 +68,7 @@ fn push(edge: &Edge, velocity: Vector, physics: &Physics) -> Push {
     let force = physics.contact_stiffness * (physics.contact_offset + edge.depth);
     // The sign of the tangent does not matter: flipping it flips the slip, and tanh is odd.
     let tangent = Vector::new(-n.y, n.x);
-    let slip = tangent.dot(&velocity);
+    let slip = tangent.dot(velocity);
     // Without a force there is no friction, whatever 0/0 is.
     let grip = if force > 0.0 {
         physics.friction * force * libm::tanh(slip / (physics.friction_slip * force))
@@ -75,21 +76,20 @@ fn push(edge: &Edge, velocity: Vector, physics: &Physics) -> Push {
         0.0
     };
     let friction = tangent * grip;
-    let on_point = n * (force - physics.contact_damping * n.dot(&velocity)) - friction;
+    let on_point = n * (force - physics.contact_damping * n.dot(velocity)) - friction;
     Push { on_point, normal_force: force, friction }
 }
 
 /// What an end of the edge feels: half of the reaction, and damping of its own motion.
 fn reaction(edge: &Edge, push: &Push, velocity: Vector, physics: &Physics) -> Vector {
     let n = edge.normal;
-    let along = -push.normal_force / 2.0 - physics.contact_damping / 2.0 * n.dot(&velocity);
+    let along = -push.normal_force / 2.0 - physics.contact_damping / 2.0 * n.dot(velocity);
     n * along + push.friction / 2.0
 }
 
 /// Adds all contact forces to `contact`.
-pub(super) fn add_contacts(
-    lattice: &Lattice,
-    physics: &Physics,
+pub(crate) fn add_contacts(
+    System { lattice, physics }: &System,
     start_column: i64,
     state: &State,
     neighbours: &Neighbours,
@@ -191,7 +191,7 @@ impl Contacts<'_> {
                     && inside(g, &robot)
                     && let Some(edge) = nearest_edge(g, far(&ground), &robot, &voxel.exposed, physics)
                 {
-                    let push = push(&edge, Vector::zeros(), physics);
+                    let push = push(&edge, Vector::ZERO, physics);
                     self.react(voxel, &edge, &push, 1.0);
                 }
             }
@@ -202,14 +202,14 @@ impl Contacts<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sim::{Start, UnstableReason, World};
+    use crate::{Start, UnstableReason, World};
 
     #[test]
     fn a_voxel_that_reaches_over_any_number_of_cells_is_soon_done_with() {
         // Not valid: nothing here has ever blown up.
         let physics = Physics { blow_up_extent: 1e10, time_step: 0.5, ..Physics::default() };
-        let lattice = Lattice::new(&"3".parse().unwrap(), &physics);
-        let mut world = World::new(&lattice, &physics, Start { column: 493, row: 2 });
+        let system = System::new(&"3".parse().unwrap(), physics);
+        let mut world = World::new(system, Start { column: 493, row: 2 });
         let begin = std::time::Instant::now();
         let ended = (0..2).try_for_each(|_| world.step());
         assert!(begin.elapsed().as_secs() < 5, "{ended:?} after {:?}", begin.elapsed());
@@ -230,8 +230,8 @@ mod tests {
         physics.validate().unwrap();
         let comb: Vec<String> =
             (0..64).map(|row| if row == 0 { "34".repeat(32) } else { "30".repeat(32) }).collect();
-        let lattice = Lattice::new(&comb.join("/").parse().unwrap(), &physics);
-        let mut world = World::new(&lattice, &physics, Start { column: 493, row: 2 });
+        let system = System::new(&comb.join("/").parse().unwrap(), physics);
+        let mut world = World::new(system, Start { column: 493, row: 2 });
         let ended = (0..5).find_map(|_| world.step().err());
         assert_eq!(ended.map(|unstable| unstable.reason), Some(UnstableReason::Overlaps));
     }

@@ -1,20 +1,20 @@
 //! Springs that end in an extra point, where two voxels touch only at a corner: few, and anywhere.
 
-use super::forces::{Pulls, Springs, Watch};
-use super::lattice::{FAMILIES, Lattice};
-use super::limits::Limits;
-use super::params::Physics;
-use super::series::carefully;
-use super::state::{Pair, X, Y, pair};
-use crate::base::lanes::{BLOCK, Buffer, Lanes, each};
+use crate::lattice::{FAMILIES, Lattice};
+use crate::simd::{BLOCK, Buffer, Lanes, each};
+use crate::state::{Pair, X, Y, pair};
+use crate::step::limits::Limits;
+use crate::step::series::carefully;
+use crate::step::springs::{Pulls, Springs, Watch};
+use crate::system::System;
 
 /// Extra springs that are computed together.
-pub(super) const GROUP: usize = FAMILIES * BLOCK;
+pub(crate) const GROUP: usize = FAMILIES * BLOCK;
 
 /// The extra springs' share of a substep: their ends are fetched and fed one by one, but the work between is as
 /// wide as the lattice's.
 #[derive(Clone, Debug)]
-pub(super) struct Extra {
+pub(crate) struct Extra {
     /// By groups.
     springs: Vec<Springs>,
     pulls: Vec<Pulls>,
@@ -88,7 +88,7 @@ impl Extra {
 
     /// Corrections of the springs beyond their limits, to be fed to the positions they come from.
     #[inline(always)]
-    pub fn limit<L: Lanes>(&mut self, lattice: &Lattice, physics: &Physics, position: &Pair) {
+    pub fn limit<L: Lanes>(&mut self, System { lattice, physics }: &System, position: &Pair) {
         self.fetch(lattice, position);
         let share = L::splat(physics.limit_share / 2.0);
         let limits = Limits::new(1.0, physics.limit_low, physics.limit_high);

@@ -1,0 +1,78 @@
+//! EvoGym's soft-robot physics: a mass–spring lattice on flat ground, fast, and the same bits on every machine.
+//!
+//! A [`Body`] is a grid of voxels: rigid, soft, muscles that oscillate, sensors that follow a pixel each. A [`System`] is
+//! a body under some [`Physics`], a [`World`] simulates it. Neither knows evolution, images, files, clocks or random
+//! numbers.
+//!
+//! ```
+//! use morphcog_sim::{Body, Grid, Physics, Start, System, World};
+//!
+//! // Two rows from the top: muscles in phase (3) and antiphase (4), an expanding sensor (6).
+//! let body: Body = "336/446".parse()?;
+//! let mut world = World::new(System::new(&body, Physics::default()), Start { column: 0, row: 2 });
+//! world.set_stimulus(&Grid::from_rows(vec![vec![0.0, 0.0, 1.0], vec![0.0, 0.0, 1.0]])?);
+//! for _ in 0..50 {
+//!     world.step()?;
+//! }
+//! let [x, _] = world.centre_of_mass();
+//! println!("after one actuation cycle at {:.2} voxel lengths", 10.0 * x);
+//! # assert!(x > 0.0 && x < 0.5);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! A system is shared: worlds of the same system, on any number of threads, take an `Arc` of it.
+//!
+//! ```
+//! # use morphcog_sim::{Body, Physics, Start, System, World};
+//! use std::sync::Arc;
+//!
+//! # let body: Body = "336/446".parse()?;
+//! let system = Arc::new(System::new(&body, Physics::default()));
+//! let ways = [2, 3].map(|row| {
+//!     let system = Arc::clone(&system);
+//!     std::thread::spawn(move || {
+//!         let mut world = World::new(system, Start { column: 0, row });
+//!         (0..50).try_for_each(|_| world.step()).map(|()| world.centre_of_mass()[0])
+//!     })
+//! });
+//! # for way in ways { way.join().unwrap()?; }
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! Feature `serde` (off by default) reads and writes bodies, grids, constants and states.
+//!
+//! # Same bits
+//!
+//! The loops are compiled for several [instruction sets](InstructionSet), and the widest that the machine has is
+//! chosen when the program runs. All of them give the same bits.
+//!
+//! Positions are *local*: x is measured from the left edge of the robot's starting box. So a simulation does not depend
+//! on where on the ground the robot stands (but for the pegs below it, which count columns).
+//!
+//! The rest of this page is the specification, `physics.md`; comments in the code cite its sections.
+//!
+#![doc = include_str!("../physics.md")]
+
+pub mod body;
+mod energy;
+pub mod grid;
+mod lattice;
+mod physics;
+mod refine;
+mod scratch;
+mod simd;
+mod state;
+mod step;
+pub mod stop;
+mod system;
+mod world;
+
+pub use body::{Body, Material};
+pub use energy::Energy;
+pub use grid::Grid;
+pub use physics::{Physics, PhysicsError};
+pub use simd::InstructionSet;
+pub use state::State;
+pub use step::actuation::width;
+pub use system::System;
+pub use world::{Start, StateMismatch, Unstable, UnstableReason, World};

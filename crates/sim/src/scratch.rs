@@ -1,0 +1,81 @@
+//! [`Scratch`]: the memory of a substep, which is never kept.
+
+use crate::simd::{BLOCK, Buffer};
+use crate::state::{Pair, State, pair};
+use crate::step::broad_phase::Neighbours;
+use crate::step::limits::Reach;
+use crate::step::off_lattice::{Extra, GROUP};
+use crate::step::springs::{Pulls, Springs, Wide};
+use crate::system::System;
+
+/// What the stages of a substep leave to each other about a block of slots.
+#[derive(Clone, Copy, Debug)]
+#[repr(C, align(64))]
+pub(crate) struct Work {
+    pub pulls: Pulls,
+    /// Acceleration by all but springs and the stages' differences in drag.
+    pub load: [Wide; 2],
+    /// Accelerations of the first three stages.
+    pub first: [Wide; 2],
+    pub second: [Wide; 2],
+    pub third: [Wide; 2],
+}
+
+/// Memory of a substep, allocated once.
+#[derive(Clone, Debug)]
+pub(crate) struct Scratch {
+    /// Goal lengths [wu]: horizontal springs by slot, then extra springs.
+    pub goals: Buffer,
+    /// By blocks.
+    pub springs: Vec<Springs>,
+    pub work: Vec<Work>,
+    /// See [`Gather`](crate::step::springs::Gather).
+    pub passing: Pair,
+    /// Contact force per point [mass·wu/s²].
+    pub contact: Pair,
+    /// Positions of the second, third and fourth stage.
+    pub stages: [Pair; 3],
+    /// New positions and velocities.
+    pub position: Pair,
+    pub velocity: Pair,
+    pub extra: Option<Extra>,
+    /// Whether the springs' lengths are forgotten.
+    pub anew: bool,
+    /// What the latest length limits had to reckon with.
+    pub reach: Reach,
+    /// Which contacts are possible.
+    pub neighbours: Neighbours,
+}
+
+impl Scratch {
+    pub fn new(System { lattice, physics }: &System, state: &State) -> Self {
+        let horizontal = (0..lattice.len).map(|_| physics.cell_size);
+        let extra = lattice.extra_springs.iter().map(|spring| spring.length);
+        let padding = [physics.cell_size; GROUP];
+        let zeros = [[0.0; BLOCK]; 2];
+        let work = Work { pulls: Pulls::ZERO, load: zeros, first: zeros, second: zeros, third: zeros };
+        // Slots without a point stay where they are parked.
+        let parked = || state.position.clone();
+        Scratch {
+            goals: horizontal.chain(extra).chain(padding).collect(),
+            springs: Springs::blocks(&lattice.stiffness, physics.mass, physics.servo_gain),
+            work: vec![work; lattice.slots / BLOCK],
+            passing: pair(lattice.len),
+            contact: pair(lattice.len),
+            stages: [parked(), parked(), parked()],
+            position: parked(),
+            velocity: pair(lattice.len),
+            extra: Extra::new(lattice, physics.mass, physics.servo_gain),
+            anew: true,
+            reach: Reach::default(),
+            neighbours: Neighbours::default(),
+        }
+    }
+
+    /// At the start of a control step: what a substep leaves to the next but is not part of the state.
+    pub fn begin(&mut self) {
+        self.anew = true;
+        self.springs.iter_mut().for_each(Springs::forget);
+        self.extra.iter_mut().for_each(Extra::forget);
+    }
+}

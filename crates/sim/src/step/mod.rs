@@ -1,0 +1,74 @@
+//! One substep (physics.md, "One substep, in this order"), compiled per instruction set.
+
+pub(crate) mod actuation;
+pub(crate) mod broad_phase;
+mod contact;
+mod geometry;
+pub(crate) mod limits;
+pub(crate) mod off_lattice;
+mod rk4;
+mod series;
+pub(crate) mod springs;
+
+use crate::energy::Meter;
+use crate::scratch::Scratch;
+use crate::simd::{Kernel, Lanes};
+use crate::state::State;
+use crate::stop::{Stopped, check};
+use crate::system::System;
+use crate::world::UnstableReason;
+use std::sync::atomic::AtomicBool;
+
+/// The substeps of a control step.
+pub(crate) struct ControlStep<'a> {
+    pub system: &'a System,
+    pub start_column: i64,
+    pub state: &'a mut State,
+    pub scratch: &'a mut Scratch,
+    pub meter: Option<&'a mut Meter>,
+    pub stop: &'a AtomicBool,
+}
+
+/// Why a control step ended early.
+pub(crate) enum Ended {
+    Unstable(UnstableReason),
+    Stopped,
+}
+
+impl Kernel for ControlStep<'_> {
+    type Output = Result<(), Ended>;
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) -> Self::Output {
+        let ControlStep { system, start_column, state, scratch, mut meter, stop } = self;
+        for _ in 0..system.physics.substeps {
+            check(stop).map_err(|Stopped| Ended::Stopped)?;
+            substep::<L>(system, start_column, state, scratch, meter.as_deref_mut())
+                .map_err(Ended::Unstable)?;
+        }
+        Ok(())
+    }
+}
+
+#[inline(always)]
+fn substep<L: Lanes>(
+    system: &System,
+    start_column: i64,
+    state: &mut State,
+    scratch: &mut Scratch,
+    mut meter: Option<&mut Meter>,
+) -> Result<(), UnstableReason> {
+    scratch.neighbours.refresh::<L>(system, state)?;
+    let unstable = scratch.neighbours.too_many_overlaps(system, state);
+
+    scratch.contact.iter_mut().for_each(|axis| axis.fill(0.0));
+    contact::add_contacts(system, start_column, state, &scratch.neighbours, &mut scratch.contact);
+    // Contacts see true velocities: position now less position then. The integrator knows its own.
+    rk4::integrate::<L>(system, state, scratch);
+    meter.iter_mut().for_each(|meter| meter.before_limits(&scratch.position));
+    rk4::limit::<L>(system, state, scratch);
+    limits::limit_rigid(system, &mut state.position);
+    meter.iter_mut().for_each(|meter| meter.after_limits(&state.position));
+
+    if unstable { Err(UnstableReason::Overlaps) } else { Ok(()) }
+}

@@ -1,0 +1,101 @@
+//! Trajectories of EvoGym's own (see `tests/golden/README.md`).
+#![allow(dead_code, reason = "every test program uses its own part")]
+
+use flate2::read::GzDecoder;
+use morphcog_sim::{Body, Grid, Material, Physics, Start, System, World};
+use serde::de::{DeserializeOwned, Error};
+use serde::{Deserialize, Deserializer};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// One reference simulation.
+#[derive(Deserialize)]
+pub struct Reference {
+    pub name: String,
+    #[serde(deserialize_with = "body")]
+    pub body: Body,
+    #[serde(deserialize_with = "grid")]
+    pub stimulus: Grid<f64>,
+    pub start_column: i64,
+    pub start_row: u32,
+    pub control_steps: u64,
+    pub unstable_at: i64,
+    pub com: Vec<[f64; 2]>,
+    pub points: BTreeMap<u64, Vec<[f64; 2]>>,
+    /// The same simulation in EvoGym itself at other columns; of sensitive ones only.
+    #[serde(default)]
+    evogym_elsewhere: Vec<Elsewhere>,
+}
+
+#[derive(Deserialize)]
+struct Elsewhere {
+    largest_difference_voxels: f64,
+}
+
+// Not by feature `serde`, so that it need not be on.
+fn grid<'de, T: Deserialize<'de>, D: Deserializer<'de>>(reader: D) -> Result<Grid<T>, D::Error> {
+    Grid::from_rows(Vec::deserialize(reader)?).map_err(D::Error::custom)
+}
+
+fn body<'de, D: Deserializer<'de>>(reader: D) -> Result<Body, D::Error> {
+    let codes: Grid<u8> = grid(reader)?;
+    let material = |&code: &u8| Material::from_code(code).expect("the files hold bodies");
+    Body::new(codes.map(material)).map_err(D::Error::custom)
+}
+
+impl Reference {
+    pub fn system(&self, physics: &Physics) -> Arc<System> {
+        Arc::new(System::new(&self.body, physics.clone()))
+    }
+
+    /// At its beginning.
+    pub fn world(&self, physics: &Physics) -> World {
+        let start = Start { column: self.start_column, row: self.start_row };
+        let mut world = World::new(self.system(physics), start);
+        world.set_stimulus(&self.stimulus);
+        world
+    }
+
+    /// The largest distance of EvoGym from itself at other columns \[voxel lengths\].
+    pub fn spread(&self) -> f64 {
+        self.evogym_elsewhere.iter().map(|other| other.largest_difference_voxels).fold(0.0, f64::max)
+    }
+}
+
+/// A file of `tests/golden`.
+pub fn golden<T: DeserializeOwned>(name: &str) -> T {
+    let path = folder().join(format!("{name}.json.gz"));
+    serde_json::from_reader(GzDecoder::new(std::fs::File::open(path).unwrap())).unwrap()
+}
+
+/// `tests/golden`, for the program's tests as well.
+fn folder() -> PathBuf {
+    let folders = ["tests/golden", "crates/sim/tests/golden"];
+    let mut folders = folders.map(|folder| Path::new(env!("CARGO_MANIFEST_DIR")).join(folder)).into_iter();
+    folders.find(|folder| folder.is_dir()).expect("it is part of the project")
+}
+
+/// The names of a folder's simulations, in order.
+fn names(folder: &Path) -> Vec<String> {
+    let files = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name());
+    let names = files.filter_map(|name| Some(name.to_str().unwrap().strip_suffix(".json.gz")?.to_string()));
+    let mut names: Vec<String> = names.filter(|name| name != "published_robots").collect();
+    names.sort();
+    names
+}
+
+/// All reference simulations.
+pub fn references() -> Vec<Reference> {
+    let all: Vec<Reference> = names(&folder()).iter().map(|name| golden(name)).collect();
+    assert_eq!(all.len(), 17);
+    all
+}
+
+/// All simulations in which small differences grow.
+pub fn sensitive() -> Vec<Reference> {
+    let names = names(&folder().join("sensitive"));
+    let all: Vec<Reference> = names.iter().map(|name| golden(&format!("sensitive/{name}"))).collect();
+    assert_eq!(all.len(), 4);
+    all
+}
