@@ -3,7 +3,7 @@
 mod common;
 
 use common::program::{Sandbox, TINY, files, said, staged};
-use common::{Reference, golden};
+use common::reference::{Reference, golden};
 use morphcog::run::config::{BUILT_IN, Config};
 use morphcog::run::eval_file::EvalFile;
 use morphcog::run::plan::PAPER_TOML;

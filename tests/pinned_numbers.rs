@@ -6,7 +6,7 @@
 mod common;
 
 use common::program::{Sandbox, TINY, staged};
-use common::{Reference, references, sensitive};
+use common::reference::{Reference, references, sensitive};
 use morphcog::base::hash::sha256_hex;
 use morphcog::sim::{Physics, World};
 use rayon::prelude::*;

@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::golden;
+use common::reference::golden;
 use morphcog::base::Grid;
 use morphcog::base::stop::NEVER;
 use morphcog::body::Body;

@@ -404,7 +404,7 @@ fn the_gallery_walks_as_it_was_trained() {
     struct Reference {
         evogym_displacements: Vec<Vec<f64>>,
     }
-    let references: BTreeMap<String, Reference> = common::golden("published_robots");
+    let references: BTreeMap<String, Reference> = common::reference::golden("published_robots");
     for robot in gallery::gallery().unwrap() {
         let under_zero = references[&robot.name].evogym_displacements[0][0];
         assert_eq!(Direction::of(under_zero, 3.0), Some(robot.zero_walks), "{}", robot.name);

@@ -8,5 +8,3 @@ pub mod program;
 #[path = "../../crates/sim/tests/common/mod.rs"]
 pub mod reference;
 pub mod server;
-
-pub use reference::*;

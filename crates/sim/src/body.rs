@@ -4,7 +4,7 @@ use crate::grid::{Grid, GridError};
 use std::fmt;
 use std::str::FromStr;
 
-/// What a voxel is made of; the numbers are those of the paper and of all files.
+/// What a voxel is made of; the numbers are those of all files.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(try_from = "u8", into = "u8"))]
@@ -53,7 +53,7 @@ impl Material {
         self == Material::Empty
     }
 
-    /// Whether it oscillates ("active voxels" in the paper's descriptor).
+    /// Whether it oscillates.
     pub fn is_muscle(self) -> bool {
         matches!(self, Material::MuscleInPhase | Material::MuscleAntiphase)
     }
@@ -103,18 +103,19 @@ impl From<Material> for u8 {
 /// Largest height and width of a body in voxels.
 pub const MAX_SIDE: usize = 64;
 
-/// A robot's body: H × W voxels, row 0 on top. Empty rows and columns count: pixel (row, column) of a stimulus
-/// drives voxel (row, column). In files it is a list of rows of numbers 0…6 (see [`Material`]).
+/// A robot's body: H × W voxels, row 0 on top. Empty rows and columns count: pixel (row, column) of
+/// a stimulus drives voxel (row, column). In files it is a list of rows of numbers 0…6 (see
+/// [`Material`]).
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(try_from = "Grid<Material>", into = "Grid<Material>"))]
 pub struct Body(Grid<Material>);
 
-/// How many voxels of a kind a body has: what the archive's descriptor is made of (paper, section "MAP-Elites").
+/// How many voxels of a kind a body has.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct VoxelCounts {
-    /// Muscle voxels ("active" in the paper), both phases.
+    /// Muscle voxels, both phases.
     pub muscle: usize,
     /// Sensor voxels, both kinds.
     pub sensor: usize,
@@ -215,13 +216,13 @@ impl Body {
         count == self.counts().total
     }
 
-    /// Whether evolution may use the body: connected, and at least `min_muscles` muscle voxels (paper: three).
+    /// Whether the body may walk: connected, and with at least `min_muscles` muscle voxels.
     pub fn is_valid(&self, min_muscles: usize) -> bool {
         self.counts().muscle >= min_muscles && self.is_connected()
     }
 
-    /// The body in which every soft voxel and every sensor is an expanding sensor: what each of those places does when
-    /// its voxel grows can be seen in it.
+    /// The body in which every soft voxel and every sensor is an expanding sensor: what each of
+    /// those places does when its voxel grows can be seen in it.
     pub fn probe(&self) -> Self {
         let is_place = |material: Material| material == Material::Soft || material.is_sensor();
         Body(self.0.map(|&material| if is_place(material) { Material::SensorExpand } else { material }))

@@ -1,9 +1,11 @@
-//! [`Energy`]: what the actuators put into a robot, and what the length limits put in besides (physics.md, 4).
+//! [`Energy`]: what the actuators put into a robot, and what the length limits put in besides
+//! (physics.md, "One substep", 4).
 //!
-//! The servo makes a spring of stiffness k and gain g pull towards its goal length with k·g·(d − goal) at the start of
-//! every substep: over many substeps that is a spring of stiffness k·g, and its energy is ½·k·g·(d − goal)². The length
-//! limits move points and leave their velocities alone, so what they change of that energy nobody pays for. They move
-//! both ends of a spring by as much, so that gravity's part of the change is 0 but for rounding.
+//! The servo makes a spring of stiffness k and gain g pull towards its goal length with k·g·(d −
+//! goal) at the start of every substep: over many substeps that is a spring of stiffness k·g, and
+//! its energy is ½·k·g·(d − goal)². The length limits move points and leave their velocities alone,
+//! so what they change of that energy nobody pays for. They move both ends of a spring by as much,
+//! so that gravity's part of the change is 0 but for rounding.
 
 use crate::lattice::{FAMILIES, spring_index};
 use crate::state::{Pair, X, Y};
@@ -30,14 +32,15 @@ struct Spring {
     length: f64,
 }
 
-/// Measures a life. It only looks: the life is the same bits as without it.
+/// Measures a simulation. It only looks: the simulation is the same bits as without it.
 #[derive(Clone, Debug)]
 pub(crate) struct Meter {
     springs: Vec<Spring>,
     points: Vec<usize>,
     /// Weight of a point.
     weight: f64,
-    /// Goals of the present control step; empty before the first, when every spring's is its length.
+    /// Goals of the present control step; empty before the first, when every spring's is its
+    /// length.
     goals: Vec<f64>,
     before: f64,
     pub energy: Energy,
@@ -60,7 +63,7 @@ impl Meter {
                 });
             }
         }
-        springs.extend(lattice.extra_springs.iter().enumerate().map(|(i, spring)| Spring {
+        springs.extend(lattice.off_lattice_springs.iter().enumerate().map(|(i, spring)| Spring {
             ends: spring.ends,
             half: half * spring.stiffness,
             goal: Some(lattice.len + i),
@@ -76,7 +79,7 @@ impl Meter {
         }
     }
 
-    /// A new life begins at rest; energies go on adding up.
+    /// Begins anew, at rest; energies go on adding up.
     pub fn rest(&mut self) {
         self.goals.clear();
     }
@@ -118,7 +121,7 @@ mod tests {
     use super::*;
     use crate::{Physics, Start, World};
 
-    fn lived(body: &str, physics: Physics) -> (Energy, [f64; 2]) {
+    fn simulated(body: &str, physics: Physics) -> (Energy, [f64; 2]) {
         let system = System::new(&body.parse().unwrap(), physics);
         let mut world = World::new(system, Start { column: 0, row: 20 }).with_energy_meter();
         (0..50).for_each(|_| world.step().unwrap());
@@ -127,17 +130,17 @@ mod tests {
 
     #[test]
     fn a_passive_body_in_free_fall_is_given_no_energy() {
-        let (energy, _) = lived("111/202", Physics::default());
+        let (energy, _) = simulated("111/202", Physics::default());
         assert_eq!(energy.drive, 0.0);
         assert!(energy.limits.abs() < 1e-6, "{energy:?}");
     }
 
     #[test]
     fn muscles_give_energy_and_limits_only_where_they_are_reached() {
-        let (driven, _) = lived("344/044", Physics::default());
+        let (driven, _) = simulated("344/044", Physics::default());
         assert!(driven.drive > 1.0 && driven.limits > 0.0, "{driven:?}");
         let wide = Physics { limit_low: 0.0, limit_high: 9.0, ..Physics::default() };
-        let (free, _) = lived("344/044", wide);
+        let (free, _) = simulated("344/044", wide);
         assert!(free.drive > 1.0 && free.limits.abs() < 1e-6, "{free:?}");
     }
 
@@ -154,7 +157,7 @@ mod tests {
     }
 
     #[test]
-    fn a_measured_life_is_the_same_bits() {
+    fn a_measured_simulation_is_the_same_bits() {
         let system = System::new(&"3443/1044/3005".parse().unwrap(), Physics::default());
         let mut plain = World::new(system, Start { column: 0, row: 2 });
         let mut measured = plain.clone().with_energy_meter();

@@ -76,7 +76,8 @@ impl<T> Grid<T> {
         self.cells.len()
     }
 
-    /// The cell, or `None` outside the grid; takes signed indices so that neighbours can be asked for freely.
+    /// The cell, or `None` outside the grid; takes signed indices so that neighbours can be asked
+    /// for freely.
     pub fn get(&self, row: isize, column: isize) -> Option<&T> {
         let (r, c) = (usize::try_from(row).ok()?, usize::try_from(column).ok()?);
         (r < self.height && c < self.width).then(|| &self.cells[r * self.width + c])

@@ -1,9 +1,10 @@
-//! [`Lattice`]: a body as points, springs and surface; fixed for a life.
+//! [`Lattice`]: a body as points, springs and surface.
 //!
-//! Points lie on a dense lattice, one slot per grid vertex of the body's bounding box, row-major from the top left
-//! with a fixed row pitch; where two voxels touch only at a corner, the later voxel's point is an *extra* behind
-//! the lattice. So each of the four spring families (sides and diagonals) joins points a fixed offset apart and
-//! is a plain sweep over arrays; the few springs that end in an extra are kept in a list.
+//! Points lie on a dense lattice, one slot per grid vertex of the body's bounding box, row-major
+//! from the top left with a fixed row pitch; where two voxels touch only at a corner, the later
+//! voxel's point is an *off-lattice point* behind the lattice. So each of the four spring families
+//! (sides and diagonals) joins points a fixed offset apart and is a plain sweep over arrays; the
+//! few springs that end in one are kept in a list.
 
 use crate::body::{Body, Material};
 use crate::grid::Grid;
@@ -12,8 +13,8 @@ use crate::simd::{BLOCK, Buffer};
 use crate::step::limits::in_rounds;
 use std::ops::Range;
 
-/// Sides of a voxel in the order in which they are visited: top, right, bottom, left. Each runs clockwise, so
-/// that its outward normal is its direction turned left.
+/// Sides of a voxel in the order in which they are visited: top, right, bottom, left. Each runs
+/// clockwise, so that its outward normal is its direction turned left.
 pub(crate) const SIDES: [(usize, usize); 4] = [(0, 1), (1, 2), (2, 3), (3, 0)];
 
 /// Neighbouring cell across each side, in the order of [`SIDES`].
@@ -22,16 +23,16 @@ const ACROSS: [(isize, isize); 4] = [(-1, 0), (0, 1), (1, 0), (0, -1)];
 /// The four families of springs: horizontal, vertical, falling and rising diagonals.
 pub(crate) const FAMILIES: usize = 4;
 
-/// Where the spring of a family that belongs to a slot is in the arrays over all springs: by blocks of slots, in a
-/// block by families, so that a sweep over the slots reads them from front to back.
+/// Where the spring of a family that belongs to a slot is in the arrays over all springs: by blocks
+/// of slots, in a block by families, so that a sweep over the slots reads them from front to back.
 #[inline(always)]
 pub(crate) fn spring_index(slot: usize, family: usize) -> usize {
     (slot / BLOCK * FAMILIES + family) * BLOCK + slot % BLOCK
 }
 
-/// A spring with an end at an extra point.
+/// A spring with an end at an off-lattice point.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct ExtraSpring {
+pub(crate) struct OffLatticeSpring {
     pub ends: [usize; 2],
     pub length: f64,
     pub stiffness: f64,
@@ -40,7 +41,8 @@ pub(crate) struct ExtraSpring {
 /// A horizontal side that active voxels actuate.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ActuatedSide {
-    /// Index into the goals: a slot of the horizontal family, or (`len` + index of the extra spring).
+    /// Index into the goals: a slot of the horizontal family, or (`len` + index of the off-lattice
+    /// spring).
     pub goal: usize,
     /// The one or two active voxels that share it, as indices into [`Lattice::active`].
     pub voxels: [usize; 2],
@@ -72,27 +74,29 @@ pub(crate) struct Lattice {
     pub(crate) pitch: usize,
     /// Slots of the lattice proper.
     lattice_slots: usize,
-    /// Slots, those of the extras included; a whole number of blocks.
+    /// Slots, off-lattice points included; a whole number of blocks.
     pub(crate) slots: usize,
     /// Length of all per-point arrays: slots, and room for the sweeps to look ahead.
     pub(crate) len: usize,
     /// Where a slot has a point 1, elsewhere 0.
     pub(crate) present: Buffer,
     /// The slots with a point or a spring, in whole blocks: the others need no work.
-    pub(crate) runs: Vec<Range<usize>>,
+    pub(crate) active_ranges: Vec<Range<usize>>,
     /// Length at rest of each family's springs [wu].
     pub(crate) lengths: [f64; FAMILIES],
     /// Stiffness of every spring ([`spring_index`]), 0 where there is none.
     pub(crate) stiffness: Buffer,
-    /// Where there is a spring a number of all bits but the sign's, elsewhere 0 (see [`Lanes::bits_and`]).
+    /// Where there is a spring a number of all bits but the sign's, elsewhere 0 (see
+    /// [`Lanes::bits_and`]).
     pub(crate) exists: Buffer,
-    pub(crate) extra_springs: Vec<ExtraSpring>,
+    pub(crate) off_lattice_springs: Vec<OffLatticeSpring>,
     pub(crate) actuated: Vec<ActuatedSide>,
     pub(crate) active: Vec<ActiveVoxel>,
     /// Sides of rigid voxels in an order of equal results to the rigid pass's.
     pub(crate) rigid_links: Vec<[usize; 2]>,
     pub(crate) surface: Vec<SurfaceVoxel>,
-    /// Grid vertex (row, column) in the body of every point that exists, in EvoGym's order of creation.
+    /// Grid vertex (row, column) in the body of every point that exists, in EvoGym's order of
+    /// creation.
     pub(crate) points: Vec<(usize, (usize, usize))>,
     /// Non-empty voxels, row-major, with their points clockwise from the top left.
     pub(crate) voxels: Vec<((usize, usize), [usize; 4])>,
@@ -113,11 +117,11 @@ impl Lattice {
             // Sweeps look from a slot to the row below, one block ahead.
             len: slots + pitch + BLOCK,
             present: Buffer::zeros(slots + pitch + BLOCK),
-            runs: Vec::new(),
+            active_ranges: Vec::new(),
             lengths: [length, length, diagonal, diagonal],
             stiffness: Buffer::zeros(slots * FAMILIES),
             exists: Buffer::zeros(slots * FAMILIES),
-            extra_springs: Vec::new(),
+            off_lattice_springs: Vec::new(),
             actuated: Vec::new(),
             active: Vec::new(),
             rigid_links: Vec::new(),
@@ -131,12 +135,12 @@ impl Lattice {
         lattice.add_springs(body, physics);
         lattice.add_actuation(body);
         lattice.rigid_links = in_rounds(&lattice.rigid_links, lattice.len);
-        lattice.find_runs();
+        lattice.find_active_ranges();
         lattice
     }
 
-    /// Every point once, in EvoGym's order of creation: voxels row-major; in a voxel top left, top right,
-    /// bottom left, bottom right.
+    /// Every point once, in EvoGym's order of creation: voxels row-major; in a voxel top left, top
+    /// right, bottom left, bottom right.
     fn add_points(&mut self) {
         let mut known = vec![false; self.len];
         for ((row, column), corners) in &self.voxels {
@@ -158,8 +162,9 @@ impl Lattice {
                 _ => (physics.active_stiffness, physics.active_diagonal_ratio),
             };
             let [tl, tr, br, bl] = corners;
-            // Voxels come row-major, so a later one overwrites; a rigid one only where there is no spring yet
-            // (physics.md: start from the rigid value, every non-rigid cell overwrites).
+            // Voxels come row-major, so a later one overwrites; a rigid one only where there is no
+            // spring yet (physics.md, "Points and springs": start from the rigid value, every
+            // non-rigid cell overwrites).
             let keep = material == Material::Rigid;
             let sides = [[tl, tr], [tr, br], [bl, br], [tl, bl]];
             for (ends, family) in sides.into_iter().zip([0, 1, 0, 1]) {
@@ -185,14 +190,18 @@ impl Lattice {
             self.exists[index] = f64::from_bits(u64::MAX >> 1);
             return;
         }
-        match self.extra_springs.iter_mut().find(|spring| spring.ends == ends) {
+        match self.off_lattice_springs.iter_mut().find(|spring| spring.ends == ends) {
             Some(spring) if !keep => spring.stiffness = stiffness,
             Some(_) => {}
-            None => self.extra_springs.push(ExtraSpring { ends, length: self.lengths[family], stiffness }),
+            None => self.off_lattice_springs.push(OffLatticeSpring {
+                ends,
+                length: self.lengths[family],
+                stiffness,
+            }),
         }
     }
 
-    fn find_runs(&mut self) {
+    fn find_active_ranges(&mut self) {
         let mut used = vec![false; self.slots / BLOCK];
         for (point, _) in &self.points {
             self.present[*point] = 1.0;
@@ -210,9 +219,9 @@ impl Lattice {
         }
         for (block, _) in used.into_iter().enumerate().filter(|(_, used)| *used) {
             let slots = block * BLOCK..(block + 1) * BLOCK;
-            match self.runs.last_mut() {
-                Some(run) if run.end == slots.start => run.end = slots.end,
-                _ => self.runs.push(slots),
+            match self.active_ranges.last_mut() {
+                Some(range) if range.end == slots.start => range.end = slots.end,
+                _ => self.active_ranges.push(slots),
             }
         }
     }
@@ -227,8 +236,8 @@ impl Lattice {
             let voxel = self.active.len();
             self.active.push(ActiveVoxel { material, place });
             for ends in [[tl, tr], [bl, br]] {
-                let extra = self.extra_springs.iter().position(|spring| spring.ends == ends);
-                let goal = extra.map_or(ends[0], |index| self.len + index);
+                let off_lattice = self.off_lattice_springs.iter().position(|spring| spring.ends == ends);
+                let goal = off_lattice.map_or(ends[0], |index| self.len + index);
                 owner.entry(goal).or_insert([voxel, voxel])[1] = voxel;
             }
         }
@@ -255,17 +264,18 @@ fn numbered_voxels(body: &Body) -> NumberedVoxels {
     let pitch = if 4 * padded <= 5 * width { padded } else { width };
     let lattice_slots = height * pitch;
     let mut len = lattice_slots;
-    let mut extra = Grid::filled(body.height() + 1, body.width() + 1, None);
+    let mut off_lattice = Grid::filled(body.height() + 1, body.width() + 1, None);
     let mut list = Vec::with_capacity(filled.len());
     for (row, column) in filled {
-        let corner = |down: usize, right: usize, extra: &mut Grid<Option<usize>>, len: &mut usize| {
+        let corner = |down: usize, right: usize, off_lattice: &mut Grid<Option<usize>>, len: &mut usize| {
             let (r, c) = (row + down, column + right);
             let at = |dr: isize, dc: isize| !body.at(r as isize + dr, c as isize + dc).is_empty();
             let falling = at(-1, -1) && at(0, 0) && !at(-1, 0) && !at(0, -1);
             let rising = at(-1, 0) && at(0, -1) && !at(-1, -1) && !at(0, 0);
-            // Of two voxels that touch only here the lower one, for which the vertex is a top corner, is later.
+            // Of two voxels that touch only here the lower one, for which the vertex is a top
+            // corner, is later.
             if (falling || rising) && down == 0 {
-                *extra[(r, c)].get_or_insert_with(|| {
+                *off_lattice[(r, c)].get_or_insert_with(|| {
                     *len += 1;
                     *len - 1
                 })
@@ -273,7 +283,7 @@ fn numbered_voxels(body: &Body) -> NumberedVoxels {
                 (r - top) * pitch + (c - left)
             }
         };
-        let mut number = |down, right| corner(down, right, &mut extra, &mut len);
+        let mut number = |down, right| corner(down, right, &mut off_lattice, &mut len);
         let corners = [number(0, 0), number(0, 1), number(1, 1), number(1, 0)];
         list.push(((row, column), corners));
     }

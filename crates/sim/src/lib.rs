@@ -1,8 +1,9 @@
-//! EvoGym's soft-robot physics: a mass–spring lattice on flat ground, fast, and the same bits on every machine.
+//! EvoGym's soft-robot physics: a mass–spring lattice on flat ground, fast, and the same bits on
+//! every machine.
 //!
-//! A [`Body`] is a grid of voxels: rigid, soft, muscles that oscillate, sensors that follow a pixel each. A [`System`] is
-//! a body under some [`Physics`], a [`World`] simulates it. Neither knows evolution, images, files, clocks or random
-//! numbers.
+//! A [`Body`] is a grid of voxels: rigid, soft, muscles that oscillate, sensors that follow a pixel
+//! each. A [`System`] is a body under some [`Physics`], a [`World`] simulates it. Neither knows
+//! evolution, images, files, clocks or random numbers.
 //!
 //! ```
 //! use morphcog_sim::{Body, Grid, Physics, Start, System, World};
@@ -43,13 +44,15 @@
 //!
 //! # Same bits
 //!
-//! The loops are compiled for several [instruction sets](InstructionSet), and the widest that the machine has is
-//! chosen when the program runs. All of them give the same bits.
+//! The loops are compiled for several [instruction sets](InstructionSet), and the widest that the
+//! machine has is chosen when the program runs. All of them give the same bits.
 //!
-//! Positions are *local*: x is measured from the left edge of the robot's starting box. So a simulation does not depend
-//! on where on the ground the robot stands (but for the pegs below it, which count columns).
+//! Positions are *local*: x is measured from the left edge of the robot's starting box. So a
+//! simulation does not depend on where on the ground the robot stands (but for the pegs below it,
+//! which count columns).
 //!
-//! The rest of this page is the specification, `physics.md`; comments in the code cite its sections.
+//! The rest of this page is the specification, `physics.md`; comments in the code cite its
+//! sections.
 //!
 #![doc = include_str!("../physics.md")]
 

@@ -1,7 +1,7 @@
-//! [`Physics`]: every constant of the simulator, with unit, default and source.
+//! [`Physics`]: every constant of the simulator, with unit, default and section of physics.md.
 
-/// Most substeps in a control step, so that one ends soon enough for whoever waits for it: a body of 64 × 64 voxels takes
-/// about a quarter of a second.
+/// Most substeps in a control step, so that a control step ends soon: a body of 64 × 64 voxels
+/// takes about a quarter of a second.
 pub const MOST_SUBSTEPS: u32 = 1000;
 
 /// Most control steps in an actuation cycle.
@@ -10,26 +10,30 @@ pub const MOST_CYCLE_STEPS: u32 = 100_000;
 /// Highest row of the ground \[grid rows\].
 pub const MOST_ROWS: u32 = 1_000_000;
 
-/// Most voxel lengths that `Physics::blow_up_extent` may be: contacts are looked for in every cell under a voxel.
+/// Most voxel lengths that `Physics::blow_up_extent` may be: contacts are looked for in every cell
+/// under a voxel.
 pub const MOST_CELLS: u32 = 1000;
 
-/// The constants of the physics. Defaults are EvoGym's (simulator v2.2.5), as `physics.md` states them.
+/// The constants of the physics. Defaults are EvoGym's (simulator v2.2.5), as physics.md states
+/// them; the title of its section stands behind each.
 ///
-/// Units: a *world unit* (wu) is ten voxel lengths; masses are in units of a point's mass; a *second* is 10⁴ default
-/// substeps. All of them can be set under `[physics]` in a run config and are recorded with the run.
+/// Units: a *world unit* (wu) is ten voxel lengths; masses are in units of a point's mass; a
+/// *second* is 10⁴ default substeps.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(default, deny_unknown_fields))]
 pub struct Physics {
-    /// Side of a voxel at rest \[wu\]. (physics.md, Units)
+    /// Side of a voxel at rest \[wu\]. (Units)
     pub cell_size: f64,
     /// Mass of every point \[mass\]. (Units)
     pub mass: f64,
-    /// Duration of a substep \[s\]; much above 1e-4 the stiffest springs leave RK4's region of stability. (Units)
+    /// Duration of a substep \[s\]; much above 1e-4 the stiffest springs leave RK4's region of
+    /// stability. (Units)
     pub time_step: f64,
     /// Substeps in a control step. (Units)
     pub substeps: u32,
-    /// Control steps in an actuation cycle; the muscles' sine has this less one as its period. (Units; Actuation)
+    /// Control steps in an actuation cycle; the muscles' sine has this less one as its period.
+    /// (Units; Actuation)
     pub cycle_steps: u32,
 
     /// Stiffness of a rigid voxel's sides \[mass/s²\]. (Points and springs)
@@ -45,7 +49,8 @@ pub struct Physics {
     /// The same for muscles and sensors. (Points and springs)
     pub active_diagonal_ratio: f64,
 
-    /// Least target width of an active voxel \[rest widths\]; targets are clipped to it. (Actuation)
+    /// Least target width of an active voxel \[rest widths\]; targets are clipped to it.
+    /// (Actuation)
     pub target_min: f64,
     /// Greatest target width \[rest widths\]. (Actuation)
     pub target_max: f64,
@@ -61,7 +66,8 @@ pub struct Physics {
     pub sensor_expand_dark: f64,
     /// Change of a sensor's target from a dark to a bright pixel \[rest widths\]. (Actuation)
     pub sensor_swing: f64,
-    /// Share of the way from its present length to its goal that a spring's rest length goes in a substep. (One substep, 2)
+    /// Share of the way from its present length to its goal that a spring's rest length goes in a
+    /// substep. (One substep, 2)
     pub servo_gain: f64,
 
     /// Drag on a point \[mass/s\]. (One substep, 3)
@@ -75,7 +81,8 @@ pub struct Physics {
     pub limit_low: f64,
     /// Share of the excess that the pass removes. (One substep, 4a)
     pub limit_share: f64,
-    /// The same three for the sides of rigid voxels: greatest length \[rest lengths\]. (One substep, 4b)
+    /// The same three for the sides of rigid voxels: greatest length \[rest lengths\]. (One
+    /// substep, 4b)
     pub rigid_limit_high: f64,
     /// Least length of a rigid voxel's sides \[rest lengths\]. (One substep, 4b)
     pub rigid_limit_low: f64,
@@ -99,7 +106,8 @@ pub struct Physics {
 
     /// Top of the ground \[grid rows\]; the ground is one cell thick. (World)
     pub ground_row: u32,
-    /// Every so many columns a peg stands below the ground and covers the underside of a cell. (World)
+    /// Every so many columns a peg stands below the ground and covers the underside of a cell.
+    /// (World)
     pub peg_spacing: u32,
     /// Stiffness of the floor plane at y = 0 \[mass/s²\]. (World)
     pub floor_stiffness: f64,
@@ -108,11 +116,11 @@ pub struct Physics {
     /// Slope of the floor's friction over velocity, per normal force \[s³/(mass·wu²)\]. (World)
     pub floor_slip: f64,
 
-    /// A life is unstable when more ordered pairs of distant surface voxels overlap than this times the number of
-    /// surface voxels. (Instability)
+    /// A simulation is unstable when more ordered pairs of distant surface voxels overlap than this
+    /// times the number of surface voxels. (Instability)
     pub unstable_ratio: f64,
-    /// A voxel wider or higher than this has blown up, and the life is unstable \[wu\]. Ours: EvoGym goes on
-    /// with such numbers; no body that still hangs together comes near.
+    /// A voxel wider or higher than this has blown up, and the simulation is unstable \[wu\]. Ours:
+    /// EvoGym goes on with such numbers; no body that still hangs together comes near.
     pub blow_up_extent: f64,
 }
 
@@ -169,7 +177,7 @@ impl Default for Physics {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{name} = {value}: expected {expected}")]
 pub struct PhysicsError {
-    /// The key under `[physics]`.
+    /// Its name.
     pub name: &'static str,
     /// Its value.
     pub value: f64,

@@ -1,16 +1,17 @@
 //! The same material at a finer time step: [`Physics::refined`].
 //!
-//! What a material does is not what its constants say but what they do together with the time step h. In a substep a spring
-//! of stiffness k and gain g, of length d₀ at its start, pulls with k·(d − d₀) + k·g·(d₀ − goal):
+//! What a material does is not what its constants say but what they do together with the time step
+//! h. In a substep a spring of stiffness k and gain g, of length d₀ at its start, pulls with k·(d −
+//! d₀) + k·g·(d₀ − goal):
 //! - the second term is, substep after substep, a spring of stiffness **k·g** towards the goal;
-//! - the first forgets its length at every substep. Ends that part with speed v are d − d₀ = v·t apart after t, a mean
-//!   pull of k·v·h/2 over the substep: a dashpot of **k·h/2**.
+//! - the first forgets its length at every substep. Ends that part with speed v are d − d₀ = v·t
+//!   apart after t, a mean pull of k·v·h/2 over the substep: a dashpot of **k·h/2**.
 //!
-//! So the modelled material is a Kelvin–Voigt solid, and h/n with k·n and g/n leaves both as they are. (With g/n alone
-//! stiffness and viscosity would both fall with n, and a robot would be another at every time step.)
-//! The length limits remove a share s of an excess per substep; 1 − (1 − s)^(1/n) removes as much in n of them. Drag,
-//! gravity, contacts and the floor are forces already, per time, and stay. Displacements converge as n grows
-//! (`docs/audit.md`).
+//! So the modelled material is a Kelvin–Voigt solid, and h/n with k·n and g/n leaves both as they
+//! are. (With g/n alone stiffness and viscosity would both fall with n, and a robot would be
+//! another at every time step.) The length limits remove a share s of an excess per substep; 1 − (1
+//! − s)^(1/n) removes as much in n of them. Drag, gravity, contacts and the floor are forces
+//! already, per time, and stay. Displacements converge as n grows (`docs/audit.md`).
 
 use crate::physics::Physics;
 
@@ -20,7 +21,8 @@ fn spread_out(share: f64, by: f64) -> f64 {
 }
 
 impl Physics {
-    /// The same material and world with `by` substeps for each one: the time step is so much shorter.
+    /// The same material and world with `by` substeps for each one: the time step is so much
+    /// shorter.
     #[must_use]
     pub fn refined(&self, by: u32) -> Self {
         let n = f64::from(by.max(1));
@@ -53,8 +55,8 @@ impl Physics {
         }
     }
 
-    /// Length limits of soft and active voxels beyond every goal of their springs, so that none is held at a limit against its
-    /// goal, and given energy there.
+    /// Length limits of soft and active voxels beyond every goal of their springs, so that none is
+    /// held at a limit against its goal, and given energy there.
     #[must_use]
     pub fn without_limits(&self) -> Self {
         Physics {

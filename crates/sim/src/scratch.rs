@@ -2,9 +2,9 @@
 
 use crate::simd::{BLOCK, Buffer};
 use crate::state::{Pair, State, pair};
-use crate::step::broad_phase::Neighbours;
+use crate::step::broad_phase::BroadPhase;
 use crate::step::limits::Reach;
-use crate::step::off_lattice::{Extra, GROUP};
+use crate::step::off_lattice::{GROUP, OffLattice};
 use crate::step::springs::{Pulls, Springs, Wide};
 use crate::system::System;
 
@@ -24,13 +24,13 @@ pub(crate) struct Work {
 /// Memory of a substep, allocated once.
 #[derive(Clone, Debug)]
 pub(crate) struct Scratch {
-    /// Goal lengths [wu]: horizontal springs by slot, then extra springs.
+    /// Goal lengths [wu]: horizontal springs by slot, then off-lattice springs.
     pub goals: Buffer,
     /// By blocks.
     pub springs: Vec<Springs>,
     pub work: Vec<Work>,
     /// See [`Gather`](crate::step::springs::Gather).
-    pub passing: Pair,
+    pub carry: Pair,
     /// Contact force per point [mass·wu/s²].
     pub contact: Pair,
     /// Positions of the second, third and fourth stage.
@@ -38,44 +38,45 @@ pub(crate) struct Scratch {
     /// New positions and velocities.
     pub position: Pair,
     pub velocity: Pair,
-    pub extra: Option<Extra>,
+    pub off_lattice: Option<OffLattice>,
     /// Whether the springs' lengths are forgotten.
     pub anew: bool,
     /// What the latest length limits had to reckon with.
     pub reach: Reach,
     /// Which contacts are possible.
-    pub neighbours: Neighbours,
+    pub broad_phase: BroadPhase,
 }
 
 impl Scratch {
     pub fn new(System { lattice, physics }: &System, state: &State) -> Self {
         let horizontal = (0..lattice.len).map(|_| physics.cell_size);
-        let extra = lattice.extra_springs.iter().map(|spring| spring.length);
+        let off_lattice = lattice.off_lattice_springs.iter().map(|spring| spring.length);
         let padding = [physics.cell_size; GROUP];
         let zeros = [[0.0; BLOCK]; 2];
         let work = Work { pulls: Pulls::ZERO, load: zeros, first: zeros, second: zeros, third: zeros };
         // Slots without a point stay where they are parked.
         let parked = || state.position.clone();
         Scratch {
-            goals: horizontal.chain(extra).chain(padding).collect(),
+            goals: horizontal.chain(off_lattice).chain(padding).collect(),
             springs: Springs::blocks(&lattice.stiffness, physics.mass, physics.servo_gain),
             work: vec![work; lattice.slots / BLOCK],
-            passing: pair(lattice.len),
+            carry: pair(lattice.len),
             contact: pair(lattice.len),
             stages: [parked(), parked(), parked()],
             position: parked(),
             velocity: pair(lattice.len),
-            extra: Extra::new(lattice, physics.mass, physics.servo_gain),
+            off_lattice: OffLattice::new(lattice, physics.mass, physics.servo_gain),
             anew: true,
             reach: Reach::default(),
-            neighbours: Neighbours::default(),
+            broad_phase: BroadPhase::default(),
         }
     }
 
-    /// At the start of a control step: what a substep leaves to the next but is not part of the state.
+    /// At the start of a control step: what a substep leaves to the next but is not part of the
+    /// state.
     pub fn begin(&mut self) {
         self.anew = true;
         self.springs.iter_mut().for_each(Springs::forget);
-        self.extra.iter_mut().for_each(Extra::forget);
+        self.off_lattice.iter_mut().for_each(OffLattice::forget);
     }
 }

@@ -3,7 +3,8 @@
 use crate::simd::Buffer;
 use crate::system::System;
 
-/// Height at which slots without a point are parked [wu]: out of every point's way, and above the floor.
+/// Height at which slots without a point are parked [wu]: out of every point's way, and above the
+/// floor.
 const PARKED: f64 = 1e6;
 
 /// The two axes, as indices of a [`Pair`].
@@ -30,8 +31,8 @@ pub(crate) fn pair(len: usize) -> Pair {
     [Buffer::zeros(len), Buffer::zeros(len)]
 }
 
-/// What a simulation must remember: 48 bytes a point and the clock. Going on from a [restored](crate::World::restore)
-/// state is bit for bit the same as not having stopped.
+/// What a simulation must remember: 48 bytes a point and the clock. Going on from a
+/// [restored](crate::World::restore) state is bit for bit the same as not having stopped.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct State {
@@ -39,9 +40,10 @@ pub struct State {
     pub(crate) position: Pair,
     /// Integrated velocities \[wu/s\].
     pub(crate) velocity: Pair,
-    /// Positions at the end of the previous substep \[wu\]: the *true* velocity is (x − previous x) / dt.
+    /// Positions at the end of the previous substep \[wu\]: the *true* velocity is (x − previous x)
+    /// / dt.
     pub(crate) previous: Pair,
-    /// Control steps lived: the muscles' clock.
+    /// Control steps done: the muscles' clock.
     pub(crate) control_step: u64,
 }
 

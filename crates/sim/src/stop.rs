@@ -1,5 +1,5 @@
-//! Stopping what computes for long: a flag that a signal, or whoever else asked for the work, sets; and [`Stopped`], what the
-//! work then ends with, so that nobody takes what is unfinished for a result.
+//! Stopping what computes for long: a flag that may be set at any time, and [`Stopped`],
+//! which the work then ends with, so that what is unfinished is not taken for a result.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 

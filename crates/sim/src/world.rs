@@ -1,4 +1,4 @@
-//! [`World`]: one life of one robot on flat ground.
+//! [`World`]: one simulation of one robot on flat ground.
 
 use crate::energy::{Energy, Meter};
 use crate::grid::Grid;
@@ -11,7 +11,8 @@ use crate::system::System;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-/// Where a life begins: the grid cell of the lower left corner of the body's box (empty rows and columns count).
+/// Where a simulation begins: the grid cell of the lower left corner of the body's box (empty rows
+/// and columns count).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Start {
     /// Column \[voxels\]. Nothing depends on it but the places of the pegs below the ground.
@@ -20,7 +21,7 @@ pub struct Start {
     pub row: u32,
 }
 
-/// How a life became unstable.
+/// How a simulation became unstable.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum UnstableReason {
     /// Too many distant surface voxels overlap (EvoGym's criterion).
@@ -29,7 +30,7 @@ pub enum UnstableReason {
     BlownUp,
 }
 
-/// A life ended because it became unstable; it has no displacement.
+/// A simulation became unstable: it ended there, and has no displacement.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("unstable in control step {control_step}: {}", match reason {
     UnstableReason::Overlaps => "too many surface voxels overlap",
@@ -98,18 +99,19 @@ impl World {
         self
     }
 
-    /// Energies put in so far, all lives together; 0 without a meter.
+    /// Energies put in so far, resets included; 0 without a meter.
     pub fn energy(&self) -> Energy {
         self.meter.as_ref().map_or_else(Energy::default, |meter| meter.energy)
     }
 
-    /// Begins the life anew; the stimulus stays.
+    /// Begins anew; the stimulus stays.
     pub fn reset(&mut self) {
         self.state = State::at_rest(&self.system, self.start.row);
         self.meter.iter_mut().for_each(Meter::rest);
     }
 
-    /// Shows an image: H × W in [0, 1], pixel (row, column) to voxel (row, column); outside it is dark.
+    /// Shows an image: H × W in [0, 1], pixel (row, column) to voxel (row, column); outside it is
+    /// dark.
     pub fn set_stimulus(&mut self, stimulus: &Grid<f64>) {
         for (voxel, pixel) in self.system.lattice.active.iter().zip(&mut self.pixels) {
             let (row, column) = voxel.place;
@@ -120,7 +122,7 @@ impl World {
     /// One control step.
     ///
     /// # Errors
-    /// [`Unstable`] if the life ends in it; the state is then of no use.
+    /// [`Unstable`] if the simulation ends in it; the state is then of no use.
     pub fn step(&mut self) -> Result<(), Unstable> {
         self.step_unless(&NEVER).expect("nobody sets NEVER")
     }
@@ -128,7 +130,8 @@ impl World {
     /// One control step, which ends within a substep or two when `stop` is set.
     ///
     /// # Errors
-    /// [`Stopped`] then; within, [`Unstable`] if the life ends in it. The state is of no use in either case.
+    /// [`Stopped`] then; within, [`Unstable`] if the simulation ends in it. The state is of no use
+    /// in either case.
     pub fn step_unless(&mut self, stop: &AtomicBool) -> Result<Result<(), Unstable>, Stopped> {
         let (system, control_step) = (&*self.system, self.state.control_step);
         self.scratch.begin();
@@ -151,13 +154,13 @@ impl World {
         Ok(Ok(()))
     }
 
-    /// Control steps lived.
+    /// Control steps done.
     pub fn control_step(&self) -> u64 {
         self.state.control_step
     }
 
-    /// Centre of mass [x, y] in world units: x from the left edge of the starting box, y from the floor plane. The
-    /// unweighted mean of the points.
+    /// Centre of mass [x, y] in world units: x from the left edge of the starting box, y from the
+    /// floor plane. The unweighted mean of the points.
     pub fn centre_of_mass(&self) -> [f64; 2] {
         let points = &self.system.lattice.points;
         let count = points.len().max(1) as f64;
@@ -165,14 +168,15 @@ impl World {
         [mean(&self.state.position[X]), mean(&self.state.position[Y])]
     }
 
-    /// All points [x, y] in world units (as [`World::centre_of_mass`]), in EvoGym's order of creation.
+    /// All points [x, y] in world units (as [`World::centre_of_mass`]), in EvoGym's order of
+    /// creation.
     pub fn points(&self) -> impl Iterator<Item = [f64; 2]> + '_ {
         let [x, y] = &self.state.position;
         self.system.lattice.points.iter().map(|&(point, _)| [x[point], y[point]])
     }
 
-    /// Every non-empty voxel's (row, column) and its corners (top left, top right, bottom right, bottom left) as
-    /// indices into [`World::points`].
+    /// Every non-empty voxel's (row, column) and its corners (top left, top right, bottom right,
+    /// bottom left) as indices into [`World::points`].
     pub fn voxels(&self) -> impl Iterator<Item = ((usize, usize), [usize; 4])> + '_ {
         let lattice = &self.system.lattice;
         let mut order = vec![0; lattice.len];
@@ -196,5 +200,41 @@ impl World {
         self.state.clone_from(state);
         self.meter.iter_mut().for_each(Meter::rest);
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Physics;
+
+    fn world(body: &str) -> World {
+        let system = System::new(&body.parse().expect("a body"), Physics::default());
+        World::new(system, Start { column: 0, row: 2 })
+    }
+
+    #[test]
+    fn a_simulation_goes_on_from_a_restored_state_with_the_same_bits() {
+        let body = "4663/4005/3350/0333";
+        let (mut ours, mut other) = (world(body), world(body));
+        (0..30).for_each(|_| ours.step().unwrap());
+        let state = ours.state().clone();
+        #[cfg(feature = "serde")]
+        let state: State = serde_json::from_str(&serde_json::to_string(&state).unwrap()).unwrap();
+        // Wherever the other has been meanwhile.
+        (0..7).for_each(|_| other.step().unwrap());
+        other.restore(&state).unwrap();
+        (0..30).for_each(|_| ours.step().unwrap());
+        (0..30).for_each(|_| other.step().unwrap());
+        assert_eq!(ours.control_step(), 60);
+        assert_eq!(ours.state(), other.state());
+    }
+
+    #[test]
+    fn the_state_of_another_body_is_refused() {
+        let (mut ours, other) = (world("343"), world("343/343"));
+        let before = ours.state().clone();
+        assert_eq!(ours.restore(other.state()), Err(StateMismatch));
+        assert_eq!(ours.state(), &before);
     }
 }

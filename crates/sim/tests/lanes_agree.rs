@@ -1,4 +1,4 @@
-//! Same bits: every instruction set of this machine gives the same life.
+//! Same bits: every instruction set of this machine gives the same simulation.
 
 mod common;
 
@@ -6,18 +6,18 @@ use common::references;
 use morphcog_sim::{InstructionSet, Physics};
 
 #[test]
-fn whole_lives_are_bitwise_equal_on_every_instruction_set() {
+fn whole_simulations_are_bitwise_equal_on_every_instruction_set() {
     let physics = Physics::default();
     let sets: Vec<_> = InstructionSet::ALL.into_iter().filter(|set| set.is_available()).collect();
     println!("instruction sets of this machine: {sets:?}");
-    for life in references() {
-        let world = life.world(&physics);
+    for reference in references() {
+        let world = reference.world(&physics);
         let end = |set| {
             let mut world = world.clone().with_instructions(set);
-            let outcome = (0..life.control_steps).try_for_each(|_| world.step());
+            let outcome = (0..reference.control_steps).try_for_each(|_| world.step());
             (outcome, world.points().map(|p| p.map(f64::to_bits)).collect::<Vec<_>>())
         };
         let first = end(sets[0]);
-        assert!(sets[1..].iter().all(|&set| end(set) == first), "{}", life.name);
+        assert!(sets[1..].iter().all(|&set| end(set) == first), "{}", reference.name);
     }
 }

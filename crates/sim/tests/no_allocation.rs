@@ -1,4 +1,4 @@
-//! Simulating asks for no memory: what a life needs is there from its first control steps on.
+//! Simulating asks for no memory: what a simulation needs is there from its first control steps on.
 
 mod common;
 
@@ -11,12 +11,12 @@ const WARM_UP: u64 = 200;
 #[test]
 fn a_control_step_allocates_nothing() {
     let physics = Physics::default();
-    for life in references() {
-        let mut world = life.world(&physics);
-        if (0..WARM_UP.min(life.control_steps)).try_for_each(|_| world.step()).is_err() {
+    for reference in references() {
+        let mut world = reference.world(&physics);
+        if (0..WARM_UP.min(reference.control_steps)).try_for_each(|_| world.step()).is_err() {
             continue;
         }
         let info = allocation_counter::measure(|| (0..100).for_each(|_| world.step().unwrap_or(())));
-        assert_eq!(info.count_total, 0, "{}: {info:?}", life.name);
+        assert_eq!(info.count_total, 0, "{}: {info:?}", reference.name);
     }
 }

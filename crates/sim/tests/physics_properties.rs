@@ -20,8 +20,8 @@ fn stimuli(body: Body) -> impl Strategy<Value = (Body, Grid<f64>)> {
         .prop_map(move |pixels| (body.clone(), Grid::from_fn(height, width, |r, c| pixels[r * width + c])))
 }
 
-/// Ends of a life: centre of mass before and after each control step.
-fn live(
+/// A simulation: centre of mass before and after each control step.
+fn simulate(
     body: &Body,
     stimulus: &Grid<f64>,
     start: Start,
@@ -39,14 +39,16 @@ fn live(
 }
 
 const ALL: &[Material] = &Material::ALL;
-/// Bodies whose physics has no left and right: without rigid voxels (their pass has a direction), without soft ones
-/// (of soft and active the later one wins) and without corner-only contacts (they start with two edges at distance 0 from
-/// a point, of which the first in the order top, right, bottom, left counts).
+/// Bodies whose physics has no left and right: without rigid voxels (their pass has a direction),
+/// without soft ones (of soft and active the later one wins) and without corner-only contacts (they
+/// start with two edges at distance 0 from a point, of which the first in the order top, right,
+/// bottom, left counts).
 fn symmetric_bodies() -> impl Strategy<Value = Body> {
     let filled = bodies(ACTIVE_OR_EMPTY, 7).prop_map(|body| {
         let mut voxels = body.voxels().clone();
         let empty = |g: &Grid<Material>, r, c| g[(r, c)].is_empty();
-        // Filling a gap may make a new corner-only contact above or to the left, so until nothing changes.
+        // Filling a gap may make a new corner-only contact above or to the left, so until nothing
+        // changes.
         loop {
             let before = voxels.clone();
             for r in 1..voxels.height() {
@@ -90,14 +92,14 @@ proptest! {
     fn the_mirror_image_walks_the_mirrored_way(
         (body, stimulus) in symmetric_bodies().prop_flat_map(stimuli)
     ) {
-        // A symmetric robot falls with its middle exactly on a vertex of the ground, and rounding then decides
-        // on which side it first touches (physics.md, "Measured").
+        // A symmetric robot falls with its middle exactly on a vertex of the ground, and rounding
+        // then decides on which side it first touches (physics.md, "Measured").
         prop_assume!(voxels(&body, &stimulus) != voxels(&body.mirrored(), &stimulus.mirrored()));
         let physics = Physics::default();
         let start = Start { column: 0, row: 3 };
         // A peg's column is not symmetric, but reached only by tunnelling.
-        let ours = live(&body, &stimulus, start, 60, &physics);
-        let mirrored = live(&body.mirrored(), &stimulus.mirrored(), start, 60, &physics);
+        let ours = simulate(&body, &stimulus, start, 60, &physics);
+        let mirrored = simulate(&body.mirrored(), &stimulus.mirrored(), start, 60, &physics);
         match (ours, mirrored) {
             (Ok(ours), Ok(mirrored)) => {
                 let walked = |path: &[[f64; 2]]| path[60][0] - path[0][0];
@@ -116,7 +118,7 @@ proptest! {
         row in 2u32..4,
     ) {
         let physics = Physics::default();
-        let at = |column| live(&body, &stimulus, Start { column, row }, 40, &physics);
+        let at = |column| simulate(&body, &stimulus, Start { column, row }, 40, &physics);
         prop_assert_eq!(at(0), at(6 * column));
     }
 
@@ -126,7 +128,7 @@ proptest! {
     ) {
         // Without self-contact: the voxels may touch, but nothing comes of it.
         let physics = Physics { self_contact_weight: 0.0, ..Physics::default() };
-        if let Ok(path) = live(&body, &stimulus, Start { column: 0, row: 200 }, 30, &physics) {
+        if let Ok(path) = simulate(&body, &stimulus, Start { column: 0, row: 200 }, 30, &physics) {
             for [x, _] in &path {
                 prop_assert!((x - path[0][0]).abs() < 1e-9, "{} to {x}", path[0][0]);
             }
@@ -159,16 +161,16 @@ proptest! {
         time_step in prop::sample::select(vec![1e-3, 1e-2, 1.0, 1e6, 1e150]),
     ) {
         let physics = Physics { time_step, ..Physics::default() };
-        let end = live(&body, &stimulus, Start { column: 0, row: 2 }, 20, &physics);
+        let end = simulate(&body, &stimulus, Start { column: 0, row: 2 }, 20, &physics);
         prop_assert!(end.is_err_and(|end| end.control_step < 20), "{time_step}: it went on");
     }
 }
 
 #[test]
-fn a_large_body_of_every_material_lives() {
+fn a_large_body_of_every_material_stays_stable() {
     let body = Body::new(Grid::from_fn(28, 28, |r, c| Material::ALL[(r * 5 + c * 3) % 6 + 1])).unwrap();
     let stimulus = Grid::from_fn(28, 28, |r, c| f64::from(u8::from((r + c) % 2 == 0)));
-    let path = live(&body, &stimulus, Start { column: 0, row: 2 }, 20, &Physics::default()).unwrap();
+    let path = simulate(&body, &stimulus, Start { column: 0, row: 2 }, 20, &Physics::default()).unwrap();
     assert!(path.iter().flatten().all(|v| v.is_finite()));
 }
 
@@ -176,5 +178,5 @@ fn a_large_body_of_every_material_lives() {
 fn an_empty_body_does_not_panic() {
     let body = Body::new(Grid::filled(3, 3, Material::Empty)).unwrap();
     let stimulus = Grid::filled(3, 3, 1.0);
-    assert!(live(&body, &stimulus, Start { column: 0, row: 2 }, 5, &Physics::default()).is_ok());
+    assert!(simulate(&body, &stimulus, Start { column: 0, row: 2 }, 5, &Physics::default()).is_ok());
 }

@@ -32,8 +32,9 @@ impl Deref for Buffer {
     #[inline(always)]
     #[allow(unsafe_code)]
     fn deref(&self) -> &[f64] {
-        // SAFETY: a block is BLOCK numbers without padding (repr(C); its size is its alignment), the blocks lie side
-        // by side, and `len` is at most their number times BLOCK from the start on.
+        // SAFETY: a block is BLOCK numbers without padding (repr(C); its size is its alignment),
+        // the blocks lie side by side, and `len` is at most their number times BLOCK from the start
+        // on.
         unsafe { std::slice::from_raw_parts(self.blocks.as_ptr().cast(), self.len) }
     }
 }

@@ -2,8 +2,8 @@
 
 use super::each;
 
-/// Whether the target has an instruction for it: then the compiler uses that for [`f64::mul_add`], else it calls a
-/// function that is slow.
+/// Whether the target has an instruction for it: then the compiler uses that for [`f64::mul_add`],
+/// else it calls a function that is slow.
 const NATIVE: bool = cfg!(any(target_arch = "aarch64", target_feature = "fma"));
 
 /// a · b + c, rounded once.
@@ -35,7 +35,8 @@ fn extraordinary(a: [f64; 4], b: [f64; 4], c: [f64; 4]) -> [f64; 4] {
     each!(i in [0, 1, 2, 3] => a[i].mul_add(b[i], c[i]))
 }
 
-/// Boldo and Melquiond (2008), "Emulation of a FMA and correctly rounded sums: proved algorithms using rounding to odd".
+/// Boldo and Melquiond (2008), "Emulation of a FMA and correctly rounded sums: proved algorithms
+/// using rounding to odd".
 #[inline(always)]
 fn emulated(a: f64, b: f64, c: f64) -> f64 {
     let (product, rest) = exact_product(a, b);

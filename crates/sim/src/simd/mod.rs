@@ -1,10 +1,12 @@
-//! Wide lanes: numerical loops written once, compiled for every instruction set, chosen when the program runs.
+//! Wide lanes: numerical loops written once, compiled for every instruction set, chosen when the
+//! program runs.
 //!
-//! A loop is a [`Kernel`] that is generic over [`Lanes`], a few `f64` side by side. [`dispatch`] runs it with the
-//! widest lanes that the machine has. Every operation of [`Lanes`] is one of IEEE 754's, exactly rounded (products and
-//! sums are fused where the loop says so, and nowhere else), and lanes never mix but in [`Lanes::after`]. So every
-//! instruction set gives the same bits (`tests/lanes_agree.rs`). On the few x86-64 machines that cannot fuse (before
-//! 2013, and some small ones since) it is worked out exactly, slowly.
+//! A loop is a [`Kernel`] that is generic over [`Lanes`], a few `f64` side by side. [`dispatch`]
+//! runs it with the widest lanes that the machine has. Every operation of [`Lanes`] is one of IEEE
+//! 754's, exactly rounded (products and sums are fused where the loop says so, and nowhere else),
+//! and lanes never mix but in [`Lanes::shift_in`]. So every instruction set gives the same bits
+//! (`tests/lanes_agree.rs`). On the few x86-64 machines that cannot fuse (before 2013, and some
+//! small ones since) it is worked out exactly, slowly.
 
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Sub};
 use std::sync::OnceLock;
@@ -17,7 +19,8 @@ mod x86;
 
 pub use buffer::Buffer;
 
-/// The number of lanes that the width of all lane types divides: loops over a multiple of it need no remainder.
+/// The number of lanes that the width of all lane types divides: loops over a multiple of it need
+/// no remainder.
 pub const BLOCK: usize = 8;
 
 /// An instruction set that the numerical loops exist for.
@@ -108,7 +111,8 @@ pub trait Lanes:
     fn mul_sub_from(self, factor: Self, more: Self) -> Self;
     /// self · factor − less, rounded once.
     fn mul_sub(self, factor: Self, less: Self) -> Self;
-    /// The bits that both have: with a number of all bits but the sign's, the absolute value; with 0, 0.
+    /// The bits that both have: with a number of all bits but the sign's, the absolute value; with
+    /// 0, 0.
     fn bits_and(self, other: Self) -> Self;
     /// Square root.
     fn sqrt(self) -> Self;
@@ -116,23 +120,26 @@ pub trait Lanes:
     fn abs(self) -> Self;
     /// self > other ? self : other (so `other` where one is no number).
     fn max(self, other: Self) -> Self;
-    /// The greater absolute value; no number where either is none, so that what is no number is not lost in a maximum
-    /// over many. (Without their sign, the bits of numbers are in the order of the numbers, with NaN last.)
+    /// The greater absolute value; no number where either is none, so that what is no number is not
+    /// lost in a maximum over many. (Without their sign, the bits of numbers are in the order of
+    /// the numbers, with NaN last.)
     fn max_abs(self, other: Self) -> Self;
     /// Lanes in which self > other (false where one is no number).
-    fn above(self, other: Self) -> Self::Mask;
+    fn gt(self, other: Self) -> Self::Mask;
     /// Where the mask holds `self`, elsewhere `other`.
     fn or_else(self, mask: Self::Mask, other: Self) -> Self;
     /// Whether a mask holds in any lane.
     fn any(mask: Self::Mask) -> bool;
     /// Whether a mask holds in all lanes.
     fn all(mask: Self::Mask) -> bool;
-    /// The lanes moved up by one; the lowest is the last of `previous`: what `load` gives one place earlier.
-    fn after(self, previous: Self) -> Self;
+    /// The lanes moved up by one; the lowest is the last of `previous`: what `load` gives one place
+    /// earlier.
+    fn shift_in(self, previous: Self) -> Self;
 }
 
-/// An array of an expression for some indices, `each!(i in [0, 1] => a[i] + b[i])`. Unlike `array::map` it leaves nothing
-/// for the compiler to inline: a closure that it does not inline would be compiled without wide instructions.
+/// An array of an expression for some indices, `each!(i in [0, 1] => a[i] + b[i])`. Unlike
+/// `array::map` it leaves nothing for the compiler to inline: a closure that it does not inline
+/// would be compiled without wide instructions.
 macro_rules! each {
     ($index:ident in [$($value:expr),*] => $expression:expr) => {
         [$({
@@ -143,8 +150,8 @@ macro_rules! each {
 }
 pub(crate) use each;
 
-/// A numerical loop to be compiled for every instruction set. `run` must be `#[inline(always)]`, and so must
-/// all that is to be vectorised below it.
+/// A numerical loop to be compiled for every instruction set. `run` must be `#[inline(always)]`,
+/// and so must all that is to be vectorised below it.
 pub trait Kernel {
     /// What it computes.
     type Output;
@@ -163,7 +170,7 @@ pub fn dispatch<K: Kernel>(set: InstructionSet, kernel: K) -> K::Output {
         InstructionSet::Avx2 if set.is_available() => return unsafe { x86::avx2(kernel) },
         _ => {}
     }
-    kernel.run::<portable::Few>()
+    kernel.run::<portable::F64x4>()
 }
 
 #[cfg(test)]

@@ -1,5 +1,6 @@
-//! Lanes of x86-64. Values of these types are only made inside [`avx2`] and [`avx512`], which `dispatch` calls
-//! only where the processor has the instructions; that is what makes the calls below sound.
+//! Lanes of x86-64. Values of these types are only made inside [`avx2`] and [`avx512`], which
+//! `dispatch` calls only where the processor has the instructions; that is what makes the calls
+//! below sound.
 #![allow(unsafe_code)]
 
 use super::{Kernel, Lanes};
@@ -8,29 +9,29 @@ use std::ops::{Add, BitAnd, BitOr, Div, Mul, Sub};
 
 #[target_feature(enable = "avx512f,avx512dq,avx2,fma")]
 pub(super) fn avx512<K: Kernel>(kernel: K) -> K::Output {
-    kernel.run::<Eight>()
+    kernel.run::<F64x8>()
 }
 
 #[target_feature(enable = "avx2,fma")]
 pub(super) fn avx2<K: Kernel>(kernel: K) -> K::Output {
-    kernel.run::<Four>()
+    kernel.run::<F64x4>()
 }
 
-/// Four lanes (AVX2).
+/// F64x4 lanes (AVX2).
 #[derive(Clone, Copy)]
-pub(super) struct Four(__m256d);
+pub(super) struct F64x4(__m256d);
 
-/// Truth of four lanes: all bits of a lane, or none.
+/// Mask of four lanes: all bits of a lane, or none.
 #[derive(Clone, Copy)]
-pub(super) struct FourTruths(__m256d);
+pub(super) struct Mask4(__m256d);
 
-/// Eight lanes (AVX-512).
+/// F64x8 lanes (AVX-512).
 #[derive(Clone, Copy)]
-pub(super) struct Eight(__m512d);
+pub(super) struct F64x8(__m512d);
 
-/// Truth of eight lanes: a bit each.
+/// Mask of eight lanes: a bit each.
 #[derive(Clone, Copy)]
-pub(super) struct EightTruths(__mmask8);
+pub(super) struct Mask8(__mmask8);
 
 macro_rules! operators {
     ($lanes:ident: $($operator:ident $method:ident $instruction:ident),*) => {$(
@@ -44,41 +45,41 @@ macro_rules! operators {
         }
     )*};
 }
-operators!(Four: Add add _mm256_add_pd, Sub sub _mm256_sub_pd, Mul mul _mm256_mul_pd, Div div _mm256_div_pd);
-operators!(Eight: Add add _mm512_add_pd, Sub sub _mm512_sub_pd, Mul mul _mm512_mul_pd, Div div _mm512_div_pd);
-operators!(FourTruths: BitAnd bitand _mm256_and_pd, BitOr bitor _mm256_or_pd);
+operators!(F64x4: Add add _mm256_add_pd, Sub sub _mm256_sub_pd, Mul mul _mm256_mul_pd, Div div _mm256_div_pd);
+operators!(F64x8: Add add _mm512_add_pd, Sub sub _mm512_sub_pd, Mul mul _mm512_mul_pd, Div div _mm512_div_pd);
+operators!(Mask4: BitAnd bitand _mm256_and_pd, BitOr bitor _mm256_or_pd);
 
-impl BitAnd for EightTruths {
+impl BitAnd for Mask8 {
     type Output = Self;
     #[inline(always)]
     fn bitand(self, other: Self) -> Self {
-        EightTruths(self.0 & other.0)
+        Mask8(self.0 & other.0)
     }
 }
 
-impl BitOr for EightTruths {
+impl BitOr for Mask8 {
     type Output = Self;
     #[inline(always)]
     fn bitor(self, other: Self) -> Self {
-        EightTruths(self.0 | other.0)
+        Mask8(self.0 | other.0)
     }
 }
 
-impl Lanes for Four {
-    type Mask = FourTruths;
+impl Lanes for F64x4 {
+    type Mask = Mask4;
     const WIDTH: usize = 4;
 
     #[inline(always)]
     fn splat(value: f64) -> Self {
         // SAFETY: the processor has the instruction (see the module).
-        unsafe { Four(_mm256_set1_pd(value)) }
+        unsafe { F64x4(_mm256_set1_pd(value)) }
     }
 
     #[inline(always)]
     fn load(from: &[f64], at: usize) -> Self {
         let from = &from[at..at + 4];
         // SAFETY: four values were just found to be there; loads need no alignment.
-        unsafe { Four(_mm256_loadu_pd(from.as_ptr())) }
+        unsafe { F64x4(_mm256_loadu_pd(from.as_ptr())) }
     }
 
     #[inline(always)]
@@ -91,43 +92,43 @@ impl Lanes for Four {
     #[inline(always)]
     fn mul_add(self, factor: Self, more: Self) -> Self {
         // SAFETY: the processor has the instruction (see the module).
-        unsafe { Four(_mm256_fmadd_pd(self.0, factor.0, more.0)) }
+        unsafe { F64x4(_mm256_fmadd_pd(self.0, factor.0, more.0)) }
     }
 
     #[inline(always)]
     fn mul_sub_from(self, factor: Self, more: Self) -> Self {
         // SAFETY: the processor has the instruction (see the module).
-        unsafe { Four(_mm256_fnmadd_pd(self.0, factor.0, more.0)) }
+        unsafe { F64x4(_mm256_fnmadd_pd(self.0, factor.0, more.0)) }
     }
 
     #[inline(always)]
     fn mul_sub(self, factor: Self, less: Self) -> Self {
         // SAFETY: the processor has the instruction (see the module).
-        unsafe { Four(_mm256_fmsub_pd(self.0, factor.0, less.0)) }
+        unsafe { F64x4(_mm256_fmsub_pd(self.0, factor.0, less.0)) }
     }
 
     #[inline(always)]
     fn bits_and(self, other: Self) -> Self {
         // SAFETY: the processor has the instruction (see the module).
-        unsafe { Four(_mm256_and_pd(self.0, other.0)) }
+        unsafe { F64x4(_mm256_and_pd(self.0, other.0)) }
     }
 
     #[inline(always)]
     fn sqrt(self) -> Self {
         // SAFETY: the processor has the instruction (see the module).
-        unsafe { Four(_mm256_sqrt_pd(self.0)) }
+        unsafe { F64x4(_mm256_sqrt_pd(self.0)) }
     }
 
     #[inline(always)]
     fn abs(self) -> Self {
         // SAFETY: the processor has the instructions (see the module).
-        unsafe { Four(_mm256_andnot_pd(_mm256_set1_pd(-0.0), self.0)) }
+        unsafe { F64x4(_mm256_andnot_pd(_mm256_set1_pd(-0.0), self.0)) }
     }
 
     #[inline(always)]
     fn max(self, other: Self) -> Self {
         // SAFETY: the processor has the instruction (see the module).
-        unsafe { Four(_mm256_max_pd(self.0, other.0)) }
+        unsafe { F64x4(_mm256_max_pd(self.0, other.0)) }
     }
 
     #[inline(always)]
@@ -136,60 +137,61 @@ impl Lanes for Four {
         // SAFETY: the processor has the instructions (see the module).
         unsafe {
             let greater = _mm256_cmpgt_epi64(_mm256_castpd_si256(a), _mm256_castpd_si256(b));
-            Four(_mm256_blendv_pd(b, a, _mm256_castsi256_pd(greater)))
+            F64x4(_mm256_blendv_pd(b, a, _mm256_castsi256_pd(greater)))
         }
     }
 
     #[inline(always)]
-    fn above(self, other: Self) -> FourTruths {
+    fn gt(self, other: Self) -> Mask4 {
         // SAFETY: the processor has the instruction (see the module).
-        unsafe { FourTruths(_mm256_cmp_pd::<_CMP_GT_OQ>(self.0, other.0)) }
+        unsafe { Mask4(_mm256_cmp_pd::<_CMP_GT_OQ>(self.0, other.0)) }
     }
 
     #[inline(always)]
-    fn or_else(self, mask: FourTruths, other: Self) -> Self {
+    fn or_else(self, mask: Mask4, other: Self) -> Self {
         // SAFETY: the processor has the instruction (see the module).
-        unsafe { Four(_mm256_blendv_pd(other.0, self.0, mask.0)) }
+        unsafe { F64x4(_mm256_blendv_pd(other.0, self.0, mask.0)) }
     }
 
     #[inline(always)]
-    fn any(mask: FourTruths) -> bool {
+    fn any(mask: Mask4) -> bool {
         // SAFETY: the processor has the instruction (see the module).
         unsafe { _mm256_movemask_pd(mask.0) != 0 }
     }
 
     #[inline(always)]
-    fn all(mask: FourTruths) -> bool {
+    fn all(mask: Mask4) -> bool {
         // SAFETY: the processor has the instruction (see the module).
         unsafe { _mm256_movemask_pd(mask.0) == 0b1111 }
     }
 
     #[inline(always)]
-    fn after(self, previous: Self) -> Self {
+    fn shift_in(self, previous: Self) -> Self {
         // SAFETY: the processor has the instructions (see the module).
         unsafe {
-            // [previous 2, previous 3, self 0, self 1], then the odd ones of it before the even ones of self.
+            // [previous 2, previous 3, self 0, self 1], then the odd ones of it before the even
+            // ones of self.
             let middle = _mm256_permute2f128_pd::<0x21>(previous.0, self.0);
-            Four(_mm256_shuffle_pd::<0b0101>(middle, self.0))
+            F64x4(_mm256_shuffle_pd::<0b0101>(middle, self.0))
         }
     }
 }
 
-impl Lanes for Eight {
-    type Mask = EightTruths;
+impl Lanes for F64x8 {
+    type Mask = Mask8;
     const WIDTH: usize = 8;
 
     #[inline(always)]
     fn splat(value: f64) -> Self {
         // SAFETY: the processor has the instruction (see the module).
-        unsafe { Eight(_mm512_set1_pd(value)) }
+        unsafe { F64x8(_mm512_set1_pd(value)) }
     }
 
     #[inline(always)]
     fn load(from: &[f64], at: usize) -> Self {
         let from = &from[at..at + 8];
         // SAFETY: eight values were just found to be there; loads need no alignment.
-        unsafe { Eight(_mm512_loadu_pd(from.as_ptr())) }
+        unsafe { F64x8(_mm512_loadu_pd(from.as_ptr())) }
     }
 
     #[inline(always)]
@@ -202,26 +204,26 @@ impl Lanes for Eight {
     #[inline(always)]
     fn mul_add(self, factor: Self, more: Self) -> Self {
         // SAFETY: the processor has the instruction (see the module).
-        unsafe { Eight(_mm512_fmadd_pd(self.0, factor.0, more.0)) }
+        unsafe { F64x8(_mm512_fmadd_pd(self.0, factor.0, more.0)) }
     }
 
     #[inline(always)]
     fn mul_sub_from(self, factor: Self, more: Self) -> Self {
         // SAFETY: the processor has the instruction (see the module).
-        unsafe { Eight(_mm512_fnmadd_pd(self.0, factor.0, more.0)) }
+        unsafe { F64x8(_mm512_fnmadd_pd(self.0, factor.0, more.0)) }
     }
 
     #[inline(always)]
     fn mul_sub(self, factor: Self, less: Self) -> Self {
         // SAFETY: the processor has the instruction (see the module).
-        unsafe { Eight(_mm512_fmsub_pd(self.0, factor.0, less.0)) }
+        unsafe { F64x8(_mm512_fmsub_pd(self.0, factor.0, less.0)) }
     }
 
     #[inline(always)]
     fn bits_and(self, other: Self) -> Self {
         // SAFETY: the processor has the instruction (see the module).
         unsafe {
-            Eight(_mm512_castsi512_pd(_mm512_and_si512(
+            F64x8(_mm512_castsi512_pd(_mm512_and_si512(
                 _mm512_castpd_si512(self.0),
                 _mm512_castpd_si512(other.0),
             )))
@@ -231,19 +233,19 @@ impl Lanes for Eight {
     #[inline(always)]
     fn sqrt(self) -> Self {
         // SAFETY: the processor has the instruction (see the module).
-        unsafe { Eight(_mm512_sqrt_pd(self.0)) }
+        unsafe { F64x8(_mm512_sqrt_pd(self.0)) }
     }
 
     #[inline(always)]
     fn abs(self) -> Self {
         // SAFETY: the processor has the instruction (see the module).
-        unsafe { Eight(_mm512_abs_pd(self.0)) }
+        unsafe { F64x8(_mm512_abs_pd(self.0)) }
     }
 
     #[inline(always)]
     fn max(self, other: Self) -> Self {
         // SAFETY: the processor has the instruction (see the module).
-        unsafe { Eight(_mm512_max_pd(self.0, other.0)) }
+        unsafe { F64x8(_mm512_max_pd(self.0, other.0)) }
     }
 
     #[inline(always)]
@@ -251,38 +253,38 @@ impl Lanes for Eight {
         let (a, b) = (self.abs().0, other.abs().0);
         // SAFETY: the processor has the instruction (see the module).
         unsafe {
-            Eight(_mm512_castsi512_pd(_mm512_max_epi64(_mm512_castpd_si512(a), _mm512_castpd_si512(b))))
+            F64x8(_mm512_castsi512_pd(_mm512_max_epi64(_mm512_castpd_si512(a), _mm512_castpd_si512(b))))
         }
     }
 
     #[inline(always)]
-    fn above(self, other: Self) -> EightTruths {
+    fn gt(self, other: Self) -> Mask8 {
         // SAFETY: the processor has the instruction (see the module).
-        unsafe { EightTruths(_mm512_cmp_pd_mask::<_CMP_GT_OQ>(self.0, other.0)) }
+        unsafe { Mask8(_mm512_cmp_pd_mask::<_CMP_GT_OQ>(self.0, other.0)) }
     }
 
     #[inline(always)]
-    fn or_else(self, mask: EightTruths, other: Self) -> Self {
+    fn or_else(self, mask: Mask8, other: Self) -> Self {
         // SAFETY: the processor has the instruction (see the module).
-        unsafe { Eight(_mm512_mask_blend_pd(mask.0, other.0, self.0)) }
+        unsafe { F64x8(_mm512_mask_blend_pd(mask.0, other.0, self.0)) }
     }
 
     #[inline(always)]
-    fn any(mask: EightTruths) -> bool {
+    fn any(mask: Mask8) -> bool {
         mask.0 != 0
     }
 
     #[inline(always)]
-    fn all(mask: EightTruths) -> bool {
+    fn all(mask: Mask8) -> bool {
         mask.0 == 0xff
     }
 
     #[inline(always)]
-    fn after(self, previous: Self) -> Self {
+    fn shift_in(self, previous: Self) -> Self {
         // SAFETY: the processor has the instructions (see the module).
         unsafe {
             let (below, here) = (_mm512_castpd_si512(previous.0), _mm512_castpd_si512(self.0));
-            Eight(_mm512_castsi512_pd(_mm512_alignr_epi64::<7>(here, below)))
+            F64x8(_mm512_castsi512_pd(_mm512_alignr_epi64::<7>(here, below)))
         }
     }
 }

@@ -4,7 +4,8 @@ use crate::body::Material;
 use crate::physics::Physics;
 use crate::system::System;
 
-/// Target width of an active voxel at a control step \[rest widths\]; `pixel` in [0, 1] matters to sensors only.
+/// Target width of an active voxel at a control step \[rest widths\]; `pixel` in [0, 1] matters to
+/// sensors only.
 pub(crate) fn target(material: Material, control_step: u64, pixel: f64, physics: &Physics) -> f64 {
     let phase = match material {
         Material::MuscleInPhase => 0.0,
@@ -18,7 +19,8 @@ pub(crate) fn target(material: Material, control_step: u64, pixel: f64, physics:
     free.clamp(physics.target_min, physics.target_max)
 }
 
-/// Target width of any voxel under a pixel in [0, 1] \[rest widths\]: of a muscle halfway through its swing, of a passive one 1.
+/// Target width of any voxel under a pixel in [0, 1] \[rest widths\]: of a muscle halfway through
+/// its swing, of a passive one 1.
 pub fn width(material: Material, pixel: f64, physics: &Physics) -> f64 {
     let free = match material {
         Material::MuscleInPhase | Material::MuscleAntiphase => {
@@ -31,8 +33,8 @@ pub fn width(material: Material, pixel: f64, physics: &Physics) -> f64 {
     free.clamp(physics.target_min, physics.target_max)
 }
 
-/// Writes the goals of all actuated sides for a control step. `pixels` holds each active voxel's pixel,
-/// `targets` is memory for one number each.
+/// Writes the goals of all actuated sides for a control step. `pixels` holds each active voxel's
+/// pixel, `targets` is memory for one number each.
 pub(crate) fn set_goals(
     System { lattice, physics }: &System,
     control_step: u64,

@@ -1,9 +1,11 @@
-//! Which contacts are possible: lists that stay complete while no point has moved further than a budget.
+//! Which contacts are possible: lists that stay complete while no point has moved further than a
+//! budget.
 //!
-//! All pairs of surface voxels would be tested in every substep otherwise. A list holds every pair whose boxes
-//! come within twice the budget; until a point has moved by more than the budget, along x or y, since the
-//! lists were made, no other pair can have met. So the lists change nothing but the time it takes. Motion along x
-//! counts relative to one of the points: the ground is the same everywhere, and a walk wears no list out.
+//! All pairs of surface voxels would be tested in every substep otherwise. A list holds every pair
+//! whose boxes come within twice the budget; until a point has moved by more than the budget, along
+//! x or y, since the lists were made, no other pair can have met. So the lists change nothing but
+//! the time it takes. Motion along x counts relative to one of the points: the ground is the same
+//! everywhere, and a walk wears no list out.
 
 use crate::lattice::{FAMILIES, Lattice, SurfaceVoxel};
 use crate::simd::{BLOCK, Buffer, Lanes, each};
@@ -16,8 +18,9 @@ use crate::world::UnstableReason;
 /// How far a point may move before the lists are made anew \[voxel lengths\].
 const BUDGET: f64 = 0.2;
 
-/// More candidates than this for each surface voxel are a heap of voxels within each other, whatever
-/// `Physics::unstable_ratio` says: a substep would take seconds. A life that is stable with EvoGym's ratio stays far below.
+/// More candidates than this for each surface voxel are a heap of voxels within each other,
+/// whatever `Physics::unstable_ratio` says: a substep would take seconds. A simulation that is
+/// stable with EvoGym's ratio stays far below.
 const MOST_CANDIDATES: usize = 256;
 
 /// A corner of one surface voxel that may come to lie inside another.
@@ -32,7 +35,7 @@ pub(crate) struct Candidate {
 
 /// The lists, and the positions at which they were made.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Neighbours {
+pub(crate) struct BroadPhase {
     made: Pair,
     /// Surface voxels that may touch the ground, in order.
     pub low: Vec<usize>,
@@ -41,7 +44,8 @@ pub(crate) struct Neighbours {
     /// Pairs of surface voxels, not neighbours in the body, whose boxes may overlap.
     pub distant: Vec<[usize; 2]>,
     bounds: Vec<Bounds>,
-    /// The same for wide lanes, in whole blocks: low x, low y, high x, high y. Behind the last box there is no number.
+    /// The same for wide lanes, in whole blocks: low x, low y, high x, high y. Behind the last box
+    /// there is no number.
     sides: [Buffer; 4],
 }
 
@@ -69,31 +73,31 @@ fn sane(System { lattice, physics }: &System, state: &State) -> bool {
     })
 }
 
-/// Whether all sides of all voxels are numbers and so short that every voxel is [`sane`]: the way from any of its corners
-/// to any other is two sides long.
+/// Whether all sides of all voxels are numbers and so short that every voxel is [`sane`]: the way
+/// from any of its corners to any other is two sides long.
 #[inline(always)]
 fn short_sides<L: Lanes>(System { lattice, physics }: &System, state: &State) -> bool {
-    if !lattice.extra_springs.is_empty() {
+    if !lattice.off_lattice_springs.is_empty() {
         return false;
     }
     let half = L::splat(physics.blow_up_extent / 2.0);
     let (exists, _) = lattice.exists.as_chunks::<{ FAMILIES * BLOCK }>();
-    let mut short = half.above(L::splat(0.0));
-    for slot in lattice.runs.iter().flat_map(|run| run.clone().step_by(L::WIDTH)) {
+    let mut short = half.gt(L::splat(0.0));
+    for slot in lattice.active_ranges.iter().flat_map(|range| range.clone().step_by(L::WIDTH)) {
         let vectors = vectors::<L>(slices(&state.position, lattice.len), slot, lattice.pitch);
         let (exists, lane) = (&exists[slot / BLOCK], slot % BLOCK);
         for along in vectors {
             for family in [0, 1] {
                 let side = along[family].bits_and(L::load(exists, family * BLOCK + lane));
                 // What is no number is not short either.
-                short = short & half.above(side);
+                short = short & half.gt(side);
             }
         }
     }
     L::all(short)
 }
 
-impl Neighbours {
+impl BroadPhase {
     /// Makes the lists anew if a point has moved too far since they were made.
     #[inline(always)]
     pub fn refresh<L: Lanes>(&mut self, system: &System, state: &State) -> Result<(), UnstableReason> {
@@ -101,14 +105,14 @@ impl Neighbours {
         if self.made[X].len() == lattice.len {
             let budget = L::splat(BUDGET * physics.cell_size);
             let walked = lattice.points.first().map_or(0.0, |&(p, _)| state.position[X][p] - self.made[X][p]);
-            let mut near = budget.above(L::splat(0.0));
-            for slot in lattice.runs.iter().flat_map(|run| run.clone().step_by(L::WIDTH)) {
+            let mut near = budget.gt(L::splat(0.0));
+            for slot in lattice.active_ranges.iter().flat_map(|range| range.clone().step_by(L::WIDTH)) {
                 let moved = each!(axis in [X, Y] => {
                     L::load(&state.position[axis], slot) - L::load(&self.made[axis], slot)
                 });
                 let strayed = moved[X] - L::splat(walked) * L::load(&lattice.present, slot);
                 // What is no number is not below the budget either.
-                near = near & budget.above(strayed.abs()) & budget.above(moved[Y].abs());
+                near = near & budget.gt(strayed.abs()) & budget.gt(moved[Y].abs());
             }
             if L::all(near) {
                 return Ok(());
@@ -176,12 +180,12 @@ impl Neighbours {
     #[inline(always)]
     fn any_near<L: Lanes>(&self, bounds: &Bounds, block: usize, slack: f64) -> bool {
         let [low_x, low_y, high_x, high_y] = each!(i in [0, 1, 2, 3] => L::load(&self.sides[i], block));
-        // A little more, since these comparisons are strict: whoever touches is looked at.
+        // A little more, since these comparisons are strict: what touches is looked at.
         let reach = 1.001 * slack;
         let (left, right) = (L::splat(bounds.low.x - reach), L::splat(bounds.high.x + reach));
         let (bottom, top) = (L::splat(bounds.low.y - reach), L::splat(bounds.high.y + reach));
-        let across = high_x.above(left) & right.above(low_x);
-        L::any(across & high_y.above(bottom) & top.above(low_y))
+        let across = high_x.gt(left) & right.gt(low_x);
+        L::any(across & high_y.gt(bottom) & top.gt(low_y))
     }
 
     /// Adds a surface voxel near another to the lists.
@@ -199,10 +203,12 @@ impl Neighbours {
         }
     }
 
-    /// Whether so many distant surface voxels overlap that the life is unstable (physics.md, "Instability").
+    /// Whether so many distant surface voxels overlap that the simulation is unstable (physics.md,
+    /// "Instability").
     pub fn too_many_overlaps(&self, System { lattice, physics }: &System, state: &State) -> bool {
         let most = physics.unstable_ratio * lattice.surface.len() as f64;
-        // Ordered pairs: each counts twice. Mostly the list itself is too short to be worth looking through.
+        // Ordered pairs: each counts twice. Mostly the list itself is too short to be worth looking
+        // through.
         if (2 * self.distant.len()) as f64 <= most {
             return false;
         }

@@ -1,22 +1,25 @@
 //! Contacts of surface voxels with the ground and with each other (physics.md, "Contacts").
 //!
-//! The ground never moves, so it is not simulated: its cells are worked out where a voxel comes down to it.
+//! The ground never moves, so it is not simulated: its cells are worked out where a voxel comes
+//! down to it.
 
 use crate::lattice::{Lattice, SIDES, SurfaceVoxel};
 use crate::physics::{MOST_CELLS, Physics};
 use crate::state::{Pair, State, X, Y};
-use crate::step::broad_phase::{Candidate, Neighbours, place, quad};
+use crate::step::broad_phase::{BroadPhase, Candidate, place, quad};
 use crate::step::geometry::{Bounds, Vector, cross, inside};
 use crate::system::System;
 
-/// For each corner (clockwise from the top left) the corners at the far ends of the two sides that meet there.
+/// For each corner (clockwise from the top left) the corners at the far ends of the two sides that
+/// meet there.
 const FAR_ENDS: [[usize; 2]; 4] = [[1, 3], [0, 2], [3, 1], [2, 0]];
 
-/// A point this far out of a voxel's box \[wu\] is not inside, whatever rounding may do to the exact test.
+/// A point this far out of a voxel's box \[wu\] is not inside, whatever rounding may do to the
+/// exact test.
 const CLEAR: f64 = 1e-9;
 
-/// Most columns that a voxel reaches over: as many as the widest that has not blown up, and room for its way since the last
-/// look.
+/// Most columns that a voxel reaches over: as many as the widest that has not blown up, and room
+/// for its way since the last look.
 const MOST_COLUMNS: i64 = MOST_CELLS as i64 + 8;
 
 /// The edge of a voxel that pushes a point out, with the depth of the point below it.
@@ -29,7 +32,8 @@ struct Edge {
     depth: f64,
 }
 
-/// The exposed edge of `host` nearest to `p` among those that cross a side of the mover at `p`; first wins a tie.
+/// The exposed edge of `host` nearest to `p` among those that cross a side of the mover at `p`;
+/// first wins a tie.
 fn nearest_edge(
     p: Vector,
     far_ends: [Vector; 2],
@@ -55,8 +59,8 @@ fn nearest_edge(
     nearest
 }
 
-/// The force on the point that an edge pushes out, without the damping of the edge's own motion; and the two
-/// parts of it that the edge's ends feel: along the normal, and friction.
+/// The force on the point that an edge pushes out, without the damping of the edge's own motion;
+/// and the two parts of it that the edge's ends feel: along the normal, and friction.
 struct Push {
     on_point: Vector,
     normal_force: f64,
@@ -92,14 +96,14 @@ pub(crate) fn add_contacts(
     System { lattice, physics }: &System,
     start_column: i64,
     state: &State,
-    neighbours: &Neighbours,
+    broad_phase: &BroadPhase,
     contact: &mut Pair,
 ) {
     let mut contacts = Contacts { lattice, physics, state, contact };
-    for &voxel in &neighbours.low {
+    for &voxel in &broad_phase.low {
         contacts.with_ground(&lattice.surface[voxel], start_column);
     }
-    for candidate in &neighbours.candidates {
+    for candidate in &broad_phase.candidates {
         contacts.with_self(*candidate);
     }
 }
@@ -153,8 +157,8 @@ impl Contacts<'_> {
         }
     }
 
-    /// One surface voxel and every ground cell whose box its box meets: its corners in the ground, and the
-    /// ground's corners in it.
+    /// One surface voxel and every ground cell whose box its box meets: its corners in the ground,
+    /// and the ground's corners in it.
     fn with_ground(&mut self, voxel: &SurfaceVoxel, start_column: i64) {
         let (physics, cell) = (self.physics, self.physics.cell_size);
         let (top, bottom) = (f64::from(physics.ground_row) * cell, f64::from(physics.ground_row - 1) * cell);

@@ -104,8 +104,8 @@ impl Bounds {
     }
 }
 
-/// Whether `p` lies in the quad (corners clockwise from the top left), boundary included: it is split into the
-/// triangles TL-TR-BR and TL-BR-BL (physics.md, "Inside test").
+/// Whether `p` lies in the quad (corners clockwise from the top left), boundary included: it is
+/// split into the triangles TL-TR-BR and TL-BR-BL (physics.md, "Contacts").
 #[inline]
 pub(crate) fn inside(p: Vector, quad: &[Vector; 4]) -> bool {
     let [tl, tr, br, bl] = quad.map(|corner| corner - p);
@@ -117,8 +117,8 @@ pub(crate) fn inside(p: Vector, quad: &[Vector; 4]) -> bool {
     c * d >= 0.0 && c * e >= 0.0
 }
 
-/// Whether the segments a–b and p–q cross, ends included; those with a cross product below `epsilon` are parallel
-/// and never do.
+/// Whether the segments a–b and p–q cross, ends included; those with a cross product below
+/// `epsilon` are parallel and never do.
 #[inline]
 pub(crate) fn cross(a: Vector, b: Vector, p: Vector, q: Vector, epsilon: f64) -> bool {
     let (r, s, w) = (b - a, q - p, p - a);

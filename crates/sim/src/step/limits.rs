@@ -1,12 +1,13 @@
-//! Length limits: positions are corrected so that no spring is far from its rest length (physics.md, 4).
+//! Length limits: positions are corrected so that no spring is far from its rest length
+//! (physics.md, "One substep", 4).
 //!
-//! A spring beyond a limit l is corrected by (1 − l/d) of its vector; with t = d²/l² − 1, which is small, that is
-//! 1 − 1/√(1 + t) again: mostly neither root nor division.
+//! A spring beyond a limit l is corrected by (1 − l/d) of its vector; with t = d²/l² − 1, which is
+//! small, that is 1 − 1/√(1 + t) again: mostly neither root nor division.
 
 use crate::lattice::FAMILIES;
 use crate::simd::{BLOCK, Lanes, each};
 use crate::state::{Pair, X, Y, slices, slices_mut};
-use crate::step::series::{RANGE, TERMS, briefly, carefully};
+use crate::step::series::{RANGE, TERMS, rsqrt_exact, rsqrt_series};
 use crate::step::springs::{Gather, squares, vectors};
 use crate::system::System;
 
@@ -30,14 +31,14 @@ impl Limits {
     #[inline(always)]
     pub fn excess<L: Lanes>(&self, square: L) -> L {
         let [low, high] = each!(i in [0, 1] => L::splat(1.0 / self.squares[i]));
-        let limit = high.or_else(square.above(L::splat(self.middle)), low);
+        let limit = high.or_else(square.gt(L::splat(self.middle)), low);
         square.mul_add(limit, L::splat(-1.0))
     }
 
     /// Where a squared length is beyond the limits; nowhere that `exists` is 0.
     #[inline(always)]
     pub fn beyond<L: Lanes>(&self, square: L, exists: L) -> L::Mask {
-        (square - L::splat(self.middle)).bits_and(exists).above(L::splat(self.half))
+        (square - L::splat(self.middle)).bits_and(exists).gt(L::splat(self.half))
     }
 }
 
@@ -53,21 +54,21 @@ pub(crate) enum Reach {
     Far,
 }
 
-/// All springs at once: corrections from the same positions, then added up. `reach` is a guess, from the substep before,
-/// and then what it was; it makes no difference to the result.
+/// All springs at once: corrections from the same positions, then added up. `reach` is a guess,
+/// from the substep before, and then what it was; it makes no difference to the result.
 #[inline(always)]
 pub(crate) fn limit_all<L: Lanes>(
     system: &System,
     from: &Pair,
     to: &mut Pair,
-    passing: &mut Pair,
+    carry: &mut Pair,
     reach: &mut Reach,
 ) {
     loop {
         let found = match *reach {
             Reach::Horizontal => limit_horizontal::<L>(system, from, to),
-            Reach::Any => limit_any::<L, false>(system, from, to, passing),
-            Reach::Far => limit_any::<L, true>(system, from, to, passing),
+            Reach::Any => limit_any::<L, false>(system, from, to, carry),
+            Reach::Far => limit_any::<L, true>(system, from, to, carry),
         };
         let enough = found <= *reach;
         *reach = found;
@@ -103,10 +104,10 @@ fn limit_horizontal<L: Lanes>(system: &System, from: &Pair, to: &mut Pair) -> Re
     let (exists, _) = lattice.exists.as_chunks::<{ FAMILIES * BLOCK }>();
     let (from, to) = (slices(from, lattice.len), slices_mut(to, lattice.len));
     let zero = L::splat(0.0);
-    let (mut others, mut far) = (zero.above(zero), zero.above(zero));
-    for run in &lattice.runs {
+    let (mut others, mut far) = (zero.gt(zero), zero.gt(zero));
+    for range in &lattice.active_ranges {
         let mut gather = Gather::<L>::new([&mut [], &mut []], lattice.pitch);
-        for slot in run.clone().step_by(L::WIDTH) {
+        for slot in range.clone().step_by(L::WIDTH) {
             let vectors = vectors(from, slot, lattice.pitch);
             let (exists, lane) = (&exists[slot / BLOCK], slot % BLOCK);
             let squares = squares(&vectors);
@@ -115,8 +116,8 @@ fn limit_horizontal<L: Lanes>(system: &System, from: &Pair, to: &mut Pair) -> Re
             });
             others = others | ((other[0] | other[1]) | other[2]);
             let t = limits[0].excess(squares[0]).or_else(beyond, zero);
-            far = far | t.abs().above(L::splat(RANGE));
-            let sums = gather.next_horizontal(share * briefly(t), &vectors);
+            far = far | t.abs().gt(L::splat(RANGE));
+            let sums = gather.next_horizontal(share * rsqrt_series(t), &vectors);
             (L::load(from[X], slot) + sums[X]).store(to[X], slot);
             (L::load(from[Y], slot) + sums[Y]).store(to[Y], slot);
         }
@@ -129,19 +130,19 @@ fn limit_any<L: Lanes, const FAR: bool>(
     system: &System,
     from: &Pair,
     to: &mut Pair,
-    passing: &mut Pair,
+    carry: &mut Pair,
 ) -> Reach {
     let System { lattice, physics } = system;
     let limits = limits(system);
     let share = L::splat(physics.limit_share / 2.0);
     let (exists, _) = lattice.exists.as_chunks::<{ FAMILIES * BLOCK }>();
     let (from, to) = (slices(from, lattice.len), slices_mut(to, lattice.len));
-    let [passing_x, passing_y] = slices_mut(passing, lattice.len);
+    let [carry_x, carry_y] = slices_mut(carry, lattice.len);
     let zero = L::splat(0.0);
-    let (mut others, mut far) = (zero.above(zero), zero.above(zero));
-    for run in &lattice.runs {
-        let mut gather = Gather::<L>::new([passing_x, passing_y], lattice.pitch);
-        for slot in run.clone().step_by(L::WIDTH) {
+    let (mut others, mut far) = (zero.gt(zero), zero.gt(zero));
+    for range in &lattice.active_ranges {
+        let mut gather = Gather::<L>::new([carry_x, carry_y], lattice.pitch);
+        for slot in range.clone().step_by(L::WIDTH) {
             let vectors = vectors(from, slot, lattice.pitch);
             let (exists, lane) = (&exists[slot / BLOCK], slot % BLOCK);
             let squares = squares(&vectors);
@@ -158,8 +159,9 @@ fn limit_any<L: Lanes, const FAR: bool>(
             others = others | other;
             let t = each!(i in [0, 1, 2, 3] => limits[i].excess(squares[i]).or_else(beyond[i], zero));
             let greatest = t[0].max_abs(t[1]).max_abs(t[2].max_abs(t[3]));
-            far = far | greatest.above(L::splat(RANGE));
-            let pull = each!(i in [0, 1, 2, 3] => share * if FAR { carefully(t[i]) } else { briefly(t[i]) });
+            far = far | greatest.gt(L::splat(RANGE));
+            let pull =
+                each!(i in [0, 1, 2, 3] => share * if FAR { rsqrt_exact(t[i]) } else { rsqrt_series(t[i]) });
             let sums = gather.next(pull, &vectors, slot);
             (L::load(from[X], slot) + sums[X]).store(to[X], slot);
             (L::load(from[Y], slot) + sums[Y]).store(to[Y], slot);
@@ -168,8 +170,9 @@ fn limit_any<L: Lanes, const FAR: bool>(
     reach::<L>(others, far)
 }
 
-/// Brings links of the rigid pass that have nothing to do with each other together, so that the processor can work on
-/// several at once. Links that share a point stay in their order: results are the same bits.
+/// Brings links of the rigid pass that have nothing to do with each other together, so that the
+/// processor can work on several at once. Links that share a point stay in their order: results are
+/// the same bits.
 pub(crate) fn in_rounds(links: &[[usize; 2]], points: usize) -> Vec<[usize; 2]> {
     let mut taken = vec![0; points];
     let mut round = |&[a, b]: &[usize; 2]| {
@@ -183,7 +186,8 @@ pub(crate) fn in_rounds(links: &[[usize; 2]], points: usize) -> Vec<[usize; 2]> 
     rounds.into_iter().map(|(_, link)| link).collect()
 }
 
-/// The sides of rigid voxels, one after the other on current positions; a side shared by two comes up twice.
+/// The sides of rigid voxels, one after the other on current positions; a side shared by two comes
+/// up twice.
 pub(crate) fn limit_rigid(System { lattice, physics }: &System, [x, y]: &mut Pair) {
     let limits = Limits::new(physics.cell_size, physics.rigid_limit_low, physics.rigid_limit_high);
     let [low, high] = limits.squares;

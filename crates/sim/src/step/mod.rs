@@ -1,4 +1,4 @@
-//! One substep (physics.md, "One substep, in this order"), compiled per instruction set.
+//! One substep (physics.md, "One substep"), compiled per instruction set.
 
 pub(crate) mod actuation;
 pub(crate) mod broad_phase;
@@ -58,11 +58,11 @@ fn substep<L: Lanes>(
     scratch: &mut Scratch,
     mut meter: Option<&mut Meter>,
 ) -> Result<(), UnstableReason> {
-    scratch.neighbours.refresh::<L>(system, state)?;
-    let unstable = scratch.neighbours.too_many_overlaps(system, state);
+    scratch.broad_phase.refresh::<L>(system, state)?;
+    let unstable = scratch.broad_phase.too_many_overlaps(system, state);
 
     scratch.contact.iter_mut().for_each(|axis| axis.fill(0.0));
-    contact::add_contacts(system, start_column, state, &scratch.neighbours, &mut scratch.contact);
+    contact::add_contacts(system, start_column, state, &scratch.broad_phase, &mut scratch.contact);
     // Contacts see true velocities: position now less position then. The integrator knows its own.
     rk4::integrate::<L>(system, state, scratch);
     meter.iter_mut().for_each(|meter| meter.before_limits(&scratch.position));

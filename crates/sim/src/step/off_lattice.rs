@@ -1,20 +1,21 @@
-//! Springs that end in an extra point, where two voxels touch only at a corner: few, and anywhere.
+//! Springs that end in an off-lattice point, where two voxels touch only at a corner: few, and
+//! anywhere.
 
 use crate::lattice::{FAMILIES, Lattice};
 use crate::simd::{BLOCK, Buffer, Lanes, each};
 use crate::state::{Pair, X, Y, pair};
 use crate::step::limits::Limits;
-use crate::step::series::carefully;
+use crate::step::series::rsqrt_exact;
 use crate::step::springs::{Pulls, Springs, Watch};
 use crate::system::System;
 
-/// Extra springs that are computed together.
+/// Off-lattice springs that are computed together.
 pub(crate) const GROUP: usize = FAMILIES * BLOCK;
 
-/// The extra springs' share of a substep: their ends are fetched and fed one by one, but the work between is as
-/// wide as the lattice's.
+/// The off-lattice springs' share of a substep: their ends are fetched and fed one by one, but the
+/// work between is as wide as the lattice's.
 #[derive(Clone, Debug)]
-pub(crate) struct Extra {
+pub(crate) struct OffLattice {
     /// By groups.
     springs: Vec<Springs>,
     pulls: Vec<Pulls>,
@@ -27,18 +28,18 @@ pub(crate) struct Extra {
     pub load: Pair,
 }
 
-impl Extra {
+impl OffLattice {
     /// None for a body without such springs.
     pub fn new(lattice: &Lattice, mass: f64, gain: f64) -> Option<Self> {
-        let count = lattice.extra_springs.len().next_multiple_of(GROUP);
+        let count = lattice.off_lattice_springs.len().next_multiple_of(GROUP);
         let mut stiffness = Buffer::zeros(count);
         let mut inverse_rest_square = Buffer::filled(count, 1.0);
-        for (i, spring) in lattice.extra_springs.iter().enumerate() {
+        for (i, spring) in lattice.off_lattice_springs.iter().enumerate() {
             stiffness[i] = spring.stiffness;
             inverse_rest_square[i] = 1.0 / (spring.length * spring.length);
         }
         let half = std::f64::consts::FRAC_1_SQRT_2;
-        (count > 0).then(|| Extra {
+        (count > 0).then(|| OffLattice {
             springs: Springs::blocks(&stiffness, mass, gain),
             pulls: vec![Pulls::ZERO; count / GROUP],
             inverse_rest_square,
@@ -98,7 +99,7 @@ impl Extra {
             let pull = each!(i in [0, 1, 2, 3] => {
                 let square = square[i] * L::load(&self.inverse_rest_square, at + i * BLOCK);
                 let t = limits.excess(square).or_else(limits.beyond(square, all), L::splat(0.0));
-                share * carefully(t)
+                share * rsqrt_exact(t)
             });
             self.put(at, vector, pull);
         }
@@ -113,7 +114,7 @@ impl Extra {
 
     fn fetch(&mut self, lattice: &Lattice, position: &Pair) {
         for axis in [X, Y] {
-            for (vector, spring) in self.vector[axis].iter_mut().zip(&lattice.extra_springs) {
+            for (vector, spring) in self.vector[axis].iter_mut().zip(&lattice.off_lattice_springs) {
                 *vector = position[axis][spring.ends[1]] - position[axis][spring.ends[0]];
             }
         }
@@ -137,7 +138,7 @@ impl Extra {
     }
 
     fn load_points(&mut self, lattice: &Lattice) {
-        for spring in &lattice.extra_springs {
+        for spring in &lattice.off_lattice_springs {
             spring.ends.iter().for_each(|&end| (self.load[X][end], self.load[Y][end]) = (0.0, 0.0));
         }
         // Springs act on masses: their stiffness is already per mass.
@@ -147,7 +148,7 @@ impl Extra {
 
 fn feed(lattice: &Lattice, change: &Pair, to: &mut Pair) {
     for axis in [X, Y] {
-        for (change, spring) in change[axis].iter().zip(&lattice.extra_springs) {
+        for (change, spring) in change[axis].iter().zip(&lattice.off_lattice_springs) {
             to[axis][spring.ends[0]] += change;
             to[axis][spring.ends[1]] -= change;
         }

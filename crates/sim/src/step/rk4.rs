@@ -1,9 +1,10 @@
-//! Classical fourth-order Runge–Kutta over one substep (physics.md, 3).
+//! Classical fourth-order Runge–Kutta over one substep (physics.md, "One substep", 3).
 //!
-//! With accelerations a₁ … a₄ the four stages' positions are x₀, x₀ + (h/2)v₀, x₀ + (h/2)v₀ + (h²/4)a₁ and
-//! x₀ + hv₀ + (h²/2)a₂, so those of the first two are known at the start and those of the last two after the second;
-//! and the new positions are x₀ + hv₀ + (h²/6)(a₁ + a₂ + a₃). One sweep over the springs a stage: two in one would need
-//! more registers than there are, and what is spilled fills the queue of stores.
+//! With accelerations a₁ … a₄ the four stages' positions are x₀, x₀ + (h/2)v₀, x₀ + (h/2)v₀ +
+//! (h²/4)a₁ and x₀ + hv₀ + (h²/2)a₂, so those of the first two are known at the start and those of
+//! the last two after the second; and the new positions are x₀ + hv₀ + (h²/6)(a₁ + a₂ + a₃). One
+//! sweep over the springs a stage: two in one would need more registers than there are, and what is
+//! spilled fills the queue of stores.
 
 use crate::lattice::Lattice;
 use crate::physics::Physics;
@@ -11,17 +12,18 @@ use crate::scratch::{Scratch, Work};
 use crate::simd::{BLOCK, Lanes, each};
 use crate::state::{State, X, Y, slices, slices_mut};
 use crate::step::limits::limit_all;
-use crate::step::off_lattice::Extra;
+use crate::step::off_lattice::OffLattice;
 use crate::step::springs::{Gather, Watch, squares, vectors};
 use crate::system::System;
 
-/// Advances velocities by one substep, contact forces held constant; the new positions are in `scratch`.
+/// Advances velocities by one substep, contact forces held constant; the new positions are in
+/// `scratch`.
 #[inline(always)]
 pub(crate) fn integrate<L: Lanes>(system: &System, state: &mut State, scratch: &mut Scratch) {
     let System { lattice, physics } = system;
-    if let Some(extra) = &mut scratch.extra {
+    if let Some(off_lattice) = &mut scratch.off_lattice {
         let goals = &scratch.goals[lattice.len..];
-        extra.first_stage::<L>(lattice, goals, physics.servo_gain, &state.position);
+        off_lattice.first_stage::<L>(lattice, goals, physics.servo_gain, &state.position);
     }
     // The first substep of a control step knows no lengths yet.
     let anew = std::mem::take(&mut scratch.anew);
@@ -34,62 +36,59 @@ pub(crate) fn integrate<L: Lanes>(system: &System, state: &mut State, scratch: &
     std::mem::swap(&mut state.velocity, &mut scratch.velocity);
 }
 
-/// Limits the lengths of all springs at the new positions. The positions at the start of the substep become the
-/// previous ones.
+/// Limits the lengths of all springs at the new positions. The positions at the start of the
+/// substep become the previous ones.
 #[inline(always)]
 pub(crate) fn limit<L: Lanes>(system: &System, state: &mut State, scratch: &mut Scratch) {
-    let Scratch { position: new, passing, extra, reach, .. } = scratch;
-    limit_all::<L>(system, new, &mut state.previous, passing, reach);
-    if let Some(extra) = extra {
-        extra.limit::<L>(system, new);
-        extra.feed(&system.lattice, &mut state.previous);
+    let Scratch { position: new, carry, off_lattice, reach, .. } = scratch;
+    limit_all::<L>(system, new, &mut state.previous, carry, reach);
+    if let Some(off_lattice) = off_lattice {
+        off_lattice.limit::<L>(system, new);
+        off_lattice.feed(&system.lattice, &mut state.previous);
     }
     std::mem::swap(&mut state.position, &mut state.previous);
 }
 
-/// The other three stages. Taken for regular, they are to be done again carefully if they were not, which is seen in
-/// the first and in the last stage: between them springs hardly stretch, and points hardly fall, any further.
+/// The other three stages. Taken for regular, they are to be done again exactly if they were not,
+/// which is seen in the first and in the last stage: between them springs hardly stretch, and
+/// points hardly fall, any further.
 #[inline(always)]
-fn later_stages<L: Lanes, const CAREFUL: bool>(
-    system: &System,
-    state: &State,
-    scratch: &mut Scratch,
-) -> bool {
+fn later_stages<L: Lanes, const EXACT: bool>(system: &System, state: &State, scratch: &mut Scratch) -> bool {
     let lattice = &system.lattice;
-    extra_stage::<L>(lattice, scratch, 0);
-    second_stage::<L, CAREFUL>(system, state, scratch);
-    extra_stage::<L>(lattice, scratch, 1);
-    third_stage::<L, CAREFUL>(system, state, scratch);
-    extra_stage::<L>(lattice, scratch, 2);
-    fourth_stage::<L, CAREFUL>(system, state, scratch)
+    off_lattice_stage::<L>(lattice, scratch, 0);
+    second_stage::<L, EXACT>(system, state, scratch);
+    off_lattice_stage::<L>(lattice, scratch, 1);
+    third_stage::<L, EXACT>(system, state, scratch);
+    off_lattice_stage::<L>(lattice, scratch, 2);
+    fourth_stage::<L, EXACT>(system, state, scratch)
 }
 
-/// The extra springs' part of the second stage or a later one.
+/// The off-lattice springs' part of the second stage or a later one.
 #[inline(always)]
-fn extra_stage<L: Lanes>(lattice: &Lattice, scratch: &mut Scratch, stage: usize) {
-    if let Some(extra) = &mut scratch.extra {
-        extra.later_stage::<L>(lattice, &scratch.stages[stage]);
+fn off_lattice_stage<L: Lanes>(lattice: &Lattice, scratch: &mut Scratch, stage: usize) {
+    if let Some(off_lattice) = &mut scratch.off_lattice {
+        off_lattice.later_stage::<L>(lattice, &scratch.stages[stage]);
     }
 }
 
 /// What acts besides the lattice's springs on a slot's points.
 #[inline(always)]
-fn load_of<L: Lanes>(work: &Work, extra: Option<&Extra>, slot: usize) -> [L; 2] {
+fn load_of<L: Lanes>(work: &Work, off_lattice: Option<&OffLattice>, slot: usize) -> [L; 2] {
     let of = each!(axis in [X, Y] => L::load(&work.load[axis], slot % BLOCK));
-    let Some(extra) = extra else { return of };
-    each!(axis in [X, Y] => of[axis] + L::load(&extra.load[axis], slot))
+    let Some(off_lattice) = off_lattice else { return of };
+    each!(axis in [X, Y] => of[axis] + L::load(&off_lattice.load[axis], slot))
 }
 
-/// The first stage: what acts besides springs, the springs' rest lengths, and the second stage's positions. Gives whether
-/// all was regular.
+/// The first stage: what acts besides springs, the springs' rest lengths, and the second stage's
+/// positions. Gives whether all was regular.
 #[inline(always)]
-fn first_stage<L: Lanes, const CAREFUL: bool>(
+fn first_stage<L: Lanes, const EXACT: bool>(
     System { lattice, physics }: &System,
     state: &State,
     scratch: &mut Scratch,
 ) -> bool {
     let (len, pitch) = (lattice.len, lattice.pitch);
-    let Scratch { springs, goals, passing, work, extra, contact, stages: [next, ..], .. } = scratch;
+    let Scratch { springs, goals, carry, work, off_lattice, contact, stages: [next, ..], .. } = scratch;
     let (goals, present, gain) = (&goals[..len], &lattice.present[..len], physics.servo_gain);
     let (straight, diagonal) = (L::splat(physics.cell_size), L::splat(lattice.lengths[2]));
     let half = L::splat(physics.time_step / 2.0);
@@ -97,17 +96,17 @@ fn first_stage<L: Lanes, const CAREFUL: bool>(
     let gravity = L::splat(-physics.gravity);
     let (position, velocity) = (slices(&state.position, len), slices(&state.velocity, len));
     let (contact, next) = (slices(contact, len), slices_mut(next, len));
-    let ([px, py], extra) = (slices_mut(passing, len), extra.as_ref());
+    let ([px, py], off_lattice) = (slices_mut(carry, len), off_lattice.as_ref());
     let mut watch = Watch::<L>::new();
-    for run in &lattice.runs {
+    for range in &lattice.active_ranges {
         let mut gather = Gather::<L>::new([&mut *px, &mut *py], pitch);
-        for slot in run.clone().step_by(L::WIDTH) {
+        for slot in range.clone().step_by(L::WIDTH) {
             let (work, lane) = (&mut work[slot / BLOCK], slot % BLOCK);
             let goal = [L::load(goals, slot), straight, diagonal, diagonal];
             let vectors = vectors(position, slot, pitch);
             let springs = &mut springs[slot / BLOCK];
             let square = squares(&vectors);
-            let pull = springs.servo::<L, CAREFUL>(&mut work.pulls, lane, square, (goal, gain), &mut watch);
+            let pull = springs.servo::<L, EXACT>(&mut work.pulls, lane, square, (goal, gain), &mut watch);
             let force = gather.next(pull, &vectors, slot);
             let falling = [L::splat(0.0), gravity * L::load(present, slot)];
             let velocity = each!(axis in [X, Y] => L::load(velocity[axis], slot));
@@ -116,47 +115,47 @@ fn first_stage<L: Lanes, const CAREFUL: bool>(
                 let pushed = L::load(contact[axis], slot).mul_add(inverse_mass, falling[axis]);
                 velocity[axis].mul_sub_from(drag, pushed).store(&mut work.load[axis], lane);
             });
-            let load = load_of::<L>(work, extra, slot);
+            let load = load_of::<L>(work, off_lattice, slot);
             let mut first = each!(axis in [X, Y] => force[axis] + load[axis]);
             let y = L::load(position[Y], slot);
             watch.points(y);
-            if CAREFUL {
+            if EXACT {
                 first = floor(physics, y, first, velocity[X]);
             }
             each!(axis in [X, Y] => first[axis].store(&mut work.first[axis], lane));
         }
     }
-    CAREFUL || watch.regular()
+    EXACT || watch.regular()
 }
 
 /// The second stage; leaves the positions of the third and of the fourth.
 #[inline(always)]
-fn second_stage<L: Lanes, const CAREFUL: bool>(
+fn second_stage<L: Lanes, const EXACT: bool>(
     System { lattice, physics }: &System,
     state: &State,
     scratch: &mut Scratch,
 ) {
     let (h, len, pitch) = (physics.time_step, lattice.len, lattice.pitch);
-    let Scratch { passing, work, extra, stages: [here, next, last], .. } = scratch;
+    let Scratch { carry, work, off_lattice, stages: [here, next, last], .. } = scratch;
     let drag = L::splat(physics.drag / physics.mass * h / 2.0);
     let (position, velocity) = (slices(&state.position, len), slices(&state.velocity, len));
     let (here, next, last) = (slices(here, len), slices_mut(next, len), slices_mut(last, len));
-    let ([px, py], extra) = (slices_mut(passing, len), extra.as_ref());
-    for run in &lattice.runs {
+    let ([px, py], off_lattice) = (slices_mut(carry, len), off_lattice.as_ref());
+    for range in &lattice.active_ranges {
         let mut gather = Gather::<L>::new([&mut *px, &mut *py], pitch);
-        for slot in run.clone().step_by(L::WIDTH) {
+        for slot in range.clone().step_by(L::WIDTH) {
             let (work, lane) = (&mut work[slot / BLOCK], slot % BLOCK);
             let vectors = vectors(here, slot, pitch);
-            let pull = work.pulls.at::<L, CAREFUL>(lane, squares(&vectors), None);
+            let pull = work.pulls.at::<L, EXACT>(lane, squares(&vectors), None);
             let force = gather.next(pull, &vectors, slot);
-            let load = load_of::<L>(work, extra, slot);
+            let load = load_of::<L>(work, off_lattice, slot);
             let first = each!(axis in [X, Y] => L::load(&work.first[axis], lane));
             let velocity = each!(axis in [X, Y] => L::load(velocity[axis], slot));
             let mut second = each!(axis in [X, Y] => {
                 first[axis].mul_sub_from(drag, force[axis] + load[axis])
             });
             let here = each!(axis in [X, Y] => L::load(here[axis], slot));
-            if CAREFUL {
+            if EXACT {
                 second = floor(physics, here[Y], second, first[X].mul_add(L::splat(h / 2.0), velocity[X]));
             }
             each!(axis in [X, Y] => {
@@ -171,31 +170,31 @@ fn second_stage<L: Lanes, const CAREFUL: bool>(
 
 /// The third stage, after which the new positions are known.
 #[inline(always)]
-fn third_stage<L: Lanes, const CAREFUL: bool>(
+fn third_stage<L: Lanes, const EXACT: bool>(
     System { lattice, physics }: &System,
     state: &State,
     scratch: &mut Scratch,
 ) {
     let (h, len, pitch) = (physics.time_step, lattice.len, lattice.pitch);
-    let Scratch { passing, work, extra, stages: [_, here, _], position: new, .. } = scratch;
+    let Scratch { carry, work, off_lattice, stages: [_, here, _], position: new, .. } = scratch;
     let drag = L::splat(physics.drag / physics.mass * h / 2.0);
     let (position, velocity) = (slices(&state.position, len), slices(&state.velocity, len));
     let (here, new) = (slices(here, len), slices_mut(new, len));
-    let ([px, py], extra) = (slices_mut(passing, len), extra.as_ref());
-    for run in &lattice.runs {
+    let ([px, py], off_lattice) = (slices_mut(carry, len), off_lattice.as_ref());
+    for range in &lattice.active_ranges {
         let mut gather = Gather::<L>::new([&mut *px, &mut *py], pitch);
-        for slot in run.clone().step_by(L::WIDTH) {
+        for slot in range.clone().step_by(L::WIDTH) {
             let (work, lane) = (&mut work[slot / BLOCK], slot % BLOCK);
             let vectors = vectors(here, slot, pitch);
-            let pull = work.pulls.at::<L, CAREFUL>(lane, squares(&vectors), None);
+            let pull = work.pulls.at::<L, EXACT>(lane, squares(&vectors), None);
             let force = gather.next(pull, &vectors, slot);
-            let load = load_of::<L>(work, extra, slot);
+            let load = load_of::<L>(work, off_lattice, slot);
             let second = each!(axis in [X, Y] => L::load(&work.second[axis], lane));
             let velocity = each!(axis in [X, Y] => L::load(velocity[axis], slot));
             let mut third = each!(axis in [X, Y] => {
                 second[axis].mul_sub_from(drag, force[axis] + load[axis])
             });
-            if CAREFUL {
+            if EXACT {
                 let y = L::load(here[Y], slot);
                 third = floor(physics, y, third, second[X].mul_add(L::splat(h / 2.0), velocity[X]));
             }
@@ -211,25 +210,25 @@ fn third_stage<L: Lanes, const CAREFUL: bool>(
 
 /// The fourth stage, after which the new velocities are known. Gives whether all was regular.
 #[inline(always)]
-fn fourth_stage<L: Lanes, const CAREFUL: bool>(
+fn fourth_stage<L: Lanes, const EXACT: bool>(
     System { lattice, physics }: &System,
     state: &State,
     scratch: &mut Scratch,
 ) -> bool {
     let (h, len, pitch) = (physics.time_step, lattice.len, lattice.pitch);
-    let Scratch { passing, work, extra, stages: [_, _, here], velocity: new, .. } = scratch;
+    let Scratch { carry, work, off_lattice, stages: [_, _, here], velocity: new, .. } = scratch;
     let drag = L::splat(physics.drag / physics.mass * h);
     let (here, velocity, new) = (slices(here, len), slices(&state.velocity, len), slices_mut(new, len));
-    let ([px, py], extra) = (slices_mut(passing, len), extra.as_ref());
+    let ([px, py], off_lattice) = (slices_mut(carry, len), off_lattice.as_ref());
     let mut watch = Watch::<L>::new();
-    for run in &lattice.runs {
+    for range in &lattice.active_ranges {
         let mut gather = Gather::<L>::new([&mut *px, &mut *py], pitch);
-        for slot in run.clone().step_by(L::WIDTH) {
+        for slot in range.clone().step_by(L::WIDTH) {
             let (work, lane) = (&work[slot / BLOCK], slot % BLOCK);
             let vectors = vectors(here, slot, pitch);
-            let pull = work.pulls.at::<L, CAREFUL>(lane, squares(&vectors), Some(&mut watch));
+            let pull = work.pulls.at::<L, EXACT>(lane, squares(&vectors), Some(&mut watch));
             let force = gather.next(pull, &vectors, slot);
-            let load = load_of::<L>(work, extra, slot);
+            let load = load_of::<L>(work, off_lattice, slot);
             let third = each!(axis in [X, Y] => L::load(&work.third[axis], lane));
             let velocity = each!(axis in [X, Y] => L::load(velocity[axis], slot));
             let mut fourth = each!(axis in [X, Y] => {
@@ -237,7 +236,7 @@ fn fourth_stage<L: Lanes, const CAREFUL: bool>(
             });
             let y = L::load(here[Y], slot);
             watch.points(y);
-            if CAREFUL {
+            if EXACT {
                 fourth = floor(physics, y, fourth, third[X].mul_add(L::splat(h), velocity[X]));
             }
             each!(axis in [X, Y] => {
@@ -248,18 +247,20 @@ fn fourth_stage<L: Lanes, const CAREFUL: bool>(
             });
         }
     }
-    CAREFUL || watch.regular()
+    EXACT || watch.regular()
 }
 
-/// Lanes in memory. Their alignment matters beyond them: a compiler that need not align the stack for anything else
-/// does not do so for what it spills of the sweeps' registers either, and each of those then straddles cache lines.
+/// Lanes in memory. Their alignment matters beyond them: a compiler that need not align the stack
+/// for anything else does not do so for what it spills of the sweeps' registers either, and each of
+/// those then straddles cache lines.
 #[repr(align(64))]
 struct Aligned([[f64; BLOCK]; 4]);
 
-/// Adds the floor plane's push at y < 0, below the ground; only reached by tunnelling (physics.md, "World").
+/// Adds the floor plane's push at y < 0, below the ground; only reached by tunnelling (physics.md,
+/// "World").
 #[inline(always)]
 fn floor<L: Lanes>(physics: &Physics, y: L, acceleration: [L; 2], velocity: L) -> [L; 2] {
-    if !L::any(L::splat(0.0).above(y)) {
+    if !L::any(L::splat(0.0).gt(y)) {
         return acceleration;
     }
     let mut lanes = Aligned([[0.0; BLOCK]; 4]);

@@ -1,24 +1,26 @@
 //! Spring forces on wide lanes.
 //!
-//! A sweep goes over the lattice's slots block by block. Each slot has four springs (horizontal, vertical, falling,
-//! rising), which look only ahead: to the slot's own point, the one to the right, and those two below. So what a
-//! spring does to points ahead is handed on ([`Passing`]), each point's forces are added up in the same order on
-//! any lanes, and a block's results may overwrite its inputs.
+//! A sweep goes over the lattice's slots block by block. Each slot has four springs (horizontal,
+//! vertical, falling, rising), which look only ahead: to the slot's own point, the one to the
+//! right, and those two below. So what a spring does to points ahead is handed on (`carry` of
+//! [`Gather`]), each point's forces are added up in the same order on any lanes, and a block's
+//! results may overwrite its inputs.
 //!
-//! A spring of stiffness k and rest length ρ, of length d₀ at the start of the substep, pulls with k(1 − ρ/d)w when
-//! its vector w has length d. With t = d²/d₀² − 1 that is
+//! A spring of stiffness k and rest length ρ, of length d₀ at the start of the substep, pulls with
+//! k(1 − ρ/d)w when its vector w has length d. With t = d²/d₀² − 1 that is
 //!
 //!   k(1 − ρ/d₀) + k(ρ/d₀)·(1 − 1/√(1 + t)) = `initial` + `change`·(1 − 1/√(1 + t)).
 //!
-//! Within a substep t is small, and a short series does ([`super::series`]): neither root nor division.
+//! Within a substep t is small, and a short series does ([`super::series`]): neither root nor
+//! division.
 
 use crate::lattice::FAMILIES;
 use crate::simd::{BLOCK, Lanes, each};
 use crate::state::{X, Y};
-use crate::step::series::{RANGE, briefly, carefully};
+use crate::step::series::{RANGE, rsqrt_exact, rsqrt_series};
 
-/// What a sweep looks out for while it takes everything for regular. A branch in every block would cost more than the
-/// rare second sweep that treats each irregular spring and point as it must be.
+/// What a sweep looks out for while it takes everything for regular. A branch in every block would
+/// cost more than the rare second sweep that treats each irregular spring and point as it must be.
 #[derive(Clone, Copy)]
 pub(crate) struct Watch<L> {
     stretch: L,
@@ -38,7 +40,8 @@ impl<L: Lanes> Watch<L> {
         self.stretch = first.max_abs(second).max_abs(self.stretch);
     }
 
-    /// Points that are to be above the floor plane. One that is nowhere (NaN) has springs, which are seen to be irregular.
+    /// Points that are to be above the floor plane. One that is nowhere (NaN) has springs, which
+    /// are seen to be irregular.
     #[inline(always)]
     pub fn points(&mut self, y: L) {
         self.depth = (L::splat(0.0) - y).max(self.depth);
@@ -47,8 +50,8 @@ impl<L: Lanes> Watch<L> {
     /// Whether all was as it was taken to be; not where a spring's stretch is no number.
     #[inline(always)]
     pub fn regular(self) -> bool {
-        let within = L::splat(RANGE.next_up()).above(self.stretch);
-        L::all(within) && !L::any(self.depth.above(L::splat(0.0)))
+        let within = L::splat(RANGE.next_up()).gt(self.stretch);
+        L::all(within) && !L::any(self.depth.gt(L::splat(0.0)))
     }
 }
 
@@ -59,9 +62,10 @@ pub(crate) type Wide = [f64; BLOCK];
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
 pub(crate) struct Springs {
-    /// 1/d₀ of the latest substep. Within a control step the next substep's is found from it by the series; the
-    /// first substep of each control step starts from 0, which is out of the series' range, and so from root and
-    /// division: a life continued from its state is the same bits.
+    /// 1/d₀ of the latest substep. Within a control step the next substep's is found from it by the
+    /// series; the first substep of each control step starts from 0, which is out of the series'
+    /// range, and so from root and division: a simulation that goes on from its state is the same
+    /// bits.
     inverse_length: [Wide; FAMILIES],
     /// Stiffness per mass of a point, times the servo's gain \[1/s²\]; 0 where there is no spring.
     driven: [Wide; FAMILIES],
@@ -85,7 +89,7 @@ impl Pulls {
 
     /// The pull of each spring per vector at some later squared lengths in the same substep.
     #[inline(always)]
-    pub fn at<L: Lanes, const CAREFUL: bool>(
+    pub fn at<L: Lanes, const EXACT: bool>(
         &self,
         lane: usize,
         square: [L; 4],
@@ -98,7 +102,7 @@ impl Pulls {
             watch.springs(&t);
         }
         each!(i in [0, 1, 2, 3] => {
-            let shrunk = if CAREFUL { carefully(t[i]) } else { briefly(t[i]) };
+            let shrunk = if EXACT { rsqrt_exact(t[i]) } else { rsqrt_series(t[i]) };
             L::load(&self.change[i], lane).mul_add(shrunk, L::load(&self.initial[i], lane))
         })
     }
@@ -119,11 +123,11 @@ impl Springs {
         self.inverse_length = [[0.0; BLOCK]; FAMILIES];
     }
 
-    /// Sets this substep's rest lengths, a small part (`gain`) of the way from the present lengths to the goals
-    /// (physics.md, 2), in `pulls`; gives the pull of each spring per vector. A careful servo finds all lengths with
-    /// root and division.
+    /// Sets this substep's rest lengths, a small part (`gain`) of the way from the present lengths
+    /// to the goals (physics.md, "One substep", 2), in `pulls`; gives the pull of each spring per
+    /// vector. An exact servo finds all lengths with root and division.
     #[inline(always)]
-    pub fn servo<L: Lanes, const CAREFUL: bool>(
+    pub fn servo<L: Lanes, const EXACT: bool>(
         &mut self,
         pulls: &mut Pulls,
         lane: usize,
@@ -132,7 +136,7 @@ impl Springs {
         watch: &mut Watch<L>,
     ) -> [L; 4] {
         let (one, inverse_gain) = (L::splat(1.0), L::splat(1.0 / gain));
-        let inverse = if CAREFUL {
+        let inverse = if EXACT {
             // The floor is for what is no spring, between points at the same place.
             each!(i in [0, 1, 2, 3] => one / square[i].max(L::splat(1e-60)).sqrt())
         } else {
@@ -141,7 +145,7 @@ impl Springs {
                 square[i].mul_add(before[i] * before[i], L::splat(-1.0))
             });
             watch.springs(&t);
-            each!(i in [0, 1, 2, 3] => before[i].mul_sub_from(briefly(t[i]), before[i]))
+            each!(i in [0, 1, 2, 3] => before[i].mul_sub_from(rsqrt_series(t[i]), before[i]))
         };
         each!(i in [0, 1, 2, 3] => {
             // rest/d₀ = 1 − gain·(1 − goal/d₀)
@@ -176,22 +180,23 @@ pub(crate) fn squares<L: Lanes>([x, y]: &Vectors<L>) -> [L; FAMILIES] {
     each!(i in [0, 1, 2, 3] => x[i].mul_add(x[i], y[i] * y[i]))
 }
 
-/// Sums on the points of what their own springs and those of slots gone by do to them. What slots gone by do to
-/// points below waits in `passing`, by point; zeros in the first row.
+/// Sums on the points of what their own springs and those of slots gone by do to them. What slots
+/// gone by do to points below waits in `carry`, by point; zeros in the first row.
 pub(crate) struct Gather<'a, L> {
-    passing: [&'a mut [f64]; 2],
+    carry: [&'a mut [f64]; 2],
     pitch: usize,
-    /// What the springs of the block before do to points at their right: in their own row, and in the row below.
+    /// What the springs of the block before do to points at their right: in their own row, and in
+    /// the row below.
     beside: [L; 2],
     below: [L; 2],
 }
 
 impl<'a, L: Lanes> Gather<'a, L> {
-    /// For a run of blocks.
+    /// For an active range of blocks.
     #[inline(always)]
-    pub fn new(passing: [&'a mut [f64]; 2], pitch: usize) -> Self {
+    pub fn new(carry: [&'a mut [f64]; 2], pitch: usize) -> Self {
         let nothing = [L::splat(0.0); 2];
-        Gather { passing, pitch, beside: nothing, below: nothing }
+        Gather { carry, pitch, beside: nothing, below: nothing }
     }
 
     /// The sum of all springs' pulls on the points at the next slot, given how the slot's own pull.
@@ -203,11 +208,11 @@ impl<'a, L: Lanes> Gather<'a, L> {
             let (falling, rising) = (pull[2] * vector[2], pull[3] * vector[3]);
             let own = (horizontal + vertical) + falling;
             let beside = rising - horizontal;
-            let below = (vertical + rising) + falling.after(self.below[axis]);
+            let below = (vertical + rising) + falling.shift_in(self.below[axis]);
             // In this order: of a narrow body the row above is in the same block.
-            below.store(self.passing[axis], slot + self.pitch);
-            let above = L::load(self.passing[axis], slot);
-            let sum = (own - above) + beside.after(self.beside[axis]);
+            below.store(self.carry[axis], slot + self.pitch);
+            let above = L::load(self.carry[axis], slot);
+            let sum = (own - above) + beside.shift_in(self.beside[axis]);
             self.beside[axis] = beside;
             self.below[axis] = falling;
             sum
@@ -219,9 +224,9 @@ impl<'a, L: Lanes> Gather<'a, L> {
     pub fn next_nothing(&mut self, slot: usize) -> [L; 2] {
         let zero = L::splat(0.0);
         each!(axis in [X, Y] => {
-            zero.after(self.below[axis]).store(self.passing[axis], slot + self.pitch);
-            let above = L::load(self.passing[axis], slot);
-            let sum = zero.after(self.beside[axis]) - above;
+            zero.shift_in(self.below[axis]).store(self.carry[axis], slot + self.pitch);
+            let above = L::load(self.carry[axis], slot);
+            let sum = zero.shift_in(self.beside[axis]) - above;
             (self.beside[axis], self.below[axis]) = (zero, zero);
             sum
         })
@@ -232,7 +237,7 @@ impl<'a, L: Lanes> Gather<'a, L> {
     pub fn next_horizontal(&mut self, pull: L, vectors: &Vectors<L>) -> [L; 2] {
         each!(axis in [X, Y] => {
             let horizontal = pull * vectors[axis][0];
-            let sum = horizontal - horizontal.after(self.beside[axis]);
+            let sum = horizontal - horizontal.shift_in(self.beside[axis]);
             self.beside[axis] = horizontal;
             sum
         })
