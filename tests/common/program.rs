@@ -44,15 +44,14 @@ initial = 8
 parents = 8
 "#;
 
-/// Three stages in twelve generations: the second with shorter lives; the last with three draws of images, the hardest of
-/// three times as many, with the four fittest elites at the beginning of each, half of the offspring changed in up to four voxels, each
-/// chosen among several by what three relatives did, too, every second start raised, every third image
-/// shown to robots without length limits, and two pixels of each inverted.
+/// Three stages in twelve generations: the last with three draws of images, the hardest of three times as many, with the
+/// four fittest elites at the beginning of each, half of the offspring changed in up to four voxels, each chosen among
+/// several by what three relatives did, too, every second start raised, every third image shown to robots without length
+/// limits, and two pixels of each inverted.
 pub fn staged() -> String {
     let stages = "\n[[stage]]\ngenerations = 4\n\
         [[stage]]\ngenerations = 3\nimages_per_class = 2\nfitness = \"mean_clipped\"\n\
-        control_steps = 15\n\
-        [[stage]]\nimages_per_class = 3\npool = 9\nfitness = \"right_then_margin\"\nredraw = 2\nkeep = 4\n\
+        [[stage]]\nimages_per_class = 3\npool = 9\nfitness = \"mean_hinge\"\nredraw = 2\nkeep = 4\n\
         voxel_mutations = 0.5\nvoxel_candidates = 8\nvoxel_changes = 4\nvoxel_relatives = 3\nraised_starts = 1\n\
         without_limits = true\ninverted_pixels = 2\n";
     format!("{TINY}{stages}")
