@@ -87,13 +87,7 @@ fn evaluations(criterion: &mut Criterion) {
         let images: Vec<Grid<f64>> = (0..images).map(stimulus).collect();
         let jobs: Vec<Job> = bodies
             .iter()
-            .map(|&body| Job {
-                body,
-                order: Vec::new(),
-                may_win: Box::new(|_| true),
-                settled: None,
-                given_up: None,
-            })
+            .map(|&body| Job { body, order: Vec::new(), may_win: Box::new(|_| true), given_up: None })
             .collect();
         group.throughput(Throughput::Elements((bodies.len() * images.len()) as u64));
         for threads in [1, 2] {

@@ -315,11 +315,11 @@ fn set_reaches_a_stage_by_its_number_and_unsets_a_key() {
     let sandbox = Sandbox::new();
     sandbox.write("three.toml", staged());
     let plain = changed(&sandbox, &[]);
-    let third = changed(&sandbox, &["stage.3.keep=7", "stage.2.control_steps=", "data.train_images="]);
+    let third = changed(&sandbox, &["stage.3.keep=7", "stage.2.fitness=", "data.train_images="]);
     assert_eq!(third["stage"][2]["keep"].as_integer(), Some(7));
     assert_eq!(third["stage"][0], plain["stage"][0]);
-    assert!(plain["stage"][1].get("control_steps").is_some() && plain["data"].get("train_images").is_some());
-    assert!(third["stage"][1].get("control_steps").is_none() && third["data"].get("train_images").is_none());
+    assert!(plain["stage"][1].get("fitness").is_some() && plain["data"].get("train_images").is_some());
+    assert!(third["stage"][1].get("fitness").is_none() && third["data"].get("train_images").is_none());
     // Unset is what it would be if it did not stand in the file, and once more changes nothing.
     assert_eq!(
         changed(&sandbox, &["generations=", "start.archive="])["generations"].as_integer(),

@@ -41,9 +41,8 @@ fn a_robot_is_as_fit_as_its_probe_varies_under_shuffled_images() {
         });
         let probe = Body::new(probe).unwrap();
         let places = probe.counts().sensor;
-        let job =
-            Job { body: &probe, order: vec![], may_win: Box::new(|_| true), settled: None, given_up: None };
-        let Training { stimuli, conditions, protocol, .. } = &training;
+        let job = Job { body: &probe, order: vec![], may_win: Box::new(|_| true), given_up: None };
+        let Training { stimuli, conditions, .. } = &training;
         let physics = &run.config.physics;
         let (savings, stop) = (Savings::default(), AtomicBool::new(false));
         let evaluation = evaluate(&[job], stimuli, conditions, physics, protocol, savings, &stop).unwrap();

@@ -65,9 +65,11 @@ fn a_generation_that_lasts_for_minutes_is_dropped_when_a_signal_comes() {
 }
 
 #[test]
-fn a_stage_that_begins_with_long_lives_is_stopped_and_the_stage_before_is_kept() {
+fn a_stage_that_begins_with_much_work_is_stopped_and_the_stage_before_is_kept() {
     let sandbox = Sandbox::tiny();
-    let stages = "\n[[stage]]\ngenerations = 2\n[[stage]]\ncontrol_steps = 1000000\n";
+    // A quarter of a minute of processor time for each elite that the second stage evaluates anew.
+    let stages =
+        "\n[physics]\nsubsteps = 1000\n[[stage]]\ngenerations = 2\n[[stage]]\nimages_per_class = 900\n";
     sandbox.write("staged.toml", format!("{TINY}{stages}"));
     let mut child = sandbox.start("evolve -q -c staged.toml -o run");
     assert_eq!(stopped(&mut child, "TERM").code(), Some(75));
@@ -170,8 +172,7 @@ impl Observer for Silent {
 #[test]
 fn a_run_stopped_at_any_moments_goes_on_to_the_same_bytes() {
     let sandbox = Sandbox::new();
-    let robust = format!("{TINY}\n[evaluation]\nrobust = true\n");
-    for (name, text) in [("staged", staged()), ("robust", robust)] {
+    for (name, text) in [("plain", TINY.to_string()), ("staged", staged())] {
         let text = text.replace("control_steps = 20", "control_steps = 60");
         sandbox.write(&format!("{name}.toml"), &text);
         sandbox.run(&format!("evolve -q -c {name}.toml -o {name}-whole")).ended(0, &[]);
@@ -199,6 +200,8 @@ fn a_run_stopped_at_any_moments_goes_on_to_the_same_bytes() {
             match finished {
                 Ok(finished) if !finished.stopped => break,
                 Ok(_) => {}
+                // A program that another test starts has this process's files, and with them the lock of the run before, for a moment.
+                Err(error) if error.kind == ErrorKind::Occupied => continue,
                 // Before there was anything to save.
                 Err(error) => assert_eq!(error.kind, ErrorKind::Stopped, "{error}"),
             }

@@ -11,7 +11,6 @@ use crate::genome::Genome;
 use crate::qd::descriptor::{count_bin, possible_cells};
 use crate::qd::{Archive, ArchiveStats, DescriptorSpace, Elite};
 use crate::task::fitness::Criterion;
-use crate::task::protocol::Protocol;
 use crate::task::score::Answer;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
@@ -190,10 +189,8 @@ impl RunFile {
             if space.index(&robot.cell).is_none() {
                 return refuse("there is no such cell in the archive");
             }
-            let needed =
-                self.config.grouping()?.with_fitness(self.criterion()).settled_by(&self.answers(robot));
-            if robot.displacements.len() != needed.unwrap_or(self.training_images.len()) {
-                return refuse("it has not one displacement per training image that it has to be shown");
+            if robot.displacements.len() != self.training_images.len() {
+                return refuse("it has not one displacement per training image");
             }
         }
         self.archive().map(|_| ())
@@ -215,11 +212,6 @@ impl RunFile {
         format!("{}{unit}", number::fixed(objective, 2))
     }
 
-    /// How its elites were shown images.
-    pub fn protocol(&self) -> Protocol {
-        self.config.protocol_in(self.config.period(self.latest()))
-    }
-
     /// Whether both are of one run, however far it had got: the same config and seed make the same robots.
     fn is_one_with(&self, other: &RunFile) -> bool {
         let essence = |run: &RunFile| (run.config.essence(), run.dataset.clone());
@@ -237,15 +229,15 @@ impl RunFile {
         answers(&self.training_images, robot.displacements.iter().copied().map(Some))
     }
 
-    /// Whether its displacements are those of its bodies' lives under the training images as the config's protocol has them: of no
-    /// other length, from no raised starts, with the length limits, without inverted or shuffled pixels.
+    /// Whether its displacements are those of its bodies' lives under the training images as the config's protocol has them: from no
+    /// raised starts, with the length limits, without inverted or shuffled pixels.
     pub fn follows_protocol(&self) -> bool {
         let period = self.config.period(self.latest());
         let changed = self.config.measures_response(period)
             || self.config.raised_starts(period) > 0
             || self.config.without_limits(period)
             || self.config.inverted_pixels(period) > 0;
-        !changed && self.protocol() == self.config.protocol
+        !changed
     }
 
     /// The last generation done, from 0.

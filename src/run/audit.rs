@@ -230,7 +230,7 @@ fn training_of(run: &RunFile, path: &Path, whereabouts: &Whereabouts) -> Result<
     let (dataset, stimuli) = (run.dataset.clone(), images.iter().map(see).collect::<Result<Vec<_>, Error>>());
     // As in a test, every life is lived under the same conditions, however the robot was trained.
     let conditions = Vec::new();
-    Ok(Training { dataset, images, stimuli: stimuli?, conditions, protocol: run.config.protocol.clone() })
+    Ok(Training { dataset, images, stimuli: stimuli?, conditions })
 }
 
 impl Trial {
@@ -314,7 +314,7 @@ fn live(setting: &Setting, measured: bool, stop: &AtomicBool) -> Result<Option<(
         let system = Arc::new(System::new(body, physics.clone()));
         return Ok(walk(&system, protocol, stimuli, true, stop)?.ok());
     }
-    let job = Job { body, order: Vec::new(), may_win: Box::new(|_| true), settled: None, given_up: None };
+    let job = Job { body, order: Vec::new(), may_win: Box::new(|_| true), given_up: None };
     let savings = Savings { early_stop: false, ..Savings::default() };
     let evaluation = evaluate(&[job], stimuli, &[], physics, protocol, savings, stop)?.pop();
     Ok(match evaluation.map(|evaluation| evaluation.outcome) {

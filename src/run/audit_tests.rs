@@ -18,13 +18,7 @@ fn trial(height: usize, width: usize, physics: Physics) -> Trial {
     let stimuli = [0.0, 1.0].map(|pixel| Grid::filled(height, width, pixel)).to_vec();
     Trial {
         grouping: config.grouping().unwrap(),
-        training: Training {
-            dataset,
-            images,
-            stimuli,
-            conditions: Vec::new(),
-            protocol: config.protocol.clone(),
-        },
+        training: Training { dataset, images, stimuli, conditions: Vec::new() },
         criteria,
         config,
     }

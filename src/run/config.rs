@@ -2,7 +2,7 @@
 
 use super::Error;
 use super::curriculum::StageConfig;
-use super::robust::EvaluationConfig;
+use super::evaluation_config::EvaluationConfig;
 use super::start::StartConfig;
 pub use super::task_config::TaskConfig;
 use super::toml_text::{self, Format};

@@ -5,7 +5,6 @@ use crate::genome::MutationParams;
 use crate::genome::params::VoxelScope;
 use crate::task::evaluation::Savings;
 use crate::task::fitness::{Criterion, Fitness};
-use crate::task::protocol::Protocol;
 use serde::{Deserialize, Serialize};
 use std::iter::successors;
 
@@ -36,10 +35,6 @@ pub struct StageConfig {
     /// archive. Default: never.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub redraw: Option<u64>,
-    /// Control steps an image is shown for. Default `protocol.control_steps`. Shorter lives are cheaper, and who walks the
-    /// right way usually does so from the start.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub control_steps: Option<u32>,
     /// Elites of each task of the stage before, or of the archive that the run starts from, that are evaluated when the stage
     /// begins: those who were fittest there. Default: all.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -52,9 +47,6 @@ pub struct StageConfig {
     /// Default: none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub threshold_min: Option<f64>,
-    /// Fitness is that of the worst of a few perturbed lives, the unchanged one included. Default `evaluation.robust`.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub robust: Option<bool>,
     /// Share of offspring of which one voxel is mutated instead of the network. Default `genome.voxel_mutations`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub voxel_mutations: Option<f64>,
@@ -153,11 +145,6 @@ impl Config {
         }
     }
 
-    /// Whether perturbed lives count in a period.
-    pub fn robust(&self, period: Period) -> bool {
-        self.stage_of(period).robust.unwrap_or(self.evaluation.robust)
-    }
-
     /// The period whose images are shown in a period: itself, or one of a stage before.
     pub fn drawn_in(&self, period: Period) -> Period {
         let Some(shown) = self.stage_of(period).images_of.and_then(|number| self.stage.get(..number)) else {
@@ -175,12 +162,6 @@ impl Config {
     /// Images of each class among which the hardest are chosen in a period; `None`: no choice.
     pub fn pool(&self, period: Period) -> Option<usize> {
         self.stage_of(period).pool
-    }
-
-    /// How images are shown in a period.
-    pub fn protocol_in(&self, period: Period) -> Protocol {
-        let control_steps = self.stage_of(period).control_steps.unwrap_or(self.protocol.control_steps);
-        Protocol { control_steps, ..self.protocol.clone() }
     }
 
     /// Rows up to which starts are raised in a period, by turns within a class.

@@ -10,7 +10,7 @@ fn config(stages: &str) -> Result<Config, Error> {
 fn stages_follow_each_other_and_the_last_lasts() {
     let config = config(
         "[[stage]]\ngenerations = 10\n[[stage]]\ngenerations = 20\nimages_per_class = 4\nfitness = 'mean_clipped'\n\
-         redraw = 8\n[[stage]]\nimages_per_class = 8\nfitness = 'right_then_margin'",
+         redraw = 8\n[[stage]]\nimages_per_class = 8\nfitness = 'mean_hinge'",
     )
     .unwrap();
     let at = |generation| {
@@ -21,7 +21,7 @@ fn stages_follow_each_other_and_the_last_lasts() {
         [0, 9, 10, 17, 18, 29, 30, 10_000].map(at),
         [(0, 0), (0, 0), (1, 0), (1, 0), (1, 1), (1, 2), (2, 0), (2, 0)]
     );
-    let fitness = [Fitness::Min, Fitness::MeanClipped, Fitness::RightThenMargin];
+    let fitness = [Fitness::Min, Fitness::MeanClipped, Fitness::MeanHinge];
     assert_eq!([9, 10, 30].map(|generation| config.criterion(generation).fitness), fitness);
     assert_eq!([9, 10, 30].map(|g| config.drawn_per_class(config.period(g))), [None, Some(4), Some(8)]);
     assert_ne!(config.period(10).number(), config.period(18).number());

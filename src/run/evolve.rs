@@ -10,7 +10,6 @@ use super::folder::{self, IfExists, RunFolder};
 use super::keep::Floors;
 use super::metrics::{Metrics, Totals};
 use super::relatives::Relatives;
-use super::robust::{Scored, with_perturbed_lives};
 pub use super::session::{Finished, Observer, Options, Progress};
 use super::start::{Start, StartRef};
 use super::train::TRAINING_JSON;
@@ -365,7 +364,7 @@ impl<'a> Run<'a> {
         stop: &AtomicBool,
     ) -> Result<(), Error> {
         let config = &self.options.config;
-        let Training { stimuli, conditions, protocol, .. } = &self.training;
+        let Training { stimuli, conditions, .. } = &self.training;
         let floors = Floors::of(self.search.archive(), &self.grouping, config.keep(self.period), least);
         let probes: Vec<Body> = match config.measures_response(self.period) {
             true => robots.iter().map(|(_, _, robot)| robot.body.probe()).collect(),
@@ -375,17 +374,13 @@ impl<'a> Run<'a> {
         let mut jobs: Vec<Job> = jobs.collect();
         jobs.iter_mut().zip(&probes).for_each(|(job, probe)| job.body = probe);
         let savings = config.savings_in(self.period);
-        let evaluations = evaluate(&jobs, stimuli, conditions, &config.physics, protocol, savings, stop)?;
-        let scored = if config.robust(self.period) {
-            with_perturbed_lives(config, &self.training, &self.grouping, &jobs, evaluations, savings, stop)?
-        } else {
-            evaluations.into_iter().map(Scored::from).collect()
-        };
+        let evaluations =
+            evaluate(&jobs, stimuli, conditions, &config.physics, &config.protocol, savings, stop)?;
         drop(jobs);
 
         let mut told = Vec::new();
         let relatives = usize::from(config.mutation_in(self.period).voxel_relatives);
-        for ((child, _, robot), Scored { evaluation, at_most }) in robots.into_iter().zip(scored) {
+        for ((child, _, robot), evaluation) in robots.into_iter().zip(evaluations) {
             self.totals.count(&evaluation);
             if relatives > 0
                 && let Some(known) = evaluation.outcome.known()
@@ -394,7 +389,7 @@ impl<'a> Run<'a> {
             }
             match evaluation.outcome {
                 Outcome::Walked(displacements) => {
-                    told.extend(self.scored(child, robot, displacements, at_most, &floors))
+                    told.extend(self.scored(child, robot, displacements, &floors))
                 }
                 Outcome::Unstable(_) => self.totals.unstable += 1,
                 Outcome::Stopped(_) => {}

@@ -16,6 +16,7 @@ pub mod error;
 pub mod eval;
 pub mod eval_file;
 mod eval_images;
+pub mod evaluation_config;
 pub mod evolve;
 pub mod folder;
 pub mod gallery;
@@ -36,7 +37,6 @@ pub mod reproduce;
 mod response;
 mod resume;
 pub mod robots;
-pub mod robust;
 #[cfg(test)]
 mod samples;
 pub mod sensitivity;

@@ -63,7 +63,6 @@ impl Config {
                 "\"sequential\"".to_string(),
                 "\"fresh\"",
             ),
-            (self.evaluation.robust, "evaluation.robust", "true".to_string(), "false"),
             (
                 self.genome.voxel_candidates > 1,
                 "genome.voxel_candidates",

@@ -57,7 +57,6 @@ fn what_does_not_go_with_a_response_is_refused_with_its_key() {
         ("data.images_per_class=1", "data.images_per_class = 1", "4 training images or more"),
         ("data.train_images=[0, 1, 2]", "data.train_images = 3 images", "4 training images or more"),
         ("protocol.life=\"sequential\"", "protocol.life = \"sequential\"", "\"fresh\""),
-        ("evaluation.robust=true", "evaluation.robust = true", "false"),
         ("genome.voxel_candidates=2", "genome.voxel_candidates = 2", "expected 1"),
         ("genome.voxel_relatives=1", "genome.voxel_relatives = 1", "expected 0"),
     ];

@@ -2,7 +2,7 @@
 
 use super::archive::RunFile;
 use super::config::{ArchiveConfig, BodyConfig, CheckpointConfig, DataConfig, TaskConfig};
-use super::robust::EvaluationConfig;
+use super::evaluation_config::EvaluationConfig;
 use super::start::StartConfig;
 use super::train_config::TrainConfig;
 use super::training::ImageRef;

@@ -3,7 +3,7 @@
 use super::curriculum::Period;
 use super::{Config, Error};
 use crate::genome::params::{MAX_CANDIDATES, MAX_RELATIVES};
-use crate::task::protocol::{Life, MAX_STEPS};
+use crate::task::protocol::Life;
 
 /// Most draws of images in a stage: what a run was trained on is worked out from all of them.
 const MAX_DRAWS: u64 = 100_000;
@@ -26,10 +26,6 @@ impl Config {
             if begin > u64::from(u32::MAX) {
                 return refuse(number, format!("it ends with generation {begin}: expected less than 2³²"));
             }
-            if let Some(steps) = stage.control_steps.filter(|&steps| steps > MAX_STEPS) {
-                let text = format!("control_steps = {steps}: expected 1 to {MAX_STEPS}");
-                return refuse(number, text);
-            }
             if let Some(every) = stage.redraw.filter(|&every| every > 0) {
                 let lasts = match stage.generations {
                     Some(generations) if !is_last => generations,
@@ -45,7 +41,6 @@ impl Config {
             let zeros = [
                 ("images_per_class", stage.images_per_class == Some(0)),
                 ("redraw", stage.redraw == Some(0)),
-                ("control_steps", stage.control_steps == Some(0)),
                 ("start_with", stage.start_with == Some(0)),
                 ("keep", stage.keep == Some(0)),
                 ("enough", stage.enough == Some(0)),

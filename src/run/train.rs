@@ -6,10 +6,10 @@
 use super::archive::{Dimensions, FORMAT, FORMAT_VERSION, Robot, RunFile};
 use super::config::DataConfig;
 use super::curriculum::Period;
+use super::evaluation_config::EvaluationConfig;
 use super::folder::{self, IfExists, RunFolder};
 use super::metrics::{Metrics, Totals};
 use super::robots::{Selection, Source};
-use super::robust::EvaluationConfig;
 use super::start::{StartConfig, StartRef};
 use super::task_config::TaskConfig;
 use super::training::{ImageRef, Training};

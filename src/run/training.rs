@@ -10,7 +10,6 @@ use crate::base::random::{Purpose, Stream, stream};
 use crate::base::stop::NEVER;
 use crate::task::condition::Condition;
 use crate::task::dataset::{Dataset, DatasetError, Split};
-use crate::task::protocol::Protocol;
 use crate::task::score::Answer;
 use crate::task::stimulus::{StimulusParams, stimulus};
 use serde::{Deserialize, Serialize};
@@ -46,8 +45,6 @@ pub struct Training {
     pub stimuli: Vec<Grid<f64>>,
     /// Under what each is shown, in a fresh life.
     pub conditions: Vec<Condition>,
-    /// How they are shown.
-    pub protocol: Protocol,
 }
 
 /// Loads the dataset of a config; `data` is the folder given on the command line.
@@ -173,7 +170,7 @@ impl Training {
             return Ok(drawn);
         }
         // Where the first images decide whether others are shown, they are not to be of one class.
-        let takes_turns = config.criterion_in(period).last_wrong().is_some() || config.race(period);
+        let takes_turns = config.race(period);
         let per_class = drawn.len() / config.classes().len().max(1);
         Ok(if takes_turns { by_turns(drawn, per_class) } else { drawn })
     }
@@ -230,7 +227,7 @@ impl Training {
         } else {
             Condition::by_turns(classes, config.raised_starts(period), config.without_limits(period))
         };
-        Ok(Training { dataset, images, stimuli, conditions, protocol: config.protocol_in(period) })
+        Ok(Training { dataset, images, stimuli, conditions })
     }
 
     /// The answers that displacements under the images are, in their order; those that are missing are still to come.
@@ -284,14 +281,12 @@ mod tests {
         for (data, images) in [("", two), ("", pool), (two, "")] {
             let plain = drawn(data, &format!("{images}\nfitness = \"mean_hinge\""));
             assert_eq!(plain.0, [3, 3, 0, 0, 1, 1]);
-            for fitness in ["\"mean_hinge\"\nrace = true", "\"until_fifth_wrong\""] {
-                let by_turns = drawn(data, &format!("{images}\nfitness = {fitness}"));
-                // The same images.
-                assert_eq!(by_turns, (vec![3, 0, 1, 3, 0, 1], plain.1.clone()), "{data} {images} {fitness}");
-            }
+            let by_turns = drawn(data, &format!("{images}\nfitness = \"mean_hinge\"\nrace = true"));
+            // The same images.
+            assert_eq!(by_turns, (vec![3, 0, 1, 3, 0, 1], plain.1), "{data} {images}");
         }
         // Images that are named come as they are named.
-        let named = drawn("train_images = [3, 0, 10, 1]", "fitness = \"until_fifth_wrong\"");
+        let named = drawn("train_images = [3, 0, 10, 1]", "fitness = \"mean_hinge\"\nrace = true");
         assert_eq!(named.0, [3, 0, 0, 1]);
     }
 

@@ -36,8 +36,7 @@ impl Default for Savings {
 /// How an evaluation ended.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Outcome {
-    /// The displacement under every image, in the images' order, voxel lengths; where the fitness is [settled](Job::settled)
-    /// by the first of them, of those at least.
+    /// The displacement under every image, in the images' order, voxel lengths.
     Walked(Vec<f64>),
     /// A life became unstable: no fitness.
     Unstable(Unstable),
@@ -83,8 +82,6 @@ pub struct Job<'a> {
     pub order: Vec<usize>,
     /// Whether it may still get into the archive, given some of its displacements; asked with early stopping only.
     pub may_win: Box<MayWin<'a>>,
-    /// Whether its fitness is known, whatever its other displacements: they are then not simulated. Without it all are.
-    pub settled: Option<Box<MayWin<'a>>>,
     /// Whether it is given up, going by the images in some order up to the first whose displacement is not known, and no others: so
     /// that it does not matter which are shown first, or are one life.
     pub given_up: Option<Box<MayWin<'a>>>,
@@ -177,9 +174,10 @@ struct Lives {
     verdict: Option<Evaluation>,
 }
 
-/// Walked, under the first images: there may be such that are not known between others.
+/// Walked, under all images.
 fn walked(known: Vec<Option<f64>>) -> Outcome {
-    Outcome::Walked(known.into_iter().map_while(|d| d).collect())
+    let displacement = |known: Option<f64>| known.expect("no life was left out, and none was unstable");
+    Outcome::Walked(known.into_iter().map(displacement).collect())
 }
 
 /// What all jobs have in common.
@@ -321,11 +319,8 @@ impl<'a> Candidate<'a> {
 
     /// How it ends for a robot with these displacements, in the order of showing, whatever the rest may be; `None` if that matters.
     fn outcome(&self, displacements: &[Option<f64>]) -> Option<Outcome> {
-        let Job { may_win, settled, given_up, .. } = self.job;
+        let Job { may_win, given_up, .. } = self.job;
         let known = self.known(displacements);
-        if settled.as_ref().is_some_and(|settled| settled(&known)) {
-            return Some(walked(known));
-        }
         let is_lost = || self.early_stop && displacements.len() < self.order.len() && !may_win(&known);
         let is_given_up = given_up.as_ref().is_some_and(|given_up| given_up(&known));
         (is_given_up || is_lost()).then_some(Outcome::Stopped(known))
@@ -339,11 +334,8 @@ impl<'a> Candidate<'a> {
     /// Counts the lives that are known, in their order, whichever was done first: every one once, since each takes a look at
     /// all images.
     fn count(&self, lives: &mut Lives) {
-        let is_over = |lives: &Lives| {
-            // If images before that one settle the fitness, it does not count.
-            let is_lost = self.early_stop && lives.unstable.is_some() && self.job.settled.is_none();
-            is_lost || lives.counted == lives.lived.len()
-        };
+        let is_over =
+            |lives: &Lives| self.early_stop && lives.unstable.is_some() || lives.counted == lives.lived.len();
         if lives.verdict.is_some() {
             return;
         }

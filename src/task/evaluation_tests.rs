@@ -27,20 +27,9 @@ const WILD: [[f64; 3]; 5] =
     [[0.4, 0.0, 0.3], [0.2, 0.5, 0.4], [1.0, 0.0, 1.0], [0.2, 0.9, 0.4], [1.0, 0.7, 1.0]];
 
 fn run(rows: &[[f64; 3]], life: Life, savings: Savings, order: &[usize], may_win: Box<MayWin>) -> Evaluation {
-    run_until(rows, life, savings, order, may_win, None)
-}
-
-fn run_until(
-    rows: &[[f64; 3]],
-    life: Life,
-    savings: Savings,
-    order: &[usize],
-    may_win: Box<MayWin>,
-    settled: Option<Box<MayWin>>,
-) -> Evaluation {
     let protocol = Protocol { life, control_steps: 8, ..Protocol::default() };
     let body = body();
-    let job = Job { body: &body, order: order.to_vec(), may_win, settled, given_up: None };
+    let job = Job { body: &body, order: order.to_vec(), may_win, given_up: None };
     let mut evaluations =
         evaluate(&[job], &images(rows), &[], &physics(), &protocol, savings, &NEVER).unwrap();
     assert_eq!(evaluations.len(), 1);
@@ -118,23 +107,16 @@ fn fresh_lives_follow_the_order_and_stop_when_nothing_can_be_won() {
 #[test]
 fn every_life_is_looked_at_once() {
     let rows: Vec<[f64; 3]> = (0..60).map(|i| [0.4 / 60.0 * f64::from(i), 0.0, 0.3]).collect();
-    let looks = || {
-        let looks = Arc::new(AtomicUsize::new(0));
-        let look = Arc::clone(&looks);
-        let asked = move |may: bool| {
-            look.fetch_add(1, Ordering::Relaxed);
-            may
-        };
-        (looks, asked)
-    };
-    let ((winning, may_win), (settling, settled)) = (looks(), looks());
-    let may_win: Box<MayWin> = Box::new(move |_| may_win(true));
-    let settled: Box<MayWin> = Box::new(move |_| settled(false));
-    let savings = Savings::default();
-    let evaluation = rayon(2).install(|| run_until(&rows, Life::Fresh, savings, &[], may_win, Some(settled)));
+    let looks = Arc::new(AtomicUsize::new(0));
+    let look = Arc::clone(&looks);
+    let may_win: Box<MayWin> = Box::new(move |_| {
+        look.fetch_add(1, Ordering::Relaxed);
+        true
+    });
+    let evaluation = rayon(2).install(|| run(&rows, Life::Fresh, Savings::default(), &[], may_win));
     assert_eq!(evaluation.simulated, 60);
     // After the last one there is no rest to be dropped.
-    assert_eq!([winning, settling].map(|looks| looks.load(Ordering::Relaxed)), [59, 60]);
+    assert_eq!(looks.load(Ordering::Relaxed), 59);
 }
 
 #[test]
@@ -154,13 +136,7 @@ fn a_raised_start_is_another_life_even_under_the_same_image() {
         let evaluated = |raised: &[u32]| {
             let condition = |&raised: &u32| Condition { raised, ..Condition::default() };
             let conditions: Vec<Condition> = raised.iter().map(condition).collect();
-            let job = Job {
-                body: &body,
-                order: Vec::new(),
-                may_win: Box::new(|_| true),
-                settled: None,
-                given_up: None,
-            };
+            let job = Job { body: &body, order: Vec::new(), may_win: Box::new(|_| true), given_up: None };
             evaluate(&[job], &images, &conditions, &physics, &protocol, savings, &NEVER).unwrap().remove(0)
         };
         let evaluation = evaluated(&raised);
@@ -179,7 +155,7 @@ fn a_life_without_limits_is_another_life_and_leads_nowhere_where_it_becomes_unst
         let conditions: Vec<Condition> = without_limits.iter().map(condition).collect();
         let body = body();
         let may_win = Box::new(|_: &[Option<f64>]| true);
-        let job = Job { body: &body, order: Vec::new(), may_win, settled: None, given_up: None };
+        let job = Job { body: &body, order: Vec::new(), may_win, given_up: None };
         evaluate(&[job], &images, &conditions, physics, &protocol, Savings::default(), &NEVER)
             .unwrap()
             .remove(0)
@@ -225,43 +201,13 @@ fn a_sequential_life_keeps_the_order_of_the_images() {
 }
 
 #[test]
-fn what_is_not_needed_is_not_simulated_and_cannot_spoil_what_is() {
-    for (life, savings) in
-        [Life::Fresh, Life::Sequential].into_iter().flat_map(|l| all_savings().map(move |s| (l, s)))
-    {
-        let plain = run(&CALM, life, savings, &[], Box::new(|_| true));
-        let Outcome::Walked(all) = plain.outcome else { panic!("{plain:?}") };
-        for (rows, order) in [&CALM, &WILD].into_iter().flat_map(|r| ORDERS.map(|order| (r, order))) {
-            // The third image of the wild ones is unstable: not needed, or needed.
-            for needed in [2, 3] {
-                let settled = move |known: &[Option<f64>]| known[..needed].iter().all(Option::is_some);
-                let evaluation =
-                    run_until(rows, life, savings, order, Box::new(|_| true), Some(Box::new(settled)));
-                match evaluation.outcome {
-                    Outcome::Walked(first) => {
-                        assert!(rows == &CALM || needed == 2, "{life:?} {savings:?} {order:?}");
-                        assert!(first.len() >= needed);
-                        assert_eq!(first[..2], all[..2]);
-                    }
-                    Outcome::Unstable(_) => assert!(rows == &WILD && needed == 3),
-                    Outcome::Stopped(_) => panic!("{evaluation:?}"),
-                }
-                if order.is_empty() && rows == &CALM {
-                    assert_eq!(evaluation.simulated, needed as u64);
-                }
-            }
-        }
-    }
-}
-
-#[test]
 fn what_is_stopped_is_no_evaluation_and_ends_in_the_middle_of_a_life() {
     let (body, images) = (body(), images(&CALM));
     // A life that lasts for minutes.
     for life in [Life::Fresh, Life::Sequential] {
         let protocol = Protocol { life, control_steps: 10_000_000, ..Protocol::default() };
         let may_win = Box::new(|_: &[Option<f64>]| true);
-        let job = Job { body: &body, order: Vec::new(), may_win, settled: None, given_up: None };
+        let job = Job { body: &body, order: Vec::new(), may_win, given_up: None };
         let stop = AtomicBool::new(false);
         let begin = std::time::Instant::now();
         let ended = std::thread::scope(|threads| {

@@ -5,7 +5,7 @@ use super::grouping::Group;
 use serde::{Deserialize, Serialize};
 
 /// Displacement at which an answer is as good as can be, if nothing else is said, for [`Fitness::MeanClipped`] and
-/// [`Fitness::MeanHinge`]; and half as good as can be, for the tie-breaks of the others \[voxel lengths\].
+/// [`Fitness::MeanHinge`] \[voxel lengths\].
 pub const ENOUGH: u16 = 10;
 
 /// Displacements up to this are wrong, as in the paper's test \[voxel lengths\].
@@ -17,7 +17,7 @@ const SLACK: f64 = 1e-9;
 /// How answers to several images become one number. An answer's *margin* is its displacement towards the right side, in
 /// voxel lengths, negative on the wrong one; of the two ways to assign sides to groups the fitter counts.
 ///
-/// Where images are counted or averaged, both groups weigh the same, however many images they have: with one class
+/// Where images are averaged, both groups weigh the same, however many images they have: with one class
 /// against three, a robot that always walks the way of the three would else be right on three quarters, and the fittest
 /// for long.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -33,19 +33,6 @@ pub enum Fitness {
     /// The mean of the margins, each divided by as much, but never more than 1 (hinge loss; Cortes & Vapnik 1995): the farther an answer leads astray, the more it costs, so that a robot which knows three classes and walks the wrong way
     /// for all of the fourth is drawn away from there.
     MeanHinge,
-    /// How many images are answered right, by more than three voxel lengths; and, between 0 and the worth of an image, the
-    /// mean of (1 + m/(|m| + 10))/2 over the margins m, which tells equals apart and never saturates.
-    RightThenMargin,
-    /// How many images are answered right, as above; and (1 + m/(|m| + 10))/2 of the smallest margin m alone. One image on
-    /// which a robot is worse than an equally good elite rules it out: on many images, sooner than with the mean.
-    RightThenMin,
-    /// How many images are answered right before the fifth wrong answer, in the images' order, the classes by turns; ties
-    /// as with [`Fitness::RightThenMargin`], of the images so far. What comes after need not be shown: bodies that know
-    /// little are told after few images, and hundreds tell the good from the better.
-    UntilFifthWrong,
-    /// The same up to the twentieth wrong answer: for robots that know so little that up to the fifth they are shown a dozen
-    /// images, and told by luck.
-    UntilTwentiethWrong,
     /// How strongly a gait responds to what its voxels see, whatever its task: the standard deviation of the displacements
     /// \[voxel lengths\] within each of [the conditions](Condition::OF_RESPONSE) that images are shown under by turns,
     /// pooled. A run measures it on the body's [probe](crate::body::Body::probe), under shuffled images. Both ways to
@@ -59,10 +46,6 @@ impl Fitness {
         match self {
             Fitness::Min | Fitness::Response => Some("voxel lengths"),
             Fitness::MeanClipped | Fitness::MeanHinge => None,
-            Fitness::RightThenMargin
-            | Fitness::RightThenMin
-            | Fitness::UntilFifthWrong
-            | Fitness::UntilTwentiethWrong => Some("right answers"),
         }
     }
 }
@@ -86,15 +69,6 @@ impl From<Fitness> for Criterion {
 }
 
 impl Criterion {
-    /// Wrong answers after which nothing counts; `None` where all images do.
-    pub fn last_wrong(self) -> Option<u16> {
-        match self.fitness {
-            Fitness::UntilFifthWrong => Some(5),
-            Fitness::UntilTwentiethWrong => Some(20),
-            _ => None,
-        }
-    }
-
     /// Fitness under both assignments, of answers by group and displacement in the images' order; if some are still to
     /// come (`None`), upper bounds of it. Infinite without any image; not a number if an answer is none.
     pub(super) fn of_assignments(
@@ -116,34 +90,18 @@ impl Criterion {
         if all == 0 {
             return (f64::INFINITY, f64::INFINITY);
         }
-        if let Some(last) = self.last_wrong() {
-            return (run(margins.clone(), weights, 1.0, last).0, run(margins, weights, -1.0, last).0);
-        }
         let mut to_come = images;
         margins.clone().filter(|(_, m)| m.is_some()).for_each(|(group, _)| to_come[group] -= 1);
         // What is to come is as good as can be.
         let best = weights[0] * to_come[0] as f64 + weights[1] * to_come[1] as f64;
-        let (mut counts, mut sums, mut least) = ([to_come; 2], [best; 2], [1.0; 2]);
+        let mut sums = [best; 2];
         for (group, margin) in margins.filter_map(|(group, m)| Some((group, m?))) {
             for (way, m) in [margin, -margin].into_iter().enumerate() {
-                counts[way][group] += usize::from(m > WRONG);
-                let worth = self.worth(m);
-                sums[way] += weights[group] * worth;
-                least[way] = smaller(least[way], worth);
+                sums[way] += weights[group] * self.worth(m);
             }
         }
         let slack = if to_come == [0, 0] { 0.0 } else { SLACK };
-        let image = weights[0].min(weights[1]);
-        let of = |way: usize| {
-            let mean = sums[way] / all as f64;
-            let right = weights[0] * counts[way][0] as f64 + weights[1] * counts[way][1] as f64;
-            let fitness = match self.fitness {
-                Fitness::RightThenMargin => right + image * mean,
-                Fitness::RightThenMin => right + image * least[way],
-                _ => mean,
-            };
-            fitness + slack
-        };
+        let of = |way: usize| sums[way] / all as f64 + slack;
         (of(0), of(1))
     }
 
@@ -152,23 +110,13 @@ impl Criterion {
         matches!(self.fitness, Fitness::MeanClipped | Fitness::MeanHinge)
     }
 
-    /// What an answer with this margin is worth, at most 1, in the mean that the fitness is, or that breaks its ties.
+    /// What an answer with this margin is worth in the mean that the fitness is, at most 1.
     pub(super) fn worth(self, margin: f64) -> f64 {
         let share = margin / f64::from(self.enough);
         match self.fitness {
             Fitness::MeanClipped => share.clamp(-1.0, 1.0),
-            Fitness::MeanHinge => smaller(1.0, share),
-            _ => grown(margin),
+            _ => smaller(1.0, share),
         }
-    }
-
-    /// Whether answers that are still to come (`None`) cannot change the fitness under either assignment.
-    pub(super) fn is_settled(self, answers: impl Iterator<Item = (Group, Option<f64>)> + Clone) -> bool {
-        let margins = margins(answers);
-        let (_, weights) = weights(margins.clone());
-        self.last_wrong().is_some_and(|last| {
-            run(margins.clone(), weights, 1.0, last).1 && run(margins, weights, -1.0, last).1
-        })
     }
 }
 
@@ -207,38 +155,6 @@ pub(super) fn weights(margins: impl Iterator<Item = (usize, Option<f64>)>) -> ([
     let all = images[0] + images[1];
     let weight = |of_group: usize| if images.contains(&0) { 1.0 } else { all as f64 / (2 * of_group) as f64 };
     (images, images.map(weight))
-}
-
-/// Fitness up to the `last` wrong answer under one of the assignments, or an upper bound of it; and whether it is known that
-/// that was given, and when.
-fn run(
-    margins: impl Iterator<Item = (usize, Option<f64>)>,
-    weights: [f64; 2],
-    sign: f64,
-    last: u16,
-) -> (f64, bool) {
-    let (mut right, mut wrong, mut shown, mut sum) = (0.0, 0.0, 0.0, 0.0);
-    let (mut is_known, mut is_over) = (true, false);
-    for (group, margin) in margins {
-        // What is to come is as good as can be.
-        let margin = margin.map(|m| sign * m);
-        is_known &= margin.is_some();
-        shown += weights[group];
-        sum += weights[group] * margin.map_or(1.0, grown);
-        let counts = if margin.is_none_or(|m| m > WRONG) { &mut right } else { &mut wrong };
-        *counts += weights[group];
-        is_over = wrong > f64::from(last) - SLACK;
-        if is_over {
-            break;
-        }
-    }
-    let slack = if is_known { 0.0 } else { SLACK };
-    (right + weights[0].min(weights[1]) * sum / shown + slack, is_known && is_over)
-}
-
-/// A margin as a number between 0 and 1 that never stops growing: 1/2 for standing still.
-fn grown(margin: f64) -> f64 {
-    (1.0 + margin / (margin.abs() + f64::from(ENOUGH))) / 2.0
 }
 
 /// The smaller, or what is not a number: an answer that is none must never be overlooked.

@@ -154,15 +154,6 @@ impl Perturbation {
         Kind::ALL.into_iter().flat_map(of).collect()
     }
 
-    /// Those that robust evolution lives besides: a start raised by 1, and stiffness less by 5 %.
-    pub fn of_evolution() -> [Self; 2] {
-        [(Kind::Start, 1.0), (Kind::Stiffness, 0.95)].map(|(kind, amount)| Perturbation {
-            kind,
-            amount,
-            seed: 0,
-        })
-    }
-
     /// For people: "time step / 4".
     pub fn name(&self) -> String {
         let (kind, amount) = (self.kind.name(), self.amount);

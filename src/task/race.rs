@@ -284,7 +284,7 @@ mod tests {
         assert!(!race.is_left_behind(&worse, |_| Some(0.4)));
         let few = Race::against(&grouping(Fitness::MeanHinge), &parent[..FEWEST]).unwrap();
         assert!(!few.is_left_behind(&known(&answers(2, 0.0)), |_| Some(0.4)));
-        assert!(Race::against(&grouping(Fitness::RightThenMargin), &parent).is_none());
+        assert!(Race::against(&grouping(Fitness::Min), &parent).is_none());
         let unknown = Answer { class: 1, displacement: None };
         assert!(Race::against(&grouping(Fitness::MeanHinge), &[&parent[..], &[unknown]].concat()).is_none());
     }

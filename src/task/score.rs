@@ -57,24 +57,6 @@ impl Grouping {
         better(self.criterion().of_assignments(of_split(split, answers)))
     }
 
-    /// Whether the fitness on every task is known, whatever comes after the displacements known so far: with
-    /// [`Criterion::last_wrong`] before all images are shown.
-    pub fn is_settled(&self, answers: &[Answer]) -> bool {
-        self.tasks().iter().all(|split| self.criterion().is_settled(of_split(split, answers)))
-    }
-
-    /// How many of the first answers [settle](Self::is_settled) the fitness; `None` if not even all that are known do.
-    pub fn settled_by(&self, answers: &[Answer]) -> Option<usize> {
-        let by = |shown: usize| {
-            let mut answers = answers.to_vec();
-            answers.iter_mut().skip(shown).for_each(|answer| answer.displacement = None);
-            self.is_settled(&answers)
-        };
-        // Once settled, always settled.
-        let lengths: Vec<usize> = (0..answers.len()).collect();
-        by(answers.len()).then(|| lengths.partition_point(|&shown| !by(shown)))
-    }
-
     /// The task a robot performs, the one it is fittest on (the first wins a tie), and its fitness there.
     ///
     /// With one image per class and the smallest margin this is the paper's rule: min |d|, and the signs say which

@@ -174,7 +174,7 @@ mod tests {
     }
 
     fn surrogate<'a>(body: &'a Body, stimuli: &'a [Grid<f64>], known: usize) -> Option<Surrogate<'a>> {
-        Surrogate::of(body, stimuli, &answers(stimuli, known), &[], &split(), Fitness::RightThenMin, &PHYSICS)
+        Surrogate::of(body, stimuli, &answers(stimuli, known), &[], &split(), Fitness::MeanClipped, &PHYSICS)
     }
 
     #[test]

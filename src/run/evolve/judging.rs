@@ -4,7 +4,6 @@ use super::Run;
 use crate::qd::Evaluated;
 use crate::run::archive::Robot;
 use crate::run::keep::Floors;
-use crate::run::robust::settled;
 use crate::task::evaluation::{Job, MayWin};
 use crate::task::race::Race;
 use std::iter::repeat;
@@ -45,13 +44,7 @@ impl Run<'_> {
             Box::new(move |known: &[Option<f64>]| race.is_left_behind(known, |task| to_beat[task]))
                 as Box<MayWin>
         });
-        Job {
-            body: &robot.body,
-            order,
-            may_win: Box::new(may_win),
-            settled: settled(training, grouping),
-            given_up,
-        }
+        Job { body: &robot.body, order, may_win: Box::new(may_win), given_up }
     }
 
     /// A robot as it is told to the archive; nothing if a stage that keeps only the fittest does not let it in.
@@ -59,20 +52,16 @@ impl Run<'_> {
         &self,
         child: u64,
         robot: Robot,
-        mut displacements: Vec<f64>,
-        at_most: f64,
+        displacements: Vec<f64>,
         floors: &Floors,
     ) -> Option<Evaluated<Robot>> {
         let answers = self.training.answers(displacements.iter().copied().map(Some));
-        // More may be known, but not always.
-        displacements.truncate(self.grouping.settled_by(&answers).unwrap_or(displacements.len()));
         let score = self.grouping.score(&answers);
         let coordinates = self.cell(robot.bins(), score.task);
         let cell = self.space.index(&coordinates).expect("the coordinates are bins of this very space");
         let task = self.grouping.tasks()[score.task].name();
-        let objective = score.fitness.min(at_most);
-        let solution = Robot { cell: coordinates, task, objective, displacements, ..robot };
-        let is_in = floors.to_beat(score.task, None).is_none_or(|floor| objective > floor);
-        is_in.then_some(Evaluated { child, cell, objective, solution })
+        let solution = Robot { cell: coordinates, task, objective: score.fitness, displacements, ..robot };
+        let is_in = floors.to_beat(score.task, None).is_none_or(|floor| score.fitness > floor);
+        is_in.then_some(Evaluated { child, cell, objective: score.fitness, solution })
     }
 }

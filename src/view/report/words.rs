@@ -50,7 +50,7 @@ pub(super) fn methods(dossier: &Dossier) -> String {
         Encoding::Saturated => "1 for any pixel above 0".to_string(),
         Encoding::Threshold => format!("1 for any pixel above {} of full intensity", config.stimulus.level),
     };
-    let steps = run.protocol().control_steps;
+    let steps = config.protocol.control_steps;
     let cycles = number::fixed(f64::from(steps) / f64::from(config.physics.cycle_steps), 0);
     let life = match config.protocol.life {
         Life::Fresh => "a life of its own from the initial state",
@@ -78,18 +78,6 @@ pub(super) fn methods(dossier: &Dossier) -> String {
             "the standard deviation of the distance walked by the body with all soft voxels and sensors made expanding sensors, \
              when each pixel was shuffled between the images, pooled over the images as described and every second one, with a \
              start one voxel higher and without length limits"
-        }
-        Fitness::RightThenMargin => {
-            "the number of images answered right, both groups weighing the same, ties broken by how far it walked"
-        }
-        Fitness::RightThenMin => {
-            "the number of images answered right, both groups weighing the same, ties broken by its worst answer"
-        }
-        Fitness::UntilFifthWrong => {
-            "the number of images answered right before the fifth wrong answer, both groups weighing the same, ties broken by how far it walked"
-        }
-        Fitness::UntilTwentiethWrong => {
-            "the number of images answered right before the twentieth wrong answer, both groups weighing the same, ties broken by how far it walked"
         }
     };
     let stages = match config.stage.len() {

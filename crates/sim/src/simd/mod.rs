@@ -12,7 +12,6 @@ use std::ops::{Add, BitAnd, BitOr, Div, Mul, Sub};
 use std::sync::OnceLock;
 
 mod buffer;
-mod fused;
 mod portable;
 #[cfg(target_arch = "x86_64")]
 mod x86;

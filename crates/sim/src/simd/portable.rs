@@ -1,8 +1,19 @@
 //! Lanes of any machine: an array that the compiler turns into what vectors there are.
 
-use super::fused::mul_add;
 use super::{Lanes, each};
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Sub};
+
+/// a · b + c, rounded once. The compiler has an instruction for it or not; where not, `libm` looks
+/// for one when the program runs, and else works it out. (`f64::mul_add` would call the C
+/// library's, which is not exact everywhere.)
+#[inline(always)]
+fn mul_add(a: f64, b: f64, c: f64) -> f64 {
+    if cfg!(any(target_arch = "aarch64", target_feature = "fma")) {
+        a.mul_add(b, c)
+    } else {
+        libm::fma(a, b, c)
+    }
+}
 
 /// Four lanes.
 #[derive(Clone, Copy)]
@@ -66,17 +77,17 @@ impl Lanes for F64x4 {
 
     #[inline(always)]
     fn mul_add(self, factor: Self, more: Self) -> Self {
-        F64x4(mul_add(self.0, factor.0, more.0))
+        F64x4(each!(i in [0, 1, 2, 3] => mul_add(self.0[i], factor.0[i], more.0[i])))
     }
 
     #[inline(always)]
     fn mul_sub_from(self, factor: Self, more: Self) -> Self {
-        F64x4(mul_add(each!(i in [0, 1, 2, 3] => -self.0[i]), factor.0, more.0))
+        F64x4(each!(i in [0, 1, 2, 3] => mul_add(-self.0[i], factor.0[i], more.0[i])))
     }
 
     #[inline(always)]
     fn mul_sub(self, factor: Self, less: Self) -> Self {
-        F64x4(mul_add(self.0, factor.0, each!(i in [0, 1, 2, 3] => -less.0[i])))
+        F64x4(each!(i in [0, 1, 2, 3] => mul_add(self.0[i], factor.0[i], -less.0[i])))
     }
 
     #[inline(always)]
