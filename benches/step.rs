@@ -1,4 +1,5 @@
 //! Cost of one substep by body and instruction set; see `benches/README.md`.
+#![allow(clippy::disallowed_methods)]
 
 mod processor;
 

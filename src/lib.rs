@@ -41,6 +41,21 @@
 //! ```
 
 #![forbid(unsafe_code)]
+// In tests all of this may be.
+#![cfg_attr(
+    not(test),
+    deny(
+        clippy::dbg_macro,
+        clippy::panic,
+        clippy::print_stderr,
+        clippy::print_stdout,
+        clippy::todo,
+        clippy::unimplemented,
+        clippy::unreachable,
+        clippy::unwrap_used
+    )
+)]
+#![cfg_attr(test, allow(clippy::disallowed_methods))]
 
 pub mod base;
 pub mod baseline;

@@ -1,5 +1,8 @@
 //! The morphcog command.
 
+#![forbid(unsafe_code)]
+#![deny(clippy::panic, clippy::print_stderr, clippy::print_stdout, clippy::unwrap_used)]
+
 use clap::Parser;
 use morphcog::base::text::is_unseen;
 use morphcog::cli::{self, Cli};

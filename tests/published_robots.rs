@@ -1,4 +1,5 @@
 //! Faithful: the robots that the paper's authors published walk as published.
+#![allow(clippy::disallowed_methods)]
 
 mod common;
 

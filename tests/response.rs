@@ -1,10 +1,12 @@
 //! `fitness = "response"`: the body's probe is measured under shuffled images, the run is the same bits however it is run, and
 //! what reads a run reads this one.
+#![allow(clippy::disallowed_methods)]
 
 mod common;
 
 use common::program::{Sandbox, TINY, without_seconds};
 use morphcog::body::{Body, Material};
+use morphcog::run::Config;
 use morphcog::run::archive::RunFile;
 use morphcog::run::training::Training;
 use morphcog::task::evaluation::{Job, Outcome, Savings, evaluate};
@@ -43,7 +45,7 @@ fn a_robot_is_as_fit_as_its_probe_varies_under_shuffled_images() {
         let places = probe.counts().sensor;
         let job = Job { body: &probe, order: vec![], may_win: Box::new(|_| true), given_up: None };
         let Training { stimuli, conditions, .. } = &training;
-        let physics = &run.config.physics;
+        let Config { physics, protocol, .. } = &run.config;
         let (savings, stop) = (Savings::default(), AtomicBool::new(false));
         let evaluation = evaluate(&[job], stimuli, conditions, physics, protocol, savings, &stop).unwrap();
         let Outcome::Walked(d) = &evaluation[0].outcome else { panic!("{}: unstable", robot.id) };

@@ -1,5 +1,5 @@
 //! The page of `morphcog serve` in a real browser: what is drawn is walked, at every width, without complaints.
-
+#![allow(clippy::disallowed_methods)]
 #![cfg(unix)]
 
 mod common;

@@ -1,4 +1,5 @@
 //! Whose images robots are shown: the run's own, wherever they lie, and others only if they are asked for by name.
+#![allow(clippy::disallowed_methods)]
 
 mod common;
 

@@ -103,8 +103,8 @@ fn flipped(image: &Grid<f64>, place: (usize, usize)) -> Grid<f64> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::replay::{Options, find};
     use super::*;
+    use crate::run::replay::{Options, find};
     use crate::task::protocol::Protocol;
 
     fn subject(life: Life) -> Subject {

@@ -260,7 +260,7 @@ pub fn to_file(from: &Path, path: &Path) -> Result<(), Error> {
 pub fn digits17(value: f64) -> String {
     // Nothing has no sign.
     let value = value + 0.0;
-    let before = if value == 0.0 { 0.0 } else { value.abs().log10().floor() };
+    let before = if value == 0.0 { 0.0 } else { libm::log10(value.abs()).floor() };
     let decimals = (16.0 - before).clamp(0.0, 40.0) as usize;
     format!("{value:.decimals$}")
 }

@@ -133,8 +133,8 @@ impl<'c> Live<'c> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::console::tests::console;
     use super::*;
+    use crate::view::console::tests::console;
 
     const PROGRESS: Progress =
         Progress { done: 0, total: 100, best: Some(1.0), coverage: 0.5, evaluations: 0 };

@@ -1,7 +1,9 @@
 //! [`Console`]: the only writer to the terminal. Results go to stdout; progress, notes and errors to stderr.
+#![allow(clippy::disallowed_methods, reason = "this is the module that writes")]
 
 pub use super::bar::{Bar, Counter, Live};
 pub use super::progress::Progress;
+
 use super::table;
 use crate::base::text::{is_unseen, one_line, shortened};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};

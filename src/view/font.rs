@@ -78,8 +78,8 @@ mod tests {
     #[test]
     fn text_is_as_wide_as_said_and_unknown_letters_are_boxes() {
         assert_eq!((width(""), width("1"), width("10")), (0.0, 5.0, 11.0));
-        assert!(text("   ", [0.0, 0.0], 1.0, super::super::colour::INK).is_empty());
-        let boxed = text("\u{4e00}", [0.0, 0.0], 1.0, super::super::colour::INK);
+        assert!(text("   ", [0.0, 0.0], 1.0, crate::view::colour::INK).is_empty());
+        let boxed = text("\u{4e00}", [0.0, 0.0], 1.0, crate::view::colour::INK);
         assert_eq!(boxed.len(), 2 + 5 * 2);
     }
 }

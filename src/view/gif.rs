@@ -164,8 +164,8 @@ fn difference(before: &[u8], now: &[u8], width: u16, height: u16, unchanged: u8)
 
 #[cfg(test)]
 mod tests {
-    use super::super::wobble;
     use super::*;
+    use crate::view::simulated;
 
     /// Every frame of a GIF as a viewer shows it (RGB bytes), with its delay.
     fn decode(bytes: &[u8]) -> (u16, u16, Repeat, Vec<(Vec<u8>, u16)>) {
@@ -188,7 +188,7 @@ mod tests {
 
     #[test]
     fn a_gif_decodes_to_the_rendered_frames_within_the_palette() {
-        let recording = wobble::recording("3344/1256/5612", 2, 30, true);
+        let recording = simulated("3344/1256/5612", 2, 30, true);
         let walk = Walk::new(&recording).unwrap();
         let options = GifOptions { width: 320, every: 4, ..GifOptions::default() };
         let stage = Stage::new(&walk, 320).unwrap().crisp();
@@ -214,7 +214,7 @@ mod tests {
 
     #[test]
     fn phases_play_in_order_and_their_ends_are_held() {
-        let recording = wobble::recording("33/44", 2, 10, true);
+        let recording = simulated("33/44", 2, 10, true);
         let walk = Walk::new(&recording).unwrap();
         assert_eq!(shown(&walk, 4), [0, 4, 8, 10, 11, 15, 19, 21]);
         assert_eq!(shown(&walk, 0).len(), 22);
@@ -229,7 +229,7 @@ mod tests {
 
     #[test]
     fn single_frames_still_bodies_and_odd_options_work() {
-        let mut recording = wobble::recording("1", 1, 2, false);
+        let mut recording = simulated("1", 1, 2, false);
         recording.frames[1] = recording.frames[0].clone();
         recording.frames.truncate(2);
         let options = GifOptions { width: 320, fps: f64::NAN, hold: f64::INFINITY, ..GifOptions::default() };
@@ -240,7 +240,7 @@ mod tests {
 
     #[test]
     fn the_largest_body_thrown_a_million_voxels_away_is_drawn() {
-        let mut recording = wobble::recording(&[&*"3".repeat(64); 64].join("/"), 1, 3, false);
+        let mut recording = simulated(&[&*"3".repeat(64); 64].join("/"), 1, 3, false);
         for (frame, shift) in recording.frames.iter_mut().zip([0.0, 40.0, 1e6, -1e6]) {
             frame.points.iter_mut().for_each(|p| p[0] += shift);
             frame.centre[0] += shift;

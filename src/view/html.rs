@@ -189,8 +189,8 @@ pub(super) fn fill(template: &str, values: &[(&str, &str)]) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::super::wobble;
     use super::*;
+    use crate::view::simulated;
 
     fn embedded(page: &str) -> serde_json::Value {
         let (_, rest) = page.split_once("<script type=\"application/json\" id=\"life\">").unwrap();
@@ -215,7 +215,7 @@ mod tests {
     #[test]
     fn embedded_positions_decode_within_a_200th_of_a_voxel_however_far() {
         for far in [0.0, -321.7, 1e6] {
-            let mut recording = wobble::recording("3344/1256", 2, 40, true);
+            let mut recording = simulated("3344/1256", 2, 40, true);
             recording.frames.iter_mut().for_each(|f| {
                 f.points.iter_mut().for_each(|p| p[0] += far);
                 f.centre[0] += far;
@@ -236,7 +236,7 @@ mod tests {
 
     #[test]
     fn the_page_needs_no_network_and_lets_no_text_become_markup() {
-        let mut recording = wobble::recording("34/56", 1, 5, false);
+        let mut recording = simulated("34/56", 1, 5, false);
         recording.robot = "</script><script>alert(1)</script>".into();
         recording.phases[0].label = "<script>".into();
         let metadata = [("<b>".to_string(), "\"{{life}}\" & <script>x</script>".to_string())];
@@ -256,7 +256,7 @@ mod tests {
 
     #[test]
     fn unstable_lives_say_so_and_leave_out_what_is_nowhere() {
-        let mut recording = wobble::recording("34/56", 1, 5, false);
+        let mut recording = simulated("34/56", 1, 5, false);
         assert!(!page(&recording, "", &[]).unwrap().contains("became unstable"));
         recording.unstable = true;
         recording.frames[5].points[0] = [f64::NAN, 1.0];
@@ -272,12 +272,12 @@ mod tests {
     #[test]
     fn pages_stay_below_eight_megabytes() {
         let full = ["34215634215634"; 14].join("/");
-        let recording = wobble::recording(&full, 4, 500, true);
+        let recording = simulated(&full, 4, 500, true);
         let text = page(&recording, "", &[]).unwrap();
         assert!(text.len() < 8_000_000, "{}", text.len());
         assert_eq!(positions(&embedded(&text)).len(), recording.frames.len());
         let huge = [&*"3".repeat(64); 64].join("/");
-        let text = page(&wobble::recording(&huge, 2, 250, true), "", &[]).unwrap();
+        let text = page(&simulated(&huge, 2, 250, true), "", &[]).unwrap();
         assert!(text.len() < 8_000_000, "{}", text.len());
     }
 }

@@ -33,8 +33,6 @@ pub mod table;
 pub mod terminal;
 pub mod verdicts;
 pub mod walk;
-#[cfg(test)]
-mod wobble;
 
 pub use stage::Stage;
 pub use walk::Walk;
@@ -101,6 +99,24 @@ impl From<PictureError> for Error {
 pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), PictureError> {
     crate::base::files::write_atomically(path, bytes)
         .map_err(|source| PictureError::Write { path: path.to_path_buf(), source })
+}
+
+/// For tests: the simulation of a body (text form) that is shown `phases` images, dark and bright ones by turns, each for
+/// `steps` control steps.
+#[cfg(test)]
+fn simulated(body: &str, phases: usize, steps: u32, fresh: bool) -> crate::task::recording::Recording {
+    use crate::body::Body;
+    use crate::{base::Grid, sim::Physics, task::protocol::Protocol, task::rollout::record};
+    let body: Body = body.parse().expect("tests name bodies");
+    let image = |phase: usize| {
+        let pixel =
+            |row: usize, column: usize| if (row + column + phase).is_multiple_of(3) { 1.0 } else { 0.0 };
+        let stimulus = Grid::from_fn(body.height(), body.width(), pixel);
+        (format!("{} (train {})", phase % 2, 2 * phase + 1), stimulus)
+    };
+    let images: Vec<(String, Grid<f64>)> = (0..phases).map(image).collect();
+    let protocol = Protocol { control_steps: steps, ..Protocol::default() };
+    record("ROBOT", &body, &Physics::default(), &protocol, fresh, &images)
 }
 
 #[cfg(test)]

@@ -86,8 +86,8 @@ pub fn write_png(path: &Path, picture: &Pixmap) -> Result<(), PictureError> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{colour, wobble};
     use super::*;
+    use crate::view::{colour, simulated};
 
     fn pixel(picture: &Pixmap, [x, y]: [f64; 2]) -> [u8; 3] {
         let p = picture.pixel(x as u32, y as u32).unwrap();
@@ -96,7 +96,7 @@ mod tests {
 
     #[test]
     fn voxels_ground_and_sky_are_where_the_stage_says() {
-        let recording = wobble::recording("3456/3412", 1, 20, false);
+        let recording = simulated("3456/3412", 1, 20, false);
         let walk = Walk::new(&recording).unwrap();
         let stage = Stage::new(&walk, 480).unwrap();
         let picture = picture(&walk, 10, &stage).unwrap();
@@ -104,7 +104,7 @@ mod tests {
         for (material, quad) in walk.voxels(10) {
             // Beside the middle, so that the path of the centre of mass does not cover it.
             let at = [0.7 * quad[0][0] + 0.3 * quad[1][0], 0.7 * quad[0][1] + 0.3 * quad[2][1]];
-            let expected = colour::shade(material, super::super::walk::area(&quad)).rgb;
+            let expected = colour::shade(material, crate::view::walk::area(&quad)).rgb;
             seen += usize::from(pixel(&picture, stage.to_pixels(10, at)) == expected);
         }
         assert!(seen >= 7, "only {seen} of 8 voxels have their colour");
@@ -115,7 +115,7 @@ mod tests {
 
     #[test]
     fn pictures_are_written_as_png_and_read_back_equal() {
-        let recording = wobble::recording("34/56", 1, 5, false);
+        let recording = simulated("34/56", 1, 5, false);
         let walk = Walk::new(&recording).unwrap();
         let picture = picture(&walk, 5, &Stage::new(&walk, 320).unwrap()).unwrap();
         let path = tempfile::tempdir().unwrap().keep().join("robot.png");
@@ -126,7 +126,7 @@ mod tests {
 
     #[test]
     fn exploded_bodies_are_drawn_without_panic() {
-        let mut recording = wobble::recording("333/343/356", 1, 6, false);
+        let mut recording = simulated("333/343/356", 1, 6, false);
         let wild = [1e3, -1e8, 1e300, f64::INFINITY, f64::NAN, 0.0];
         for (k, frame) in recording.frames.iter_mut().enumerate() {
             for (i, p) in frame.points.iter_mut().enumerate() {

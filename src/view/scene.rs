@@ -213,8 +213,8 @@ fn path(walk: &Walk, frame: usize, window: &Window) -> Vec<Primitive> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::wobble;
     use super::*;
+    use crate::view::simulated;
 
     const WINDOW: Window = Window {
         left: -10.0,
@@ -228,7 +228,7 @@ mod tests {
 
     #[test]
     fn every_visible_voxel_is_a_quad_with_its_shade() {
-        let recording = wobble::recording("34/56", 1, 40, false);
+        let recording = simulated("34/56", 1, 40, false);
         let walk = Walk::new(&recording).unwrap();
         let scene = world(&walk, 20, &WINDOW);
         for (material, corners) in walk.voxels(20) {
@@ -251,7 +251,7 @@ mod tests {
 
     #[test]
     fn the_papers_look_has_a_peg_for_every_column_of_the_ground() {
-        let recording = wobble::recording("34/56", 1, 4, false);
+        let recording = simulated("34/56", 1, 4, false);
         let walk = Walk::new(&recording).unwrap();
         let pegs = |window: &Window| {
             let is_peg = |p: &&Primitive| matches!(p, Primitive::Quad { fill, .. } if *fill == colour::PEG);
@@ -266,7 +266,7 @@ mod tests {
 
     #[test]
     fn the_path_starts_at_the_last_reset() {
-        let fresh = wobble::recording("33/44", 2, 30, true);
+        let fresh = simulated("33/44", 2, 30, true);
         let walk = Walk::new(&fresh).unwrap();
         let lengths = |frame| {
             let path = path(&walk, frame, &WINDOW);

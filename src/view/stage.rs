@@ -162,12 +162,12 @@ fn smooth(path: &mut [f64]) {
 
 #[cfg(test)]
 mod tests {
-    use super::super::wobble;
     use super::*;
+    use crate::view::simulated;
 
     #[test]
     fn a_walk_that_fits_has_a_fixed_view_that_holds_all_of_it() {
-        let recording = wobble::recording("3344/5566", 2, 100, true);
+        let recording = simulated("3344/5566", 2, 100, true);
         let walk = Walk::new(&recording).unwrap();
         let stage = Stage::new(&walk, 480).unwrap();
         let extent = walk.extent(0..walk.len());
@@ -179,7 +179,7 @@ mod tests {
 
     #[test]
     fn a_long_walk_is_followed_smoothly_and_stays_in_the_picture() {
-        let mut recording = wobble::recording("3344/5566", 1, 1000, false);
+        let mut recording = simulated("3344/5566", 1, 1000, false);
         for (step, frame) in recording.frames.iter_mut().enumerate() {
             let shift = 0.3 * step as f64 + 2.0 * (step as f64 / 4.0).sin();
             frame.points.iter_mut().for_each(|p| p[0] += shift);
@@ -198,7 +198,7 @@ mod tests {
     #[test]
     fn any_recording_gives_a_picture_of_modest_size() {
         for body in ["3", &"3".repeat(64), &["3"; 64].join("/"), &[&*"3".repeat(64); 64].join("/")] {
-            let mut recording = wobble::recording(body, 1, 3, false);
+            let mut recording = simulated(body, 1, 3, false);
             for x in [0.0, 1e6, -1e30, f64::NAN] {
                 let moved = [x, x];
                 recording.frames[2].points.iter_mut().for_each(|p| *p = moved);
@@ -212,7 +212,7 @@ mod tests {
                 assert!((0.0..=480.0).contains(&seen), "{x}: {seen}");
             }
         }
-        let recording = wobble::recording("3", 1, 1, false);
+        let recording = simulated("3", 1, 1, false);
         let walk = Walk::new(&recording).unwrap();
         assert!(matches!(Stage::new(&walk, 10), Err(PictureError::Size { width: 10, .. })));
     }

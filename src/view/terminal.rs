@@ -187,8 +187,8 @@ fn letter(pixel: Pixel) -> char {
 
 #[cfg(test)]
 mod tests {
-    use super::super::wobble;
     use super::*;
+    use crate::view::simulated;
 
     /// The visible characters of every line.
     fn visible(text: &str) -> Vec<usize> {
@@ -202,7 +202,7 @@ mod tests {
 
     #[test]
     fn views_have_the_asked_size() {
-        let mut recording = wobble::recording("3344/1256", 2, 20, true);
+        let mut recording = simulated("3344/1256", 2, 20, true);
         recording.frames[7].points[3] = [f64::NAN, 1e300];
         recording.frames[8].points[3] = [1e8, -1e8];
         let walk = Walk::new(&recording).unwrap();
@@ -231,7 +231,7 @@ mod tests {
 
     #[test]
     fn every_material_is_seen_in_its_colour_or_letter() {
-        let recording = wobble::recording("123/456", 1, 10, false);
+        let recording = simulated("123/456", 1, 10, false);
         let walk = Walk::new(&recording).unwrap();
         let plain = frame(&walk, 0, 80, 24, Depth::Plain);
         assert!("#:/\\-+=|".chars().all(|c| plain.contains(c)), "{plain}");

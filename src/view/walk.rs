@@ -191,12 +191,12 @@ fn sides(recording: &Recording) -> Vec<([usize; 2], u32)> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::wobble;
     use super::*;
+    use crate::view::simulated;
 
     #[test]
     fn recordings_without_frames_phases_or_corners_are_refused() {
-        let good = wobble::recording("33/44", 2, 10, false);
+        let good = simulated("33/44", 2, 10, false);
         assert!(Walk::new(&good).is_ok());
         let refused = |spoil: fn(&mut Recording)| {
             let mut bad = good.clone();
@@ -212,11 +212,11 @@ mod tests {
 
     #[test]
     fn fresh_lives_end_at_each_phase_and_sequential_ones_go_on() {
-        let fresh = wobble::recording("33/44", 2, 10, true);
+        let fresh = simulated("33/44", 2, 10, true);
         let walk = Walk::new(&fresh).unwrap();
         assert_eq!((walk.life(3), walk.life(15)), (0..11, 11..22));
         assert_eq!(walk.displacement(11), 0.0);
-        let sequential = wobble::recording("33/44", 2, 10, false);
+        let sequential = simulated("33/44", 2, 10, false);
         let walk = Walk::new(&sequential).unwrap();
         assert_eq!((walk.life(3), walk.life(15)), (0..21, 0..21));
         assert_eq!((walk.phase_index(9), walk.phase_index(10)), (0, 1));
@@ -233,14 +233,14 @@ mod tests {
 
     #[test]
     fn outlines_are_the_sides_of_one_voxel_only() {
-        let recording = wobble::recording("333/303/333", 1, 2, false);
+        let recording = simulated("333/303/333", 1, 2, false);
         let walk = Walk::new(&recording).unwrap();
         assert_eq!((walk.outline(0).count(), walk.seams(0).count()), (12 + 4, 8));
     }
 
     #[test]
     fn voxels_that_are_nowhere_are_left_out() {
-        let mut recording = wobble::recording("33/44", 1, 2, false);
+        let mut recording = simulated("33/44", 1, 2, false);
         recording.frames[1].points[0] = [f64::NAN, 0.0];
         recording.frames[1].centre = [f64::INFINITY, 0.0];
         let walk = Walk::new(&recording).unwrap();

@@ -55,6 +55,21 @@
 //! sections.
 //!
 #![doc = include_str!("../physics.md")]
+// In tests all of this may be.
+#![cfg_attr(
+    not(test),
+    deny(
+        clippy::dbg_macro,
+        clippy::panic,
+        clippy::print_stderr,
+        clippy::print_stdout,
+        clippy::todo,
+        clippy::unimplemented,
+        clippy::unreachable,
+        clippy::unwrap_used
+    )
+)]
+#![cfg_attr(test, allow(clippy::disallowed_methods))]
 
 pub mod body;
 mod energy;

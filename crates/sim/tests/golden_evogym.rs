@@ -1,4 +1,5 @@
 //! Faithful: EvoGym's own trajectories come out of our simulator.
+#![allow(clippy::disallowed_methods)]
 
 mod common;
 

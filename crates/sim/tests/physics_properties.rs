@@ -1,4 +1,5 @@
 //! What must hold for any body and any stimulus.
+#![allow(clippy::disallowed_methods)]
 
 use morphcog_sim::{Body, Grid, Material, Physics, Start, System, Unstable, World};
 use proptest::prelude::*;

@@ -181,10 +181,10 @@ impl Clock {
 
 #[cfg(test)]
 mod tests {
-    use super::super::lives::Lives;
-    use super::super::request::Who;
     use super::*;
     use crate::base::Grid;
+    use crate::run::serve::lives::Lives;
+    use crate::run::serve::request::Who;
     use crate::sim::Physics;
     use crate::task::protocol::Protocol;
     use crate::task::stimulus::StimulusParams;

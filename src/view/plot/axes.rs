@@ -37,7 +37,7 @@ impl Axis {
         let (low, high) = (finite(low, 0.0), finite(high, 1.0));
         let (low, high) = if high - low > 1e-9 { (low, high) } else { (low - 0.5, low + 0.5) };
         let rough = (high - low) / about.max(1) as f64;
-        let power = 10f64.powf(rough.log10().floor());
+        let power = libm::pow(10.0, libm::log10(rough).floor());
         let factor = [1.0, 2.0, 5.0, 10.0].into_iter().find(|f| f * power >= rough * 0.999).unwrap_or(10.0);
         Axis { from: low, to: high, step: factor * power }
     }
@@ -56,7 +56,7 @@ impl Axis {
 
     /// A number as it stands at a tick.
     pub fn label(&self, value: f64) -> String {
-        let decimals = (-self.step.log10().floor()).clamp(0.0, 6.0) as usize;
+        let decimals = (-libm::log10(self.step).floor()).clamp(0.0, 6.0) as usize;
         grouped(&number::fixed(value, decimals))
     }
 

@@ -136,8 +136,8 @@ fn encode_png(pixmap: &Pixmap, scale: f64, background: Background) -> Result<Vec
 
 #[cfg(test)]
 mod tests {
-    use super::super::canvas::{Canvas, Words};
     use super::*;
+    use crate::view::plot::canvas::{Canvas, Words};
 
     fn figure() -> Figure {
         let mut canvas = Canvas::new();

@@ -133,21 +133,21 @@ fn panel(canvas: &mut Canvas, walk: &Walk, phase: usize, every: usize, plot: &Pl
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::view::wobble;
+    use crate::view::simulated;
 
     #[test]
     fn there_is_a_panel_per_stimulus_and_a_pose_every_so_often() {
-        let recording = wobble::recording("3344/5566", 2, 100, true);
+        let recording = simulated("3344/5566", 2, 100, true);
         let figure = snapshots(&recording, 25, "robot x").unwrap();
         assert_eq!(figure.svg().matches("<g opacity").count(), 2 * 5);
         assert!(figure.svg().contains("1 (train 3)") && figure.size()[0] == COLUMN);
-        let four = wobble::recording("3344/5566", 4, 100, true);
+        let four = simulated("3344/5566", 4, 100, true);
         assert_eq!(snapshots(&four, 0, "robot x").unwrap().size()[0], PAGE);
     }
 
     #[test]
     fn exploded_and_single_frames_are_drawn() {
-        let mut recording = wobble::recording("34/56", 1, 5, false);
+        let mut recording = simulated("34/56", 1, 5, false);
         recording.frames[5].points[0] = [f64::NAN, 1e300];
         recording.frames[4].points[1] = [1e8, -1e8];
         recording.frames[5].centre = [f64::INFINITY; 2];

@@ -225,12 +225,12 @@ fn axes(canvas: &mut Canvas, plot: &Plot, is_first: bool) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::view::wobble;
+    use crate::view::simulated;
 
     #[test]
     fn fresh_lives_have_a_panel_each_and_a_continuous_one_has_a_dashed_line_per_change() {
         let panels = |fresh| {
-            let recording = wobble::recording("3344/5566", 3, 60, fresh);
+            let recording = simulated("3344/5566", 3, 60, fresh);
             let svg = spacetime(&recording, "robot x").unwrap().svg();
             (svg.matches("x [voxel lengths]").count(), svg.matches("stroke-dasharray").count())
         };
@@ -239,7 +239,7 @@ mod tests {
 
     #[test]
     fn compressed_columns_are_darker() {
-        let mut recording = wobble::recording("33", 1, 2, false);
+        let mut recording = simulated("33", 1, 2, false);
         recording.frames[1] = recording.frames[0].clone();
         recording.frames[1].points.iter_mut().for_each(|p| p[1] *= 0.5);
         let walk = Walk::new(&recording).unwrap();
@@ -253,7 +253,7 @@ mod tests {
 
     #[test]
     fn exploded_and_single_frames_are_drawn() {
-        let mut recording = wobble::recording("34/56", 1, 5, false);
+        let mut recording = simulated("34/56", 1, 5, false);
         recording.frames[5].points[0] = [f64::NAN, 1e300];
         recording.frames[4].points[1] = [1e8, -1e8];
         assert!(spacetime(&recording, "x").is_ok());

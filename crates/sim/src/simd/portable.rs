@@ -7,6 +7,7 @@ use std::ops::{Add, BitAnd, BitOr, Div, Mul, Sub};
 /// for one when the program runs, and else works it out. (`f64::mul_add` would call the C
 /// library's, which is not exact everywhere.)
 #[inline(always)]
+#[allow(clippy::disallowed_methods, reason = "these are the lanes")]
 fn mul_add(a: f64, b: f64, c: f64) -> f64 {
     if cfg!(any(target_arch = "aarch64", target_feature = "fma")) {
         a.mul_add(b, c)
