@@ -196,9 +196,7 @@ fn open(options: &Options) -> Result<Opened, Error> {
                 id: robot.id.clone(),
                 task: robot.task.clone(),
                 body: robot.body.clone(),
-                // Those after the fifth wrong answer are not.
-                known: (is_known && robot.displacements.len() == training.images.len())
-                    .then(|| robot.displacements.clone()),
+                known: is_known.then(|| robot.displacements.clone()),
             };
             let mut subjects: Vec<Subject> = Vec::new();
             for chosen in options.robots.of(std::slice::from_ref(&source), options.seed)? {
