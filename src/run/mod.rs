@@ -29,6 +29,7 @@ mod pair;
 mod physical;
 pub mod plan;
 pub mod plot;
+pub mod probing;
 pub mod published;
 pub mod relatives;
 pub mod replay;

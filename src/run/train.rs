@@ -9,6 +9,7 @@ use super::curriculum::Period;
 use super::evaluation_config::EvaluationConfig;
 use super::folder::{self, IfExists, RunFolder};
 use super::metrics::{Metrics, Totals};
+use super::probing::{Probing, response};
 use super::robots::{Selection, Source};
 use super::start::{StartConfig, StartRef};
 use super::task_config::TaskConfig;
@@ -19,7 +20,6 @@ use super::{Config, Error, eval, held_out, toml_text};
 use crate::base::Grid;
 use crate::base::files::{read_text, write_atomically};
 use crate::base::hash::sha256_hex;
-use crate::base::random::{Purpose, stream};
 use crate::body::{Body, Material};
 use crate::qd::{Archive, DescriptorSpace, Elite};
 use crate::task::condition::Condition;
@@ -27,7 +27,7 @@ use crate::task::dataset::{Dataset, Split};
 use crate::task::evaluation::fresh_rollouts;
 use crate::task::fitness::Fitness;
 use crate::task::protocol::{Life, Protocol};
-use crate::task::response::{Example, Gait, Response, Shown, frequencies, random_image};
+use crate::task::response::{Example, Gait, Response, frequencies};
 use crate::task::teach::{Image, Plan, Rollouts, Round, Taught, teach};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -166,8 +166,9 @@ pub fn train(
     let pool = eval::pool(options.threads)?;
     let began = Instant::now();
     observer.started(&folder, walkers.len(), training.images.len());
-    let taught =
-        pool.install(|| Trainer { config: &config, training: &training }.train(&walkers, &mut log, observer));
+    let probing = Probing::new(frequencies(&training.stimuli), &training.conditions, config.seed);
+    let trainer = Trainer { config: &config, training: &training, probing };
+    let taught = pool.install(|| trainer.train(&walkers, &mut log, observer));
     // What was simulated is kept, however it ended.
     let saved = log.save();
     let (walker, taught) = taught?;
@@ -384,6 +385,7 @@ impl<'a> Log<'a> {
 struct Trainer<'a> {
     config: &'a Config,
     training: &'a Training,
+    probing: Probing,
 }
 
 /// Displacements by design and images; `None` where a rollout was unstable.
@@ -405,7 +407,7 @@ impl Rollouts for OfGait<'_, '_> {
         if let Some(known) = self.known.get(&key) {
             return Ok(known.clone());
         }
-        let Trainer { config, training } = self.trainer;
+        let Trainer { config, training, .. } = self.trainer;
         let stimuli: Vec<Grid<f64>> = images.iter().map(|image| training.stimuli[*image].clone()).collect();
         let conditions: Vec<Condition> = images.iter().map(|image| training.conditions[*image]).collect();
         let batch = self.log.rollouts(&self.gait.built(design), &stimuli, &conditions, config)?;
@@ -416,44 +418,20 @@ impl Rollouts for OfGait<'_, '_> {
 }
 
 impl Trainer<'_> {
-    /// Every condition that there is, in the order of their numbers.
-    fn conditions(&self) -> Vec<Condition> {
-        let mut all: Vec<Condition> = Vec::new();
-        self.training.conditions.iter().for_each(|condition| {
-            if !all.contains(condition) {
-                all.push(*condition);
-            }
-        });
-        all
-    }
-
     /// Measures a gait's response; `None` if most of its rollouts are unstable.
     fn response(&self, gait: &Gait, log: &mut Log) -> Result<Option<Response>, Error> {
-        let Trainer { config, training } = self;
-        let frequencies = frequencies(&training.stimuli);
-        let all = self.conditions();
+        let Trainer { config, probing, .. } = self;
         let count = config.train.random_images;
-        let image = |number: usize| {
-            random_image(&frequencies, &mut stream(config.seed, Purpose::RandomImages, 0, number as u64))
-        };
-        let stimuli: Vec<Grid<f64>> = (0..count).map(image).collect();
-        let conditions: Vec<Condition> = (0..count).map(|number| all[number % all.len()]).collect();
-        let probe = gait.probe();
-        let design = vec![Material::SensorExpand; gait.places().len()];
-        let batch = log.rollouts(&probe, &stimuli, &conditions, config)?;
-        let shown =
-            batch.iter().zip(&stimuli).enumerate().filter_map(|(number, (displacement, stimulus))| {
-                let widths = gait.widths(&design, stimulus, &config.physics);
-                Some(Shown { widths, displacement: (*displacement)?, condition: number % all.len() })
-            });
-        let shown: Vec<Shown> = shown.collect();
-        Ok(if 2 * shown.len() > count { Response::of(&shown) } else { None })
+        let shown = probing.shown(gait, &config.physics, 0..count, |probe, stimuli, conditions| {
+            log.rollouts(probe, stimuli, conditions, config)
+        })?;
+        Ok(response(&shown, count))
     }
 
     /// The training images as a gait sees them; both groups weigh the same.
     fn images(&self, gait: &Gait) -> Vec<Image> {
-        let Trainer { config, training } = self;
-        let all = self.conditions();
+        let Trainer { config, training, probing } = self;
+        let all = probing.conditions();
         let [a, b] = config.task.groups.as_ref().expect("a training has two groups");
         let of =
             |classes: &[u8]| training.images.iter().filter(|image| classes.contains(&image.label)).count();

@@ -1,0 +1,70 @@
+//! [`Probing`]: how the response of a gait is measured, by `morphcog response` and by `morphcog train` in the same way.
+
+use crate::base::Grid;
+use crate::base::random::{Purpose, stream};
+use crate::body::{Body, Material};
+use crate::sim::Physics;
+use crate::task::condition::Condition;
+use crate::task::response::{Gait, Response, Shown, random_image};
+use std::ops::Range;
+
+/// Random images, numbered from 0, and the conditions under which a gait's probe is shown them by turns.
+#[derive(Clone, Debug)]
+pub struct Probing {
+    /// How often each pixel is bright.
+    frequencies: Grid<f64>,
+    /// Every condition once.
+    conditions: Vec<Condition>,
+    seed: u64,
+}
+
+impl Probing {
+    /// Images whose pixels are bright with these frequencies, shown under these conditions; some may be named repeatedly.
+    pub fn new(frequencies: Grid<f64>, conditions: &[Condition], seed: u64) -> Self {
+        let mut once: Vec<Condition> = Vec::new();
+        for condition in conditions {
+            if !once.contains(condition) {
+                once.push(*condition);
+            }
+        }
+        Probing { frequencies, conditions: once, seed }
+    }
+
+    /// The conditions, each once, in the order of their numbers.
+    pub fn conditions(&self) -> &[Condition] {
+        &self.conditions
+    }
+
+    /// Shows a gait's probe the random images with these numbers: what became of each, unstable rollouts left out. `roll`
+    /// simulates: displacements of a body under images and conditions, `None` where unstable.
+    ///
+    /// # Errors
+    /// Those of `roll`.
+    pub fn shown<E>(
+        &self,
+        gait: &Gait,
+        physics: &Physics,
+        numbers: Range<usize>,
+        roll: impl FnOnce(&Body, &[Grid<f64>], &[Condition]) -> Result<Vec<Option<f64>>, E>,
+    ) -> Result<Vec<Shown>, E> {
+        let image = |number: usize| {
+            random_image(&self.frequencies, &mut stream(self.seed, Purpose::RandomImages, 0, number as u64))
+        };
+        let condition = |number: usize| number % self.conditions.len();
+        let stimuli: Vec<Grid<f64>> = numbers.clone().map(image).collect();
+        let conditions: Vec<Condition> =
+            numbers.clone().map(|number| self.conditions[condition(number)]).collect();
+        let displacements = roll(&gait.probe(), &stimuli, &conditions)?;
+        let design = vec![Material::SensorExpand; gait.places().len()];
+        let shown = numbers.zip(&stimuli).zip(displacements).filter_map(|((number, stimulus), displacement)| {
+            let widths = gait.widths(&design, stimulus, physics);
+            Some(Shown { widths, displacement: displacement?, condition: condition(number) })
+        });
+        Ok(shown.collect())
+    }
+}
+
+/// The response that so many rollouts tell, unstable ones left out of `shown`; `None` if most are unstable, or too few stable.
+pub fn response(shown: &[Shown], rollouts: usize) -> Option<Response> {
+    if 2 * shown.len() > rollouts { Response::of(shown) } else { None }
+}
