@@ -17,11 +17,11 @@ pub(super) const EXAMPLES: &str = "\
 Examples:
   morphcog evolve --config gaits.toml
   morphcog train --archive runs/gaits-seed1 --task \"4|9\"
-  morphcog train --task \"0|123\" --robots top:1 --set train.rollouts=8000
+  morphcog train --task \"0|123\" --robots top:10 --set train.rounds=10
 then
   morphcog eval --archive runs/gaits-seed1-4v9 --robots best
 
-The response of each gait is measured under random images; the gait that learns most at first is taught with many training
+The response of each gait is measured under random images; the gait that can be taught most is taught with many training
 images; the robot is validated on images that it was not trained on, and audited. Ctrl-C stops it; --resume goes on.";
 
 /// Two groups of classes.
@@ -40,7 +40,7 @@ pub(super) struct TrainArgs {
     /// Seed of all chance (default: that of the archive's run).
     #[arg(long, value_parser = clap::value_parser!(u64).range(..=config::MAX_NUMBER))]
     seed: Option<u64>,
-    /// Change a key, as in train.rollouts=8000 or data.dataset=fashion-mnist; may be given several times.
+    /// Change a key, as in train.rounds=10 or data.dataset=fashion-mnist; may be given several times.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
     /// Folder with the images.

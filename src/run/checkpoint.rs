@@ -1,12 +1,11 @@
 //! Checkpoints: everything a run needs to go on, written so that one good checkpoint always survives.
 
-use super::archive::RunFile;
+use super::archive::{Robot, RunFile};
 use super::metrics::Totals;
 use super::relatives::Relatives;
 use super::{Error, toml_text};
 use crate::base::files::{sync_folder, write_atomically};
 use crate::base::hash::sha256_hex;
-use crate::body;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 use std::io::ErrorKind;
@@ -34,7 +33,10 @@ impl Checkpoint {
     /// As strict as a `run.json` is read: what goes on from here becomes one.
     fn check(&self) -> Result<(), Error> {
         self.run.check().map_err(|error| error.within("run"))?;
-        match self.run.elites.iter().find(|robot| !self.known_bodies.0.contains(&body::key(&robot.body))) {
+        let RunFile { config, generations, elites, .. } = &self.run;
+        let period = config.period(generations.saturating_sub(1));
+        let key = |robot: &Robot| config.known_key(&robot.body, period);
+        match elites.iter().find(|robot| !self.known_bodies.0.contains(&key(robot))) {
             Some(robot) => {
                 Err(Error::input(format!("known_bodies: expected the body of elite {} among them", robot.id)))
             }
@@ -161,6 +163,7 @@ fn content(path: &Path) -> Result<Option<String>, Error> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::body;
     use crate::run::samples;
 
     fn after(generations: u64) -> Checkpoint {

@@ -166,6 +166,9 @@ fn one_image() -> usize {
 pub struct ArchiveConfig {
     /// Fitness that counts as nothing in the QD score \[voxel lengths\]; a smaller one counts less than nothing. Default 0.
     pub qd_offset: f64,
+    /// Elites of each task that stay in the archive after each generation, the fittest. Default: all. Few make a search greedy.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub keep: Option<usize>,
 }
 
 /// When the run is saved: section `[checkpoint]`. Whichever comes first.
@@ -348,6 +351,9 @@ impl Config {
         if self.archive.qd_offset.is_nan() || self.archive.qd_offset.abs() > MAX_OFFSET {
             let expected = format!("a number from −{MAX_OFFSET} to {MAX_OFFSET}");
             return refuse("archive.qd_offset", self.archive.qd_offset.to_string(), &expected);
+        }
+        if self.archive.keep == Some(0) {
+            return refuse("archive.keep", "0".to_string(), "1 or more");
         }
         if self.checkpoint.generations == 0 {
             return refuse("checkpoint.generations", "0".to_string(), "1 or more");

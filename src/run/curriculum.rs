@@ -189,9 +189,9 @@ impl Config {
         self.stage_of(period).start_with.filter(|_| period.draw == 0)
     }
 
-    /// Elites of each task that stay in the archive in a period; `None`: all.
+    /// Elites of each task that stay in the archive in a period; `None`: all. What a stage does not say, `[archive]` does.
     pub fn keep(&self, period: Period) -> Option<usize> {
-        self.stage_of(period).keep
+        self.stage_of(period).keep.or(self.archive.keep)
     }
 
     /// Fitness that who is born in a period must exceed to be let in; `None`: any will do.
@@ -199,10 +199,11 @@ impl Config {
         self.stage_of(period).threshold_min
     }
 
-    /// What is saved in a period. Whom one parent left behind in a race, another might not: nobody is evaluated twice. What
+    /// What is saved in a period. Whom one parent left behind in a race, another might not: nobody is evaluated twice; nor is a
+    /// gait whose response is known, or it would fill the archive with its sensors. What
     /// relatives tell of is what was shown to them: it is the same whatever the savings, because all are on.
     pub fn savings_in(&self, period: Period) -> Savings {
-        let known_bodies = self.savings.known_bodies || self.race(period);
+        let known_bodies = self.savings.known_bodies || self.race(period) || self.measures_response(period);
         match self.mutation_in(period).voxel_relatives {
             0 => Savings { known_bodies, ..self.savings },
             _ => Savings::default(),

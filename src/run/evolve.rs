@@ -333,7 +333,7 @@ impl<'a> Run<'a> {
         let saves_known = config.savings_in(self.period).known_bodies;
         let (images, mut fresh, mut new) = (self.training.stimuli.len() as u64, Vec::new(), Vec::new());
         for (proposal, robot) in proposals.iter().zip(robots) {
-            let key = body::key(&robot.body);
+            let key = config.known_key(&robot.body, self.period);
             let is_new = self.known.insert(key);
             if is_new {
                 new.push(key);

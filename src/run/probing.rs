@@ -11,23 +11,21 @@ use std::ops::Range;
 /// Random images, numbered from 0, and the conditions under which a gait's probe is shown them by turns.
 #[derive(Clone, Debug)]
 pub struct Probing {
-    /// How often each pixel is bright.
-    frequencies: Grid<f64>,
     /// Every condition once.
     conditions: Vec<Condition>,
     seed: u64,
 }
 
 impl Probing {
-    /// Images whose pixels are bright with these frequencies, shown under these conditions; some may be named repeatedly.
-    pub fn new(frequencies: Grid<f64>, conditions: &[Condition], seed: u64) -> Self {
+    /// Images shown under these conditions; some may be named repeatedly.
+    pub fn new(conditions: &[Condition], seed: u64) -> Self {
         let mut once: Vec<Condition> = Vec::new();
         for condition in conditions {
             if !once.contains(condition) {
                 once.push(*condition);
             }
         }
-        Probing { frequencies, conditions: once, seed }
+        Probing { conditions: once, seed }
     }
 
     /// The conditions, each once, in the order of their numbers.
@@ -47,19 +45,22 @@ impl Probing {
         numbers: Range<usize>,
         roll: impl FnOnce(&Body, &[Grid<f64>], &[Condition]) -> Result<Vec<Option<f64>>, E>,
     ) -> Result<Vec<Shown>, E> {
+        let probe = gait.probe();
         let image = |number: usize| {
-            random_image(&self.frequencies, &mut stream(self.seed, Purpose::RandomImages, 0, number as u64))
+            let mut random = stream(self.seed, Purpose::RandomImages, 0, number as u64);
+            random_image(probe.height(), probe.width(), physics, &mut random)
         };
         let condition = |number: usize| number % self.conditions.len();
         let stimuli: Vec<Grid<f64>> = numbers.clone().map(image).collect();
         let conditions: Vec<Condition> =
             numbers.clone().map(|number| self.conditions[condition(number)]).collect();
-        let displacements = roll(&gait.probe(), &stimuli, &conditions)?;
+        let displacements = roll(&probe, &stimuli, &conditions)?;
         let design = vec![Material::SensorExpand; gait.places().len()];
-        let shown = numbers.zip(&stimuli).zip(displacements).filter_map(|((number, stimulus), displacement)| {
-            let widths = gait.widths(&design, stimulus, physics);
-            Some(Shown { widths, displacement: displacement?, condition: condition(number) })
-        });
+        let shown =
+            numbers.zip(&stimuli).zip(displacements).filter_map(|((number, stimulus), displacement)| {
+                let widths = gait.widths(&design, stimulus, physics);
+                Some(Shown { widths, displacement: displacement?, condition: condition(number) })
+            });
         Ok(shown.collect())
     }
 }

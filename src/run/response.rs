@@ -4,32 +4,94 @@ use super::curriculum::Period;
 use super::{Config, Error};
 use crate::base::Grid;
 use crate::base::random::{Purpose, stream};
-use crate::task::fitness::Fitness;
+use crate::body::{Body, key};
+use crate::sim::Physics;
+use crate::task::condition::Condition;
+use crate::task::fitness::{Fitness, response_so_far};
 use crate::task::protocol::Life;
+use crate::task::response::{random_image, resting};
 
-/// Fewest images that a response is measured under: two in each condition, to differ.
-const LEAST_IMAGES: usize = 4;
+/// Fewest images that a response is measured under: two pairs in each condition, to differ.
+const LEAST_IMAGES: usize = 8;
 
-/// As many images as these, made of their pixels: each pixel's values are given to the images in an order of its own, so that
-/// a pixel is as often bright as it was, and says nothing of the others.
-pub(super) fn shuffled(stimuli: &[Grid<f64>], seed: u64, period: Period) -> Vec<Grid<f64>> {
-    let mut shuffled = stimuli.to_vec();
-    let places: Vec<(usize, usize)> =
-        stimuli.first().into_iter().flat_map(Grid::iter).map(|(place, _)| place).collect();
-    for (number, place) in (0..).zip(places) {
-        let mut random = stream(seed, Purpose::RandomImages, period.number(), number);
-        let order = random.sample(stimuli.len(), stimuli.len());
-        for (image, other) in shuffled.iter_mut().zip(order) {
-            image[place] = stimuli[other][place];
-        }
+/// Share of what is to be beaten that a body must show after the first pairs to be shown the others. With more, chance decides;
+/// with less, hopeless ones cost as much as good ones.
+const WORTH_GOING_ON: f64 = 0.5;
+
+/// As many images as there are training images, in pairs: one whose pixels are bright, dark or at rest at random, each
+/// independently of all others, and its opposite. Pixels that are the same in all training images stay so: what never changes
+/// says nothing.
+pub(super) fn opposites(
+    stimuli: &[Grid<f64>],
+    physics: &Physics,
+    seed: u64,
+    period: Period,
+) -> Vec<Grid<f64>> {
+    let Some(first) = stimuli.first() else { return Vec::new() };
+    let rest = resting(physics);
+    let stays = first.clone();
+    let changes = |place: (usize, usize)| stimuli.iter().any(|other| other[place] != stays[place]);
+    let changes = Grid::from_fn(first.height(), first.width(), |row, column| changes((row, column)));
+    let mut images = Vec::new();
+    for pair in 0..stimuli.len().div_ceil(2) as u64 {
+        let mut random = stream(seed, Purpose::RandomImages, period.number(), pair);
+        let drawn = random_image(first.height(), first.width(), physics, &mut random);
+        let image = |of: &dyn Fn(f64) -> f64| {
+            Grid::from_fn(first.height(), first.width(), |row, column| match changes[(row, column)] {
+                true => of(drawn[(row, column)]),
+                false => first[(row, column)],
+            })
+        };
+        images.push(image(&|pixel| pixel));
+        images.push(image(&|pixel| if pixel == rest { rest } else { 1.0 - pixel }));
     }
-    shuffled
+    images.truncate(stimuli.len());
+    images
+}
+
+/// Under what each of so many images is shown: both of a pair under the same.
+pub(super) fn conditions(images: usize) -> Vec<Condition> {
+    Condition::OF_RESPONSE.into_iter().flat_map(|condition| [condition; 2]).cycle().take(images).collect()
+}
+
+/// Whether a body that is to beat a response is so far from it after the first half of its pairs, two of each condition at least,
+/// that the rest is not worth simulating.
+pub(super) fn is_left_behind(known: &[Option<f64>], to_beat: f64) -> bool {
+    // Two images a pair; as many pairs of each condition as of the other.
+    let first = (known.len() / 8 * 4).max(LEAST_IMAGES).min(known.len());
+    known[..first].iter().all(Option::is_some)
+        && to_beat > 0.0
+        && response_so_far(known[..first].iter().copied())
+            .is_some_and(|response| response < WORTH_GOING_ON * to_beat)
 }
 
 impl Config {
     /// Whether fitness is a response in a period: of the bodies' probes, under shuffled images.
     pub fn measures_response(&self, period: Period) -> bool {
         self.criterion_in(period).fitness == Fitness::Response
+    }
+
+    /// What stands for a body among those that were evaluated in a period: itself, or what a response is measured with, so that a
+    /// gait is evaluated once, whatever its sensors are.
+    pub(super) fn known_key(&self, body: &Body, period: Period) -> [u8; 16] {
+        match self.measures_response(period) {
+            true => key(&body.probe()),
+            false => key(body),
+        }
+    }
+
+    /// By what the fitness of a body is multiplied in a period: 1, or, if it is a response, the square root of the number of its
+    /// soft voxels and sensors, up to a third of its grid. Of two gaits that respond as strongly, the one with more places can
+    /// be taught more: together they can move it by at most so much (Cauchy's inequality), and by that only if all respond
+    /// alike. More than a third leave too little that walks.
+    pub(super) fn worth_of_places(&self, body: &Body, period: Period) -> f64 {
+        match self.measures_response(period) {
+            true => {
+                let most = body.height() * body.width() / 3;
+                (body.probe().counts().sensor.clamp(1, most.max(1)) as f64).sqrt()
+            }
+            false => 1.0,
+        }
     }
 
     /// Checks what goes with `fitness = "response"`, if it is asked for.
@@ -48,7 +110,7 @@ impl Config {
             Some(named) => ("data.train_images", format!("{} images", named.len()), named.len()),
             None => ("data.images_per_class", per_class.to_string(), per_class.saturating_mul(classes)),
         };
-        let enough = format!("{LEAST_IMAGES} training images or more in all");
+        let enough = format!("an even number of training images in all, {LEAST_IMAGES} or more");
         let checks = [
             (
                 tasks > 1,
@@ -75,7 +137,7 @@ impl Config {
                 self.genome.voxel_relatives.to_string(),
                 "0: what relatives teach is told by a task",
             ),
-            (images < LEAST_IMAGES, images_key, found, enough.as_str()),
+            (images < LEAST_IMAGES || images % 2 == 1, images_key, found, enough.as_str()),
         ];
         match checks.into_iter().find(|(is_wrong, ..)| *is_wrong) {
             Some((_, key, found, expected)) => Err(Error::input(format!(

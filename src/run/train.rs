@@ -27,10 +27,9 @@ use crate::task::dataset::{Dataset, Split};
 use crate::task::evaluation::fresh_rollouts;
 use crate::task::fitness::Fitness;
 use crate::task::protocol::{Life, Protocol};
-use crate::task::response::{Example, Gait, Response, frequencies};
-use crate::task::teach::{Image, Plan, Rollouts, Round, Taught, teach};
+use crate::task::response::{Example, Gait, Response};
+use crate::task::teach::{Image, Plan, Rollouts, Round, Taught, Teacher};
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
@@ -52,13 +51,13 @@ const LEAST_PER_CLASS: usize = 2;
 pub struct Options {
     /// The run.json whose robots walk.
     pub archive: PathBuf,
-    /// Which of them are tried; the one that learns most at first is taught.
+    /// Which of them are tried; the one that can be taught most is taught.
     pub robots: Selection,
     /// The two groups of classes.
     pub groups: [Vec<u8>; 2],
     /// Seed of all chance; `None`: that of the run.
     pub seed: Option<u64>,
-    /// Keys of the config that differ from those of the run, as `train.rollouts=1000`.
+    /// Keys of the config that differ from those of the run, as `train.rounds=10`.
     pub set: Vec<String>,
     /// Name of the run that is made.
     pub name: String,
@@ -78,10 +77,8 @@ pub trait Observer {
     fn started(&mut self, folder: &RunFolder, gaits: usize, images: usize);
     /// The response of a robot's gait is known.
     fn response(&mut self, robot: &str, gait: &Gait, response: &Response);
-    /// A gait was taught a little: its fitness on the first images.
-    fn tried(&mut self, robot: &str, objective: f64);
-    /// A design was proposed.
-    fn round(&mut self, round: &Round, plan: &Plan);
+    /// A robot's gait was taught in a round.
+    fn round(&mut self, robot: &str, round: &Round, plan: &Plan);
     /// What is told how the robot is validated.
     fn validation(&mut self) -> Box<dyn eval::Observer + '_> {
         Box::new(())
@@ -166,7 +163,7 @@ pub fn train(
     let pool = eval::pool(options.threads)?;
     let began = Instant::now();
     observer.started(&folder, walkers.len(), training.images.len());
-    let probing = Probing::new(frequencies(&training.stimuli), &training.conditions, config.seed);
+    let probing = Probing::new(&training.conditions, config.seed);
     let trainer = Trainer { config: &config, training: &training, probing };
     let taught = pool.install(|| trainer.train(&walkers, &mut log, observer));
     // What was simulated is kept, however it ended.
@@ -388,32 +385,21 @@ struct Trainer<'a> {
     probing: Probing,
 }
 
-/// Displacements by design and images; `None` where a rollout was unstable.
-type Known = BTreeMap<(Vec<Material>, Vec<usize>), Option<Vec<f64>>>;
-
-/// Rollouts of one gait's designs. The same design under the same images is simulated once.
+/// Rollouts of one gait's designs.
 struct OfGait<'a, 'b> {
-    trainer: &'a Trainer<'a>,
+    config: &'a Config,
+    conditions: &'a [Condition],
     gait: &'a Gait,
     log: &'a mut Log<'b>,
-    known: &'a mut Known,
 }
 
 impl Rollouts for OfGait<'_, '_> {
     type Error = Error;
 
-    fn roll(&mut self, design: &[Material], images: &[usize]) -> Result<Option<Vec<f64>>, Error> {
-        let key = (design.to_vec(), images.to_vec());
-        if let Some(known) = self.known.get(&key) {
-            return Ok(known.clone());
-        }
-        let Trainer { config, training, .. } = self.trainer;
-        let stimuli: Vec<Grid<f64>> = images.iter().map(|image| training.stimuli[*image].clone()).collect();
-        let conditions: Vec<Condition> = images.iter().map(|image| training.conditions[*image]).collect();
-        let batch = self.log.rollouts(&self.gait.built(design), &stimuli, &conditions, config)?;
-        let found: Option<Vec<f64>> = batch.into_iter().collect();
-        self.known.insert(key, found.clone());
-        Ok(found)
+    fn roll(&mut self, design: &[Material], shown: &[(Grid<f64>, usize)]) -> Result<Batch, Error> {
+        let stimuli: Vec<Grid<f64>> = shown.iter().map(|(stimulus, _)| stimulus.clone()).collect();
+        let conditions: Vec<Condition> = shown.iter().map(|(_, number)| self.conditions[*number]).collect();
+        self.log.rollouts(&self.gait.built(design), &stimuli, &conditions, self.config)
     }
 }
 
@@ -441,6 +427,7 @@ impl Trainer<'_> {
             let (right, weight) = if is_a { (1.0, 0.5 / of_a) } else { (-1.0, 0.5 / of_b) };
             let condition = all.iter().position(|other| other == condition).expect("it is one of all");
             Image {
+                stimulus: stimulus.clone(),
                 example: Example { right, weight, ..Example::new(gait, stimulus, &config.physics) },
                 condition,
             }
@@ -452,14 +439,14 @@ impl Trainer<'_> {
         let train = &self.config.train;
         Plan {
             seed: self.config.seed,
+            rounds: train.rounds,
             images: train.images,
-            most_images: train.most_images,
-            rollouts: train.rollouts,
+            final_images: train.final_images,
             enough: f64::from(self.config.evaluation.enough),
         }
     }
 
-    /// Tries all gaits, and teaches the one that learns most at first.
+    /// Teaches all gaits in one round, and goes on with the one that could be taught most.
     fn train<'w>(
         &self,
         walkers: &'w [Walker<'w>],
@@ -467,35 +454,31 @@ impl Trainer<'_> {
         observer: &mut (dyn Observer + Send),
     ) -> Result<(&'w Walker<'w>, Taught), Error> {
         let plan = self.plan();
-        let trial = Plan { rollouts: 2 * plan.images, ..plan };
-        let mut best: Option<(f64, &Walker, Response, Known)> = None;
+        let Trainer { config, probing, .. } = self;
+        let mut best: Option<(&Walker, Teacher)> = None;
         for walker in walkers {
-            let Some(response) = self.response(&walker.gait, log)? else { continue };
-            observer.response(&walker.robot.id, &walker.gait, &response);
-            let (images, mut known) = (self.images(&walker.gait), Known::new());
-            let mut rollouts = OfGait { trainer: self, gait: &walker.gait, log, known: &mut known };
-            // One gait needs no comparison.
-            let objective = match walkers.len() {
-                1 => 0.0,
-                _ => teach(&walker.gait, &response, &images, &trial, &mut rollouts, |_| ())?.objective,
-            };
-            if walkers.len() > 1 {
-                observer.tried(&walker.robot.id, objective);
-            }
-            if best.as_ref().is_none_or(|best| objective > best.0) {
-                best = Some((objective, walker, response, known));
+            let gait = &walker.gait;
+            let Some(response) = self.response(gait, log)? else { continue };
+            observer.response(&walker.robot.id, gait, &response);
+            let mut teacher = Teacher::new(gait, &response, self.images(gait), plan, &config.physics);
+            let conditions = probing.conditions();
+            let round = teacher.round(&mut OfGait { config, conditions, gait, log })?;
+            observer.round(&walker.robot.id, &round, &plan);
+            if best.as_ref().is_none_or(|(_, best)| teacher.predicted() > best.predicted()) {
+                best = Some((walker, teacher));
             }
         }
-        let Some((_, walker, response, mut known)) = best else {
+        let Some((walker, mut teacher)) = best else {
             let text = "none of the chosen robots is stable under random images: there is nothing to train";
             return Err(Error::input(text.to_string()).hint("choose others with --robots".to_string()));
         };
-        let images = self.images(&walker.gait);
-        let mut rollouts = OfGait { trainer: self, gait: &walker.gait, log, known: &mut known };
-        let taught = teach(&walker.gait, &response, &images, &plan, &mut rollouts, |round| {
-            observer.round(round, &plan)
-        })?;
-        Ok((walker, taught))
+        let (gait, conditions) = (&walker.gait, probing.conditions());
+        let mut rollouts = OfGait { config, conditions, gait, log };
+        for _ in 1..plan.rounds {
+            let round = teacher.round(&mut rollouts)?;
+            observer.round(&walker.robot.id, &round, &plan);
+        }
+        Ok((walker, teacher.finish(&mut rollouts)?))
     }
 }
 

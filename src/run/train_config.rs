@@ -15,13 +15,13 @@ pub struct TrainConfig {
     /// Rollouts under random images that measure a gait's response. Default 300: with fewer than two for each soft voxel and
     /// sensor the slopes are mostly noise.
     pub random_images: usize,
-    /// Training images that the first design is shown. Default 100.
+    /// Rounds in which the response is measured around the latest design, and the lesson is solved again. Default 6: more seldom
+    /// help.
+    pub rounds: usize,
+    /// Training images that a round shows. Default 120: with fewer, slopes are noisier, and the constant is off.
     pub images: usize,
-    /// Most training images that designs are shown; those that are added are hard ones. Default 400: more tell better designs
-    /// from good ones, and cost as many rollouts a proposal.
-    pub most_images: usize,
-    /// Rollouts under training images of the gait that is taught. Default 4000.
-    pub rollouts: usize,
+    /// Training images under which the last four designs are compared. Default 200.
+    pub final_images: usize,
     /// Rows up to which starts are raised, by turns, so that designs do not depend on the first touch of the ground. Default 2.
     pub raised_starts: u32,
     /// Whether half of the images are shown to robots without length limits, so that designs do not exploit those. Default true.
@@ -33,9 +33,9 @@ impl Default for TrainConfig {
         TrainConfig {
             images_per_class: 2000,
             random_images: 300,
-            images: 100,
-            most_images: 400,
-            rollouts: 4000,
+            rounds: 6,
+            images: 120,
+            final_images: 200,
             raised_starts: 2,
             without_limits: true,
         }
@@ -56,9 +56,9 @@ impl TrainConfig {
         let least = [
             ("images_per_class", self.images_per_class, 1),
             ("random_images", self.random_images, LEAST_RANDOM_IMAGES),
+            ("rounds", self.rounds, 1),
             ("images", self.images, 2),
-            ("most_images", self.most_images, self.images),
-            ("rollouts", self.rollouts, self.images),
+            ("final_images", self.final_images, 2),
         ];
         match least.into_iter().find(|(_, value, least)| value < least) {
             Some((key, value, least)) => {

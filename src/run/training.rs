@@ -222,8 +222,8 @@ impl Training {
         let dataset = DatasetRef { name: dataset.name().to_string(), train_sha256 };
         let classes = images.iter().map(|image| image.label);
         let conditions = if config.measures_response(period) {
-            stimuli = response::shuffled(&stimuli, config.seed, period);
-            Condition::OF_RESPONSE.into_iter().cycle().take(images.len()).collect()
+            stimuli = response::opposites(&stimuli, &config.physics, config.seed, period);
+            response::conditions(images.len())
         } else {
             Condition::by_turns(classes, config.raised_starts(period), config.without_limits(period))
         };

@@ -33,10 +33,13 @@ pub enum Fitness {
     /// The mean of the margins, each divided by as much, but never more than 1 (hinge loss; Cortes & Vapnik 1995): the farther an answer leads astray, the more it costs, so that a robot which knows three classes and walks the wrong way
     /// for all of the fourth is drawn away from there.
     MeanHinge,
-    /// How strongly a gait responds to what its voxels see, whatever its task: the standard deviation of the displacements
-    /// \[voxel lengths\] within each of [the conditions](Condition::OF_RESPONSE) that images are shown under by turns,
-    /// pooled. A run measures it on the body's [probe](crate::body::Body::probe), under shuffled images. Both ways to
-    /// assign sides are worth the same.
+    /// How strongly a gait responds to what its voxels see, whatever its task \[voxel lengths\]. Images are shown in pairs, an
+    /// image and its opposite. Half the difference of the two displacements is what is linear in the widths of the voxels, half
+    /// the sum is what is not, and where the body walks anyway. Fitness is the root of the mean square of the one, less the
+    /// variance of the other within [the conditions](Condition::OF_RESPONSE) that pairs are shown under by turns: so chance, which
+    /// is in both, adds nothing on average. An eighth of the distance that the body walks anyway is subtracted: sensors have to
+    /// make up for it. A run measures it on the body's [probe](crate::body::Body::probe). Both ways to assign sides are worth the
+    /// same.
     Response,
 }
 
@@ -120,24 +123,40 @@ impl Criterion {
     }
 }
 
-/// Pooled standard deviation of displacements within the conditions they take turns in. Infinite while one is to come, since
-/// it may be any, and without any.
-fn response(displacements: impl Iterator<Item = Option<f64>> + Clone) -> f64 {
+/// What a voxel length that the body walks anyway costs. With more, still bodies win at first; with less, so do those that walk one
+/// way and that no sensors could turn.
+const OFFSET_COST: f64 = 0.125;
+
+/// The response of the pairs of displacements that are known so far; `None` if they are fewer than two in every condition.
+pub fn response_so_far(displacements: impl Iterator<Item = Option<f64>>) -> Option<f64> {
+    let known: Vec<f64> = displacements.map_while(|displacement| displacement).collect();
+    let pairs = known.chunks_exact(2);
+    let (odd, even): (Vec<f64>, Vec<f64>) =
+        pairs.map(|pair| ((pair[0] - pair[1]) / 2.0, (pair[0] + pair[1]) / 2.0)).unzip();
     let conditions = Condition::OF_RESPONSE.len();
-    let (mut squares, mut images) = (0.0, 0);
+    let (mut squares, mut free) = (0.0, 0_usize);
     for turn in 0..conditions {
-        let within: Option<Vec<f64>> = displacements.clone().skip(turn).step_by(conditions).collect();
-        let Some(within) = within else { return f64::INFINITY };
-        let Some(&first) = within.first() else { continue };
+        let within = || even.iter().skip(turn).step_by(conditions);
         // From the first on: where all are the same, no rounding of their mean makes a difference.
-        let mean = within.iter().map(|d| d - first).sum::<f64>() / within.len() as f64;
-        squares += within.iter().map(|d| (d - first - mean) * (d - first - mean)).sum::<f64>();
-        images += within.len();
+        let Some(first) = within().next() else { continue };
+        let count = within().count();
+        let mean = within().map(|even| even - first).sum::<f64>() / count as f64;
+        squares += within().map(|even| (even - first - mean) * (even - first - mean)).sum::<f64>();
+        free += count - 1;
     }
-    match images {
-        0 => f64::INFINITY,
-        _ => (squares / images.saturating_sub(conditions).max(1) as f64).sqrt(),
+    let pairs = odd.len() as f64;
+    let linear = odd.iter().map(|odd| odd * odd).sum::<f64>() / pairs - squares / free as f64;
+    let anyway = (even.iter().sum::<f64>() / pairs).abs();
+    (free > 0).then(|| linear.signum() * linear.abs().sqrt() - OFFSET_COST * anyway)
+}
+
+/// The response of all pairs. Infinite while a displacement is to come, since it may be any, and without any.
+fn response(displacements: impl Iterator<Item = Option<f64>> + Clone) -> f64 {
+    let mut all = displacements.clone().peekable();
+    if all.peek().is_none() || all.any(|displacement| displacement.is_none()) {
+        return f64::INFINITY;
     }
+    response_so_far(displacements).unwrap_or(0.0)
 }
 
 /// By number of the group: displacements towards the right side if group A is to walk right; if it is to walk left, the

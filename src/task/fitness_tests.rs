@@ -48,20 +48,24 @@ fn how_far_is_enough_is_a_matter_of_the_criterion() {
 }
 
 #[test]
-fn a_response_is_the_standard_deviation_within_two_conditions_that_take_turns() {
+fn a_response_is_what_moves_the_two_of_a_pair_apart_within_conditions_that_take_turns() {
     let response = |d: &[f64]| {
         let answers: Vec<(Group, f64)> =
             d.iter().zip([A, B, B].iter().cycle()).map(|(&d, &g)| (g, d)).collect();
         fitness(Fitness::Response, &answers)
     };
-    // 1, 5 and 3 around 3, and 100 and 104 around 102: (4 + 4 + 0 + 4 + 4)/(5 − 2).
-    assert_eq!(response(&[1.0, 100.0, 5.0, 104.0, 3.0]), (16.0_f64 / 3.0).sqrt());
-    // What the conditions differ by is no response, nor is which way the robot walks.
-    assert_eq!(response(&[7.0, -100.0, 11.0, -104.0, 9.0]), (16.0_f64 / 3.0).sqrt());
-    assert_eq!(response(&[2.0, -2.0, 2.0, -2.0]), 0.0);
+    // Half differences 3, 2, −1, −2; half sums 0 and 0, and 10 and 10, which is 5 voxel lengths on average.
+    let pairs = [3.0, -3.0, 12.0, 8.0, -1.0, 1.0, 8.0, 12.0];
+    assert_eq!(response(&pairs), 4.5_f64.sqrt() - 5.0 / 8.0);
+    // Which way the robot walks does not matter; how far it walks anyway costs; what the conditions differ by adds nothing.
+    assert_eq!(response(&pairs.map(|d| -d)), 4.5_f64.sqrt() - 5.0 / 8.0);
+    assert_eq!(response(&[3.0, -3.0, 2.0, -2.0, -1.0, 1.0, -2.0, 2.0]), 4.5_f64.sqrt());
+    assert_eq!(response(&[13.0, 7.0, -8.0, -12.0, 9.0, 11.0, -12.0, -8.0]), 4.5_f64.sqrt());
+    // What is the same for both of a pair is none.
+    assert_eq!(response(&[2.0, 2.0, 0.0, 0.0, -2.0, -2.0, 0.0, 0.0]), -(4.0_f64).sqrt());
     // Exactly: ten times 0.1 is not 1 in binary.
-    assert_eq!(response(&[0.1; 20]).to_bits(), 0.0_f64.to_bits());
-    assert!(response(&[1.0, 2.0, f64::NAN, 2.0]).is_nan());
+    assert!((response(&[0.1; 20]) + 0.0125).abs() < 1e-12 && response(&[0.0; 20]) == 0.0);
+    assert!(response(&[1.0, 2.0, 1.0, 2.0, f64::NAN, 2.0]).is_nan());
     // Too few to say anything, and none.
     assert_eq!((response(&[1.0, 9.0]), response(&[1.0]), response(&[])), (0.0, 0.0, f64::INFINITY));
     // What is to come may be anything.

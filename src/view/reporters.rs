@@ -93,13 +93,12 @@ impl evolve::Observer for Evolution<'_> {
 /// Shows a training.
 pub struct Teaching<'c> {
     console: &'c Console,
-    counter: Option<Counter<'c>>,
 }
 
 impl<'c> Teaching<'c> {
     /// Shows it on a console.
     pub fn new(console: &'c Console) -> Self {
-        Teaching { console, counter: None }
+        Teaching { console }
     }
 }
 
@@ -118,26 +117,18 @@ impl train::Observer for Teaching<'_> {
         self.console.info(&text);
     }
 
-    fn tried(&mut self, robot: &str, objective: f64) {
-        self.console.info(&format!("{robot}: taught a little, fitness {}", number::fixed(objective, 3)));
-    }
-
-    fn round(&mut self, round: &Round, plan: &Plan) {
-        let Round { images, objective, accuracy, rollouts, .. } = round;
-        if self.counter.is_none() {
-            self.counter = Some(self.console.counter("teaching:", plan.rollouts as u64, "rollouts"));
-        }
-        if let Some(counter) = &self.counter {
-            counter.update((*rollouts).min(plan.rollouts) as u64);
-        }
+    fn round(&mut self, robot: &str, round: &Round, plan: &Plan) {
+        let of = plan.rounds;
+        let Round { round, predicted, measured, off, changed, rollouts } = round;
+        let [p, m] = [predicted, measured].map(|fitness| number::fixed(*fitness, 2));
+        self.console.info(&format!("{robot}: round {round} of {of}: fitness {m}, predicted {p}"));
         self.console.event("round", &serde_json::json!({
-            "round": round.round, "rollouts": rollouts, "images": images, "objective": objective, "accuracy": accuracy,
-            "radius": round.radius, "changed": round.changed, "predicted": round.predicted, "proposed": round.proposed,
+            "robot": robot, "round": round, "rollouts": rollouts, "predicted": predicted, "measured": measured, "off": off,
+            "changed": changed,
         }));
     }
 
     fn validation(&mut self) -> Box<dyn eval::Observer + '_> {
-        self.counter = None;
         Box::new(Evaluation::new(self.console))
     }
 }

@@ -4,6 +4,7 @@ use super::Run;
 use crate::qd::Evaluated;
 use crate::run::archive::Robot;
 use crate::run::keep::Floors;
+use crate::run::response::is_left_behind;
 use crate::task::evaluation::{Job, MayWin};
 use crate::task::race::Race;
 use std::iter::repeat;
@@ -22,10 +23,14 @@ impl Run<'_> {
             .and_then(|cell| archive.get(cell))
             .map(|elite| training.answers(elite.solution.displacements.iter().copied().map(Some)));
         let bins = robot.bins();
+        let config = &self.options.config;
+        let places = config.worth_of_places(&robot.body, self.period);
         let to_beat: Vec<Option<f64>> = (0..grouping.tasks().len())
             .map(|task| {
                 let cell = self.space.index(&self.cell(bins.clone(), task));
-                floors.to_beat(task, cell.and_then(|cell| archive.objective(cell)))
+                floors
+                    .to_beat(task, cell.and_then(|cell| archive.objective(cell)))
+                    .map(|least| least / places)
             })
             .collect();
         let beaten = to_beat.clone();
@@ -38,12 +43,21 @@ impl Run<'_> {
         // Who races is not shown first what its parent did worst, else it would begin with what that did badly by chance.
         let order = match &race {
             Some(race) => race.order().to_vec(),
+            // The first pairs decide whether the others are worth it.
+            None if config.measures_response(self.period) => Vec::new(),
             None => answers.map_or_else(Vec::new, |answers| grouping.hardest_first(&answers)),
         };
-        let given_up = race.map(|race| {
-            Box::new(move |known: &[Option<f64>]| race.is_left_behind(known, |task| to_beat[task]))
-                as Box<MayWin>
-        });
+        let measures_response = config.measures_response(self.period);
+        let given_up = if measures_response {
+            let least = to_beat.into_iter().flatten().fold(f64::INFINITY, f64::min);
+            Some(Box::new(move |known: &[Option<f64>]| least.is_finite() && is_left_behind(known, least))
+                as Box<MayWin>)
+        } else {
+            race.map(|race| {
+                Box::new(move |known: &[Option<f64>]| race.is_left_behind(known, |task| to_beat[task]))
+                    as Box<MayWin>
+            })
+        };
         Job { body: &robot.body, order, may_win: Box::new(may_win), given_up }
     }
 
@@ -60,8 +74,10 @@ impl Run<'_> {
         let coordinates = self.cell(robot.bins(), score.task);
         let cell = self.space.index(&coordinates).expect("the coordinates are bins of this very space");
         let task = self.grouping.tasks()[score.task].name();
-        let solution = Robot { cell: coordinates, task, objective: score.fitness, displacements, ..robot };
-        let is_in = floors.to_beat(score.task, None).is_none_or(|floor| score.fitness > floor);
-        is_in.then_some(Evaluated { child, cell, objective: score.fitness, solution })
+        let places = self.options.config.worth_of_places(&robot.body, self.period);
+        let objective = places * score.fitness;
+        let solution = Robot { cell: coordinates, task, objective, displacements, ..robot };
+        let is_in = floors.to_beat(score.task, None).is_none_or(|floor| objective > floor);
+        is_in.then_some(Evaluated { child, cell, objective, solution })
     }
 }

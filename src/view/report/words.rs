@@ -75,9 +75,9 @@ pub(super) fn methods(dossier: &Dossier) -> String {
             &of_means
         }
         Fitness::Response => {
-            "the standard deviation of the distance walked by the body with all soft voxels and sensors made expanding sensors, \
-             when each pixel was shuffled between the images, pooled over the images as described and every second one, with a \
-             start one voxel higher and without length limits"
+            "how far apart the two images of a pair, opposites of each other, move the body with all soft voxels and sensors \
+             made expanding sensors, less what it walks anyway; every second pair with a start one voxel higher and without \
+             length limits"
         }
     };
     let stages = match config.stage.len() {
