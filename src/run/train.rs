@@ -1,6 +1,6 @@
 //! `morphcog train`: the gaits of an archive are taught to tell two groups of images apart.
 //!
-//! [`teach`] says how. Everything that is simulated is kept in `training.json` beside `run.json`; a training that goes on
+//! [`teach`](crate::task::teach) says how. Everything that is simulated is kept in `training.json` beside `run.json`; a training that goes on
 //! takes from there what was simulated before, so that it ends with the same bits.
 
 use super::archive::{Dimensions, FORMAT, FORMAT_VERSION, Robot, RunFile};
