@@ -103,3 +103,21 @@ fn what_reads_a_run_reads_this_one() {
     sandbox.run("report run").ended(0, &[]);
     assert!(sandbox.read("run/report.html").contains("the two images of a pair"));
 }
+
+#[test]
+fn it_starts_from_another_run_with_each_gait_once_and_goes_on() {
+    let sandbox = sandbox();
+    sandbox.write("other.toml", TINY);
+    sandbox.run("evolve -q -c other.toml -o other").ended(0, &[]);
+    let start = "--set start.archive=other/run.json";
+    let whole = evolve(&sandbox, "whole", start);
+    evolve(&sandbox, "again", &format!("--generations 5 {start}"));
+    let again = evolve(&sandbox, "again", &format!("--generations 12 --resume {start}"));
+    assert_eq!(again.elites, whole.elites);
+    assert!(whole.elites.iter().any(|robot| robot.generation == 0));
+    let mut gaits: Vec<String> = whole.elites.iter().map(|robot| robot.body.probe().to_string()).collect();
+    let count = gaits.len();
+    gaits.sort();
+    gaits.dedup();
+    assert_eq!(gaits.len(), count);
+}

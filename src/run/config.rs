@@ -254,8 +254,7 @@ impl Config {
 
     /// The config as TOML, every key with its value.
     pub fn to_toml(&self) -> String {
-        // Every field is a number, text, list or table, which TOML has.
-        toml::to_string_pretty(self).unwrap_or_default()
+        toml::to_string_pretty(self).expect("every field is a number, text, list or table, which TOML has")
     }
 
     /// What the results of a generation depend on: without how many there are, and what changes no result.

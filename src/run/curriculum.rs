@@ -199,9 +199,9 @@ impl Config {
         self.stage_of(period).threshold_min
     }
 
-    /// What is saved in a period. Whom one parent left behind in a race, another might not: nobody is evaluated twice; nor is a
-    /// gait whose response is known, or it would fill the archive with its sensors. What
-    /// relatives tell of is what was shown to them: it is the same whatever the savings, because all are on.
+    /// What is saved in a period. What one parent left behind in a race, another might not: no body is evaluated twice. Nor is
+    /// a gait whose response is known, or it would fill the archive with its sensors. What relatives tell of is what was shown
+    /// to them: it is the same whatever the savings, because all are on.
     pub fn savings_in(&self, period: Period) -> Savings {
         let known_bodies = self.savings.known_bodies || self.race(period) || self.measures_response(period);
         match self.mutation_in(period).voxel_relatives {

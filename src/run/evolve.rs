@@ -19,7 +19,7 @@ use super::whereabouts::{self, Whereabouts};
 use super::{Error, ErrorKind, eval, held_out, resume, validation};
 use crate::base::files::write_atomically;
 use crate::base::stop::check;
-use crate::body::{self, Body};
+use crate::body::Body;
 use crate::qd::{Archive, ArchiveStats, DescriptorSpace, MapElites, Proposal};
 use crate::task::dataset::{Dataset, Split};
 use crate::task::evaluation::{Job, Outcome, evaluate};
@@ -284,7 +284,8 @@ impl<'a> Run<'a> {
             take(&mut self.relatives),
             self.totals,
         );
-        elites.iter().for_each(|robot| _ = self.known.insert(body::key(&robot.body)));
+        let is_gait = config.measures_response(period);
+        elites.retain(|robot| self.known.insert(config.known_key(&robot.body, period)) || !is_gait);
         self.totals.evaluations += elites.len() as u64;
         let at_once = LIVES_AT_ONCE.div_ceil(self.training.images.len().max(1));
         let mut elites = (0..).zip(elites).map(|(number, robot)| (number, None, robot)).peekable();

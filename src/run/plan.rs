@@ -54,8 +54,7 @@ impl Plan {
 
     /// The plan as TOML, every key with its value.
     pub fn to_toml(&self) -> String {
-        // Every field is a number, text, list or table, which TOML has.
-        toml::to_string_pretty(self).unwrap_or_default()
+        toml::to_string_pretty(self).expect("every field is a number, text, list or table, which TOML has")
     }
 
     /// Reads a plan: a file or, if there is none, the built-in one of that name.

@@ -1,4 +1,4 @@
-//! [`Probing`]: how the response of a gait is measured, by `morphcog response` and by `morphcog train` in the same way.
+//! [`Probing`]: how the response of a gait is measured.
 
 use crate::base::Grid;
 use crate::base::random::{Purpose, stream};

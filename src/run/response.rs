@@ -1,4 +1,4 @@
-//! Runs with `fitness = "response"`: what their images are, and which configs there can be.
+//! Runs with `fitness = "response"`: what their images are, what a gait is worth, and which configs there can be.
 
 use super::curriculum::Period;
 use super::{Config, Error};
@@ -9,7 +9,7 @@ use crate::sim::Physics;
 use crate::task::condition::Condition;
 use crate::task::fitness::{Fitness, response_so_far};
 use crate::task::protocol::Life;
-use crate::task::response::{random_image, resting};
+use crate::task::response::random_image;
 
 /// Fewest images that a response is measured under: two pairs in each condition, to differ.
 const LEAST_IMAGES: usize = 8;
@@ -18,7 +18,7 @@ const LEAST_IMAGES: usize = 8;
 /// with less, hopeless ones cost as much as good ones.
 const WORTH_GOING_ON: f64 = 0.5;
 
-/// As many images as there are training images, in pairs: one whose pixels are bright, dark or at rest at random, each
+/// As many images as there are training images, an even number, in pairs: one whose pixels are bright, dark or at rest at random, each
 /// independently of all others, and its opposite. Pixels that are the same in all training images stay so: what never changes
 /// says nothing.
 pub(super) fn opposites(
@@ -28,25 +28,25 @@ pub(super) fn opposites(
     period: Period,
 ) -> Vec<Grid<f64>> {
     let Some(first) = stimuli.first() else { return Vec::new() };
-    let rest = resting(physics);
-    let stays = first.clone();
-    let changes = |place: (usize, usize)| stimuli.iter().any(|other| other[place] != stays[place]);
-    let changes = Grid::from_fn(first.height(), first.width(), |row, column| changes((row, column)));
-    let mut images = Vec::new();
-    for pair in 0..stimuli.len().div_ceil(2) as u64 {
-        let mut random = stream(seed, Purpose::RandomImages, period.number(), pair);
+    let changes = Grid::from_fn(first.height(), first.width(), |row, column| {
+        stimuli.iter().any(|other| other[(row, column)] != first[(row, column)])
+    });
+    let pair = |number: u64| {
+        let mut random = stream(seed, Purpose::RandomImages, period.number(), number);
         let drawn = random_image(first.height(), first.width(), physics, &mut random);
-        let image = |of: &dyn Fn(f64) -> f64| {
-            Grid::from_fn(first.height(), first.width(), |row, column| match changes[(row, column)] {
-                true => of(drawn[(row, column)]),
-                false => first[(row, column)],
+        [false, true].map(|is_opposite| {
+            Grid::from_fn(first.height(), first.width(), |row, column| {
+                let pixel = drawn[(row, column)];
+                match changes[(row, column)] {
+                    false => first[(row, column)],
+                    // What is at rest is so in both.
+                    true if is_opposite && (pixel == 0.0 || pixel == 1.0) => 1.0 - pixel,
+                    true => pixel,
+                }
             })
-        };
-        images.push(image(&|pixel| pixel));
-        images.push(image(&|pixel| if pixel == rest { rest } else { 1.0 - pixel }));
-    }
-    images.truncate(stimuli.len());
-    images
+        })
+    };
+    (0..stimuli.len() as u64 / 2).flat_map(pair).collect()
 }
 
 /// Under what each of so many images is shown: both of a pair under the same.

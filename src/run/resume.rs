@@ -113,12 +113,12 @@ type Keys = BTreeMap<String, toml::Value>;
 fn keys(config: &Config, begun: usize) -> Keys {
     let essence = Config { stage: Vec::new(), ..config.essence() };
     let mut keys = Keys::new();
-    // Every field is a number, text, list or table, which TOML has.
-    toml::Value::try_from(essence).into_iter().for_each(|root| flatten("", root, &mut keys));
+    let root = toml::Value::try_from(essence);
+    flatten("", root.expect("every field is a number, text, list or table, which TOML has"), &mut keys);
     for (number, stage) in (1..=begun).zip(&config.stage) {
         let generations = stage.generations.filter(|_| number < begun);
-        let stage = toml::Value::try_from(StageConfig { generations, ..*stage });
-        let stage = stage.ok().and_then(|stage| stage.as_table().cloned()).unwrap_or_default();
+        let stage = toml::Table::try_from(StageConfig { generations, ..*stage });
+        let stage = stage.expect("every field of a stage is a number, text or list, which TOML has");
         keys.extend(stage.into_iter().map(|(key, value)| (format!("stage {number}: {key}"), value)));
     }
     keys

@@ -1,7 +1,7 @@
 //! `morphcog train`: the gaits of an archive are taught to tell two groups of images apart.
 //!
-//! [`teach`](crate::task::teach) says how. Everything that is simulated is kept in `training.json` beside `run.json`; a training that goes on
-//! takes from there what was simulated before, so that it ends with the same bits.
+//! [`teach`](crate::task::teach) says how. Everything that is simulated is kept in `training.json` beside `run.json`; a
+//! training that goes on takes from there what was simulated before, so that it ends with the same bits.
 
 use super::archive::{Dimensions, FORMAT, FORMAT_VERSION, Robot, RunFile};
 use super::config::DataConfig;
@@ -396,10 +396,14 @@ struct OfGait<'a, 'b> {
 impl Rollouts for OfGait<'_, '_> {
     type Error = Error;
 
-    fn roll(&mut self, design: &[Material], shown: &[(Grid<f64>, usize)]) -> Result<Batch, Error> {
-        let stimuli: Vec<Grid<f64>> = shown.iter().map(|(stimulus, _)| stimulus.clone()).collect();
-        let conditions: Vec<Condition> = shown.iter().map(|(_, number)| self.conditions[*number]).collect();
-        self.log.rollouts(&self.gait.built(design), &stimuli, &conditions, self.config)
+    fn roll(
+        &mut self,
+        design: &[Material],
+        stimuli: &[Grid<f64>],
+        conditions: &[usize],
+    ) -> Result<Batch, Error> {
+        let conditions: Vec<Condition> = conditions.iter().map(|number| self.conditions[*number]).collect();
+        self.log.rollouts(&self.gait.built(design), stimuli, &conditions, self.config)
     }
 }
 

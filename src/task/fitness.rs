@@ -38,8 +38,8 @@ pub enum Fitness {
     /// the sum is what is not, and where the body walks anyway. Fitness is the root of the mean square of the one, less the
     /// variance of the other within [the conditions](Condition::OF_RESPONSE) that pairs are shown under by turns: so chance, which
     /// is in both, adds nothing on average. An eighth of the distance that the body walks anyway is subtracted: sensors have to
-    /// make up for it. A run measures it on the body's [probe](crate::body::Body::probe). Both ways to assign sides are worth the
-    /// same.
+    /// make up for it. A run measures it on the body's [probe](crate::body::Body::probe), and multiplies it by the root of the
+    /// number of the probe's sensors. Both ways to assign sides are worth the same.
     Response,
 }
 

@@ -105,7 +105,7 @@ impl Gait {
 }
 
 /// The pixel under which an expanding sensor is as wide as a soft voxel; 0 or 1 if it never is.
-pub fn resting(physics: &Physics) -> f64 {
+fn resting(physics: &Physics) -> f64 {
     let [narrow, wide] = [0.0, 1.0].map(|pixel| width(Material::SensorExpand, pixel, physics));
     let rest = width(Material::Soft, 0.0, physics);
     if wide > narrow { ((rest - narrow) / (wide - narrow)).clamp(0.0, 1.0) } else { 0.0 }
@@ -341,7 +341,7 @@ fn squared(x: f64) -> f64 {
     x * x
 }
 
-fn dot(a: &[f64], b: &[f64]) -> f64 {
+pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 

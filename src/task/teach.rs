@@ -5,7 +5,7 @@
 //! are changed at random, an intervention as in the first response. Then the lesson is solved again. After a few such rounds
 //! the last designs are shown the same training images, and the best of them is taken.
 
-use super::response::{Design, Evidence, Example, Gait, Lesson, Moments, Response};
+use super::response::{CHOICES, Design, Evidence, Example, Gait, Lesson, Moments, Response, dot, worth};
 use crate::base::Grid;
 use crate::base::random::{Purpose, Stream, stream};
 use crate::body::Material;
@@ -97,7 +97,8 @@ pub trait Rollouts {
     fn roll(
         &mut self,
         design: &[Material],
-        shown: &[(Grid<f64>, usize)],
+        stimuli: &[Grid<f64>],
+        conditions: &[usize],
     ) -> Result<Vec<Option<f64>>, Self::Error>;
 }
 
@@ -185,7 +186,7 @@ impl<'a> Teacher<'a> {
             let material = |material: &Material| {
                 // Half of the rollouts are of the design itself.
                 if turn % 2 == 1 && random.unit() < CHANGED {
-                    super::response::CHOICES[random.below(super::response::CHOICES.len())]
+                    CHOICES[random.below(CHOICES.len())]
                 } else {
                     *material
                 }
@@ -194,28 +195,22 @@ impl<'a> Teacher<'a> {
         };
         let asked: Vec<(usize, Design)> = numbers.iter().enumerate().map(draw).collect();
         let as_probe = |(number, design): &(usize, Design)| {
-            let Image { stimulus, condition, .. } = &self.images[*number];
-            (self.gait.as_probe(design, stimulus, self.physics), *condition)
+            self.gait.as_probe(design, &self.images[*number].stimulus, self.physics)
         };
+        let stimuli: Vec<Grid<f64>> = asked.iter().map(as_probe).collect();
         let probe = vec![Material::SensorExpand; self.design.len()];
-        let found = rollouts.roll(&probe, &asked.iter().map(as_probe).collect::<Vec<_>>())?;
+        let found = rollouts.roll(&probe, &stimuli, &self.conditions_of(&numbers))?;
         self.rollouts += asked.len();
 
         let mut sets = vec![Moments::new(self.design.len()); self.conditions];
         let (mut off, mut stable) = (0.0, 0.0);
-        let (mut worths, mut weights) = (0.0, 0.0);
-        for ((number, design), displacement) in asked.iter().zip(found) {
+        for ((number, design), displacement) in asked.iter().zip(&found) {
             let Image { example, condition, .. } = &self.images[*number];
             let widths = example.widths(design);
-            if *design == self.design {
-                // Where it is unstable it gets nowhere.
-                worths += example.weight * self.worth(example, displacement.unwrap_or(0.0));
-                weights += example.weight;
-            }
             let Some(displacement) = displacement else { continue };
             off += displacement - self.intercepts[*condition] - dot(&self.slopes, &widths);
             stable += 1.0;
-            sets[*condition].add(&widths, displacement);
+            sets[*condition].add(&widths, *displacement);
         }
         self.evidence.fade(FADE);
         sets.iter().for_each(|set| self.evidence.add(set, 1.0));
@@ -226,12 +221,14 @@ impl<'a> Teacher<'a> {
             let mean = of_known.iter().sum::<f64>() / of_known.len() as f64;
             self.intercepts = known.into_iter().map(|intercept| intercept.unwrap_or(mean)).collect();
         }
+        let of_itself = asked.iter().zip(&found).filter(|((_, design), _)| *design == self.design);
+        let measured = self.mean_worth(of_itself.map(|((number, _), found)| (*number, nowhere(*found))));
         let before = self.design.clone();
         let (predicted, design) = self.solved(&before, self.side, |lesson| lesson.solve(&mut random));
         let round = Round {
             round: self.rounds,
             predicted: self.predicted,
-            measured: worths / weights,
+            measured,
             off: if stable > 0.0 { off / stable } else { 0.0 },
             changed: design.iter().zip(&before).filter(|(a, b)| a != b).count(),
             rollouts: self.rollouts,
@@ -254,22 +251,15 @@ impl<'a> Teacher<'a> {
         }
         let mut random = self.random(Use::Finish, 0);
         let numbers = self.drawn(self.plan.final_images, &mut random);
-        let shown: Vec<(Grid<f64>, usize)> = (numbers.iter().map(|number| &self.images[*number]))
-            .map(|image| (image.stimulus.clone(), image.condition))
-            .collect();
+        let stimuli: Vec<Grid<f64>> =
+            numbers.iter().map(|number| self.images[*number].stimulus.clone()).collect();
+        let conditions = self.conditions_of(&numbers);
         let mut best: Option<(f64, Design, Vec<f64>)> = None;
         for design in finalists {
-            let found = rollouts.roll(&design, &shown)?;
-            self.rollouts += shown.len();
-            // Where it is unstable it gets nowhere.
-            let displacements: Vec<f64> = found.into_iter().map(Option::unwrap_or_default).collect();
-            let examples = numbers.iter().map(|number| &self.images[*number].example);
-            let (mut worths, mut weights) = (0.0, 0.0);
-            for (example, displacement) in examples.zip(&displacements) {
-                worths += example.weight * self.worth(example, *displacement);
-                weights += example.weight;
-            }
-            let objective = worths / weights;
+            let found = rollouts.roll(&design, &stimuli, &conditions)?;
+            self.rollouts += stimuli.len();
+            let displacements: Vec<f64> = found.into_iter().map(nowhere).collect();
+            let objective = self.mean_worth(numbers.iter().copied().zip(displacements.iter().copied()));
             if best.as_ref().is_none_or(|best| objective > best.0) {
                 best = Some((objective, design, displacements));
             }
@@ -301,8 +291,19 @@ impl<'a> Teacher<'a> {
         drawn
     }
 
-    fn worth(&self, example: &Example, displacement: f64) -> f64 {
-        super::response::worth(self.side * example.right * displacement, self.plan.enough)
+    fn conditions_of(&self, numbers: &[usize]) -> Vec<usize> {
+        numbers.iter().map(|number| self.images[*number].condition).collect()
+    }
+
+    /// Mean worth of displacements under training images, by their numbers.
+    fn mean_worth(&self, answers: impl Iterator<Item = (usize, f64)>) -> f64 {
+        let (mut worths, mut weights) = (0.0, 0.0);
+        for (number, displacement) in answers {
+            let example = &self.images[number].example;
+            worths += example.weight * worth(self.side * example.right * displacement, self.plan.enough);
+            weights += example.weight;
+        }
+        worths / weights
     }
 
     /// Solves the lesson under the model, from a design on: what the model says of the solution, and the solution.
@@ -328,8 +329,9 @@ enum Use {
     Finish = 3,
 }
 
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
+/// Where a design is unstable it gets nowhere.
+fn nowhere(displacement: Option<f64>) -> f64 {
+    displacement.unwrap_or(0.0)
 }
 
 #[cfg(test)]
@@ -423,14 +425,15 @@ mod tests {
         fn roll(
             &mut self,
             design: &[Material],
-            shown: &[(Grid<f64>, usize)],
+            stimuli: &[Grid<f64>],
+            conditions: &[usize],
         ) -> Result<Vec<Option<f64>>, Infallible> {
-            self.asked.push((design.to_vec(), shown.len()));
-            let walk = |(stimulus, condition): &(Grid<f64>, usize)| {
+            self.asked.push((design.to_vec(), stimuli.len()));
+            let walk = |(stimulus, condition): (&Grid<f64>, &usize)| {
                 let widths = self.gait.widths(design, stimulus, &self.physics);
                 (!self.unstable).then(|| self.walks(&widths, *condition))
             };
-            Ok(shown.iter().map(walk).collect())
+            Ok(stimuli.iter().zip(conditions).map(walk).collect())
         }
     }
 

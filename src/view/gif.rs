@@ -100,7 +100,7 @@ pub fn encode(recording: &Recording, options: &GifOptions) -> Result<Vec<u8>, Pi
             number += 1;
             encoder.write_lzw_pre_encoded_frame(&encoded).map_err(failed)?;
         }
-        before = images.pop().unwrap_or_default();
+        before = images.pop().expect("the image before the batch is among them");
     }
     encoder.into_inner().map_err(|e| PictureError::Encode(e.to_string()))
 }

@@ -24,6 +24,7 @@ impl Run<'_> {
             .map(|elite| training.answers(elite.solution.displacements.iter().copied().map(Some)));
         let bins = robot.bins();
         let config = &self.options.config;
+        let measures_response = config.measures_response(self.period);
         let places = config.worth_of_places(&robot.body, self.period);
         let to_beat: Vec<Option<f64>> = (0..grouping.tasks().len())
             .map(|task| {
@@ -44,10 +45,9 @@ impl Run<'_> {
         let order = match &race {
             Some(race) => race.order().to_vec(),
             // The first pairs decide whether the others are worth it.
-            None if config.measures_response(self.period) => Vec::new(),
+            None if measures_response => Vec::new(),
             None => answers.map_or_else(Vec::new, |answers| grouping.hardest_first(&answers)),
         };
-        let measures_response = config.measures_response(self.period);
         let given_up = if measures_response {
             let least = to_beat.into_iter().flatten().fold(f64::INFINITY, f64::min);
             Some(Box::new(move |known: &[Option<f64>]| least.is_finite() && is_left_behind(known, least))

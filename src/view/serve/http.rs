@@ -205,13 +205,13 @@ fn parse(bytes: &[u8]) -> Result<Option<(Request, usize)>, Response> {
         }
         Err(error) => return Err(Response::refusal(400, &format!("not an HTTP request: {error}"))),
     };
-    let target = head.path.unwrap_or_default();
+    let target = head.path.expect("a head that is whole has a path");
     let (path, query) = target.split_once('?').unwrap_or((target, ""));
     let lower = |header: &httparse::Header| {
         (header.name.to_ascii_lowercase(), String::from_utf8_lossy(header.value).trim().to_string())
     };
     let request = Request {
-        method: head.method.unwrap_or_default().to_string(),
+        method: head.method.expect("a head that is whole has a method").to_string(),
         path: path.to_string(),
         query: query.to_string(),
         headers: head.headers.iter().map(lower).collect(),
