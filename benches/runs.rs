@@ -7,18 +7,15 @@ use morphcog::base::Grid;
 use morphcog::base::random::{Purpose, stream};
 use morphcog::base::stop::NEVER;
 use morphcog::body::Body;
+use morphcog::commands::bench;
+use morphcog::config::Config;
 use morphcog::genome::Genome;
-use morphcog::run::checkpoint::{self, Checkpoint, KnownBodies};
-use morphcog::run::config::Config;
-use morphcog::run::curriculum::Period;
-use morphcog::run::evolve::{Observer, Options, Progress, evolve};
-use morphcog::run::folder::{IfExists, RunFolder};
-use morphcog::run::metrics::Totals;
-use morphcog::run::relatives::Relatives;
-use morphcog::run::start::StartRef;
-use morphcog::run::training::Training;
-use morphcog::run::{archive::RunFile, bench};
+use morphcog::search::evolve::{Options, evolve};
 use morphcog::sim::{InstructionSet, System};
+use morphcog::store::checkpoint::{self, Checkpoint, KnownBodies};
+use morphcog::store::folder::IfExists;
+use morphcog::store::metrics::Totals;
+use morphcog::store::run::RunFile;
 use morphcog::task::evaluation::{Job, Savings, evaluate};
 use morphcog::task::rollout::fresh_life;
 use processor::Processor;
@@ -33,16 +30,6 @@ const OVERRIDES: [&str; 5] = [
     "generations=40",
     "protocol.control_steps=50",
 ];
-
-struct Silent;
-
-impl Observer for Silent {
-    fn started(&mut self, _: &RunFolder, _: &Training, _: &Progress) {}
-    fn starting_from(&mut self, _: &StartRef, _: usize) {}
-    fn period(&mut self, _: Period, _: &Training, _: &Progress) {}
-    fn generation(&mut self, _: &Progress) {}
-    fn warning(&mut self, _: &str) {}
-}
 
 fn config(overrides: &[&str]) -> Config {
     let overrides: Vec<String> = overrides.iter().map(ToString::to_string).collect();
@@ -111,13 +98,12 @@ fn bookkeeping(criterion: &mut Criterion) {
         data: None,
         threads: None,
     };
-    let run: RunFile = evolve(&options, &AtomicBool::new(false), &mut Silent).expect("the run ends").run;
+    let run: RunFile = evolve(&options, &AtomicBool::new(false), &()).expect("the run ends").run;
     let mut known_bodies = KnownBodies::default();
     for i in 0..600_000_u128 {
         known_bodies.insert((i * 0x9E37_79B9_7F4A_7C15_F39C_C060_5CED_C834).to_le_bytes());
     }
-    let checkpoint =
-        Checkpoint { run, totals: Totals::default(), known_bodies, relatives: Relatives::default() };
+    let checkpoint = Checkpoint { run, totals: Totals::default(), known_bodies };
     let mut group = criterion.benchmark_group("bookkeeping");
     group.sample_size(10);
     group.bench_function("an offspring and its body", |bencher| {

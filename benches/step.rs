@@ -5,7 +5,7 @@ mod processor;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use morphcog::base::Grid;
-use morphcog::run::bench::specimens;
+use morphcog::commands::bench::specimens;
 use morphcog::sim::{InstructionSet, Physics, Start, System, World};
 use processor::Processor;
 use std::sync::Arc;

@@ -7,37 +7,42 @@ mod choice;
 mod plot;
 mod report;
 mod reproduce;
+mod response;
 mod serve;
 mod train;
 
-use crate::run::capacity_file::CapacityFile;
-use crate::run::data::catalogue::Catalogue;
-use crate::run::data::fetch::{FetchError, FetchOptions, fetch};
-use crate::run::folder::IfExists;
-use crate::run::one_by_one::{self, Named};
-use crate::run::plan::{PAPER_TOML, Plan};
-use crate::run::robots::{BEST, Selection};
-use crate::run::{
-    Config, Error, bench, config, data, error, eval, evolve, folder, gallery, replay, signals, simulate,
-};
+use crate::analysis::gallery;
+use crate::base::error::Error;
+use crate::base::{error, signals};
+use crate::commands::one_by_one;
+use crate::commands::one_by_one::Named;
+use crate::commands::plan::{PAPER_TOML, Plan};
+use crate::commands::{bench, data, eval, replay, simulate};
+use crate::config;
+use crate::config::Config;
+use crate::data::catalogue::Catalogue;
+use crate::data::dataset::{Dataset, Split};
+use crate::data::fetch::{FetchError, FetchOptions, fetch};
+use crate::data::files::places;
+use crate::search::evolve;
 use crate::sim::InstructionSet;
-use crate::task::dataset::{Dataset, Split};
-use crate::task::files::places;
+use crate::store::capacity::CapacityFile;
+use crate::store::folder;
+use crate::store::folder::IfExists;
+use crate::store::names::RUN_JSON;
+use crate::store::robots::{BEST, Selection};
 use crate::view::console::Console;
-use crate::view::pictures::{self, Format};
-use crate::view::sheet::{self, SheetError};
-use crate::view::{reporters, summary};
+use crate::view::pictures;
+use crate::view::pictures::Format;
+use crate::view::reporters::Reporter;
+use crate::view::sheet;
+use crate::view::sheet::SheetError;
+use crate::view::summary;
 pub use args::Cli;
 use args::{Command, DataCommand, DatasetArgs, EvalArgs, EvolveArgs, ReplayArgs, SimulateArgs};
 use choice::selected;
 use clap::CommandFactory;
-use clap::builder::{PathBufValueParser, TypedValueParser};
-use std::path::{Path, PathBuf};
-
-/// Reads the path of a run.json, or of its folder.
-fn run_json() -> impl TypedValueParser<Value = PathBuf> {
-    PathBufValueParser::new().map(folder::run_json)
-}
+use std::path::Path;
 
 /// Runs a command.
 ///
@@ -48,6 +53,7 @@ pub fn run(cli: Cli, console: &Console) -> Result<(), Error> {
     match cli.command {
         Command::Evolve(args) => run_evolve(args, console),
         Command::Eval(args) => run_eval(args, console),
+        Command::Response(args) => response::run(args, console),
         Command::Train(args) => train::run(args, console),
         Command::Audit(args) => audit::run(args, console),
         Command::Capacity(args) => capacity::run(args, console),
@@ -117,8 +123,8 @@ fn run_evolve(args: EvolveArgs, console: &Console) -> Result<(), Error> {
         evolve::Options { config, name, out: out.clone(), if_exists, data: args.data.clone(), threads };
     let stop = signals::stop_flag()?;
     let finished = {
-        let mut reporter = reporters::Evolution::new(console);
-        evolve::evolve(&options, &stop, &mut reporter)?
+        let reporter = Reporter::new(console);
+        evolve::evolve(&options, &stop, &reporter)?
     };
     summary::evolution(console, &finished, &out);
     if !finished.validated.is_empty() {
@@ -141,7 +147,7 @@ fn run_evolve(args: EvolveArgs, console: &Console) -> Result<(), Error> {
     // Nothing is left to be saved: from here on a signal ends the process.
     drop(stop);
     if args.replay {
-        let archive = Some(out.join(folder::RUN_JSON));
+        let archive = Some(out.join(RUN_JSON));
         let robot = BEST.to_string();
         let replay = replay::Options { robot, archive, data: args.data, ..replay::Options::default() };
         let replay = replay::replay(&replay)?;
@@ -188,7 +194,7 @@ fn run_eval(args: EvalArgs, console: &Console) -> Result<(), Error> {
         archives,
     };
     let stop = signals::stop_flag()?;
-    let finished = eval::eval(&options, &stop, &reporters::Evaluation::new(console))?;
+    let finished = eval::eval(&options, &stop, &Reporter::new(console))?;
     let eval::Finished { file: report, unwritten } = finished;
     let capacity = CapacityFile::of(&report, &options.out);
     let written = unwritten.is_none().then_some(options.out.as_path());
@@ -279,7 +285,7 @@ fn run_data(command: DataCommand, console: &Console) -> Result<(), Error> {
         DataCommand::Fetch { dataset, to, mirror, force } => {
             let catalogue = Catalogue::named(&dataset).map_err(|error| Error::usage(error.to_string()))?;
             let options = FetchOptions { to, mirror, force };
-            let fetched = fetch(&catalogue, &options, &mut reporters::Download::new(console));
+            let fetched = fetch(&catalogue, &options, &Reporter::new(console));
             let failed = |error: FetchError| match &error {
                 FetchError::Disk { path, source } if error::is_full(source) => Error::writing(path, source),
                 _ => Error::other(error.to_string()),

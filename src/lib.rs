@@ -4,22 +4,28 @@
 //! each, and it is to walk left under some classes of images and right under the others. MAP-Elites evolves such
 //! bodies; the physics follows EvoGym's model.
 //!
-//! # The map of the house
+//! # The layers
 //!
-//! The house has floors; a room uses only rooms on lower floors, never one beside it. Below all of them is a crate of its own, the
-//! simulator: [`sim`] (`morphcog-sim`), the physics and nothing else. Begin there with [`sim::World`].
+//! A module uses only modules of lower layers. Below all of them is a crate of its own, the simulator: [`sim`] (`morphcog-sim`),
+//! the physics and nothing else. Begin there with [`sim::World`].
 //!
-//! | floor | room | what is in it | begin with |
+//! | layer | module | what is in it | begin with |
 //! |---|---|---|---|
-//! | 0 | [`base`] | random streams, hashes, whole-file writes, numbers as text | [`base::random`] |
+//! | 0 | [`base`] | random streams, hashes, whole-file writes, errors, what is told how a command goes on | [`base::error::Error`] |
 //! | 1 | [`body`] | bodies, which are the simulator's, and what they are known by | [`body::Body`] |
 //! | 2 | [`genome`] | CPPNs and their mutations | [`genome::Genome`] |
 //! | 2 | [`qd`] | archives and MAP-Elites over any type of solution | [`qd::MapElites`] |
 //! | 2 | [`baseline`] | networks that robots are compared with | [`baseline::train`] |
-//! | 3 | [`task`] | images, stimuli, protocols, rollouts, scores, baselines | [`task::evaluation`] |
-//! | 4 | [`run`] | what the commands do, one file per command | [`run::evolve`] |
-//! | 5 | [`view`] | pictures, the terminal, the page of `serve` | [`view::pictures`] |
-//! | 6 | [`cli`] | the command line | [`cli::Cli`] |
+//! | 2 | [`data`] | the IDX reader, where datasets lie and come from, drawn digits | [`data::dataset::Dataset`] |
+//! | 3 | [`task`] | stimuli, protocols, rollouts, scores, responses and teaching | [`task::evaluation`] |
+//! | 4 | [`config`] | everything a run depends on, with line and key of what is wrong | [`config::Config`] |
+//! | 5 | [`store`] | every file of a run's folder as plain data; which robots are meant | [`store::run::RunFile`] |
+//! | 6 | [`search`] | evolution, training, choice on validation images | [`search::evolve`] |
+//! | 7 | [`analysis`] | responses, verdicts, the published robots and numbers | [`analysis::measure`] |
+//! | 8 | [`commands`] | what the commands do, one file a command: options in, result out | [`commands::eval`] |
+//! | 9 | [`view`] | pictures, figures, reports, the terminal | [`view::pictures`] |
+//! | 10 | [`serve`] | the page on which one draws a digit, over HTTP | [`serve::Service`] |
+//! | 11 | [`cli`] | the command line | [`cli::Cli`] |
 //!
 //! # A rollout
 //!
@@ -57,14 +63,23 @@
 )]
 #![cfg_attr(test, allow(clippy::disallowed_methods))]
 
+pub mod analysis;
 pub mod base;
 pub mod baseline;
 pub mod body;
+#[cfg(feature = "cli")]
 pub mod cli;
+pub mod commands;
+pub mod config;
+pub mod data;
 pub mod genome;
 pub mod qd;
-pub mod run;
+pub mod search;
+#[cfg(feature = "serve")]
+pub mod serve;
+pub mod store;
 pub mod task;
+#[cfg(feature = "figures")]
 pub mod view;
 
 pub use morphcog_sim as sim;

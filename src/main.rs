@@ -4,9 +4,9 @@
 #![deny(clippy::panic, clippy::print_stderr, clippy::print_stdout, clippy::unwrap_used)]
 
 use clap::Parser;
+use morphcog::base::error::ErrorKind;
 use morphcog::base::text::is_unseen;
 use morphcog::cli::{self, Cli};
-use morphcog::run::ErrorKind;
 use morphcog::view::console::{Console, Mode};
 use std::io;
 use std::process::ExitCode;

@@ -3,10 +3,11 @@
 mod common;
 
 use common::program::{Sandbox, TINY};
-use morphcog::run::audit::{Observer, Options, Source};
-use morphcog::run::audit_file::AuditFile;
-use morphcog::run::robots::Selection;
-use morphcog::run::verdict::Verdict;
+use morphcog::base::observer::{Observer, Work};
+use morphcog::commands::audit::{Options, Source};
+use morphcog::store::audit::AuditFile;
+use morphcog::store::audit::Verdict;
+use morphcog::store::robots::Selection;
 use std::collections::BTreeSet;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
@@ -233,8 +234,8 @@ struct Impatient {
 }
 
 impl Observer for Impatient {
-    fn started(&self, _: usize, lives: usize) {
-        self.lives.store(lives as u64, Ordering::Relaxed);
+    fn begins(&self, work: &Work) {
+        self.lives.store(work.total, Ordering::Relaxed);
     }
     fn progress(&self, done: u64) {
         self.stop.fetch_or(2 * done > self.lives.load(Ordering::Relaxed), Ordering::Relaxed);
@@ -260,7 +261,7 @@ fn what_a_stopped_audit_was_done_with_is_kept() {
         out: sandbox.path("run/audit.json"),
         threads: Some(1),
     };
-    let ended = morphcog::run::audit::audit(&options, &impatient.stop, &impatient).unwrap();
+    let ended = morphcog::commands::audit::audit(&options, &impatient.stop, &impatient).unwrap();
     assert!(ended.stopped);
     let kept = verdicts(&sandbox);
     let (some, all) = (kept.robots.len(), whole.robots.len());

@@ -3,10 +3,10 @@
 mod common;
 
 use common::program::{Sandbox, TINY};
-use morphcog::run::capacity::{Observer, Options};
-use morphcog::run::capacity_config::CapacityConfig;
-use morphcog::run::capacity_file::CapacityFile;
-use morphcog::run::eval_file::EvalFile;
+use morphcog::commands::capacity::Options;
+use morphcog::config::capacity::CapacityConfig;
+use morphcog::store::capacity::CapacityFile;
+use morphcog::store::eval::EvalFile;
 use std::sync::atomic::AtomicBool;
 
 const FEW: &str = "--set trainings=3 --set sizes=[1,4]";
@@ -160,16 +160,7 @@ fn what_was_found_stays_if_the_next_search_is_stopped_before_it_finds_anything()
         out: sandbox.path("runs/capacity.json"),
         threads: Some(1),
     };
-    let stopped = morphcog::run::capacity::capacity(&options, &AtomicBool::new(true), &Silent).unwrap().file;
+    let stopped = morphcog::commands::capacity::capacity(&options, &AtomicBool::new(true), &()).unwrap().file;
     assert!(stopped.stopped && stopped.tasks.is_empty());
     assert_eq!(sandbox.read("runs/capacity.json"), found);
-}
-
-/// Says nothing.
-struct Silent;
-
-impl Observer for Silent {
-    fn started(&self, _: u64, _: u64) {}
-    fn progress(&self, _: u64) {}
-    fn warning(&self, _: &str) {}
 }

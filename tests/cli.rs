@@ -2,11 +2,11 @@
 
 mod common;
 
-use common::program::{Sandbox, TINY, files, said, staged};
+use common::program::{Sandbox, TINY, files, gaits, said};
 use common::reference::{Reference, golden};
-use morphcog::run::config::{BUILT_IN, Config};
-use morphcog::run::eval_file::EvalFile;
-use morphcog::run::plan::PAPER_TOML;
+use morphcog::commands::plan::PAPER_TOML;
+use morphcog::config::{BUILT_IN, Config};
+use morphcog::store::eval::EvalFile;
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::OnceLock;
@@ -32,9 +32,11 @@ fn with_run() -> Sandbox {
 
 // ---- help ----
 
-const COMMANDS: [&str; 21] = [
+const COMMANDS: [&str; 23] = [
     "",
     "evolve",
+    "response",
+    "train",
     "eval",
     "audit",
     "capacity",
@@ -303,68 +305,61 @@ fn a_wrong_set_is_refused_with_2_and_quotes_it() {
         .ended(3, &["--set generations=0: ", "generations = 0"]);
 }
 
-/// What `config` prints of `three.toml`, [`TINY`] in three stages, with some overrides.
+/// What `config` prints of `own.toml`, [`TINY`] for gaits, with some overrides.
 fn changed(sandbox: &Sandbox, set: &[&str]) -> toml::Table {
     let set = set.iter().flat_map(|set| ["--set", set]);
-    let said = said(sandbox.command(["config", "three.toml"].into_iter().chain(set))).ended(0, &[]);
+    let said = said(sandbox.command(["config", "own.toml"].into_iter().chain(set))).ended(0, &[]);
     toml::from_str(&said.out).unwrap()
 }
 
 #[test]
-fn set_reaches_a_stage_by_its_number_and_unsets_a_key() {
+fn set_reaches_a_key_and_unsets_it() {
     let sandbox = Sandbox::new();
-    sandbox.write("three.toml", staged());
+    sandbox.write("own.toml", gaits());
     let plain = changed(&sandbox, &[]);
-    let third = changed(&sandbox, &["stage.3.keep=7", "stage.2.fitness=", "data.train_images="]);
-    assert_eq!(third["stage"][2]["keep"].as_integer(), Some(7));
-    assert_eq!(third["stage"][0], plain["stage"][0]);
-    assert!(plain["stage"][1].get("fitness").is_some() && plain["data"].get("train_images").is_some());
-    assert!(third["stage"][1].get("fitness").is_none() && third["data"].get("train_images").is_none());
+    let other = changed(&sandbox, &["archive.keep=7", "evaluation.fitness="]);
+    assert_eq!(other["archive"]["keep"].as_integer(), Some(7));
+    assert!(plain.get("evaluation").is_some() && other.get("evaluation").is_none());
+    assert_eq!(plain["body"], other["body"]);
     // Unset is what it would be if it did not stand in the file, and once more changes nothing.
     assert_eq!(
-        changed(&sandbox, &["generations=", "start.archive="])["generations"].as_integer(),
+        changed(&sandbox, &["generations=", "train.rounds="])["generations"].as_integer(),
         Some(30_000)
     );
-    assert_eq!(changed(&sandbox, &["stage="]).get("stage"), None);
+    assert_eq!(
+        changed(&sandbox, &["task.groups.2.1=8"])["task"]["groups"][1],
+        toml::Value::Array(vec![8.into()])
+    );
     // What was set is what is run.
-    sandbox.run("evolve -q -c three.toml -o run --set stage.3.keep=7 --set data.train_images=").ended(0, &[]);
-    let config = sandbox.run_file("run").config;
-    assert_eq!((config.stage[2].keep, config.data.train_images), (Some(7), None));
+    sandbox.run("evolve -q -c own.toml -o run --set archive.keep=3 -g 2").ended(0, &[]);
+    assert_eq!(sandbox.run_file("run").config.archive.keep, Some(3));
 }
 
 #[test]
 fn an_error_blames_the_override_that_caused_it() {
     let sandbox = Sandbox::new();
-    sandbox.write("three.toml", staged());
     sandbox.write("one.toml", TINY);
-    let blamed = |file: &str, set: &[&str], code: i32, blamed: &str, words: &[&str]| {
+    let blamed = |set: &[&str], code: i32, blamed: &str, words: &[&str]| {
         let all = set.iter().flat_map(|set| ["--set", set]);
-        let command = sandbox.command(["evolve", "-c", file, "-o", "run"].into_iter().chain(all));
+        let command = sandbox.command(["evolve", "-c", "one.toml", "-o", "run"].into_iter().chain(all));
         let place = format!("error: --set {blamed}: ");
         said(command).ended(code, &[&[place.as_str()], words].concat());
         assert!(!sandbox.path("run").exists());
     };
-    let three = "three.toml";
     // By itself, alone or beside others.
-    blamed(three, &["stage.3.keep=0"], 3, "stage.3.keep=0", &["stage 3: keep = 0"]);
-    blamed(three, &["stage.3.keep=0", "seed=4"], 3, "stage.3.keep=0", &[]);
-    blamed(three, &["stage.1.keep=2", "stage.3.keep=0"], 3, "stage.3.keep=0", &[]);
-    blamed(three, &["body.width=0", "body.height=0"], 3, "body.height=0", &["body.height = 0"]);
+    blamed(&["archive.keep=0"], 3, "archive.keep=0", &["archive.keep = 0"]);
+    blamed(&["archive.keep=0", "seed=4"], 3, "archive.keep=0", &[]);
+    blamed(&["train.rounds=2", "archive.keep=0"], 3, "archive.keep=0", &[]);
     // With what stands in the file only, where the message begins with a key of the file.
-    blamed(three, &["physics.ground_row=9", "seed=4"], 3, "physics.ground_row=9", &["protocol.start_row"]);
-    blamed(three, &["seed=4", "stage.3.pool=2"], 3, "stage.3.pool=2", &["images_per_class"]);
-    blamed(three, &["stage.3.images_per_class=99"], 3, "stage.3.images_per_class=99", &["pool = 9"]);
-    blamed(three, &["stage.1.generations=", "seed=4"], 3, "stage.1.generations=", &["stage 1"]);
-    // Keys and stages that are not there, to be set or unset.
-    blamed(three, &["seed=4", "stage.4.keep=1"], 2, "stage.4.keep=1", &["no stage 4", "from 1 to 3"]);
-    blamed(three, &["stage.0.keep=1"], 2, "stage.0.keep=1", &["from 1 to 3"]);
-    blamed(three, &["stage.first.keep=1"], 2, "stage.first.keep=1", &["from 1 to 3"]);
-    blamed("one.toml", &["stage.1.keep=1"], 2, "stage.1.keep=1", &["no stage 1"]);
-    blamed("one.toml", &["stages.1.keep=1"], 2, "stages.1.keep=1", &["unknown field `stages`"]);
-    blamed(three, &["seed=4", "stage.2.kep=1"], 2, "stage.2.kep=1", &["unknown field `kep`"]);
-    blamed(three, &["seed=4", "stage.2.kep="], 2, "stage.2.kep=", &["unknown field `kep`"]);
-    blamed(three, &["data.dataset=", "seed=4"], 2, "data.dataset=", &["missing field `dataset`"]);
-    blamed(three, &["body.height=x", "seed=4"], 2, "body.height=x", &["a whole number"]);
+    blamed(&["physics.ground_row=9"], 3, "physics.ground_row=9", &["protocol.start_row"]);
+    // Keys and items that are not there, to be set or unset.
+    blamed(&["seed=4", "task.groups.3.1=1"], 2, "task.groups.3.1=1", &["from 1 to 2"]);
+    blamed(&["task.groups.0.1=1"], 2, "task.groups.0.1=1", &["from 1 to 2"]);
+    blamed(&["stages.1.keep=1"], 2, "stages.1.keep=1", &["unknown field `stages`"]);
+    blamed(&["seed=4", "archive.kep=1"], 2, "archive.kep=1", &["unknown field `kep`"]);
+    blamed(&["seed=4", "archive.kep="], 2, "archive.kep=", &["unknown field `kep`"]);
+    blamed(&["data.dataset=", "seed=4"], 2, "data.dataset=", &["missing field `dataset`"]);
+    blamed(&["body.height=x", "seed=4"], 2, "body.height=x", &["a whole number"]);
     // The file's own fault stays the file's.
     sandbox.write("bad.toml", TINY.replace("height = 5", "height = 0"));
     sandbox.run("evolve -c bad.toml -o run --set seed=4").ended(3, &["error: bad.toml:6: body.height = 0"]);
@@ -621,7 +616,7 @@ fn robots_are_selected_in_the_same_words_by_every_command() {
             .run(&format!("{command} -a a --robots best --robots top:1"))
             .ended(2, &["expected one selection"]);
     }
-    for command in commands.iter().chain(&["replay"]) {
+    for command in commands.iter().chain(&["replay", "response"]) {
         sandbox.run(&format!("{command} -a a --robots worst:3")).ended(2, &["expected all, top:N, random:N"]);
         sandbox.run(&format!("{command} -a a --robots top:0")).ended(2, &["a number from 1 after the colon"]);
         sandbox.run(&format!("{command} -a a --robots zzz")).ended(3, &["there is no robot zzz"]);
@@ -765,7 +760,7 @@ fn an_evaluation_adds_up() {
         assert!(low <= robot.accuracy && robot.accuracy <= high && low >= 0.0 && high <= 1.0);
         assert_eq!(robot.balanced_accuracy, (robot.per_class[&0] + robot.per_class[&1]) / 2.0);
         let zero_walks = if robot.first_group_walks == "right" { 1.0 } else { -1.0 };
-        let right = |(image, d): (&morphcog::run::training::ImageRef, &Option<f64>)| {
+        let right = |(image, d): (&morphcog::store::images::ImageRef, &Option<f64>)| {
             let towards = if image.label == 0 { zero_walks } else { -zero_walks };
             d.is_some_and(|d| d * towards > 0.05)
         };

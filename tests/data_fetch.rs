@@ -2,10 +2,9 @@
 //! to disk, and the next mirror is tried.
 
 use morphcog::base::hash::sha256_hex;
-use morphcog::run::data::catalogue::{Catalogue, RemoteFile};
-use morphcog::run::data::fetch::{
-    Attempt, AttemptError, FetchError, FetchObserver, FetchOptions, Fetched, Outcome, fetch,
-};
+use morphcog::base::observer::{Observer, Work};
+use morphcog::data::catalogue::{Catalogue, RemoteFile};
+use morphcog::data::fetch::{AttemptError, FetchError, FetchOptions, Fetched, Outcome, fetch};
 use std::collections::BTreeMap;
 use std::io::{BufRead, BufReader, Write};
 use std::net::{TcpListener, TcpStream};
@@ -95,22 +94,30 @@ fn names(folder: &Path) -> Vec<String> {
 }
 
 #[derive(Default)]
-struct Log(Vec<String>);
+struct Log(Mutex<Vec<String>>);
 
-impl FetchObserver for Log {
-    fn begins(&mut self, file: &RemoteFile, _: &str) {
-        self.0.push(format!("begins {}", file.name));
+impl Log {
+    fn add(&self, text: String) {
+        self.0.lock().unwrap().push(text);
     }
-    fn received(&mut self, file: &RemoteFile, bytes: u64) {
-        if bytes == file.bytes {
-            self.0.push(format!("received {} of {bytes}", file.name));
+
+    fn first(&self, count: usize) -> Vec<String> {
+        self.0.lock().unwrap()[..count].to_vec()
+    }
+}
+
+impl Observer for Log {
+    fn begins(&self, work: &Work) {
+        assert_eq!(work.unit, "bytes");
+        self.add(format!("begins {} of {}", work.label, work.total));
+    }
+    fn progress(&self, done: u64) {
+        if done == 20 {
+            self.add("received 20".to_string());
         }
     }
-    fn failed(&mut self, file: &RemoteFile, _: &Attempt) {
-        self.0.push(format!("failed {}", file.name));
-    }
-    fn done(&mut self, file: &RemoteFile, _: &Fetched) {
-        self.0.push(format!("done {}", file.name));
+    fn warning(&self, text: &str) {
+        self.add(text.split(": ").next().unwrap_or_default().to_string());
     }
 }
 
@@ -119,19 +126,19 @@ fn right_files_are_written_and_then_kept() {
     let mirror = Mirror::serving(&[("images.gz", IMAGES), ("labels.gz", LABELS)]);
     let root = tempfile::tempdir().unwrap();
     let folder = root.path().join("data/mnist");
-    let mut log = Log::default();
-    let fetched = fetch(&catalogue(&[&mirror]), &to(&folder), &mut log);
+    let log = Log::default();
+    let fetched = fetch(&catalogue(&[&mirror]), &to(&folder), &log);
     let url = |name: &str| Outcome::Downloaded(format!("{}/{name}", mirror.address));
     assert_eq!(outcomes(fetched), [url("images.gz"), url("labels.gz")]);
     assert_eq!(std::fs::read(folder.join("images.gz")).unwrap(), IMAGES);
     assert_eq!(names(&folder), ["images.gz", "labels.gz"]);
-    assert_eq!(log.0[..3], ["begins images.gz", "received images.gz of 20", "done images.gz"]);
+    assert_eq!(log.first(2), ["begins images.gz of 20", "received 20"]);
 
-    let again = fetch(&catalogue(&[&mirror]), &to(&folder), &mut ());
+    let again = fetch(&catalogue(&[&mirror]), &to(&folder), &());
     assert_eq!(outcomes(again), [Outcome::Kept, Outcome::Kept]);
     assert_eq!(mirror.asked().len(), 2);
     let forced = FetchOptions { force: true, ..to(&folder) };
-    fetch(&catalogue(&[&mirror]), &forced, &mut ()).unwrap();
+    fetch(&catalogue(&[&mirror]), &forced, &()).unwrap();
     assert_eq!(mirror.asked().len(), 4);
 }
 
@@ -140,11 +147,11 @@ fn a_file_that_a_mirror_lacks_comes_from_the_next() {
     let first = Mirror::serving(&[("labels.gz", LABELS)]);
     let second = Mirror::serving(&[("images.gz", IMAGES), ("labels.gz", LABELS)]);
     let folder = tempfile::tempdir().unwrap();
-    let mut log = Log::default();
-    let fetched = fetch(&catalogue(&[&first, &second]), &to(folder.path()), &mut log);
+    let log = Log::default();
+    let fetched = fetch(&catalogue(&[&first, &second]), &to(folder.path()), &log);
     let url = |mirror: &Mirror, name: &str| Outcome::Downloaded(format!("{}/{name}", mirror.address));
     assert_eq!(outcomes(fetched), [url(&second, "images.gz"), url(&first, "labels.gz")]);
-    assert_eq!(log.0[..3], ["begins images.gz", "failed images.gz", "begins images.gz"]);
+    assert_eq!(log.first(3), ["begins images.gz of 20", "images.gz", "begins images.gz of 20"]);
 }
 
 #[test]
@@ -156,7 +163,7 @@ fn wrong_content_is_refused_and_never_reaches_the_disk() {
     let absent = Mirror::serving(&[]);
     let folder = tempfile::tempdir().unwrap();
     let mirrors = [&wrong, &short, &long, &cut, &absent];
-    let error = fetch(&catalogue(&mirrors), &to(folder.path()), &mut ()).unwrap_err();
+    let error = fetch(&catalogue(&mirrors), &to(folder.path()), &()).unwrap_err();
     let message = error.to_string();
     let FetchError::Mirrors { file, attempts, .. } = error else { panic!("{message}") };
     let errors: Vec<AttemptError> = attempts.into_iter().map(|a| a.error).collect();
@@ -184,13 +191,13 @@ fn another_file_of_that_name_is_not_replaced_without_force() {
     let mirror = Mirror::serving(&[("images.gz", IMAGES), ("labels.gz", LABELS)]);
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("labels.gz"), "my own").unwrap();
-    let error = fetch(&catalogue(&[&mirror]), &to(folder.path()), &mut ()).unwrap_err();
+    let error = fetch(&catalogue(&[&mirror]), &to(folder.path()), &()).unwrap_err();
     assert!(matches!(error, FetchError::Differs { .. }) && error.to_string().contains("--force"), "{error}");
     assert_eq!(names(folder.path()), ["labels.gz"]);
     assert!(mirror.asked().is_empty());
 
     let forced = FetchOptions { force: true, ..to(folder.path()) };
-    fetch(&catalogue(&[&mirror]), &forced, &mut ()).unwrap();
+    fetch(&catalogue(&[&mirror]), &forced, &()).unwrap();
     assert_eq!(std::fs::read(folder.path().join("labels.gz")).unwrap(), LABELS);
 }
 
@@ -200,7 +207,7 @@ fn a_mirror_of_ones_own_is_used_instead_of_the_known_ones() {
     let own = Mirror::serving(&[("images.gz", IMAGES), ("labels.gz", LABELS)]);
     let folder = tempfile::tempdir().unwrap();
     let options = FetchOptions { mirror: Some(format!("{}/", own.address)), ..to(folder.path()) };
-    fetch(&catalogue(&[&known]), &options, &mut ()).unwrap();
+    fetch(&catalogue(&[&known]), &options, &()).unwrap();
     assert_eq!(own.asked(), ["/set/images.gz", "/set/labels.gz"]);
     assert!(known.asked().is_empty());
 }
@@ -210,6 +217,6 @@ fn a_dead_mirror_is_an_error_that_names_it() {
     let closed = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
     let folder = tempfile::tempdir().unwrap();
     let options = FetchOptions { mirror: Some(format!("http://{closed}")), ..to(folder.path()) };
-    let error = fetch(&catalogue(&[]), &options, &mut ()).unwrap_err().to_string();
+    let error = fetch(&catalogue(&[]), &options, &()).unwrap_err().to_string();
     assert!(error.contains(&closed.to_string()) && error.contains("images.gz"), "{error}");
 }

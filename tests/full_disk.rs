@@ -5,6 +5,8 @@ mod common;
 
 use assert_cmd::Command;
 use common::program::{PROGRAM, SETTINGS, Said, Sandbox, files, said};
+use morphcog::store::run::Robot;
+use morphcog::task::response::Gait;
 
 /// Runs the program where no file may become larger than so many blocks (of 512 or 1024 bytes): to it, a full disk.
 fn without_room(sandbox: &Sandbox, blocks: u32, args: &str) -> Said {
@@ -70,6 +72,19 @@ fn an_audit_that_cannot_be_written_is_shown() {
     let audit = "audit --archive run/run.json --robots top:1 --set perturbations.time_step=[2]";
     let said = said_why(without_room(&sandbox, 0, audit), "run/audit.json");
     assert!(said.out.contains("verdict") && said.out.contains("1 robots: "), "{}", said.out);
+    assert_eq!(files(&sandbox.path("run")), before);
+}
+
+#[test]
+fn a_response_that_cannot_be_written_is_shown() {
+    let sandbox = sandbox();
+    let before = files(&sandbox.path("run"));
+    let run = sandbox.run_file("run");
+    let is_place = |robot: &&Robot| Gait::of(&robot.body).is_some();
+    let id = &run.elites.iter().find(is_place).unwrap().id;
+    let response = format!("response --archive run --robots {id} --images 60");
+    let said = said_why(without_room(&sandbox, 0, &response), "run/response.json");
+    assert!(said.out.contains("explained %") && said.out.contains(id), "{}", said.out);
     assert_eq!(files(&sandbox.path("run")), before);
 }
 

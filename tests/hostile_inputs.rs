@@ -10,23 +10,25 @@ mod common;
 use common::hostile::{Dice, bytes, value};
 use common::program::{Said, Sandbox, said};
 use common::server;
+use morphcog::base::error::{Error, ErrorKind};
 use morphcog::base::hash::sha256_hex;
 use morphcog::base::text::is_unseen;
-use morphcog::run::archive::RunFile;
-use morphcog::run::audit_file::AuditFile;
-use morphcog::run::folder::IfExists;
-use morphcog::run::held_out::HeldOut;
-use morphcog::run::robots::Selection;
-use morphcog::run::serve::{self, Service};
-use morphcog::run::session::{Observer, Options, Progress};
-use morphcog::run::simulate::{Scenario, simulate};
-use morphcog::run::start::StartRef;
-use morphcog::run::training::Training;
-use morphcog::run::{Config, Error, ErrorKind, curriculum::Period, eval, evolve, replay};
+use morphcog::commands::simulate::{Scenario, simulate};
+use morphcog::commands::{eval, replay};
+use morphcog::config::Config;
+use morphcog::search::evolve;
+use morphcog::search::evolve::Options;
+use morphcog::search::training::Training;
+use morphcog::serve::server::Server;
+use morphcog::serve::{self, Service};
+use morphcog::store::audit::AuditFile;
+use morphcog::store::folder::IfExists;
+use morphcog::store::images::HeldOut;
+use morphcog::store::robots::Selection;
+use morphcog::store::run::RunFile;
 use morphcog::view::console::{Console, Mode};
 use morphcog::view::figures::{self, Kind, Wanted};
 use morphcog::view::plot::Background;
-use morphcog::view::serve::Server;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::io::{self, Read, Write};
@@ -217,7 +219,6 @@ impl World {
             archives: vec![archive.to_path_buf()],
             robots: Vec::new(),
             options: replay::Options::default(),
-            stage: None,
             every: 0,
             out: Some(self.sandbox.path("figure.svg")),
             dpi: 36,
@@ -244,23 +245,6 @@ fn scenario(world: &World, dice: &mut Dice, case: &mut Case) {
     };
     let lived = simulate(&scenario, row).map_err(|error| error.within("scenario.json"));
     case.check(lived, "scenario.json");
-}
-
-struct Silent;
-
-impl eval::Observer for Silent {
-    fn validating(&self, _robots: usize, _images: usize, _showings: u64) {}
-    fn started(&self, _robots: usize, _images: usize) {}
-    fn progress(&self, _done: u64) {}
-    fn warning(&self, _text: &str) {}
-}
-
-impl Observer for Silent {
-    fn started(&mut self, _: &morphcog::run::folder::RunFolder, _: &Training, _: &Progress) {}
-    fn starting_from(&mut self, _: &StartRef, _: usize) {}
-    fn period(&mut self, _: Period, _: &Training, _: &Progress) {}
-    fn generation(&mut self, _: &Progress) {}
-    fn warning(&mut self, _: &str) {}
 }
 
 fn run(world: &World, dice: &mut Dice, case: &mut Case) {
@@ -292,7 +276,7 @@ fn run(world: &World, dice: &mut Dice, case: &mut Case) {
         });
         done
     };
-    case.check(eval::eval(&options, &stop, &Silent), "run.json");
+    case.check(eval::eval(&options, &stop, &()), "run.json");
     drop(ended);
     world.plot(case, Kind::Archive, &archive, "run.json");
     let substeps = run.config.protocol.control_steps as f64 * f64::from(run.config.physics.substeps);
@@ -376,7 +360,7 @@ fn checkpoint(world: &World, dice: &mut Dice, case: &mut Case) {
         data: None,
         threads: Some(1),
     };
-    let resumed = evolve::evolve(&options, &AtomicBool::new(true), &mut Silent);
+    let resumed = evolve::evolve(&options, &AtomicBool::new(true), &());
     // What is wrong with the run is told with its folder.
     if case.check(resumed, "hostile").is_none() {
         assert_eq!(std::fs::read(folder.join("run.json")).unwrap(), before, "nothing is lost");

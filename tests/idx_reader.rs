@@ -1,8 +1,8 @@
 //! Our IDX reader against an independent one (the `mnist` crate), and against what is known of the real MNIST.
 #![allow(clippy::disallowed_methods)]
 
-use morphcog::task::dataset::{Dataset, Split};
-use morphcog::task::files::{Place, places};
+use morphcog::data::dataset::{Dataset, Split};
+use morphcog::data::files::{Place, places};
 use std::io::Write;
 use std::path::Path;
 

@@ -17,7 +17,7 @@ const CAPACITY: &str = r#"{
       {"size": 3, "mean": 0.65, "standard_deviation": 0.01, "parameters": 154}]}]}]}"#;
 
 /// Kinds that show one robot, and kinds that do not.
-const OF_ROBOTS: [&str; 4] = ["body", "spacetime", "snapshots", "sensitivity"];
+const OF_ROBOTS: [&str; 3] = ["body", "spacetime", "snapshots"];
 const OF_RUNS: [&str; 4] = ["archive", "progress", "accuracy", "capacity"];
 
 /// A finished tiny run with all that figures are made of, made once.
@@ -95,7 +95,7 @@ fn letters_are_at_least_seven_points_high() {
 #[test]
 fn the_same_input_gives_the_same_bytes() {
     let sandbox = with_run();
-    for kind in ["archive", "snapshots", "sensitivity"] {
+    for kind in ["archive", "snapshots", "spacetime"] {
         for name in ["one", "two"] {
             sandbox.run(&format!("plot {kind} -a run/run.json -o {name}")).ended(0, &[]);
         }
@@ -122,15 +122,10 @@ fn seeds_become_one_figure_and_robots_one_each() {
     let sandbox = with_run();
     sandbox.run("evolve -q -c tiny.toml --seed 4 -o other").ended(0, &[]);
     sandbox.run("plot progress -a run/run.json -a other/run.json -o both.svg").ended(0, &[]);
-    let said = sandbox.run("plot progress --stage 1 -a run").ended(0, &[]);
-    assert!(said.out.contains("plot-progress-stage1.svg"), "{}", said.out);
-    assert!(sandbox.read("run/plot-progress-stage1.svg").contains("stage 1"));
     for kind in ["archive", "body"] {
         sandbox.run(&format!("plot {kind} -a run -o run/")).ended(2, &["--out run/", "a folder"]);
     }
     sandbox.run("replay -a run -f gif -o figs/").ended(2, &["--out figs/", "a folder"]);
-    sandbox.run("plot progress --stage 2 -a run").ended(3, &["metrics.csv", "--stage 2", "of stage 1"]);
-    sandbox.run("plot archive --stage 1 -a run").ended(2, &["--stage", "progress only"]);
     assert!(sandbox.read("both.svg").contains("seeds 3, 4"));
     sandbox
         .run("plot progress -a run -a run/run.json")
@@ -158,11 +153,8 @@ fn what_cannot_be_shown_is_refused_in_a_line() {
     };
     refused("pie -a run/run.json", 2, &["spacetime"]);
     refused("archive -a run/run.json -o figure.pdf", 2, &["figure.pdf", ".svg or .png"]);
-    refused(
-        "archive -a run/run.json --robot best",
-        2,
-        &["--robot", "body, spacetime, snapshots, sensitivity"],
-    );
+    refused("archive -a run/run.json --robot best", 2, &["--robot", "body, spacetime, snapshots only"]);
+    refused("sensitivity -a run/run.json", 2, &["spacetime"]);
     refused("body -a run/run.json -r best,best -o a.svg", 2, &["--out", "2"]);
     refused("body -a run/run.json --dpi 1", 2, &["--dpi"]);
     refused("body -a run/run.json --robot zzz", 3, &["zzz"]);

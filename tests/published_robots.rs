@@ -4,14 +4,14 @@
 mod common;
 
 use common::reference::golden;
+use morphcog::analysis::gallery;
 use morphcog::base::Grid;
 use morphcog::base::stop::NEVER;
 use morphcog::body::Body;
-use morphcog::run::eval_file::EvalFile;
-use morphcog::run::gallery;
+use morphcog::data::dataset::{Dataset, Split};
+use morphcog::data::files::places;
 use morphcog::sim::{Physics, System};
-use morphcog::task::dataset::{Dataset, Split};
-use morphcog::task::files::places;
+use morphcog::store::eval::EvalFile;
 use morphcog::task::grouping::Group::{A, B};
 use morphcog::task::protocol::{Life, Protocol};
 use morphcog::task::rollout::{Rollout, fresh_life};

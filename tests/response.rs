@@ -6,9 +6,9 @@ mod common;
 
 use common::program::{Sandbox, TINY, without_seconds};
 use morphcog::body::{Body, Material};
-use morphcog::run::Config;
-use morphcog::run::archive::RunFile;
-use morphcog::run::training::Training;
+use morphcog::config::Config;
+use morphcog::search::training::Training;
+use morphcog::store::run::RunFile;
 use morphcog::task::evaluation::{Job, Outcome, Savings, evaluate};
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
@@ -102,22 +102,4 @@ fn what_reads_a_run_reads_this_one() {
     sandbox.run("plot archive -a run/run.json -o archive.svg").ended(0, &[]);
     sandbox.run("report run").ended(0, &[]);
     assert!(sandbox.read("run/report.html").contains("the two images of a pair"));
-}
-
-#[test]
-fn it_starts_from_another_run_with_each_gait_once_and_goes_on() {
-    let sandbox = sandbox();
-    sandbox.write("other.toml", TINY);
-    sandbox.run("evolve -q -c other.toml -o other").ended(0, &[]);
-    let start = "--set start.archive=other/run.json";
-    let whole = evolve(&sandbox, "whole", start);
-    evolve(&sandbox, "again", &format!("--generations 5 {start}"));
-    let again = evolve(&sandbox, "again", &format!("--generations 12 --resume {start}"));
-    assert_eq!(again.elites, whole.elites);
-    assert!(whole.elites.iter().any(|robot| robot.generation == 0));
-    let mut gaits: Vec<String> = whole.elites.iter().map(|robot| robot.body.probe().to_string()).collect();
-    let count = gaits.len();
-    gaits.sort();
-    gaits.dedup();
-    assert_eq!(gaits.len(), count);
 }

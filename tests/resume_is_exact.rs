@@ -5,7 +5,7 @@ mod common;
 
 use common::program::{PROGRAM, Sandbox, TINY, files, without_seconds};
 use morphcog::base::hash::sha256_hex;
-use morphcog::run::archive::RunFile;
+use morphcog::store::run::RunFile;
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read};

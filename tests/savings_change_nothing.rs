@@ -3,7 +3,7 @@
 mod common;
 
 use common::program::{Sandbox, TINY};
-use morphcog::run::archive::Robot;
+use morphcog::store::run::Robot;
 use std::collections::BTreeMap;
 
 /// All three savings; bit `i` of a combination switches the `i`-th on.

@@ -3,14 +3,12 @@
 
 mod common;
 
-use common::program::{Sandbox, TINY, files, staged, without_seconds};
+use common::program::{Sandbox, TINY, files, gaits, without_seconds};
 use common::server::Server;
-use morphcog::run::curriculum::Period;
-use morphcog::run::evolve::{Observer, Options, Progress, evolve};
-use morphcog::run::folder::{IfExists, RunFolder};
-use morphcog::run::start::StartRef;
-use morphcog::run::training::Training;
-use morphcog::run::{Config, ErrorKind};
+use morphcog::base::error::ErrorKind;
+use morphcog::config::Config;
+use morphcog::search::evolve::{Options, evolve};
+use morphcog::store::folder::IfExists;
 use std::process::{Child, Command, ExitStatus};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -65,27 +63,14 @@ fn a_generation_that_lasts_for_minutes_is_dropped_when_a_signal_comes() {
 }
 
 #[test]
-fn a_stage_that_begins_with_much_work_is_stopped_and_the_stage_before_is_kept() {
-    let sandbox = Sandbox::tiny();
-    // A quarter of a minute of processor time for each elite that the second stage evaluates anew.
-    let stages =
-        "\n[physics]\nsubsteps = 1000\n[[stage]]\ngenerations = 2\n[[stage]]\nimages_per_class = 900\n";
-    sandbox.write("staged.toml", format!("{TINY}{stages}"));
-    let mut child = sandbox.start("evolve -q -c staged.toml -o run");
-    assert_eq!(stopped(&mut child, "TERM").code(), Some(75));
-    sandbox.run("evolve -q -c staged.toml -o before -g 2").ended(0, &[]);
-    assert_eq!(sandbox.run_file("run").generations, 2);
-    assert_eq!(sandbox.run_file("run").elites, sandbox.run_file("before").elites);
-}
-
-#[test]
-fn eval_audit_validation_and_capacity_end_soon_and_leave_nothing_half_done() {
+fn eval_audit_response_validation_and_capacity_end_soon_and_leave_nothing_half_done() {
     let sandbox = patient_run(1_000_000);
     let before = files(&sandbox.path("run"));
     for command in [
         "eval -q -a run/run.json --images 40 --cycles 10000",
         "audit -q -a run/run.json",
         "audit -q -a run/run.json --set perturbations.time_step=[64]",
+        "response -q -a run/run.json --robots all",
     ] {
         let mut child = sandbox.start(command);
         assert_eq!(stopped(&mut child, "INT").code(), Some(75), "{command}");
@@ -124,7 +109,6 @@ fn commands_that_have_nothing_to_save_are_ended_by_the_signal_and_leave_no_file(
     for command in [
         "simulate long.json -o long.csv",
         "replay -q -a run/run.json --robot best --format gif",
-        "plot -q sensitivity -a run/run.json",
         "plot -q spacetime -a run/run.json",
         "report -q run/run.json",
         "bench",
@@ -158,21 +142,10 @@ fn a_life_that_is_watched_ends_with_its_tab_and_with_the_server() {
     server.ended_by("TERM");
 }
 
-/// Says nothing.
-struct Silent;
-
-impl Observer for Silent {
-    fn started(&mut self, _: &RunFolder, _: &Training, _: &Progress) {}
-    fn starting_from(&mut self, _: &StartRef, _: usize) {}
-    fn period(&mut self, _: Period, _: &Training, _: &Progress) {}
-    fn generation(&mut self, _: &Progress) {}
-    fn warning(&mut self, _: &str) {}
-}
-
 #[test]
 fn a_run_stopped_at_any_moments_goes_on_to_the_same_bytes() {
     let sandbox = Sandbox::new();
-    for (name, text) in [("plain", TINY.to_string()), ("staged", staged())] {
+    for (name, text) in [("plain", TINY.to_string()), ("gaits", gaits())] {
         let text = text.replace("control_steps = 20", "control_steps = 60");
         sandbox.write(&format!("{name}.toml"), &text);
         sandbox.run(&format!("evolve -q -c {name}.toml -o {name}-whole")).ended(0, &[]);
@@ -195,7 +168,7 @@ fn a_run_stopped_at_any_moments_goes_on_to_the_same_bytes() {
                     std::thread::sleep(patience);
                     stop.store(true, Ordering::Relaxed);
                 });
-                evolve(&options, &stop, &mut Silent)
+                evolve(&options, &stop, &())
             });
             match finished {
                 Ok(finished) if !finished.stopped => break,
@@ -249,7 +222,7 @@ fn what_would_not_end_is_refused_with_its_key_wherever_it_stands() {
     for (from, to, expected) in hostile {
         assert!(good.contains(from), "{from}");
         sandbox.write("run/run.json", good.replace(from, to));
-        for command in ["eval", "audit", "plot sensitivity", "report", "replay -r best", "serve --no-open"] {
+        for command in ["eval", "audit", "response", "report", "replay -r best", "serve --no-open"] {
             let archive = if command == "report" { "run/run.json" } else { "-a run/run.json" };
             sandbox.run(&format!("{command} {archive}")).ended(3, &["run/run.json", expected]);
         }
@@ -269,10 +242,6 @@ fn what_would_not_end_is_refused_with_its_key_wherever_it_stands() {
         let expected = "protocol.control_steps = 1000000: expected at most 694444 to record";
         sandbox.run(command).ended(3, &[expected]);
     }
-    let drawn = "--set stage=[{images_per_class=1,redraw=1}] -g 200000";
-    sandbox
-        .run(&format!("evolve -c tiny.toml -o new {drawn}"))
-        .ended(3, &["stage 1: redraw = 1: expected 2 or more"]);
     sandbox.write("run/run.json", &good);
     sandbox.run("eval -q -a run/run.json --images 40 --cycles 1").ended(0, &[]);
     let report = sandbox.read("run/eval.json");

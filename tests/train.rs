@@ -3,11 +3,11 @@
 mod common;
 
 use common::program::{Sandbox, TINY, files};
-use morphcog::run::Config;
+use morphcog::config::Config;
 
 /// A little of everything: seconds in place of minutes.
 const LITTLE: &str = "--set train.random_images=40 --set train.rounds=2 --set train.images=24 \
---set train.final_images=20 --set validation.images=40";
+--set train.final_images=20 --set train.challengers=6 --set validation.images=40";
 
 /// A run whose robots walk a little.
 fn sandbox() -> Sandbox {
@@ -20,7 +20,9 @@ fn sandbox() -> Sandbox {
 #[test]
 fn a_training_is_a_run_that_every_command_understands() {
     let sandbox = sandbox();
-    let train = format!("train -q -a walkers --task 3|14 --robots top:3 {LITTLE} -o taught");
+    let train = format!(
+        "train -q -a walkers --task 3|14 --robots top:3 {LITTLE} --set train.challengers=0 -o taught"
+    );
     sandbox.run(&train).ended(0, &[]);
     let run = sandbox.run_file("taught");
     let [robot] = &run.elites[..] else { panic!("{} robots", run.elites.len()) };
@@ -38,7 +40,7 @@ fn a_training_is_a_run_that_every_command_understands() {
     // It says on what, and whether the robot is physical.
     let audit: serde_json::Value = serde_json::from_str(&sandbox.read("taught/audit.json")).unwrap();
     assert_eq!(audit["robots"][0]["id"], robot.id);
-    assert!(run.start.is_some_and(|start| start.sha256.len() == 64));
+    assert!(run.origin.is_some_and(|origin| origin.sha256.len() == 64));
     for command in [
         "eval -q -a taught --images 12 --cycles 1",
         "replay -q -a taught --robot best -o taught.png",
@@ -106,6 +108,19 @@ fn what_cannot_be_trained_is_one_clear_error_and_writes_nothing() {
     refused("--task 0|1 --set train.round=5", 2, &["rounds"]);
     refused("--task 0|1 --set validation.images=100000", 3, &["100000"]);
     refused("--task 0|1 --robots nobody", 3, &["nobody"]);
+    // One that no image can move.
+    let mut run = sandbox.run_file("walkers");
+    let mut blind = run.elites[0].clone();
+    blind.body = "33333/44444/11111/33333/44444".parse().unwrap();
+    blind.genome = blind.genome.with_body(&blind.body).unwrap();
+    (blind.id, blind.voxels) = (blind.genome.id(), blind.body.counts());
+    blind.cell = blind.bins();
+    run.elites = vec![blind];
+    sandbox.write("blind/run.json", run.to_json());
+    let said = sandbox.run("train -q -a blind --task 0|1 -o refused");
+    let said = said.ended(3, &["blind/run.json", "soft voxel or a sensor", "--robots"]);
+    assert_eq!(said.err.matches("error:").count(), 1, "{said:?}");
+    assert!(!sandbox.path("refused").exists());
     sandbox.run("train -q -a walkers --task 0|1 -o walkers").ended(5, &["--out"]);
     // A run and a training do not go on with each other.
     let before = files(&sandbox.path("walkers"));

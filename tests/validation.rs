@@ -2,24 +2,24 @@
 
 mod common;
 
-use common::program::{Sandbox, TINY, files};
-use morphcog::run::Config;
-use morphcog::run::audit_file::AuditFile;
-use morphcog::run::curriculum::Period;
-use morphcog::run::eval_file::EvalFile;
-use morphcog::run::evolve::{Observer, Options, Progress, evolve};
-use morphcog::run::folder::{IfExists, RunFolder};
-use morphcog::run::held_out::{HeldOut, images};
-use morphcog::run::start::StartRef;
-use morphcog::run::training::{Training, load_dataset};
-use morphcog::task::dataset::Split;
+use common::program::{Sandbox, TINY};
+use morphcog::base::observer::{Generation, Observer};
+use morphcog::config::Config;
+use morphcog::data::dataset::Split;
+use morphcog::search::evolve::{Options, evolve};
+use morphcog::search::held_out::images;
+use morphcog::search::training::Training;
+use morphcog::store::audit::AuditFile;
+use morphcog::store::eval::EvalFile;
+use morphcog::store::folder::IfExists;
+use morphcog::store::images::HeldOut;
+use morphcog::store::whereabouts::load_dataset;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// A run with redrawn images, so that it was trained on more than it ends with.
+/// A run that is trained on several images of each class.
 fn sandbox() -> Sandbox {
     let sandbox = Sandbox::new();
-    let stages = "\n[[stage]]\ngenerations = 4\n[[stage]]\nimages_per_class = 3\nredraw = 2\n";
-    sandbox.write("run.toml", format!("{TINY}{stages}"));
+    sandbox.write("run.toml", TINY.replace("train_images = [0, 1]", "images_per_class = 3"));
     sandbox.run("evolve -q -c run.toml -o run").ended(0, &[]);
     sandbox
 }
@@ -34,11 +34,10 @@ fn validation_images_are_of_the_training_split_and_were_never_trained_on() {
     let sandbox = sandbox();
     let run = sandbox.run_file("run");
     let dataset = load_dataset(&run.config, None, &[Split::Train]).unwrap();
-    // All that there are: whatever was trained on, in whichever generation, is left out.
-    let trained: std::collections::BTreeSet<usize> = (0..run.generations)
-        .flat_map(|g| Training::indices(&run.config, &dataset, run.config.period(g)).unwrap())
-        .collect();
-    assert!(trained.len() > run.training_images.len());
+    // All that there are: whatever was trained on is left out.
+    let trained: std::collections::BTreeSet<usize> =
+        Training::indices(&run.config, &dataset).unwrap().into_iter().collect();
+    assert_eq!(trained.len(), 6);
     let of_class =
         |class| dataset.indices_of(Split::Train, class).iter().filter(|i| !trained.contains(i)).count();
     let most = 2 * of_class(0).min(of_class(1));
@@ -49,26 +48,6 @@ fn validation_images_are_of_the_training_split_and_were_never_trained_on() {
     // Classes take turns: a round on the first of them is fair, too.
     assert_eq!(drawn[..20].iter().filter(|image| image.label == 0).count(), 10);
     assert!(images(&[&run], &dataset, "--images", 10 * most).is_err());
-}
-
-#[test]
-fn images_that_the_hardest_were_chosen_among_are_not_for_validation() {
-    // What is left of them is easier than images are.
-    let sandbox = Sandbox::new();
-    let stages = "\n[[stage]]\ngenerations = 1\n[[stage]]\nimages_per_class = 3\npool = 40\n";
-    sandbox.write("run.toml", format!("{TINY}{stages}"));
-    sandbox.run("evolve -q -c run.toml -o run -g 2").ended(0, &[]);
-    let run = sandbox.run_file("run");
-    let dataset = load_dataset(&run.config, None, &[Split::Train]).unwrap();
-    let period = run.config.period(1);
-    let pool = Training::drawn(&run.config, &dataset, period).unwrap();
-    let hardest = Training::indices(&run.config, &dataset, period).unwrap();
-    assert!(pool.len() == 80 && hardest.len() == 6 && hardest.iter().all(|image| pool.contains(image)));
-    let of_class =
-        |class| dataset.indices_of(Split::Train, class).iter().filter(|i| !pool.contains(i)).count();
-    let most = 2 * (of_class(0).min(of_class(1)) - 1);
-    let drawn = images(&[&run], &dataset, "--images", most).unwrap();
-    assert!(drawn.iter().all(|image| !pool.contains(&image.index)));
 }
 
 #[test]
@@ -133,10 +112,8 @@ fn robots_are_compared_on_validation_images_without_a_look_at_the_test_images() 
     let turned = EvalFile::read(&sandbox.path("eval-validation.json")).unwrap();
     assert_eq!(turned.images, report.images);
     for run in [&run, &other] {
-        for period in run.config.periods(run.generations) {
-            let trained = Training::drawn(&run.config, &dataset, period).unwrap();
-            assert!(report.images.iter().all(|image| !trained.contains(&image.index)));
-        }
+        let trained = Training::indices(&run.config, &dataset).unwrap();
+        assert!(report.images.iter().all(|image| !trained.contains(&image.index)));
     }
     // What cannot be.
     sandbox.run(&format!("{command} --images 1000000")).ended(3, &["--images 1000000", "ask for at most"]);
@@ -167,7 +144,7 @@ fn a_run_that_asks_for_it_chooses_robots_at_its_end() {
     assert!(!said.err.contains("validating"), "{}", said.err);
     assert_eq!(sandbox.read("run/validation.json"), kept);
     let fewer = EvalFile::read(&sandbox.path("run/eval.json")).unwrap().robots;
-    let ids = |robots: &[morphcog::run::eval_file::RobotReport]| {
+    let ids = |robots: &[morphcog::store::eval::RobotReport]| {
         robots.iter().map(|robot| robot.id.clone()).collect::<Vec<_>>()
     };
     assert_eq!((fewer.len(), ids(&fewer)), (1, ids(&report.robots[..1])));
@@ -192,24 +169,6 @@ fn too_few_or_too_many_validation_images_are_refused() {
 }
 
 #[test]
-fn a_run_that_goes_on_to_where_too_few_are_left_is_refused_before_it_does() {
-    let sandbox = Sandbox::new();
-    let few = TINY.replace("[data]\n", "[data]\nbuiltin = { train_per_class = 40 }\n");
-    let stage = "\n[[stage]]\nimages_per_class = 10\nredraw = 2\n[validation]\nimages = 40\nbest = 1\n";
-    sandbox.write("run.toml", format!("{few}{stage}"));
-    sandbox.run("evolve -q -c run.toml -o run -g 2").ended(0, &[]);
-    let before = files(&sandbox.path("run"));
-    let on = "evolve -q -c run.toml -o run --resume -g";
-    sandbox.run(&format!("{on} 40")).ended(3, &["validation.images = 40", "validation.best"]);
-    assert_eq!(files(&sandbox.path("run")), before);
-    // Nor is one begun in a folder that is there already.
-    std::fs::create_dir(sandbox.path("empty")).unwrap();
-    sandbox.run("evolve -q -c run.toml -o empty --resume -g 40").ended(3, &["validation.images = 40"]);
-    // What is chosen at the end may be another thing: nothing before depends on it.
-    sandbox.run(&format!("{on} 40 --set validation.best=0")).ended(0, &[]);
-}
-
-#[test]
 fn nothing_is_chosen_by_other_images_of_the_same_number() {
     let sandbox = Sandbox::new();
     sandbox.write("run.toml", TINY);
@@ -231,15 +190,16 @@ fn nothing_is_chosen_by_other_images_of_the_same_number() {
 #[test]
 fn a_run_that_will_leave_too_few_of_them_is_refused_before_it_begins() {
     let sandbox = Sandbox::new();
-    // The first draw takes 30 of the 40 images of each class, and leaves 10 where 20 are asked for.
+    // Training takes 30 of the 40 images of each class, and leaves 10 where 20 are asked for.
     let few = TINY.replace("[data]\n", "[data]\nbuiltin = { train_per_class = 40 }\n");
-    let stage = "\n[[stage]]\nimages_per_class = 30\nredraw = 2\n[validation]\nimages = 40\n";
-    sandbox.write("run.toml", format!("{few}{stage}best = 1\n"));
+    let few = few.replace("train_images = [0, 1]", "images_per_class = 30");
+    sandbox.write("run.toml", format!("{few}[validation]\nimages = 40\nbest = 1\n"));
     let refused = ["validation.images = 40", "20 images of class", "ask for at most", "validation.best"];
     sandbox.run("evolve -q -c run.toml -o run").ended(3, &refused);
-    // However many generations: images run out soon.
-    sandbox.run("evolve -q -c run.toml -o run -g 200000").ended(3, &refused);
     assert!(!sandbox.path("run").exists());
+    // Nor is one begun in a folder that is there already.
+    std::fs::create_dir(sandbox.path("empty")).unwrap();
+    sandbox.run("evolve -q -c run.toml -o empty --resume").ended(3, &refused);
     // Who does not choose any needs none.
     sandbox.run("evolve -q -c run.toml -o run -g 1 --set validation.best=0").ended(0, &[]);
 }
@@ -269,13 +229,10 @@ fn evolve_itself_chooses_robots_at_its_end_and_so_whatever_calls_it() {
     /// Sets the flag, if there is one, after the first generation.
     struct Quiet<'a>(Option<&'a AtomicBool>);
     impl Observer for Quiet<'_> {
-        fn started(&mut self, _: &RunFolder, _: &Training, _: &Progress) {}
-        fn starting_from(&mut self, _: &StartRef, _: usize) {}
-        fn period(&mut self, _: Period, _: &Training, _: &Progress) {}
-        fn generation(&mut self, _: &Progress) {
-            self.0.iter().for_each(|stop| stop.store(true, Ordering::Relaxed));
+        fn generation(&self, now: &Generation) {
+            self.0.iter().filter(|_| now.done > 0).for_each(|stop| stop.store(true, Ordering::Relaxed));
         }
-        fn warning(&mut self, text: &str) {
+        fn warning(&self, text: &str) {
             panic!("{text}");
         }
     }
@@ -290,7 +247,7 @@ fn evolve_itself_chooses_robots_at_its_end_and_so_whatever_calls_it() {
         data: None,
         threads: Some(1),
     };
-    let finished = evolve(&options("library"), &AtomicBool::new(false), &mut Quiet(None)).unwrap();
+    let finished = evolve(&options("library"), &AtomicBool::new(false), &Quiet(None)).unwrap();
     assert!(!finished.stopped);
     assert_eq!(finished.validated.len(), 2);
     let first = &finished.validated[0];
@@ -301,7 +258,7 @@ fn evolve_itself_chooses_robots_at_its_end_and_so_whatever_calls_it() {
     assert_eq!(sandbox.read("library/validation.json"), sandbox.read("program/validation.json"));
     // Stopped before its last generation, a run chooses none.
     let stop = AtomicBool::new(false);
-    let stopped = evolve(&options("stopped"), &stop, &mut Quiet(Some(&stop))).unwrap();
+    let stopped = evolve(&options("stopped"), &stop, &Quiet(Some(&stop))).unwrap();
     assert!(stopped.stopped && stopped.validated.is_empty());
     assert!(!sandbox.path("stopped/validation.json").exists());
 }

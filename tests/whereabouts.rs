@@ -5,7 +5,7 @@ mod common;
 
 use common::program::{Sandbox, TINY, said};
 use common::server::Server;
-use morphcog::run::eval_file::EvalFile;
+use morphcog::store::eval::EvalFile;
 use std::fs::{remove_dir_all, rename};
 
 /// An IDX dataset of zeros and ones: noise with a bar, of the first ones upright; `seed` decides which noise.

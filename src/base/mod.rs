@@ -1,11 +1,16 @@
 //! Floor 0: what every room stands on (random generators, hashes, files, numbers and lines as text).
 
 pub mod clock;
+pub mod error;
 pub mod files;
 pub mod hash;
 pub mod number;
+pub mod observer;
 pub mod random;
+pub mod signals;
+pub mod statistics;
 pub mod text;
+pub mod threads;
 
 pub use morphcog_sim::grid::{self, Grid};
 pub use morphcog_sim::stop;

@@ -1,8 +1,12 @@
-//! Floor 2: networks that robots are compared with (paper, "Morphological cognition capacity"), trained on a library.
+//! Networks that robots are compared with (paper, "Morphological cognition capacity"), trained on a library.
 
 pub mod curve;
+#[cfg(feature = "networks")]
 pub mod network;
+pub mod settings;
+#[cfg(feature = "networks")]
 pub mod training;
 
-pub use network::{Activation, Kind, Pooling};
-pub use training::{Hyperparameters, Samples, Trained, Untrained, Watch, train};
+pub use settings::{Activation, Hyperparameters, Kind, Pooling, Trained, Watch};
+#[cfg(feature = "networks")]
+pub use training::{Samples, Untrained, train};

@@ -2,43 +2,8 @@
 
 use crate::base::Grid;
 use crate::base::random::Stream;
+use crate::baseline::settings::{Activation, Kind, Pooling};
 use candle_core::{Device, Result, Tensor, Var};
-use serde::{Deserialize, Serialize};
-
-/// Kinds of network.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Kind {
-    /// One hidden layer; its size is the number of hidden neurons.
-    Mlp,
-    /// One convolution and an output head; its size is the number of kernels.
-    Cnn,
-}
-
-impl Kind {
-    /// All kinds.
-    pub const ALL: [Kind; 2] = [Kind::Mlp, Kind::Cnn];
-
-    /// Its name in files.
-    pub fn name(self) -> &'static str {
-        match self {
-            Kind::Mlp => "mlp",
-            Kind::Cnn => "cnn",
-        }
-    }
-}
-
-/// What follows the hidden layer.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Activation {
-    /// max(0, x)
-    Relu,
-    /// tanh(x)
-    Tanh,
-    /// 1/(1 + e^−x)
-    Sigmoid,
-}
 
 impl Activation {
     fn apply(self, x: &Tensor) -> Result<Tensor> {
@@ -48,20 +13,6 @@ impl Activation {
             Activation::Sigmoid => candle_nn::ops::sigmoid(x),
         }
     }
-}
-
-/// What a convolution's maps are made to before the output head.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Pooling {
-    /// Nothing: every pixel of every map goes into the head.
-    None,
-    /// The largest of 2 × 2 pixels.
-    Max2,
-    /// The mean of a whole map.
-    Mean,
-    /// The largest of a whole map.
-    Max,
 }
 
 impl Pooling {

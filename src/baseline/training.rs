@@ -1,63 +1,13 @@
 //! Training a network from scratch, as the paper has it: Adam, with early stopping.
 
-use super::network::{Activation, Kind, Network, Pooling, Shape};
 use crate::base::Grid;
 use crate::base::random::Stream;
 use crate::base::stop::{Stopped, check};
+use crate::baseline::network::{Network, Shape};
+use crate::baseline::settings::{Hyperparameters, Kind, Trained, Watch};
 use candle_core::{D, DType, Device, Result, Tensor};
 use candle_nn::{AdamW, Optimizer, ParamsAdamW};
-use serde::{Deserialize, Serialize};
 use std::sync::atomic::AtomicBool;
-
-/// What training waits for an improvement of.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Watch {
-    /// Share answered right: larger is better.
-    Accuracy,
-    /// Cross-entropy: smaller is better.
-    Loss,
-}
-
-/// How networks are trained.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct Hyperparameters {
-    /// Passes over the training images. Default 50, the paper's.
-    pub epochs: usize,
-    /// Epochs without an improvement after which training ends. Default 5, the paper's.
-    pub patience: usize,
-    /// What is to improve.
-    pub watch: Watch,
-    /// Whether the best epoch's network is tested, not the last epoch's.
-    pub restore_best: bool,
-    /// Adam's learning rate.
-    pub learning_rate: f64,
-    /// Images per step; 0: all at once.
-    pub batch: usize,
-    /// What follows the hidden layer.
-    pub activation: Activation,
-    /// Side of the convolution's kernels.
-    pub kernel: usize,
-    /// What becomes of the convolution's maps.
-    pub pooling: Pooling,
-}
-
-impl Default for Hyperparameters {
-    fn default() -> Self {
-        Hyperparameters {
-            epochs: 50,
-            patience: 5,
-            watch: Watch::Accuracy,
-            restore_best: false,
-            learning_rate: 5e-4,
-            batch: 1,
-            activation: Activation::Relu,
-            kernel: 3,
-            pooling: Pooling::None,
-        }
-    }
-}
 
 /// Images with their groups (0 or 1), as networks of a kind see them.
 #[derive(Clone, Debug)]
@@ -94,17 +44,6 @@ impl Samples {
     fn len(&self) -> usize {
         self.groups.elem_count()
     }
-}
-
-/// How a training ended.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Trained {
-    /// Share of the test images answered right.
-    pub accuracy: f64,
-    /// Epochs it took.
-    pub epochs: usize,
-    /// Numbers that training changed.
-    pub parameters: usize,
 }
 
 /// Images judged at once: what networks make of so many stays in a core's nearest memory.

@@ -1,19 +1,29 @@
 //! The words of the command line: clap's types, help and examples.
 
-use super::audit::{self, AuditArgs};
-use super::capacity::{self, CapacityArgs};
-use super::choice::{Archives, ROBOTS};
-use super::plot::{self, PlotArgs};
-use super::report::{self, ReportArgs};
-use super::reproduce::{self, ReproduceArgs};
-use super::run_json;
-use super::serve::{self, ServeArgs};
-use super::train::{self, TrainArgs};
-use crate::run::held_out::HeldOut;
-use crate::run::replay::Shown;
-use crate::run::robots::Selection;
-use crate::run::{config, eval};
-use crate::task::dataset::BUILTIN;
+use crate::cli::audit;
+use crate::cli::audit::AuditArgs;
+use crate::cli::capacity;
+use crate::cli::capacity::CapacityArgs;
+use crate::cli::choice::run_json;
+use crate::cli::choice::{Archives, ROBOTS};
+use crate::cli::plot;
+use crate::cli::plot::PlotArgs;
+use crate::cli::report;
+use crate::cli::report::ReportArgs;
+use crate::cli::reproduce;
+use crate::cli::reproduce::ReproduceArgs;
+use crate::cli::response;
+use crate::cli::response::ResponseArgs;
+use crate::cli::serve;
+use crate::cli::serve::ServeArgs;
+use crate::cli::train;
+use crate::cli::train::TrainArgs;
+use crate::commands::replay::Shown;
+use crate::config;
+use crate::data::dataset::BUILTIN;
+use crate::search::showing;
+use crate::store::images::HeldOut;
+use crate::store::robots::Selection;
 use crate::view::console::Mode;
 use crate::view::pictures::Format;
 use crate::view::scene::Look;
@@ -42,7 +52,7 @@ const ROBOT: &str = "Which robot: best (first on validation images if the run ra
 robot; without --archive also the name of a published robot";
 
 /// What is said of `--set`.
-pub(super) const SET: &str = "Change a key, as in map_elites.parents=10 or stage.2.keep=3 (stages are counted from 1); \
+pub(super) const SET: &str = "Change a key, as in map_elites.parents=10 or task.groups.2=[1,2] (items are counted from 1); \
 without a value, as in data.train_images=, it has its default again; may be given several times";
 
 const EXAMPLES: &str = "\
@@ -69,6 +79,9 @@ Examples:
 
 Ctrl-C (or SIGTERM, SIGUSR1) drops the generation under way, saves and exits with 75; a second Ctrl-C ends at once.")]
     Evolve(EvolveArgs),
+    /// Measure how far each soft voxel and sensor of a robot moves it, and what it could be taught.
+    #[command(after_help = response::EXAMPLES)]
+    Response(ResponseArgs),
     /// Teach the gaits of an archive to tell two groups of images apart.
     #[command(after_help = train::EXAMPLES)]
     Train(TrainArgs),
@@ -231,10 +244,10 @@ pub(super) struct EvalArgs {
     #[arg(long, value_name = "NAME")]
     pub(super) dataset: Option<String>,
     /// Displacements up to this many voxel lengths are wrong.
-    #[arg(long, default_value_t = eval::THRESHOLD)]
+    #[arg(long, default_value_t = showing::THRESHOLD)]
     pub(super) threshold: f64,
     /// Actuation cycles per image.
-    #[arg(long, default_value_t = eval::CYCLES, value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    #[arg(long, default_value_t = showing::CYCLES, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     pub(super) cycles: u32,
     /// Folder with the images.
     #[arg(long, value_name = "DIR")]

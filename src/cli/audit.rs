@@ -1,14 +1,20 @@
 //! `morphcog audit`: its words, and what it calls.
 
-use super::choice::{Archives, ROBOTS, selected};
-use crate::run::archive::different;
-use crate::run::audit::{self, Options, Source};
-use crate::run::audit_file::AUDIT_JSON;
-use crate::run::robots::Selection;
-use crate::run::verdict::Criteria;
-use crate::run::{Error, folder, gallery, robots, signals, validation};
+use crate::analysis::gallery;
+use crate::base::error::Error;
+use crate::base::signals;
+use crate::cli::choice::{Archives, ROBOTS, selected};
+use crate::commands::audit;
+use crate::commands::audit::{Options, Source};
+use crate::config::audit::Criteria;
+use crate::search::validation;
+use crate::store::names::AUDIT_JSON;
+use crate::store::robots::Selection;
+use crate::store::run::different;
+use crate::store::{folder, robots};
 use crate::view::console::Console;
-use crate::view::{reporters, verdicts};
+use crate::view::reporters::Reporter;
+use crate::view::verdicts;
 use clap::Args;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
@@ -91,7 +97,7 @@ pub(super) fn run(args: AuditArgs, console: &Console) -> Result<(), Error> {
             out: args.out.clone().unwrap_or(beside),
             threads: args.threads.map(usize::from),
         };
-        let finished = audit::audit(&options, &stop, &reporters::Audit::new(console))?;
+        let finished = audit::audit(&options, &stop, &Reporter::new(console))?;
         verdicts::audit(console, &finished, &options.out);
         if let Some(error) = finished.unwritten {
             return Err(error);
@@ -118,7 +124,7 @@ fn validated(
         data: args.data.clone(),
         threads: args.threads.map(usize::from),
     };
-    let Some(found) = validation::validate(&options, stop, &reporters::Evaluation::new(console))? else {
+    let Some(found) = validation::validate(&options, stop, &Reporter::new(console))? else {
         let text = "stopped before the robots were chosen; nothing is audited";
         return Err(Error::stopped(text.to_string()).hint("the same command goes on".to_string()));
     };

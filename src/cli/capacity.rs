@@ -1,12 +1,16 @@
 //! `morphcog capacity`: its words, and what it calls.
 
-use crate::run::capacity::{self, Options};
-use crate::run::capacity_config::CapacityConfig;
-use crate::run::capacity_file::CAPACITY_JSON;
-use crate::run::eval_file::EVAL_JSON;
-use crate::run::{Error, folder, signals};
+use crate::base::error::Error;
+use crate::base::signals;
+use crate::commands::capacity;
+use crate::commands::capacity::Options;
+use crate::config::capacity::CapacityConfig;
+use crate::store::folder;
+use crate::store::names::CAPACITY_JSON;
+use crate::store::names::EVAL_JSON;
 use crate::view::console::Console;
-use crate::view::{networks, reporters};
+use crate::view::networks;
+use crate::view::reporters::Reporter;
 use clap::Args;
 use std::path::PathBuf;
 
@@ -61,7 +65,7 @@ pub(super) fn run(args: CapacityArgs, console: &Console) -> Result<(), Error> {
         eval,
     };
     let stop = signals::stop_flag()?;
-    let finished = capacity::capacity(&options, &stop, &reporters::Capacity::new(console))?;
+    let finished = capacity::capacity(&options, &stop, &Reporter::new(console))?;
     let capacity::Finished { file, unwritten } = finished;
     networks::capacity(console, &file, unwritten.is_none().then_some(options.out.as_path()));
     if let Some(error) = unwritten {

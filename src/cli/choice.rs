@@ -1,13 +1,16 @@
 //! What commands have in common that take archives, or robots of them: one rule, and the same words of help.
 
-use super::run_json;
+use crate::base::error::Error;
+use crate::base::signals;
 use crate::base::stop::NEVER;
-use crate::run::one_by_one::{self, Named};
-use crate::run::robots::Selection;
-use crate::run::{Error, signals};
+use crate::commands::one_by_one;
+use crate::commands::one_by_one::Named;
+use crate::store::folder;
+use crate::store::robots::Selection;
 use crate::view::console::Console;
-use crate::view::reporters;
+use crate::view::reporters::Reporter;
 use clap::Args;
+use clap::builder::{PathBufValueParser, TypedValueParser};
 use std::path::PathBuf;
 
 /// Archives, of a command that takes several.
@@ -44,9 +47,14 @@ pub(super) fn selected(mut given: Vec<Selection>) -> Result<Option<Selection>, E
 /// The robots of a selection, for a command that looks at them one by one.
 pub(super) fn one_by_one(search: &one_by_one::Options, console: &Console) -> Result<Vec<Named>, Error> {
     // Only a search on validation images is stopped in an orderly way: signals end all else at once.
-    let observer = reporters::Evaluation::new(console);
+    let observer = Reporter::new(console);
     match search.robots.validated() {
         Some(_) => one_by_one::named(search, &*signals::stop_flag()?, &observer),
         None => one_by_one::named(search, &NEVER, &observer),
     }
+}
+
+/// Reads the path of a run.json, or of its folder.
+pub(super) fn run_json() -> impl TypedValueParser<Value = PathBuf> {
+    PathBufValueParser::new().map(folder::run_json)
 }

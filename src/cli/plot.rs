@@ -1,12 +1,15 @@
 //! `morphcog plot`: its words, and what it calls.
 
-use super::choice::{self, Archives, ROBOTS, selected};
-use crate::run::Error;
-use crate::run::one_by_one::{self, Named};
-use crate::run::replay::{Options, Shown};
-use crate::run::robots::{BEST, Selection};
+use crate::base::error::Error;
+use crate::cli::choice;
+use crate::cli::choice::{Archives, ROBOTS, selected};
+use crate::commands::one_by_one;
+use crate::commands::one_by_one::Named;
+use crate::commands::replay::{Options, Shown};
+use crate::store::robots::{BEST, Selection};
 use crate::view::console::Console;
-use crate::view::figures::{self, Kind, Wanted};
+use crate::view::figures;
+use crate::view::figures::{Kind, Wanted};
 use crate::view::plot::Background;
 use clap::Args;
 use std::path::PathBuf;
@@ -16,7 +19,6 @@ Kinds:
   body         a robot's voxels by material
   spacetime    its position over time, seen from above
   snapshots    poses of its life laid over each other
-  sensitivity  by how much each pixel changes its walk
   archive      fitness over muscle, sensor and total voxels
   progress     QD score, coverage and best fitness; several archives (seeds) make a band
   accuracy     what morphcog eval found (eval.json beside run.json, or named in its place by --archive)
@@ -29,12 +31,11 @@ Examples:
   morphcog plot snapshots --robot YJTLA -o yjtla.svg         a robot published with the paper
   morphcog plot spacetime --images train:1,test:17 -o walk.png --dpi 600
   morphcog plot body --robot top:3
-  morphcog plot progress --archive runs/zero_one-seed*
-  morphcog plot progress --stage 7 -a runs/zero_one_curriculum-seed1";
+  morphcog plot progress --archive runs/zero_one-seed*";
 
 #[derive(Debug, Args)]
 pub(super) struct PlotArgs {
-    /// What to show: body, spacetime, snapshots, sensitivity, archive, progress, accuracy or capacity.
+    /// What to show: body, spacetime, snapshots, archive, progress, accuracy or capacity.
     kind: Kind,
     #[command(flatten)]
     archives: Archives,
@@ -55,9 +56,6 @@ pub(super) struct PlotArgs {
     /// Folder with the images.
     #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,
-    /// Of progress: the stage of a curriculum to show alone, from 1; evaluations count from where it began.
-    #[arg(long, value_parser = clap::value_parser!(u16).range(1..))]
-    stage: Option<u16>,
     /// Control steps between the poses of snapshots (default: as suits the walk).
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..))]
     every: Option<u32>,
@@ -92,7 +90,6 @@ pub(super) fn run(args: PlotArgs, console: &Console) -> Result<(), Error> {
         archives,
         robots,
         options: Options { physical_only, images, data, dataset, ..Options::default() },
-        stage: args.stage.map(usize::from),
         every: args.every.map_or(0, |steps| steps as usize),
         out: args.out,
         dpi: args.dpi,

@@ -1,13 +1,14 @@
 //! `morphcog report`: its words, and what it calls.
 
-use super::choice::Archives;
-use super::run_json;
+use crate::base::error::Error;
 use crate::base::number;
-use crate::run::report;
-use crate::run::{Error, folder};
+use crate::cli::choice::Archives;
+use crate::cli::choice::run_json;
+use crate::commands::report;
+use crate::store::folder;
 use crate::view::console::Console;
+use crate::view::error::write_whole;
 use crate::view::report::Content;
-use crate::view::write_whole;
 use clap::Args;
 use std::path::PathBuf;
 

@@ -1,10 +1,13 @@
 //! `morphcog reproduce`: its words, and what it calls.
 
-use crate::run::plan::{PAPER_TOML, Plan};
-use crate::run::reproduce::{self, Options};
-use crate::run::{Error, signals};
+use crate::base::error::Error;
+use crate::base::signals;
+use crate::commands::plan::{PAPER_TOML, Plan};
+use crate::commands::reproduce;
+use crate::commands::reproduce::Options;
 use crate::view::console::Console;
-use crate::view::{networks, reporters};
+use crate::view::networks;
+use crate::view::reporters::Reporter;
 use clap::Args;
 use std::path::PathBuf;
 
@@ -49,7 +52,7 @@ pub(super) fn run(args: ReproduceArgs, console: &Console) -> Result<(), Error> {
         threads: args.threads.map(usize::from),
     };
     let stop = signals::stop_flag()?;
-    let finished = reproduce::reproduce(&options, &stop, &reporters::Reproduction::new(console))?;
+    let finished = reproduce::reproduce(&options, &stop, &Reporter::new(console))?;
     if finished.stopped {
         let text = "stopped; what is done so far is kept".to_string();
         return Err(Error::stopped(text).hint("the same command goes on".to_string()));

@@ -1,10 +1,12 @@
 //! `morphcog serve`: its words, and what it calls.
 
-use super::choice::Archives;
-use crate::run::serve::{Options, Service};
-use crate::run::{Error, folder, signals};
+use crate::base::error::Error;
+use crate::base::signals;
+use crate::cli::choice::Archives;
+use crate::serve::server::Server;
+use crate::serve::{Options, Service};
+use crate::store::folder;
 use crate::view::console::Console;
-use crate::view::serve::Server;
 use clap::Args;
 use std::path::PathBuf;
 

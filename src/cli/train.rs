@@ -1,15 +1,22 @@
 //! `morphcog train`: its words, and what it calls.
 
-use super::choice::{ROBOTS, selected};
-use super::run_json;
-use crate::run::audit_file::AUDIT_JSON;
-use crate::run::folder::{self, IfExists};
-use crate::run::robots::Selection;
-use crate::run::train::{self, Finished, Options, groups};
-use crate::run::verdict::Criteria;
-use crate::run::{Error, audit, config, signals};
+use crate::base::error::Error;
+use crate::base::signals;
+use crate::cli::choice::run_json;
+use crate::cli::choice::{ROBOTS, selected};
+use crate::commands::audit;
+use crate::config;
+use crate::config::audit::Criteria;
+use crate::search::train;
+use crate::search::train::{Finished, Options, groups};
+use crate::store::folder;
+use crate::store::folder::IfExists;
+use crate::store::names::AUDIT_JSON;
+use crate::store::names::RUN_JSON;
+use crate::store::robots::Selection;
 use crate::view::console::Console;
-use crate::view::{reporters, summary, verdicts};
+use crate::view::reporters::Reporter;
+use crate::view::{summary, verdicts};
 use clap::Args;
 use std::path::PathBuf;
 
@@ -93,7 +100,7 @@ pub(super) fn run(args: TrainArgs, console: &Console) -> Result<(), Error> {
         threads,
     };
     let stop = signals::stop_flag()?;
-    let finished = train::train(&options, &stop, &mut reporters::Teaching::new(console))?;
+    let finished = train::train(&options, &stop, &Reporter::new(console))?;
     let Finished { validated, .. } = &finished;
     summary::training(console, &finished, &out);
     let goes_on = || "the same command with --resume goes on".to_string();
@@ -104,7 +111,7 @@ pub(super) fn run(args: TrainArgs, console: &Console) -> Result<(), Error> {
     if !validated.is_empty() {
         summary::validation(console, validated);
     }
-    let archive = out.join(folder::RUN_JSON);
+    let archive = out.join(RUN_JSON);
     let options = audit::Options {
         robots: Selection::All,
         seed: 1,
@@ -114,7 +121,7 @@ pub(super) fn run(args: TrainArgs, console: &Console) -> Result<(), Error> {
         threads,
         source: audit::Source::Archive(archive),
     };
-    let audited = audit::audit(&options, &stop, &reporters::Audit::new(console))?;
+    let audited = audit::audit(&options, &stop, &Reporter::new(console))?;
     verdicts::audit(console, &audited, &options.out);
     if let Some(error) = audited.unwritten {
         return Err(error);

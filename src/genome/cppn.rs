@@ -1,8 +1,8 @@
 //! [`Cppn`]: a compositional pattern-producing network, as a graph that is always acyclic.
 
-use super::file::{CppnFile, VERSION};
-use super::function::Function;
 use crate::body::Material;
+use crate::genome::file::{CppnFile, VERSION};
+use crate::genome::function::Function;
 use serde::{Deserialize, Serialize};
 
 /// Inputs: nodes 0 (x), 1 (y), 2 (distance to the centre) and 3 (bias).

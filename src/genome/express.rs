@@ -1,9 +1,9 @@
 //! From a [`Cppn`] to a [`Body`]: every node is evaluated over the whole grid at once.
 
-use super::cppn::{Cppn, INPUTS, OUTPUTS};
 use crate::base::Grid;
 use crate::base::grid::GridError;
 use crate::body::{Body, BodyError, MAX_SIDE, Material};
+use crate::genome::cppn::{Cppn, INPUTS, OUTPUTS};
 
 impl Cppn {
     /// The body of `height` × `width` voxels the network describes: in each cell, the material whose output is

@@ -1,7 +1,7 @@
 //! The file form of a [`Cppn`] and what is checked on reading it.
 
-use super::cppn::{Cppn, Edge, FIRST_HIDDEN, INPUTS, MAX_HIDDEN, OUTPUTS};
-use super::function::Function;
+use crate::genome::cppn::{Cppn, Edge, FIRST_HIDDEN, INPUTS, MAX_HIDDEN, OUTPUTS};
+use crate::genome::function::Function;
 use serde::{Deserialize, Serialize};
 
 /// Version of the file form.

@@ -9,8 +9,9 @@ pub mod mutation;
 pub mod params;
 mod voxels;
 
+use crate::base::hash;
+use crate::base::random::Stream;
 use crate::base::stop::{NEVER, Stopped, check};
-use crate::base::{hash, random::Stream};
 use crate::body::{Body, BodyError};
 pub use cppn::Cppn;
 pub use edits::{EditError, Edits};
@@ -133,33 +134,27 @@ impl Genome {
         params: &MutationParams,
         rng: &mut Stream,
     ) -> Result<(Genome, Body), GenomeError> {
-        self.promising_offspring(spec, params, rng, |_| 0.0, &NEVER)
+        self.offspring_unless(spec, params, rng, &NEVER)
     }
 
-    /// The same; where several voxel mutations are drawn ([`MutationParams::voxel_candidates`]), the one whose body has the
-    /// greatest `promise` (the first of equals). Unless `stop` is set meanwhile.
+    /// The same, unless `stop` is set meanwhile.
     ///
     /// # Errors
     /// [`GenomeError::Stopped`] then; else as [`Genome::offspring`].
-    pub fn promising_offspring(
+    pub fn offspring_unless(
         &self,
         spec: BodySpec,
         params: &MutationParams,
         rng: &mut Stream,
-        promise: impl Fn(&Body) -> f64,
         stop: &AtomicBool,
     ) -> Result<(Genome, Body), GenomeError> {
-        // Without voxel mutations, or choice among them, nothing is drawn, and runs are what they were before there were any.
+        // Without voxel mutations nothing is drawn, and runs are what they were before there were any.
         if params.voxel_mutations == 0.0 || rng.unit() >= params.voxel_mutations {
             return self.with_mutated_network(spec, params, rng, stop);
         }
         let described = self.cppn.express(spec.height, spec.width)?;
-        let voxels = self.edits.apply(&described);
-        if !voxels.cells().iter().any(|material| params.voxel_scope.contains(*material)) {
-            return self.with_mutated_network(spec, params, rng, stop);
-        }
-        match self.with_voxels_changed(&described, spec, params, rng, promise, stop) {
-            // On a large body with few voxels that may change, not one was hit in all those draws.
+        match self.with_voxels_changed(&described, spec, params, rng, stop) {
+            // No valid body was hit in all those draws.
             Err(GenomeError::NoValidBody { .. }) => self.with_mutated_network(spec, params, rng, stop),
             changed => changed,
         }

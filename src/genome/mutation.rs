@@ -1,9 +1,9 @@
 //! The six mutations of a [`Cppn`].
 
-use super::cppn::{Cppn, FIRST_HIDDEN, INPUTS, MAX_HIDDEN, OUTPUTS};
-use super::function::Function;
-use super::params::MutationParams;
 use crate::base::random::Stream;
+use crate::genome::cppn::{Cppn, FIRST_HIDDEN, INPUTS, MAX_HIDDEN, OUTPUTS};
+use crate::genome::function::Function;
+use crate::genome::params::MutationParams;
 
 /// One kind of mutation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

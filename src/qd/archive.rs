@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 /// The best solution of a cell.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Elite<S> {
-    /// Index of its cell, see [`super::DescriptorSpace`].
+    /// Index of its cell, see [`crate::qd::DescriptorSpace`].
     pub cell: usize,
     /// Its fitness, finite.
     pub objective: f64,

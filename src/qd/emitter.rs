@@ -1,7 +1,7 @@
 //! [`EmitterParams`]: what a generation consists of; [`Variation`]: how its solutions are made.
 
-use super::archive::Archive;
 use crate::base::random::{Purpose, stream};
+use crate::qd::archive::Archive;
 use serde::{Deserialize, Serialize};
 use std::num::NonZeroU16;
 

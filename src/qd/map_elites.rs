@@ -1,7 +1,7 @@
 //! [`MapElites`]: ask for a generation, make and evaluate it, tell the archive.
 
-use super::archive::{Archive, ArchiveError, Elite, Insertion};
-use super::emitter::{EmitterParams, Proposal, Variation};
+use crate::qd::archive::{Archive, ArchiveError, Elite, Insertion};
+use crate::qd::emitter::{EmitterParams, Proposal, Variation};
 
 /// MAP-Elites (Mouret & Clune 2015; paper, section "MAP-Elites").
 ///

@@ -1,7 +1,7 @@
 //! Honest neighbours of a robot's accuracy: what takes no body at all.
 
-use super::grouping::{Group, Split};
 use crate::base::Grid;
+use crate::task::grouping::{Group, Split};
 
 /// An image as the sensors see it, with its class.
 #[derive(Clone, Copy, Debug)]

@@ -1,7 +1,10 @@
 //! [`Condition`]: under what a robot is shown a training image, so that evolution cannot live off what an audit changes.
 
+use serde::{Deserialize, Serialize};
+
 /// In what a fresh life differs from what protocol and physics say. The default is not at all.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Condition {
     /// Rows by which the start is raised.
     pub raised: u32,

@@ -1,9 +1,9 @@
 //! [`Direction`] and [`Assignment`]: which way a robot walks, and which way it should (paper, section
 //! "Generalization test").
 
-use super::fitness::Criterion;
-use super::grouping::{Group, Split};
-use super::score::{Answer, of_split};
+use crate::task::fitness::Fitness;
+use crate::task::grouping::{Group, Split};
+use crate::task::score::{Answer, of_split};
 
 /// A way to walk.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -31,8 +31,8 @@ pub struct Assignment {
 
 impl Assignment {
     /// The assignment under which a robot's training answers are fitter (A left if it makes no difference).
-    pub fn from_training(split: &Split, criterion: impl Into<Criterion>, answers: &[Answer]) -> Self {
-        let (a_right, a_left) = criterion.into().of_assignments(of_split(split, answers));
+    pub fn from_training(split: &Split, fitness: Fitness, answers: &[Answer]) -> Self {
+        let (a_right, a_left) = fitness.of_assignments(of_split(split, answers));
         Assignment { a: if a_right > a_left { Direction::Right } else { Direction::Left } }
     }
 

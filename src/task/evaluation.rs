@@ -1,16 +1,16 @@
 //! Evaluation of many robots at once, in parallel over robots and images, and what can be saved without loss.
 
-use super::condition::Condition;
-use super::protocol::{Life, Protocol};
-use super::rollout::{Rollout, fresh_life, same_to_sensors};
 use crate::base::Grid;
 use crate::base::stop::{Stopped, check};
 use crate::body::Body;
 use crate::sim::{Physics, System, Unstable};
+use crate::task::condition::Condition;
+use crate::task::protocol::{Life, Protocol};
+use crate::task::rollout::{Rollout, fresh_life, same_to_sensors};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::cmp::Reverse;
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
@@ -127,7 +127,8 @@ pub fn evaluate(
 }
 
 /// Fresh rollouts of a body, one under each image and its condition (the default where one is missing): displacements in voxel
-/// lengths, in the images' order.
+/// lengths, in the images' order. Images that show its sensors the same pixels under the same condition are one rollout. With how many
+/// were simulated; `told` is told after each for how many images it stands.
 ///
 /// # Errors
 /// [`Stopped`] if `stop` was set meanwhile; within, [`Unstable`] for a rollout that ended early.
@@ -135,13 +136,24 @@ pub fn fresh_rollouts(
     body: &Body,
     images: &[Grid<f64>],
     conditions: &[Condition],
-    physics: &Physics,
-    protocol: &Protocol,
+    (physics, protocol): (&Physics, &Protocol),
+    told: &(dyn Fn(u64) + Sync),
     stop: &AtomicBool,
-) -> Result<Vec<Result<f64, Unstable>>, Stopped> {
+) -> Result<(Vec<Result<f64, Unstable>>, usize), Stopped> {
     let setup = Setup { images, conditions, physics, protocol, stop };
     let systems = setup.systems(body);
-    (0..images.len()).into_par_iter().with_max_len(1).map(|image| setup.fresh_life(&systems, image)).collect()
+    let same_as = setup.same_as(body);
+    let mut shared = BTreeMap::<usize, u64>::new();
+    same_as.iter().for_each(|&first| *shared.entry(first).or_default() += 1);
+    let shared: Vec<(usize, u64)> = shared.into_iter().collect();
+    let roll = |&(image, count): &(usize, u64)| {
+        let displacement = setup.fresh_life(&systems, image)?;
+        told(count);
+        Ok((image, displacement))
+    };
+    let rolled = shared.par_iter().with_max_len(1).map(roll);
+    let rolled: BTreeMap<usize, Result<f64, Unstable>> = rolled.collect::<Result<_, Stopped>>()?;
+    Ok((same_as.iter().map(|first| rolled[first]).collect(), rolled.len()))
 }
 
 /// A life that was lived: one image's if fresh; if sequential all images', up to where the robot dropped out.
@@ -211,6 +223,14 @@ impl Setup<'_> {
         self.conditions.get(image).copied().unwrap_or_default()
     }
 
+    /// For each image the first that shows the body's sensors the same pixels under the same condition.
+    fn same_as(&self, body: &Body) -> Vec<usize> {
+        let mut first = HashMap::new();
+        let same = same_to_sensors(body, &self.images.iter().collect::<Vec<_>>());
+        let of = |(image, same)| *first.entry((same, self.condition(image))).or_insert(image);
+        same.into_iter().enumerate().map(of).collect()
+    }
+
     /// A fresh life under an image and its condition.
     fn fresh_life(&self, systems: &Systems, image: usize) -> Result<Result<f64, Unstable>, Stopped> {
         let Condition { raised, without_limits } = self.condition(image);
@@ -247,13 +267,7 @@ impl<'a> Candidate<'a> {
         let all: Vec<usize> = (0..images.len()).collect();
         let is_fresh = protocol.life == Life::Fresh;
         let same_as = match is_fresh && savings.shared_lives {
-            true => {
-                // Under another condition it is another life.
-                let mut first = HashMap::new();
-                let same = same_to_sensors(job.body, &images.iter().collect::<Vec<_>>());
-                let lives = same.into_iter().zip(all.iter().map(|&image| setup.condition(image)));
-                lives.zip(&all).map(|(life, &image)| *first.entry(life).or_insert(image)).collect()
-            }
+            true => setup.same_as(job.body),
             false => all.clone(),
         };
         let wished: &[usize] = if is_fresh { &job.order } else { &[] };

@@ -1,15 +1,12 @@
 //! [`Fitness`]: how good a robot's answers to several images are together.
 
-use super::condition::Condition;
-use super::grouping::Group;
+use crate::task::condition::Condition;
+use crate::task::grouping::Group;
 use serde::{Deserialize, Serialize};
 
-/// Displacement at which an answer is as good as can be, if nothing else is said, for [`Fitness::MeanClipped`] and
-/// [`Fitness::MeanHinge`] \[voxel lengths\].
-pub const ENOUGH: u16 = 10;
-
-/// Displacements up to this are wrong, as in the paper's test \[voxel lengths\].
-pub(super) const WRONG: f64 = 3.0;
+/// Margin at which an answer is as good as can be, for [`Fitness::MeanClipped`] \[voxel lengths\]. With less, a small change turns
+/// many answers; with more, bodies that walk far count more than bodies that are right.
+pub const ENOUGH: f64 = 10.0;
 
 /// More than rounding can make of a sum over images.
 const SLACK: f64 = 1e-9;
@@ -27,12 +24,8 @@ pub enum Fitness {
     /// the best that is in reach.
     #[default]
     Min,
-    /// The mean of the margins, each divided by ten voxel lengths (or what else is [`enough`](Criterion::enough)) and clipped to
-    /// −1 … 1.
+    /// The mean of the margins, each divided by ten voxel lengths and clipped to −1 … 1.
     MeanClipped,
-    /// The mean of the margins, each divided by as much, but never more than 1 (hinge loss; Cortes & Vapnik 1995): the farther an answer leads astray, the more it costs, so that a robot which knows three classes and walks the wrong way
-    /// for all of the fourth is drawn away from there.
-    MeanHinge,
     /// How strongly a gait responds to what its voxels see, whatever its task \[voxel lengths\]. Images are shown in pairs, an
     /// image and its opposite. Half the difference of the two displacements is what is linear in the widths of the voxels, half
     /// the sum is what is not, and where the body walks anyway. Fitness is the root of the mean square of the one, less the
@@ -48,7 +41,7 @@ impl Fitness {
     pub fn unit(self) -> Option<&'static str> {
         match self {
             Fitness::Min | Fitness::Response => Some("voxel lengths"),
-            Fitness::MeanClipped | Fitness::MeanHinge => None,
+            Fitness::MeanClipped => None,
         }
     }
 }
@@ -56,34 +49,19 @@ impl Fitness {
 /// The two ways to assign sides to groups: group A is to walk right, or left.
 pub(super) type Assignments = (f64, f64);
 
-/// What answers are judged by.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Criterion {
-    /// How they become one number.
-    pub fitness: Fitness,
-    /// In a mean, the margin at which an answer is as good as can be \[voxel lengths\], above 0.
-    pub enough: u16,
-}
-
-impl From<Fitness> for Criterion {
-    fn from(fitness: Fitness) -> Self {
-        Criterion { fitness, enough: ENOUGH }
-    }
-}
-
-impl Criterion {
+impl Fitness {
     /// Fitness under both assignments, of answers by group and displacement in the images' order; if some are still to
     /// come (`None`), upper bounds of it. Infinite without any image; not a number if an answer is none.
     pub(super) fn of_assignments(
         self,
         answers: impl Iterator<Item = (Group, Option<f64>)> + Clone,
     ) -> Assignments {
-        if self.fitness == Fitness::Response {
+        if self == Fitness::Response {
             let response = response(answers.map(|(_, d)| d));
             return (response, response);
         }
         let margins = margins(answers);
-        if self.fitness == Fitness::Min {
+        if self == Fitness::Min {
             let nothing = (f64::INFINITY, f64::INFINITY);
             let known = margins.filter_map(|(_, m)| m);
             return known.fold(nothing, |(right, left), m| (smaller(right, m), smaller(left, -m)));
@@ -100,27 +78,18 @@ impl Criterion {
         let mut sums = [best; 2];
         for (group, margin) in margins.filter_map(|(group, m)| Some((group, m?))) {
             for (way, m) in [margin, -margin].into_iter().enumerate() {
-                sums[way] += weights[group] * self.worth(m);
+                sums[way] += weights[group] * worth(m);
             }
         }
         let slack = if to_come == [0, 0] { 0.0 } else { SLACK };
         let of = |way: usize| sums[way] / all as f64 + slack;
         (of(0), of(1))
     }
+}
 
-    /// Whether it is nothing but the mean of what answers are worth, both groups weighing the same.
-    pub fn is_mean(self) -> bool {
-        matches!(self.fitness, Fitness::MeanClipped | Fitness::MeanHinge)
-    }
-
-    /// What an answer with this margin is worth in the mean that the fitness is, at most 1.
-    pub(super) fn worth(self, margin: f64) -> f64 {
-        let share = margin / f64::from(self.enough);
-        match self.fitness {
-            Fitness::MeanClipped => share.clamp(-1.0, 1.0),
-            _ => smaller(1.0, share),
-        }
-    }
+/// What an answer with this margin is worth in a mean: from −1 to 1.
+pub fn worth(margin: f64) -> f64 {
+    (margin / ENOUGH).clamp(-1.0, 1.0)
 }
 
 /// What a voxel length that the body walks anyway costs. With more, still bodies win at first; with less, so do those that walk one

@@ -2,10 +2,10 @@ use super::*;
 use Group::{A, B};
 use proptest::prelude::*;
 
-const MANY: [Fitness; 3] = [Fitness::MeanClipped, Fitness::MeanHinge, Fitness::Response];
+const MANY: [Fitness; 2] = [Fitness::MeanClipped, Fitness::Response];
 
 fn fitness(kind: Fitness, answers: &[(Group, f64)]) -> f64 {
-    better(Criterion::from(kind).of_assignments(answers.iter().map(|&(group, d)| (group, Some(d)))))
+    better(kind.of_assignments(answers.iter().map(|&(group, d)| (group, Some(d)))))
 }
 
 #[test]
@@ -14,37 +14,6 @@ fn long_walks_count_no_more_than_enough() {
     assert_eq!(mean(&[(A, -5.0), (B, 40.0)]), 0.75);
     assert_eq!(mean(&[(A, 40.0), (A, -10.0), (B, 2.0), (B, -10.0)]), 0.2);
     assert_eq!(mean(&[(A, 4.0), (B, 4.0)]), 0.0);
-}
-
-#[test]
-fn the_farther_astray_the_worse_is_a_hinged_answer_but_enough_is_enough() {
-    let mean = |answers: &[(Group, f64)]| fitness(Fitness::MeanHinge, answers);
-    assert_eq!(mean(&[(A, 5.0), (B, -40.0)]), 0.75);
-    assert_eq!(mean(&[(A, 40.0), (B, 40.0)]), -1.5);
-    // Three of four known by far and one by far wrong is worth less than all four a little.
-    let (three, four) =
-        ([(A, 30.0), (A, 30.0), (B, -30.0), (B, 30.0)], [(A, 1.0), (A, 1.0), (B, -1.0), (B, -1.0)]);
-    assert!(mean(&three) < mean(&four));
-    let clipped = |answers: &[(Group, f64)]| fitness(Fitness::MeanClipped, answers);
-    assert!(clipped(&three) > clipped(&four));
-    assert!(mean(&[(A, f64::NAN), (B, -9.0)]).is_nan());
-}
-
-#[test]
-fn how_far_is_enough_is_a_matter_of_the_criterion() {
-    let mean = |fitness, enough, answers: &[(Group, f64)]| {
-        let known = answers.iter().map(|&(group, d)| (group, Some(d)));
-        better(Criterion { fitness, enough }.of_assignments(known))
-    };
-    let answers = [(A, 30.0), (A, -10.0), (B, -10.0), (B, -80.0)];
-    assert_eq!(mean(Fitness::MeanHinge, 40, &answers), (0.75 - 0.25 + 0.25 + 1.0) / 4.0);
-    assert_eq!(mean(Fitness::MeanClipped, 40, &answers), mean(Fitness::MeanHinge, 40, &answers));
-    assert_eq!(mean(Fitness::MeanHinge, 5, &answers), (1.0 - 2.0 + 1.0 + 1.0) / 4.0);
-    assert_eq!(mean(Fitness::MeanClipped, 5, &answers), 0.5);
-    // Of two robots that are as often right, the one that walks farther.
-    let (short, long) = ([(A, 12.0), (B, -12.0)], [(A, 36.0), (B, -36.0)]);
-    assert_eq!(mean(Fitness::MeanHinge, ENOUGH, &short), mean(Fitness::MeanHinge, ENOUGH, &long));
-    assert!(mean(Fitness::MeanHinge, 40, &short) < mean(Fitness::MeanHinge, 40, &long));
 }
 
 #[test]
@@ -70,10 +39,8 @@ fn a_response_is_what_moves_the_two_of_a_pair_apart_within_conditions_that_take_
     assert_eq!((response(&[1.0, 9.0]), response(&[1.0]), response(&[])), (0.0, 0.0, f64::INFINITY));
     // What is to come may be anything.
     let some = [(A, Some(1.0)), (B, None), (A, Some(1.0)), (B, Some(1.0))];
-    let response = Criterion::from(Fitness::Response);
-    assert_eq!(better(response.of_assignments(some.iter().copied())), f64::INFINITY);
+    assert_eq!(better(Fitness::Response.of_assignments(some.iter().copied())), f64::INFINITY);
     assert_eq!(Fitness::Response.unit(), Some("voxel lengths"));
-    assert!(!response.is_mean());
 }
 
 #[test]
@@ -102,9 +69,8 @@ proptest! {
         let all = answers.iter().map(|&(a, d, _)| (if a { A } else { B }, Some(d)));
         let known = answers.iter().map(|&(a, d, known)| (if a { A } else { B }, known.then_some(d)));
         for kind in MANY {
-            let criterion = Criterion::from(kind);
-            let fitness = criterion.of_assignments(all.clone());
-            let bound = criterion.of_assignments(known.clone());
+            let fitness = kind.of_assignments(all.clone());
+            let bound = kind.of_assignments(known.clone());
             prop_assert!(bound.0 >= fitness.0 && bound.1 >= fitness.1, "{kind:?}");
         }
     }

@@ -1,7 +1,7 @@
 //! [`Grouping`]: which tasks there are: how classes are divided into a group that walks one way and one that
 //! walks the other.
 
-use super::fitness::{Criterion, Fitness};
+use crate::task::fitness::Fitness;
 
 /// One of the two groups of a [`Split`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -53,7 +53,7 @@ impl Split {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Grouping {
     tasks: Vec<Split>,
-    criterion: Criterion,
+    fitness: Fitness,
 }
 
 /// Most classes whose splits are all made: 511 of them.
@@ -84,7 +84,7 @@ impl Grouping {
         }
         check_unique(&[a, b].concat())?;
         let tasks = vec![Split { a: a.to_vec(), b: b.to_vec() }];
-        Ok(Grouping { tasks, criterion: Fitness::Min.into() })
+        Ok(Grouping { tasks, fitness: Fitness::Min })
     }
 
     /// All ways to split the classes in two non-empty groups, 2^(k−1) − 1 for k classes: small first groups come
@@ -111,18 +111,18 @@ impl Grouping {
         };
         let same_way = same_way_bin.then(|| Split { a: classes.to_vec(), b: Vec::new() });
         let tasks = firsts.into_iter().map(split).chain(same_way).collect();
-        Ok(Grouping { tasks, criterion: Fitness::Min.into() })
+        Ok(Grouping { tasks, fitness: Fitness::Min })
     }
 
     /// The same tasks with another fitness than the smallest margin.
     #[must_use]
-    pub fn with_fitness(self, criterion: impl Into<Criterion>) -> Self {
-        Grouping { criterion: criterion.into(), ..self }
+    pub fn with_fitness(self, fitness: Fitness) -> Self {
+        Grouping { fitness, ..self }
     }
 
     /// What answers to several images are judged by together.
-    pub fn criterion(&self) -> Criterion {
-        self.criterion
+    pub fn fitness(&self) -> Fitness {
+        self.fitness
     }
 
     /// The tasks, in the order of their bins.

@@ -10,6 +10,7 @@ use crate::base::Grid;
 use crate::base::random::Stream;
 use crate::body::{Body, Material};
 use crate::sim::{Physics, width};
+use crate::task::fitness::ENOUGH;
 use nalgebra::{DMatrix, DVector};
 
 /// What a place can be made of, without changing what walks.
@@ -223,6 +224,12 @@ impl Evidence {
         self.vector += &other.vector;
     }
 
+    /// The slopes with the least bias: by ridge regression with the smallest penalty.
+    pub fn least_biased(&self) -> Fit {
+        let factor = self.factor(RIDGES[0]);
+        Fit { slopes: factor.solve(&self.vector).as_slice().to_vec(), factor }
+    }
+
     /// The slopes by ridge regression, and by what factor the noise of a rollout is in each (its standard error).
     ///
     /// # Panics
@@ -234,7 +241,23 @@ impl Evidence {
         (factor.solve(&self.vector).as_slice().to_vec(), errors)
     }
 
-    fn slopes_alone(&self, ridge: f64) -> Vec<f64> {
+    /// The same of more places: the n-th place of before is the one with the n-th of these numbers.
+    pub fn among(&self, numbers: &[usize], places: usize) -> Self {
+        let mut all = Evidence::new(places);
+        for (i, &row) in numbers.iter().enumerate() {
+            all.vector[row] = self.vector[i];
+            for (j, &column) in numbers.iter().enumerate() {
+                all.matrix[(row, column)] = self.matrix[(i, j)];
+            }
+        }
+        all
+    }
+
+    /// The slopes by ridge regression.
+    ///
+    /// # Panics
+    /// If `ridge` is not above 0.
+    pub fn slopes_alone(&self, ridge: f64) -> Vec<f64> {
         self.factor(ridge).solve(&self.vector).as_slice().to_vec()
     }
 
@@ -246,18 +269,44 @@ impl Evidence {
     }
 }
 
+/// Slopes, and how other rollouts would have changed them.
+pub struct Fit {
+    /// The slopes, in the places' order \[voxel lengths\].
+    pub slopes: Vec<f64>,
+    factor: nalgebra::Cholesky<f64, nalgebra::Dyn>,
+}
+
+impl Fit {
+    /// The expected squared error of the weighted sum of the slopes, and the part of it that is
+    /// noise, not bias; both in units of a rollout's squared scatter. True slopes vary as `ridge`,
+    /// the penalty that was chosen, supposes.
+    pub fn variance(&self, weights: &[f64], ridge: f64) -> (f64, f64) {
+        let weights = DVector::from_column_slice(weights);
+        let solved = self.factor.solve(&weights);
+        let held_back = RIDGES[0] * solved.dot(&solved);
+        let noise = solved.dot(&weights) - held_back;
+        (noise + held_back * RIDGES[0] / ridge, noise)
+    }
+}
+
 /// What rollouts under random images tell of a gait.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Response {
     /// By how much a place that is wider by one rest width moves the body to the right \[voxel lengths\], in the
     /// places' order.
     pub slopes: Vec<f64>,
-    /// Their standard errors, given the noise \[voxel lengths\].
+    /// Their standard errors, what the penalty shrinks included \[voxel lengths\].
     pub errors: Vec<f64>,
     /// The displacement of a body whose places all had no width, the mean over conditions \[voxel lengths\].
     pub intercept: f64,
-    /// What the slopes leave unexplained of a displacement: standard deviation, cross-validated \[voxel lengths\].
+    /// The same under each condition; none of one without rollouts.
+    pub intercepts: Vec<Option<f64>>,
+    /// What slopes fitted to other rollouts leave unexplained of a displacement: standard
+    /// deviation, cross-validated \[voxel lengths\].
     pub noise: f64,
+    /// What the true slopes would leave unexplained: the same without the errors of the slopes
+    /// \[voxel lengths\].
+    pub scatter: f64,
     /// Share of the displacements' variance that slopes fitted to other rollouts explain.
     pub r_squared: f64,
     /// The penalty that was chosen.
@@ -323,17 +372,42 @@ impl Response {
         }
         let noise = (least / rollouts.len() as f64).sqrt();
         let evidence = evidence(&all);
-        let (slopes, errors) = evidence.slopes(ridge);
-        let intercepts: Vec<f64> = all.iter().filter_map(|moments| moments.intercept(&slopes)).collect();
+        let (slopes, factors) = evidence.slopes(ridge);
+        let found = DVector::from_column_slice(&slopes);
+        let left = spread - 2.0 * found.dot(&evidence.vector) + (&evidence.matrix * &found).dot(&found);
+        // The effective number of parameters: residuals are smaller than the scatter by these.
+        let fitted = places as f64 - ridge * dot(&factors, &factors)
+            + all.iter().filter(|moments| moments.count > 0.0).count() as f64;
+        let scatter = (left.max(0.0) / (rollouts.len() as f64 - fitted).max(1.0)).sqrt();
+        let intercepts: Vec<Option<f64>> = all.iter().map(|moments| moments.intercept(&slopes)).collect();
+        let known = intercepts.iter().flatten();
         Some(Response {
-            intercept: intercepts.iter().sum::<f64>() / intercepts.len() as f64,
+            intercept: known.clone().sum::<f64>() / known.count() as f64,
+            intercepts,
             slopes,
-            errors: errors.into_iter().map(|error| noise * error).collect(),
+            errors: factors.into_iter().map(|factor| scatter * factor).collect(),
             noise,
+            scatter,
             r_squared: if spread > 0.0 { 1.0 - least / spread } else { 0.0 },
             ridge,
             evidence,
         })
+    }
+
+    /// The error of the slopes relative to the slopes: from 0, known exactly, to 1, nothing known.
+    /// Each place counts as much as its width varied, so this is the relative error of the
+    /// displacements that are predicted for random images. Its square is the share of the variance
+    /// that exact slopes would explain and these do not.
+    pub fn relative_error(&self) -> f64 {
+        let weighed = |numbers: &[f64]| -> f64 {
+            numbers
+                .iter()
+                .enumerate()
+                .map(|(i, number)| self.evidence.matrix[(i, i)] * squared(*number))
+                .sum()
+        };
+        let off = weighed(&self.errors);
+        if off > 0.0 { (off / (off + weighed(&self.slopes))).sqrt() } else { 0.0 }
     }
 }
 
@@ -378,11 +452,6 @@ impl Example {
     }
 }
 
-/// What a margin is worth: divided by what is enough, and clipped to −1 … 1. (`mean_clipped` is its mean.)
-pub fn worth(margin: f64, enough: f64) -> f64 {
-    (margin / enough).clamp(WORST, 1.0)
-}
-
 /// What the worst answer is worth.
 const WORST: f64 = -1.0;
 
@@ -399,8 +468,6 @@ pub struct Lesson {
     margins: Vec<f64>,
     right: Vec<f64>,
     weights: Vec<f64>,
-    /// Margins count up to this \[voxel lengths\].
-    enough: f64,
     /// What the worst answer is worth: −1, or −∞ while climbing to where answers are not hopeless.
     floor: f64,
     design: Vec<usize>,
@@ -409,7 +476,7 @@ pub struct Lesson {
 
 impl Lesson {
     /// A lesson whose examples have the displacements of `design`.
-    pub fn new(examples: &[&Example], slopes: &[f64], design: &[Material], enough: f64) -> Self {
+    pub fn new(examples: &[&Example], slopes: &[f64], design: &[Material]) -> Self {
         let column =
             |place: usize, choice: usize| examples.iter().map(|e| e.choices[place][choice]).collect();
         let total: f64 = examples.iter().map(|example| example.weight).sum();
@@ -419,7 +486,6 @@ impl Lesson {
             margins: examples.iter().map(|example| example.displacement * example.right).collect(),
             right: examples.iter().map(|example| example.right).collect(),
             weights: examples.iter().map(|example| example.weight / total).collect(),
-            enough,
             floor: WORST,
             design: design.iter().map(|material| choice(*material)).collect(),
             objective: 0.0,
@@ -430,11 +496,11 @@ impl Lesson {
 
     /// Counts the objective anew.
     fn count(&mut self) {
-        let worth = |(margin, weight): (&f64, &f64)| weight * (margin / self.enough).clamp(self.floor, 1.0);
+        let worth = |(margin, weight): (&f64, &f64)| weight * (margin / ENOUGH).clamp(self.floor, 1.0);
         self.objective = self.margins.iter().zip(&self.weights).map(worth).sum();
     }
 
-    /// The weighted mean [worth] of the margins: from −1 to 1, the best.
+    /// The weighted mean [worth](crate::task::fitness::worth) of the margins: from −1 to 1, the best.
     pub fn objective(&self) -> f64 {
         self.objective
     }
@@ -446,13 +512,12 @@ impl Lesson {
 
     /// The objective with another material at a place.
     fn tried(&self, place: usize, choice: usize) -> f64 {
-        let (slope, now) = (self.slopes[place] / self.enough, self.design[place]);
+        let (slope, now) = (self.slopes[place] / ENOUGH, self.design[place]);
         let (before, after) = (&self.widths[place][now], &self.widths[place][choice]);
         let mut sum = 0.0;
         for example in 0..self.margins.len() {
             let change = slope * self.right[example] * (after[example] - before[example]);
-            sum +=
-                self.weights[example] * (self.margins[example] / self.enough + change).clamp(self.floor, 1.0);
+            sum += self.weights[example] * (self.margins[example] / ENOUGH + change).clamp(self.floor, 1.0);
         }
         sum
     }
@@ -492,6 +557,21 @@ impl Lesson {
             }
         }
         (self.objective, self.margins, self.design) = best;
+    }
+
+    /// Changes some of these places, each time the one that helps most, until as many are changed or none helps.
+    pub fn best_changes(&mut self, places: &[usize], most: usize) {
+        for _ in 0..most {
+            let all = places.iter().flat_map(|place| (0..CHOICES.len()).map(move |choice| (*place, choice)));
+            let others = all.filter(|(place, choice)| *choice != self.design[*place]);
+            let tried = others.map(|(place, choice)| (self.tried(place, choice), (place, choice)));
+            match tried.reduce(better) {
+                Some((objective, (place, choice))) if objective > self.objective + LEAST_GAIN => {
+                    self.change(place, choice, objective);
+                }
+                _ => return,
+            }
+        }
     }
 
     /// Place by place, in an order drawn anew for every sweep.
@@ -629,6 +709,71 @@ mod tests {
         );
     }
 
+    #[test]
+    fn standard_errors_are_as_large_as_slopes_are_off_with_few_rollouts_and_many() {
+        for (places, rollouts, noise, kind) in [
+            (60, 120, 3.0, 0),
+            (100, 60, 3.0, 0),
+            (100, 300, 10.0, 1),
+            (150, 300, 3.0, 2),
+            (60, 1000, 10.0, 0),
+            (60, 300, 0.5, 1),
+        ] {
+            let (mut squares, mut within, mut all) = (0.0, 0, 0.0);
+            for seed in 0..8 {
+                let mut random = random(seed);
+                let slope = |place: usize| match kind {
+                    0 => 3.0 * random.normal(),
+                    // A few are strong.
+                    1 if place.is_multiple_of(10) => 10.0 * random.normal(),
+                    1 => 0.3 * random.normal(),
+                    // All push the same way.
+                    _ => 3.0 + random.normal(),
+                };
+                let slopes: Vec<f64> = (0..places).map(slope).collect();
+                let intercepts = [0.0, 3.0, -2.0, 7.0, 1.0, 4.0];
+                let shown = planted(&slopes, &intercepts, noise, rollouts, 100 + seed);
+                let response = Response::of(&shown).unwrap();
+                for ((found, error), slope) in response.slopes.iter().zip(&response.errors).zip(&slopes) {
+                    let off = (found - slope) / error;
+                    squares += off * off;
+                    within += usize::from(off.abs() < 2.0);
+                    all += 1.0;
+                }
+            }
+            let (size, share) = ((squares / all).sqrt(), within as f64 / all);
+            let case = format!("{places} places, {rollouts} rollouts: {size} {share}");
+            assert!((0.88..1.12).contains(&size) && (0.92..0.98).contains(&share), "{case}");
+        }
+    }
+
+    #[test]
+    fn the_relative_error_is_that_of_what_is_predicted_and_1_where_nothing_is_known() {
+        let slopes: Vec<f64> = (0..60).map(|i| 3.0 * f64::from(i % 5) - 6.0).collect();
+        for (rollouts, noise) in [(120, 5.0), (600, 5.0), (600, 0.5)] {
+            let (mut off, mut said) = (0.0, 0.0);
+            for seed in 0..8 {
+                let mut shown = planted(&slopes, &[0.0], noise, rollouts, seed);
+                // Half of the places are never wider: of their slopes nothing is known, and nothing
+                // need be.
+                for shown in &mut shown {
+                    for (width, slope) in shown.widths.iter_mut().zip(&slopes).skip(30) {
+                        shown.displacement -= slope * (*width - 0.6);
+                        *width = 0.6;
+                    }
+                }
+                let response = Response::of(&shown).unwrap();
+                let wrong: Vec<f64> = response.slopes.iter().zip(&slopes).map(|(a, b)| a - b).collect();
+                off += dot(&wrong[..30], &wrong[..30]) / dot(&slopes[..30], &slopes[..30]) / 8.0;
+                said += squared(response.relative_error()) / 8.0;
+            }
+            let (off, said) = (off.sqrt(), said.sqrt());
+            assert!((said / off - 1.0).abs() < 0.15, "{rollouts} {noise}: {said}, in truth {off}");
+        }
+        let nothing = Response::of(&planted(&[0.0; 60], &[0.0], 5.0, 600, 3)).unwrap();
+        assert!(nothing.relative_error() > 0.6, "{}", nothing.relative_error());
+    }
+
     /// A gait of one row, and images of it.
     fn lesson(places: usize, images: usize, seed: u64) -> (Gait, Vec<Example>, Vec<f64>) {
         let body: Body = "6".repeat(places).parse().unwrap();
@@ -656,7 +801,7 @@ mod tests {
         let weight: f64 = examples.iter().map(|example| example.weight).sum();
         let worth = |example: &Example| {
             let change = dot(slopes, &example.widths(design)) - dot(slopes, &example.widths(&gait.design()));
-            example.weight * super::worth(example.right * (example.displacement + change), 10.0)
+            example.weight * crate::task::fitness::worth(example.right * (example.displacement + change))
         };
         examples.iter().map(worth).sum::<f64>() / weight
     }
@@ -671,7 +816,7 @@ mod tests {
             });
             let best =
                 every.map(|design| objective(&gait, &examples, &slopes, &design)).fold(f64::MIN, f64::max);
-            let mut lesson = Lesson::new(&all, &slopes, &gait.design(), 10.0);
+            let mut lesson = Lesson::new(&all, &slopes, &gait.design());
             lesson.solve_from_many(&mut random(seed));
             let (found, design) = (lesson.objective(), lesson.design());
             assert!((found - objective(&gait, &examples, &slopes, &design)).abs() < 1e-9);

@@ -1,11 +1,11 @@
 //! Rollouts: a body, a protocol and stimuli → displacements.
 
-use super::protocol::{Life, Protocol};
-use super::recording::{Frame, Phase, Recording, VoxelCorners};
 use crate::base::Grid;
 use crate::base::stop::Stopped;
 use crate::body::Body;
 use crate::sim::{Energy, Physics, Start, System, Unstable, World};
+use crate::task::protocol::{Life, Protocol};
+use crate::task::recording::{Frame, Phase, Recording, VoxelCorners};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 

@@ -5,9 +5,9 @@
 //! both cases are then the smallest margin. Two things follow that make savings lossless: fitness is continuous
 //! (d = 0 counts as wrong, with margin 0), and the fitness of some of the images bounds that of all from above.
 
-use super::direction::Assignment;
-use super::fitness::{Criterion, Fitness, better, margins, weights};
-use super::grouping::{Group, Grouping, Split};
+use crate::task::direction::Assignment;
+use crate::task::fitness::{Fitness, better};
+use crate::task::grouping::{Group, Grouping, Split};
 
 /// How a robot answered an image.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -30,7 +30,7 @@ pub struct Score {
 /// Fitness on two groups, in voxel lengths: of both assignments of directions to groups the better one's smallest
 /// margin. Infinite without answers, not a number if an answer is none; never −0.
 pub fn two_group_fitness(answers: &[(Group, f64)]) -> f64 {
-    better(Criterion::from(Fitness::Min).of_assignments(answers.iter().map(|&(group, d)| (group, Some(d)))))
+    better(Fitness::Min.of_assignments(answers.iter().map(|&(group, d)| (group, Some(d)))))
 }
 
 pub(super) fn of_split(
@@ -40,21 +40,11 @@ pub(super) fn of_split(
     answers.iter().filter_map(|answer| Some((split.group(answer.class)?, answer.displacement)))
 }
 
-/// Of each answer that counts its number, its group, and what it weighs in a mean: both groups weigh the same.
-pub(super) fn weighed(split: &Split, answers: &[Answer]) -> Vec<(usize, Group, f64)> {
-    let (_, weights) = weights(margins(of_split(split, answers)));
-    let weighed = |(number, answer): (usize, &Answer)| {
-        let group = split.group(answer.class)?;
-        Some((number, group, weights[usize::from(group == Group::B)]))
-    };
-    answers.iter().enumerate().filter_map(weighed).collect()
-}
-
 impl Grouping {
     /// Fitness on a task, or, while some images have not been shown, an **upper bound** of it. Images of classes in neither
     /// of its groups do not count.
     pub fn fitness_on(&self, split: &Split, answers: &[Answer]) -> f64 {
-        better(self.criterion().of_assignments(of_split(split, answers)))
+        better(self.fitness().of_assignments(of_split(split, answers)))
     }
 
     /// The task a robot performs, the one it is fittest on (the first wins a tie), and its fitness there.
@@ -82,7 +72,7 @@ impl Grouping {
             let Score { task, fitness } = self.score(answers);
             return wins(task, fitness);
         }
-        let never_negative = self.criterion().fitness == Fitness::Min && self.never_negative(answers);
+        let never_negative = self.fitness() == Fitness::Min && self.never_negative(answers);
         self.tasks().iter().enumerate().any(|(task, split)| {
             let bound = self.fitness_on(split, answers);
             let possible = bound >= 0.0 || !never_negative;
@@ -94,7 +84,7 @@ impl Grouping {
     /// walks one way is right on all of a group. Images of classes in neither group, or not shown, are left out.
     pub fn hardest_first(&self, answers: &[Answer]) -> Vec<usize> {
         let split = &self.tasks()[self.score(answers).task];
-        let assignment = Assignment::from_training(split, self.criterion(), answers);
+        let assignment = Assignment::from_training(split, self.fitness(), answers);
         let mut margins: Vec<(f64, Group, usize)> = (answers.iter().zip(0..))
             .filter_map(|(answer, image)| {
                 let group = split.group(answer.class)?;

@@ -174,7 +174,6 @@ proptest! {
         kind in prop_oneof![
             Just(Fitness::Min),
             Just(Fitness::MeanClipped),
-            Just(Fitness::MeanHinge),
             Just(Fitness::Response)
         ],
         images in prop::collection::vec((0..5u8, displacement(), prop::bool::weighted(0.7)), 1..24),

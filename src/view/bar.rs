@@ -1,9 +1,10 @@
 //! What moves on the terminal while something runs: progress and live pictures. All of it is written by
 //! [`Console`].
 
-use super::console::{Console, Mode, lock};
-use super::progress::{Pacer, Progress, count_line};
+use crate::base::observer::Generation;
 use crate::base::text::one_line;
+use crate::view::console::{Console, Mode, lock};
+use crate::view::progress::{Pacer, count_line, generation_line};
 use indicatif::ProgressBar;
 use serde::Serialize;
 use std::sync::Mutex;
@@ -51,7 +52,7 @@ impl Drop for Line<'_> {
 
 /// Progress of an evolution; the line goes when this is dropped.
 pub struct Bar<'c> {
-    begin: Mutex<Option<Progress>>,
+    begin: Mutex<Option<Generation>>,
     line: Line<'c>,
 }
 
@@ -62,9 +63,9 @@ impl<'c> Bar<'c> {
 
     /// Shows how far it is (JSON: an event `generation`). The first call counts as the beginning: a resumed run calls
     /// it once before it goes on.
-    pub fn update(&self, progress: &Progress) {
+    pub fn update(&self, progress: &Generation) {
         let begin = *lock(&self.begin).get_or_insert(*progress);
-        self.line.show(progress.done, |seconds| progress.line(&begin, seconds));
+        self.line.show(progress.done, |seconds| generation_line(progress, &begin, seconds));
         self.line.console.event("generation", progress);
     }
 }
@@ -136,14 +137,14 @@ mod tests {
     use super::*;
     use crate::view::console::tests::console;
 
-    const PROGRESS: Progress =
-        Progress { done: 0, total: 100, best: Some(1.0), coverage: 0.5, evaluations: 0 };
+    const PROGRESS: Generation =
+        Generation { done: 0, total: 100, best: Some(1.0), coverage: 0.5, evaluations: 0 };
 
     #[test]
     fn without_a_terminal_progress_is_a_line_every_tenth() {
         let (console, out, err) = console(Mode::Human);
         let bar = console.progress(100);
-        (0..=100).for_each(|done| bar.update(&Progress { done, evaluations: 20 * done, ..PROGRESS }));
+        (0..=100).for_each(|done| bar.update(&Generation { done, evaluations: 20 * done, ..PROGRESS }));
         let text = err.read();
         assert_eq!((text.lines().count(), out.read().as_str()), (11, ""), "{text}");
         assert!(text.starts_with("generation 0/100 · best 1.00 · coverage 50.0 %"), "{text}");
@@ -155,7 +156,7 @@ mod tests {
         for (mode, lines) in [(Mode::Quiet, 0), (Mode::Json, 5)] {
             let (console, out, err) = console(mode);
             let bar = console.progress(100);
-            (1..=5).for_each(|done| bar.update(&Progress { done, ..PROGRESS }));
+            (1..=5).for_each(|done| bar.update(&Generation { done, ..PROGRESS }));
             assert_eq!((out.read().lines().count(), err.read().as_str()), (lines, ""));
         }
     }

@@ -1,11 +1,10 @@
 //! [`Console`]: the only writer to the terminal. Results go to stdout; progress, notes and errors to stderr.
 #![allow(clippy::disallowed_methods, reason = "this is the module that writes")]
 
-pub use super::bar::{Bar, Counter, Live};
-pub use super::progress::Progress;
+pub use crate::view::bar::{Bar, Counter, Live};
 
-use super::table;
 use crate::base::text::{is_unseen, one_line, shortened};
+use crate::view::table;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde::Serialize;
 use std::error::Error;
@@ -277,6 +276,7 @@ struct Text<'a> {
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
+    use crate::base::observer::Generation;
     use std::sync::Arc;
 
     /// A writer that can be read, or that refuses like a closed pipe.
@@ -347,8 +347,10 @@ pub(super) mod tests {
     #[test]
     fn json_mode_writes_one_object_per_line_and_nothing_else_to_stdout() {
         let (console, out, _) = console(Mode::Json);
-        console
-            .event("generation", &Progress { done: 3, total: 9, best: None, coverage: 0.5, evaluations: 60 });
+        console.event(
+            "generation",
+            &Generation { done: 3, total: 9, best: None, coverage: 0.5, evaluations: 60 },
+        );
         console.event("list", &[1, 2]);
         console.event("done", &serde_json::json!({}));
         console.line("a\nb");
@@ -371,7 +373,7 @@ pub(super) mod tests {
             console.line(evil);
             console.info(evil);
             console.warning(evil);
-            console.error(&crate::run::Error::input(evil.to_string()), Some(evil));
+            console.error(&crate::base::error::Error::input(evil.to_string()), Some(evil));
             console.error(&std::io::Error::other(evil), None);
             console.table(&["robot", evil], &[vec![evil.to_string(), "x".repeat(100_000)]]);
             console.event("robot", &serde_json::json!({ "id": evil, "of": "\u{e0041}" }));

@@ -1,15 +1,22 @@
 //! What `morphcog plot` makes: figures as SVG and PNG.
 
-use super::console::Console;
-use super::plot::{self, Background, Figure};
-use super::{PictureError, write_whole};
-use crate::run::archive::{RunFile, different};
-use crate::run::capacity_file::{CAPACITY_JSON, CapacityFile};
-use crate::run::eval_file::{EVAL_JSON, EvalFile};
-use crate::run::one_by_one::Named;
-use crate::run::plot::Progress;
-use crate::run::replay::{self, Found, Options};
-use crate::run::{Error, folder, gallery, sensitivity};
+use crate::analysis::gallery;
+use crate::base::error::Error;
+use crate::commands::one_by_one::Named;
+use crate::commands::plot::Progress;
+use crate::commands::replay;
+use crate::commands::replay::{Found, Options};
+use crate::store::capacity::CapacityFile;
+use crate::store::eval::EvalFile;
+use crate::store::folder;
+use crate::store::names::CAPACITY_JSON;
+use crate::store::names::EVAL_JSON;
+use crate::store::names::RUN_JSON;
+use crate::store::run::{RunFile, different};
+use crate::view::console::Console;
+use crate::view::error::{PictureError, write_whole};
+use crate::view::plot;
+use crate::view::plot::{Background, Figure};
 use std::fmt;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
@@ -23,8 +30,6 @@ pub enum Kind {
     Spacetime,
     /// Poses of its life.
     Snapshots,
-    /// What each pixel matters to it.
-    Sensitivity,
     /// Fitness in the archive.
     Archive,
     /// A run's metrics.
@@ -37,11 +42,10 @@ pub enum Kind {
 
 impl Kind {
     /// All of them with their names.
-    pub const ALL: [(Kind, &str); 8] = [
+    pub const ALL: [(Kind, &str); 7] = [
         (Kind::Body, "body"),
         (Kind::Spacetime, "spacetime"),
         (Kind::Snapshots, "snapshots"),
-        (Kind::Sensitivity, "sensitivity"),
         (Kind::Archive, "archive"),
         (Kind::Progress, "progress"),
         (Kind::Accuracy, "accuracy"),
@@ -50,7 +54,7 @@ impl Kind {
 
     /// Whether it shows one robot.
     pub fn is_of_robot(self) -> bool {
-        matches!(self, Kind::Body | Kind::Spacetime | Kind::Snapshots | Kind::Sensitivity)
+        matches!(self, Kind::Body | Kind::Spacetime | Kind::Snapshots)
     }
 }
 
@@ -80,8 +84,6 @@ pub struct Wanted {
     pub robots: Vec<Named>,
     /// How to find robots and images; its robot and archive are not looked at.
     pub options: Options,
-    /// Of a run's progress, the stage to show alone, from 1.
-    pub stage: Option<usize>,
     /// Control steps between poses; 0: as suits the walk.
     pub every: usize,
     /// The file; `None`: SVG and PNG beside the run.json.
@@ -104,12 +106,6 @@ struct Made {
 /// What is wrong with the command line or a file, or if a figure cannot be made or written.
 pub fn make(console: &Console, wanted: &Wanted) -> Result<Vec<PathBuf>, Error> {
     let endings = endings(wanted.out.as_deref())?;
-    if wanted.stage.is_some() && wanted.kind != Kind::Progress {
-        return Err(Error::usage(format!(
-            "--stage: plot {} shows no stages; expected with progress only",
-            wanted.kind
-        )));
-    }
     let archives = match wanted.archives.as_slice() {
         [] if !wanted.kind.is_of_robot() => vec![folder::newest_run()?],
         archives => archives.to_vec(),
@@ -153,13 +149,12 @@ pub fn make(console: &Console, wanted: &Wanted) -> Result<Vec<PathBuf>, Error> {
         let named = || paths.iter().copied().zip(&runs);
         different(named())?;
         let lines: Result<Vec<Progress>, Error> =
-            named().map(|(path, run)| Progress::of(run, path, wanted.stage)).collect();
+            named().map(|(path, run)| Progress::of(run, path)).collect();
         let figure = plot::progress(&lines?);
-        let of_stage = wanted.stage.map_or(String::new(), |stage| format!("stage{stage}"));
-        write(Made { figure, stem: stem(paths.first().copied(), wanted.kind, &of_stage) })?;
+        write(Made { figure, stem: stem(paths.first().copied(), wanted.kind, "") })?;
     } else if wanted.kind.is_of_robot() {
         for robot in &wanted.robots {
-            write(of_robot(console, wanted, robot)?)?;
+            write(of_robot(wanted, robot)?)?;
         }
     } else {
         if wanted.kind == Kind::Archive {
@@ -215,7 +210,7 @@ fn stem(archive: Option<&Path>, kind: Kind, robot: &str) -> PathBuf {
     archive.map_or_else(|| PathBuf::from(&name), |path| path.with_file_name(&name))
 }
 
-fn of_robot(console: &Console, wanted: &Wanted, named: &Named) -> Result<Made, Error> {
+fn of_robot(wanted: &Wanted, named: &Named) -> Result<Made, Error> {
     let Named { archive, robot } = named.clone();
     let options = Options { robot, archive, ..wanted.options.clone() };
     // Of nobody's archive it is a published one, or of the newest run.
@@ -231,21 +226,12 @@ fn of_robot(console: &Console, wanted: &Wanted, named: &Named) -> Result<Made, E
     }
     let subject = replay::subject(&options)?;
     let title = subject.found.title();
+    let recording = replay::record_subject(&subject);
     let figure = match wanted.kind {
-        Kind::Sensitivity => {
-            let counter = console.counter("flipping pixels", sensitivity::lives(&subject) as u64, "lives");
-            let images = sensitivity::sensitivity(&subject, &|done| counter.update(done));
-            plot::sensitivity(&subject.found.body, &images, &title)
-        }
-        kind => {
-            let recording = replay::record_subject(&subject);
-            match kind {
-                Kind::Snapshots => plot::snapshots(&recording, wanted.every, &title),
-                _ => plot::spacetime(&recording, &title),
-            }
-            .map_err(failed)?
-        }
-    };
+        Kind::Snapshots => plot::snapshots(&recording, wanted.every, &title),
+        _ => plot::spacetime(&recording, &title),
+    }
+    .map_err(failed)?;
     Ok(made(&subject.found, figure))
 }
 
@@ -284,7 +270,7 @@ fn of_run(kind: Kind, path: &Path) -> Result<Figure, Error> {
 
 /// A result file: the one beside a run.json, or the file itself that was named instead.
 fn result(path: &Path, name: &str) -> PathBuf {
-    match path.file_name().is_some_and(|given| given == folder::RUN_JSON) {
+    match path.file_name().is_some_and(|given| given == RUN_JSON) {
         true => path.with_file_name(name),
         false => path.to_path_buf(),
     }
@@ -293,9 +279,8 @@ fn result(path: &Path, name: &str) -> PathBuf {
 /// What distinguishes the figure of a result file that was named itself.
 fn result_name(kind: Kind, path: &Path) -> String {
     let is_result = matches!(kind, Kind::Accuracy | Kind::Capacity);
-    let stem = path
-        .file_stem()
-        .filter(|_| is_result && path.file_name().is_some_and(|name| name != folder::RUN_JSON));
+    let stem =
+        path.file_stem().filter(|_| is_result && path.file_name().is_some_and(|name| name != RUN_JSON));
     stem.map_or(String::new(), |stem| stem.to_string_lossy().into_owned())
 }
 

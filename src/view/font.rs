@@ -3,8 +3,8 @@
 //! `font.txt` holds bands of eight lines: the letters, six columns apart, then their seven rows of dots. Letters of
 //! `DESCENDERS` stand `DESCENT` dots lower.
 
-use super::colour::Colour;
-use super::scene::Primitive;
+use crate::view::colour::Colour;
+use crate::view::scene::Primitive;
 use std::collections::BTreeMap;
 use std::sync::LazyLock;
 

@@ -1,13 +1,15 @@
 //! Animated GIFs of recordings: one palette, and per frame only what changed.
 
-use super::colour::{self, Colour};
-use super::palette::Palette;
-use super::panel::present;
-use super::scene::Look;
-use super::stage::Stage;
-use super::walk::Walk;
-use super::{PictureError, raster, write_whole};
 use crate::task::recording::Recording;
+use crate::view::colour;
+use crate::view::colour::Colour;
+use crate::view::error::{PictureError, write_whole};
+use crate::view::palette::Palette;
+use crate::view::panel::present;
+use crate::view::raster;
+use crate::view::scene::Look;
+use crate::view::stage::Stage;
+use crate::view::walk::Walk;
 use ::gif::{DisposalMethod, Encoder, Frame, Repeat};
 use rayon::prelude::*;
 use std::path::Path;
@@ -15,7 +17,7 @@ use std::path::Path;
 /// How an animation is made.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GifOptions {
-    /// Width in pixels ([`stage::WIDTHS`](super::stage::WIDTHS)); the height follows from the body.
+    /// Width in pixels ([`stage::WIDTHS`](crate::view::stage::WIDTHS)); the height follows from the body.
     pub width: u32,
     /// Frames per second, at most 50 (GIFs count in hundredths of a second, and viewers slow down faster ones).
     pub fps: f64,

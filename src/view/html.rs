@@ -3,11 +3,12 @@
 //! Positions are embedded as 16-bit numbers, in steps of 1/200 voxel length from an origin per frame (near the centre of
 //! mass, in 64-bit floats): exact within 0.0025 voxel lengths however far the robot walks.
 
-use super::colour::{TONE_AREAS, tones};
-use super::walk::Walk;
-use super::{PictureError, gif, write_whole};
 use crate::body::Material;
 use crate::task::recording::Recording;
+use crate::view::colour::{TONE_AREAS, tones};
+use crate::view::error::{PictureError, write_whole};
+use crate::view::gif;
+use crate::view::walk::Walk;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD as BASE64;
 use serde_json::json;
@@ -18,7 +19,7 @@ const TEMPLATE: &str = include_str!("replay.html");
 /// And its script.
 const SCRIPT: &str = concat!(include_str!("drawing.js"), include_str!("replay.js"));
 /// Steps of a position per voxel length.
-pub(super) const STEPS: f64 = 200.0;
+pub(crate) const STEPS: f64 = 200.0;
 /// The number for a position that is not finite or more than 163 voxel lengths from the frame's origin.
 const NOWHERE: i16 = i16::MIN;
 /// Most bytes of positions in a page (a third more in base64); longer recordings show every second frame, third …
@@ -147,7 +148,7 @@ fn bytes<const N: usize>(words: impl Iterator<Item = [u8; N]>) -> Vec<u8> {
     words.flatten().collect()
 }
 
-pub(super) fn quantised(point: [f64; 2], origin: [f64; 2]) -> [i16; 2] {
+pub(crate) fn quantised(point: [f64; 2], origin: [f64; 2]) -> [i16; 2] {
     let steps = [0, 1].map(|k| ((point[k] - origin[k]) * STEPS).round());
     if steps.iter().all(|s| s.abs() < 32767.0) { steps.map(|s| s as i16) } else { [NOWHERE; 2] }
 }

@@ -1,13 +1,16 @@
 //! What `morphcog capacity` says at its end: the paper's table.
 
-use super::console::{Console, Mode};
-use super::{PictureError, plot, write_whole};
-use crate::base::number::{self, percent};
+use crate::analysis::published;
+use crate::base::number;
+use crate::base::number::percent;
 use crate::baseline::curve::Crossing;
-use crate::run::capacity::FIGURES;
-use crate::run::capacity_file::{CapacityFile, TaskCapacity};
-use crate::run::published;
-use crate::run::reproduce::Finished;
+use crate::commands::capacity::FIGURES;
+use crate::commands::reproduce::Finished;
+use crate::store::capacity::{CapacityFile, TaskCapacity};
+use crate::view::console::{Console, Mode};
+use crate::view::error::{PictureError, write_whole};
+use crate::view::plot;
+use crate::view::report::tables::size;
 use std::path::{Path, PathBuf};
 
 /// The table: task, accuracy and capacity, the paper's beside ours; `out` is the file, if it was written.
@@ -78,11 +81,6 @@ pub(super) fn papers_table<'a>(
     let headers =
         ["task", "robots", "accuracy %", "paper's %", "MLP neurons", "paper's", "CNN kernels", "paper's"];
     console.table(&headers, &rows.collect::<Vec<_>>());
-}
-
-/// A capacity in a table.
-pub(super) fn size(capacity: Option<Crossing>) -> String {
-    capacity.map_or_else(|| "no match".to_string(), |size| size.to_string())
 }
 
 /// What nobody measured, in a table.

@@ -1,13 +1,14 @@
 //! What stands around the world in a raster picture: stimulus, read-outs, legend, numbers on the ruler. In pixels, y
 //! down.
 
-use super::colour::{self, Colour};
-use super::font;
-use super::scene::{Primitive, ruler};
-use super::stage::Stage;
-use super::walk::Walk;
 use crate::base::number;
 use crate::body::{Body, Material};
+use crate::view::colour;
+use crate::view::colour::Colour;
+use crate::view::font;
+use crate::view::scene::{Primitive, ruler};
+use crate::view::stage::Stage;
+use crate::view::walk::Walk;
 
 /// Side of the stimulus picture at zoom 1, pixels.
 const STIMULUS: f64 = 84.0;

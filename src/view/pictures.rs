@@ -1,11 +1,16 @@
 //! What `morphcog replay` makes of a recording: files, or a view in the terminal.
 
-use super::console::Console;
-use super::scene::Look;
-use super::{PictureError, Stage, Walk, gif, html, player, raster};
+use crate::analysis::gallery;
+use crate::base::error::Error;
 use crate::base::number;
-use crate::run::replay::Replay;
-use crate::run::{Error, folder, gallery};
+use crate::commands::replay::Replay;
+use crate::store::folder;
+use crate::view::console::Console;
+use crate::view::error::PictureError;
+use crate::view::scene::Look;
+use crate::view::stage::Stage;
+use crate::view::walk::Walk;
+use crate::view::{gif, html, player, raster};
 use std::fmt;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;

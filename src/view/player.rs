@@ -1,9 +1,11 @@
 //! Plays a recording in the terminal: the robot's own speed, keys to pause and step, and the terminal as it was at the end.
 
-use super::Walk;
-use super::console::{Console, Mode};
-use super::terminal::{self, Depth};
-use crate::run::{Error, signals};
+use crate::base::error::Error;
+use crate::base::signals;
+use crate::view::console::{Console, Mode};
+use crate::view::terminal;
+use crate::view::terminal::Depth;
+use crate::view::walk::Walk;
 use crossterm::event::{self, Event, KeyCode, KeyEventKind, KeyModifiers};
 use crossterm::terminal::{disable_raw_mode, enable_raw_mode, size};
 use std::io::IsTerminal;

@@ -1,40 +1,21 @@
 //! Progress in words: how far, how fast, how long still.
 
 use crate::base::number;
-use serde::Serialize;
+use crate::base::observer::Generation;
 
-/// How far an evolution is.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Progress {
-    /// Generations done.
-    #[serde(rename = "generation")]
-    pub done: u64,
-    /// Generations in all.
-    #[serde(rename = "generations")]
-    pub total: u64,
-    /// Best fitness so far, voxel lengths; none if no robot has one.
-    pub best: Option<f64>,
-    /// Share of the possible cells that are filled, in [0, 1].
-    pub coverage: f64,
-    /// Evaluations so far.
-    pub evaluations: u64,
-}
-
-impl Progress {
-    /// In one line, given the progress at the beginning (of this session: a resumed run has done some already) and the
-    /// seconds since.
-    pub fn line(&self, begin: &Progress, seconds: f64) -> String {
-        let best = self.best.map_or("none".into(), |best| number::fixed(best, 2));
-        let rate = rate(self.evaluations.saturating_sub(begin.evaluations), seconds);
-        // The speed last: it is what a narrow terminal cuts off.
-        format!(
-            "generation {}/{} · best {best} · coverage {} %{} · {rate} evaluations/s",
-            self.done,
-            self.total,
-            number::percent(self.coverage),
-            left(begin.done, self.done, self.total, seconds)
-        )
-    }
+/// How far an evolution is, in one line, given its beginning (of this session: a resumed run has done some generations
+/// already) and the seconds since.
+pub fn generation_line(now: &Generation, begin: &Generation, seconds: f64) -> String {
+    let best = now.best.map_or("none".into(), |best| number::fixed(best, 2));
+    let rate = rate(now.evaluations.saturating_sub(begin.evaluations), seconds);
+    // The speed last: it is what a narrow terminal cuts off.
+    format!(
+        "generation {}/{} · best {best} · coverage {} %{} · {rate} evaluations/s",
+        now.done,
+        now.total,
+        number::percent(now.coverage),
+        left(begin.done, now.done, now.total, seconds)
+    )
 }
 
 /// How far some counted thing is, in one line: images, robots or, with the unit "bytes", megabytes.
@@ -102,11 +83,13 @@ mod tests {
 
     #[test]
     fn a_resumed_run_counts_its_speed_from_where_it_resumed() {
-        let begin = Progress { done: 100, total: 200, best: None, coverage: 0.0, evaluations: 2000 };
-        let now = Progress { done: 150, best: Some(3.1449), coverage: 0.25, evaluations: 3000, ..begin };
-        let line = now.line(&begin, 10.0);
+        let begin = Generation { done: 100, total: 200, best: None, coverage: 0.0, evaluations: 2000 };
+        let now = Generation { done: 150, best: Some(3.1449), coverage: 0.25, evaluations: 3000, ..begin };
+        let line = generation_line(&now, &begin, 10.0);
         assert_eq!(line, "generation 150/200 · best 3.14 · coverage 25.0 % · 10 s left · 100 evaluations/s");
-        assert!(begin.line(&begin, 0.0).ends_with("best none · coverage 0.0 % · 0.0 evaluations/s"));
+        assert!(
+            generation_line(&begin, &begin, 0.0).ends_with("best none · coverage 0.0 % · 0.0 evaluations/s")
+        );
     }
 
     #[test]

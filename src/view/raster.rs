@@ -1,11 +1,12 @@
 //! Primitives → pixels, with tiny-skia; PNG files.
 
-use super::colour::Colour;
-use super::panel;
-use super::scene::{self, Primitive};
-use super::stage::Stage;
-use super::walk::Walk;
-use super::{PictureError, write_whole};
+use crate::view::colour::Colour;
+use crate::view::error::{PictureError, write_whole};
+use crate::view::panel;
+use crate::view::scene;
+use crate::view::scene::Primitive;
+use crate::view::stage::Stage;
+use crate::view::walk::Walk;
 use std::path::Path;
 use tiny_skia::{FillRule, LineCap, LineJoin, Paint, PathBuilder, Pixmap, Stroke, Transform};
 

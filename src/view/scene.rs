@@ -1,7 +1,8 @@
 //! One frame as drawing primitives in world coordinates (voxel lengths, y up): what all raster pictures are made of.
 
-use super::colour::{self, Colour};
-use super::walk::{Walk, area};
+use crate::view::colour;
+use crate::view::colour::Colour;
+use crate::view::walk::{Walk, area};
 use std::fmt;
 use std::str::FromStr;
 

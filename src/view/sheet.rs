@@ -2,7 +2,7 @@
 
 use crate::base::Grid;
 use crate::base::files::write_atomically;
-use crate::task::dataset::{Dataset, DatasetError, Split};
+use crate::data::dataset::{Dataset, DatasetError, Split};
 use std::io;
 use std::path::{Path, PathBuf};
 use tiny_skia::{IntSize, Pixmap};
@@ -95,7 +95,7 @@ fn png(picture: &Grid<u8>) -> Result<Vec<u8>, SheetError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::task::builtin::BuiltinDigits;
+    use crate::data::builtin::BuiltinDigits;
 
     #[test]
     fn a_sheet_has_a_row_per_class_and_a_column_per_sample() {

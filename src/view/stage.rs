@@ -1,12 +1,11 @@
 //! [`Stage`]: which part of the world a picture shows, and where on it.
 
-use super::PictureError;
-use super::scene::{Look, Window};
-use super::walk::Walk;
+use crate::view::error::PictureError;
+use crate::view::scene::{Look, Window};
+use crate::view::walk::Walk;
 use std::ops::RangeInclusive;
 
-/// Possible widths of pictures, pixels.
-pub const WIDTHS: RangeInclusive<u32> = 320..=4096;
+pub use crate::view::error::WIDTHS;
 
 /// Height of the panel above the world (stimulus, read-outs, legend), in pixels at zoom 1.
 const PANEL: f64 = 104.0;

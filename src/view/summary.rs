@@ -1,40 +1,30 @@
 //! What a command says at its end.
 
-use super::console::{Console, Mode};
-use super::networks;
-use super::progress::duration;
+use crate::analysis::gallery::Published;
+use crate::analysis::published;
 use crate::base::clock::CLOCK;
-use crate::base::number::{self, percent};
-use crate::run::bench::Speed;
-use crate::run::capacity_file::CapacityFile;
-use crate::run::data::Found;
-use crate::run::data::fetch::{Fetched, Outcome};
-use crate::run::eval_file::{EvalFile, RobotReport};
-use crate::run::evolve::Finished;
-use crate::run::folder::{RUN_JSON, in_shell};
-use crate::run::gallery::Published;
-use crate::run::held_out::HeldOut;
-use crate::run::published;
-use crate::run::train;
-use crate::run::training::ImageRef;
-use crate::run::validation::Validated;
+use crate::base::number;
+use crate::base::number::percent;
+use crate::commands::bench::Speed;
+use crate::commands::data::Found;
+use crate::data::fetch::{Fetched, Outcome};
+use crate::search::evolve::Finished;
+use crate::search::train;
+use crate::store::capacity::CapacityFile;
+use crate::store::eval::{EvalFile, RobotReport};
+use crate::store::folder::in_shell;
+use crate::store::images::HeldOut;
+use crate::store::images::ImageRef;
+use crate::store::names::RUN_JSON;
+use crate::store::validation::Validated;
+use crate::view::console::{Console, Mode};
+use crate::view::networks;
+use crate::view::progress::duration;
+use crate::view::report::tables::of_robot;
 use std::path::Path;
 
 /// Robots shown after an evolution.
 const SHOWN: usize = 5;
-
-/// What tables of evaluated robots begin with: robot, task, fitness, accuracy, its interval, balanced accuracy.
-pub(super) fn of_robot(robot: &RobotReport) -> Vec<String> {
-    let [low, high] = robot.interval.map(percent);
-    vec![
-        robot.id.clone(),
-        robot.task.clone(),
-        number::fixed(robot.objective, 2),
-        percent(robot.accuracy),
-        format!("{low}–{high}"),
-        percent(robot.balanced_accuracy),
-    ]
-}
 
 /// After an evolution: the fittest robots, what was saved, and what to do next.
 pub fn evolution(console: &Console, finished: &Finished, out: &Path) {
@@ -162,7 +152,7 @@ pub fn evaluation(console: &Console, report: &EvalFile, capacity: Option<&Capaci
     console.line("");
     let rows = report.means.iter().map(|(task, mean)| {
         let baselines = report.baselines.get(task);
-        let baseline = |of: fn(&crate::run::eval_file::Baselines) -> f64| {
+        let baseline = |of: fn(&crate::store::eval::Baselines) -> f64| {
             baselines.map_or(String::new(), |b| percent(of(b)))
         };
         vec![

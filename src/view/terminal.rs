@@ -1,9 +1,10 @@
 //! A frame of a recording as text, for a live view in a terminal.
 
-use super::colour::{self, Colour};
-use super::panel::readout;
-use super::walk::{Walk, area};
 use crate::body::Material;
+use crate::view::colour;
+use crate::view::colour::Colour;
+use crate::view::panel::readout;
+use crate::view::walk::{Walk, area};
 
 /// Columns of the stimulus' corner are only taken from views at least this wide.
 const WIDE: usize = 40;

@@ -1,10 +1,10 @@
 //! What `morphcog audit` says at its end.
 
-use super::console::{Console, Mode};
 use crate::base::number;
-use crate::run::audit::Finished;
-use crate::run::audit_file::{AuditFile, RobotAudit};
-use crate::run::verdict::Verdict;
+use crate::commands::audit::Finished;
+use crate::store::audit::Verdict;
+use crate::store::audit::{AuditFile, RobotAudit};
+use crate::view::console::{Console, Mode};
 use std::path::Path;
 
 /// After an audit: a line per robot, how many there are of each verdict, and what breaks walks.

@@ -1,8 +1,8 @@
 //! [`Walk`]: a recording, checked once, with the questions pictures ask of it.
 
-use super::PictureError;
 use crate::body::Material;
 use crate::task::recording::{Phase, Recording};
+use crate::view::error::PictureError;
 use std::collections::BTreeMap;
 use std::ops::Range;
 

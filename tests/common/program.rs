@@ -1,7 +1,7 @@
 //! Running the program itself, as a user does: in a folder of its own, with no settings from outside.
 
 use assert_cmd::Command;
-use morphcog::run::archive::RunFile;
+use morphcog::store::run::RunFile;
 use std::collections::BTreeMap;
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
@@ -44,17 +44,14 @@ initial = 8
 parents = 8
 "#;
 
-/// Three stages in twelve generations: the last with three draws of images, the hardest of three times as many, with the
-/// four fittest elites at the beginning of each, half of the offspring changed in up to four voxels, each chosen among
-/// several by what three relatives did, too, every second start raised, every third image shown to robots without length
-/// limits, and two pixels of each inverted.
-pub fn staged() -> String {
-    let stages = "\n[[stage]]\ngenerations = 4\n\
-        [[stage]]\ngenerations = 3\nimages_per_class = 2\nfitness = \"mean_clipped\"\n\
-        [[stage]]\nimages_per_class = 3\npool = 9\nfitness = \"mean_hinge\"\nredraw = 2\nkeep = 4\n\
-        voxel_mutations = 0.5\nvoxel_candidates = 8\nvoxel_changes = 4\nvoxel_relatives = 3\nraised_starts = 1\n\
-        without_limits = true\ninverted_pixels = 2\n";
-    format!("{TINY}{stages}")
+/// The other way to evolve: [`TINY`] with the response as fitness, half of the offspring changed in up to four voxels, the six
+/// fittest kept.
+pub fn gaits() -> String {
+    let data = TINY.replace("train_images = [0, 1]", "images_per_class = 4");
+    format!(
+        "{data}\n[genome]\nvoxel_mutations = 0.5\nvoxel_changes = 4\n[evaluation]\nfitness = \"response\"\n\
+         [archive]\nkeep = 6\n"
+    )
 }
 
 /// What a command said and how it ended.

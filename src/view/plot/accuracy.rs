@@ -1,12 +1,12 @@
 //! The figure of an evaluation: accuracy per robot with its interval.
 
-use super::axes::{AXIS, Axis, MARGIN, Plot, heading};
-use super::canvas::{Canvas, Pen, TEXT, Words};
-use super::figure::{COLUMN, Figure};
-use super::{fonts, scales};
 use crate::base::number;
-use crate::run::eval_file::{EvalFile, RobotReport};
+use crate::store::eval::{EvalFile, RobotReport};
 use crate::view::colour;
+use crate::view::plot::axes::{AXIS, Axis, MARGIN, Plot, heading};
+use crate::view::plot::canvas::{Canvas, Pen, TEXT, Words};
+use crate::view::plot::figure::{COLUMN, Figure};
+use crate::view::plot::{fonts, scales};
 
 /// Robots that have a line of their own with their name; of more, lines are thin and nameless.
 const NAMED: usize = 40;

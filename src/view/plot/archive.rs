@@ -3,13 +3,14 @@
 //! A map has a square for every pair of muscle and sensor bins, and in it a strip for every bin of the total. A cell that
 //! could have an elite is framed; where no body can be there is nothing.
 
-use super::axes::{Axis, MARGIN, colour_bar, heading};
-use super::canvas::{Canvas, Pen, TEXT, Words, number, path};
-use super::figure::{COLUMN, Figure, PAGE};
-use super::{robot, scales};
 use crate::qd::descriptor::{COUNT_BINS, DescriptorSpace, count_bin, possible_cells};
-use crate::run::archive::RunFile;
-use crate::view::colour::{self, Colour};
+use crate::store::run::RunFile;
+use crate::view::colour;
+use crate::view::colour::Colour;
+use crate::view::plot::axes::{Axis, MARGIN, colour_bar, heading};
+use crate::view::plot::canvas::{Canvas, Pen, TEXT, Words, number, path};
+use crate::view::plot::figure::{COLUMN, Figure, PAGE};
+use crate::view::plot::{robot, scales};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Space left of and below a map, points.
@@ -95,7 +96,7 @@ impl Scale {
             right: Axis::nice(0.0, highest, 4),
             lowest: (lowest < 0.0).then_some(lowest),
             is_open: run.elites.len() < run.dimensions.possible_cells,
-            unit: run.criterion().fitness.unit(),
+            unit: run.fitness().unit(),
         }
     }
 

@@ -1,9 +1,10 @@
 //! Axes with whole numbers on them, headings, colour bars.
 
-use super::canvas::{Canvas, HEADING, Pen, TEXT, Words};
-use super::{fonts, scales};
 use crate::base::number;
-use crate::view::colour::{self, Colour};
+use crate::view::colour;
+use crate::view::colour::Colour;
+use crate::view::plot::canvas::{Canvas, HEADING, Pen, TEXT, Words};
+use crate::view::plot::{fonts, scales};
 
 /// Line of an axis, points.
 const LINE: f64 = 0.6;

@@ -1,12 +1,13 @@
 //! The figure of a body: its voxels by material.
 
-use super::axes::{MARGIN, heading};
-use super::canvas::{Canvas, Pen, Words};
-use super::figure::{COLUMN, Figure};
-use super::{robot, scales};
 use crate::body::{Body, Material};
-use crate::view::colour::{self, Colour};
+use crate::view::colour;
+use crate::view::colour::Colour;
 use crate::view::panel::present;
+use crate::view::plot::axes::{MARGIN, heading};
+use crate::view::plot::canvas::{Canvas, Pen, Words};
+use crate::view::plot::figure::{COLUMN, Figure};
+use crate::view::plot::{robot, scales};
 
 /// Side of the map, points.
 const MAP: f64 = 132.0;

@@ -1,9 +1,10 @@
 //! [`Canvas`]: SVG elements in points, y down, without ids, classes or styles.
 
-use super::fonts;
 use crate::base::number;
 use crate::base::text::shortened;
-use crate::view::colour::{self, Colour};
+use crate::view::colour;
+use crate::view::colour::Colour;
+use crate::view::plot::fonts;
 use std::fmt::Write;
 
 /// Most characters of a text.

@@ -1,12 +1,12 @@
 //! The figure of the morphological cognition capacity: accuracy of networks over their size, and the robots'.
 
-use super::axes::{AXIS, Axis, MARGIN, Plot, heading, left_space};
-use super::canvas::{Anchor, Canvas, Pen, Words};
-use super::figure::{COLUMN, Figure, PAGE};
-use super::{fonts, scales};
 use crate::baseline::curve::Crossing;
-use crate::run::capacity_file::{CapacityFile, Curve, Point, TaskCapacity};
+use crate::store::capacity::{CapacityFile, Curve, Point, TaskCapacity};
 use crate::view::colour;
+use crate::view::plot::axes::{AXIS, Axis, MARGIN, Plot, heading, left_space};
+use crate::view::plot::canvas::{Anchor, Canvas, Pen, Words};
+use crate::view::plot::figure::{COLUMN, Figure, PAGE};
+use crate::view::plot::{fonts, scales};
 
 /// Height of a panel, points.
 const PANEL: f64 = 104.0;
@@ -135,7 +135,7 @@ fn legend(canvas: &mut Canvas, trainings: usize, [x, top]: [f64; 2], width: f64)
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::run::capacity_file::Point;
+    use crate::store::capacity::Point;
 
     fn file(capacity: Option<Crossing>) -> CapacityFile {
         let point = |size: usize| Point {

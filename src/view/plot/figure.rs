@@ -1,8 +1,9 @@
 //! [`Figure`]: a vector picture, written as SVG, or as PNG with fonts of its own.
 
-use super::canvas::{escape, number};
-use super::fonts;
-use crate::view::{PictureError, colour};
+use crate::view::colour;
+use crate::view::error::PictureError;
+use crate::view::plot::canvas::{escape, number};
+use crate::view::plot::fonts;
 use resvg::tiny_skia::{Pixmap, Transform};
 use resvg::usvg::{Options, Tree};
 

@@ -1,11 +1,12 @@
 //! The figure of a run's progress: QD score, coverage and best fitness over evaluations.
 
-use super::axes::{AXIS, Axis, MARGIN, Plot, heading, left_space};
-use super::canvas::{Canvas, Pen, TEXT, Words, path};
-use super::figure::{COLUMN, Figure};
-use super::scales;
-use crate::run::plot::{Moment, Progress};
-use crate::view::colour::{self, Colour};
+use crate::commands::plot::{Moment, Progress};
+use crate::view::colour;
+use crate::view::colour::Colour;
+use crate::view::plot::axes::{AXIS, Axis, MARGIN, Plot, heading, left_space};
+use crate::view::plot::canvas::{Canvas, Pen, TEXT, Words, path};
+use crate::view::plot::figure::{COLUMN, Figure};
+use crate::view::plot::scales;
 
 /// Height of a panel, points.
 const PANEL: f64 = 62.0;
@@ -37,9 +38,7 @@ pub fn progress(runs: &[Progress]) -> Figure {
         .map(|quantity| {
             let bands = bands(runs, quantity.1, shortest);
             let values = || bands.iter().flat_map(|band| [band.low, band.high]).filter(|v| v.is_finite());
-            // What a stage wins is little of what it began with.
-            let base = if runs.iter().any(|run| run.stage.is_some()) { f64::INFINITY } else { 0.0 };
-            let (low, high) = (values().fold(base, f64::min), values().fold(f64::NEG_INFINITY, f64::max));
+            let (low, high) = (values().fold(0.0, f64::min), values().fold(f64::NEG_INFINITY, f64::max));
             (quantity, bands, Axis::nice(low, high, 4))
         })
         .collect();
@@ -50,13 +49,6 @@ pub fn progress(runs: &[Progress]) -> Figure {
         let size = [COLUMN - MARGIN - 8.0 - left, PANEL];
         let plot = Plot { at: [left, top], size, x: x.clone(), y };
         plot.grid(&mut canvas, true, false);
-        for at in changes(runs) {
-            canvas.line(
-                plot.place([at, plot.y.from]),
-                plot.place([at, plot.y.to]),
-                Pen::new(colour::FAINT, 0.4),
-            );
-        }
         draw(&mut canvas, &plot, &bands, colour, runs.len() > 1);
         plot.left_axis_beside(&mut canvas, name, labels);
         plot.lower_axis(&mut canvas, (k + 1 == count).then_some("evaluations"));
@@ -85,15 +77,7 @@ fn names(runs: &[Progress]) -> String {
         let word = if seeds.len() > 1 { "seeds" } else { "seed" };
         format!("{name}, {word} {}", seeds.join(", "))
     };
-    let stage = runs.first().and_then(|run| run.stage).map(|stage| format!("stage {stage}"));
-    parts.into_iter().map(part).chain(stage).collect::<Vec<_>>().join("; ")
-}
-
-/// Evaluations after which a stage follows another; only of a single run, since others' are elsewhere.
-fn changes(runs: &[Progress]) -> Vec<f64> {
-    let [run] = runs else { return Vec::new() };
-    let pairs = run.moments.windows(2).filter(|pair| pair[0].stage != pair[1].stage);
-    pairs.map(|pair| pair[0].evaluations).collect()
+    parts.into_iter().map(part).collect::<Vec<_>>().join("; ")
 }
 
 /// Least, median and largest value at a number of evaluations.
@@ -148,22 +132,13 @@ mod tests {
             qd_score: 3.0,
             obj_max: *best,
             seconds: 0.0,
-            stage: 1 + k / 2,
         };
         Progress {
             run: "toy".into(),
             seed,
-            stage: None,
             unit: None,
             moments: best.iter().enumerate().map(moment).collect(),
         }
-    }
-
-    #[test]
-    fn where_a_stage_follows_another_is_marked_of_a_single_run() {
-        let runs = [1, 2].map(|seed| run(seed, &[Some(1.0); 5]));
-        assert_eq!(changes(&runs[..1]), [40.0, 80.0]);
-        assert!(changes(&runs).is_empty());
     }
 
     #[test]

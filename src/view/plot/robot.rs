@@ -1,10 +1,11 @@
 //! Bodies, poses and stimuli as figures draw them.
 
-use super::canvas::{Canvas, Pen, Words, number, path};
-use super::scales;
 use crate::base::Grid;
 use crate::body::{Body, Material};
-use crate::view::colour::{self, Colour};
+use crate::view::colour;
+use crate::view::colour::Colour;
+use crate::view::plot::canvas::{Canvas, Pen, Words, number, path};
+use crate::view::plot::scales;
 use crate::view::walk::{Walk, area};
 use std::collections::BTreeMap;
 

@@ -28,17 +28,17 @@ const VIRIDIS: [[u8; 3]; 11] = [
     [0xfd, 0xe7, 0x25],
 ];
 
-/// Purple over white to orange (ColorBrewer's PuOr), the middle for nothing.
-const PURPLE_ORANGE: [[u8; 3]; 9] = [
-    [0x54, 0x27, 0x88],
-    [0x80, 0x73, 0xac],
-    [0xb2, 0xab, 0xd2],
-    [0xd8, 0xda, 0xeb],
+/// Purple over white to green (ColorBrewer's PRGn), the middle for nothing: neither is a muscle's colour.
+const PURPLE_GREEN: [[u8; 3]; 9] = [
+    [0x76, 0x2a, 0x83],
+    [0x99, 0x70, 0xab],
+    [0xc2, 0xa5, 0xcf],
+    [0xe7, 0xd4, 0xe8],
     [0xf7, 0xf7, 0xf7],
-    [0xfe, 0xe0, 0xb6],
-    [0xfd, 0xb8, 0x63],
-    [0xe0, 0x82, 0x14],
-    [0xb3, 0x58, 0x06],
+    [0xd9, 0xf0, 0xd3],
+    [0xa6, 0xdb, 0xa0],
+    [0x5a, 0xae, 0x61],
+    [0x1b, 0x78, 0x37],
 ];
 
 /// Grays from dark to light, for what is below a scale.
@@ -51,7 +51,7 @@ pub fn sequential(t: f64) -> Colour {
 
 /// The colour at `t` in [−1, 1] of a scale with a middle.
 pub fn diverging(t: f64) -> Colour {
-    between(&PURPLE_ORANGE, (t + 1.0) / 2.0)
+    between(&PURPLE_GREEN, (t + 1.0) / 2.0)
 }
 
 /// The gray at `t` in [0, 1], from dark to light.

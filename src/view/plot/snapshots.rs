@@ -1,12 +1,14 @@
 //! The figure of a life: poses laid over each other.
 
-use super::axes::{Axis, MARGIN, Plot, heading};
-use super::canvas::{Canvas, Pen, TEXT, Words};
-use super::figure::{COLUMN, Figure, PAGE};
-use super::robot;
 use crate::task::recording::Recording;
+use crate::view::colour;
+use crate::view::error::PictureError;
 use crate::view::panel::signed;
-use crate::view::{PictureError, Walk, colour};
+use crate::view::plot::axes::{Axis, MARGIN, Plot, heading};
+use crate::view::plot::canvas::{Canvas, Pen, TEXT, Words};
+use crate::view::plot::figure::{COLUMN, Figure, PAGE};
+use crate::view::plot::robot;
+use crate::view::walk::Walk;
 
 /// Side of the stimulus, points.
 const STIMULUS: f64 = 27.0;

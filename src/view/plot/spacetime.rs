@@ -1,14 +1,16 @@
 //! The figure of a walk: the robot from above the time axis, one row per moment.
 
-use super::axes::{AXIS, Axis, MARGIN, Plot, heading, left_space};
-use super::canvas::{Canvas, Pen, TEXT, Words, number};
-use super::figure::{COLUMN, Figure, PAGE};
-use super::robot;
 use crate::task::recording::Recording;
+use crate::view::colour;
 use crate::view::colour::Colour;
+use crate::view::error::PictureError;
 use crate::view::panel::signed;
+use crate::view::plot::axes::{AXIS, Axis, MARGIN, Plot, heading, left_space};
+use crate::view::plot::canvas::{Canvas, Pen, TEXT, Words, number};
+use crate::view::plot::figure::{COLUMN, Figure, PAGE};
+use crate::view::plot::robot;
+use crate::view::walk::Walk;
 use crate::view::walk::area;
-use crate::view::{PictureError, Walk, colour};
 use std::ops::Range;
 
 /// Rows of a panel at most: finer ones would not be seen in print.

@@ -1,12 +1,12 @@
 //! Robots as buttons: a click plays them.
 
-use super::maps::Lives;
 use crate::base::number;
 use crate::body::{Body, Material};
-use crate::run::archive::Robot;
-use crate::run::report::Dossier;
+use crate::commands::report::Dossier;
+use crate::store::run::Robot;
 use crate::view::colour::tones;
 use crate::view::html::escape;
+use crate::view::report::maps::Lives;
 use std::collections::BTreeSet;
 use std::fmt::Write;
 

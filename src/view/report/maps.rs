@@ -1,12 +1,13 @@
 //! The archive as buttons, and the lives they play.
 
-use super::bodies::button;
+use crate::commands::report::{Dossier, Gathered};
 use crate::qd::descriptor::{COUNT_BINS, DescriptorSpace, possible_cells};
-use crate::run::archive::Robot;
-use crate::run::report::{Dossier, Gathered};
+use crate::store::run::Robot;
+use crate::view::error::PictureError;
 use crate::view::html::{escape, packed};
 use crate::view::plot::{below, sequential};
-use crate::view::{PictureError, Walk};
+use crate::view::report::bodies::button;
+use crate::view::walk::Walk;
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::atomic::{AtomicU64, Ordering};

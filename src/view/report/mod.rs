@@ -3,13 +3,15 @@
 
 mod bodies;
 mod maps;
-mod tables;
+pub(crate) mod tables;
 mod words;
 
-use super::html::{escape, fill};
-use super::plot::{self, Figure};
-use super::{PictureError, html};
-use crate::run::report::{Dossier, Findings, Gathered};
+use crate::commands::report::{Dossier, Findings, Gathered};
+use crate::view::error::PictureError;
+use crate::view::html;
+use crate::view::html::{escape, fill};
+use crate::view::plot;
+use crate::view::plot::Figure;
 use maps::Lives;
 
 /// What goes into a page.

@@ -1,20 +1,19 @@
 //! The tables of a report.
 
-use super::words;
-use crate::base::number::{self, percent};
+use crate::analysis::published;
+use crate::base::number;
+use crate::base::number::percent;
 use crate::baseline::curve::Crossing;
-use crate::run::audit_file::AuditFile;
-use crate::run::capacity_file::CapacityFile;
-use crate::run::eval_file::{EvalFile, Mean, RobotReport};
-use crate::run::held_out::HeldOut;
-use crate::run::published;
-use crate::run::report::Dossier;
-use crate::run::verdict::Verdict;
+use crate::commands::report::Dossier;
 use crate::sim::InstructionSet;
+use crate::store::audit::AuditFile;
+use crate::store::audit::Verdict;
+use crate::store::capacity::CapacityFile;
+use crate::store::eval::{EvalFile, Mean, RobotReport};
+use crate::store::images::HeldOut;
 use crate::view::html::escape;
-use crate::view::networks::size;
 use crate::view::progress::duration;
-use crate::view::summary::of_robot;
+use crate::view::report::words;
 
 /// Robots of a test or an audit that are listed one by one.
 const LISTED: usize = 50;
@@ -195,7 +194,7 @@ pub(super) fn audit(audit: &AuditFile) -> String {
     let mut walkers: Vec<_> =
         audit.robots.iter().filter(|robot| robot.verdict != Verdict::NotAWalker).collect();
     walkers.sort_by(|a, b| b.persisting.total_cmp(&a.persisting));
-    let row = |robot: &&crate::run::audit_file::RobotAudit| {
+    let row = |robot: &&crate::store::audit::RobotAudit| {
         vec![
             robot.id.clone(),
             robot.task.clone(),
@@ -239,4 +238,22 @@ pub(super) fn capacity(file: &CapacityFile) -> String {
         file.trainings,
         table(&headers, rows)
     )
+}
+
+/// A capacity in a table.
+pub(crate) fn size(capacity: Option<Crossing>) -> String {
+    capacity.map_or_else(|| "no match".to_string(), |size| size.to_string())
+}
+
+/// What tables of evaluated robots begin with: robot, task, fitness, accuracy, its interval, balanced accuracy.
+pub(crate) fn of_robot(robot: &RobotReport) -> Vec<String> {
+    let [low, high] = robot.interval.map(percent);
+    vec![
+        robot.id.clone(),
+        robot.task.clone(),
+        number::fixed(robot.objective, 2),
+        percent(robot.accuracy),
+        format!("{low}–{high}"),
+        percent(robot.balanced_accuracy),
+    ]
 }

@@ -1,13 +1,16 @@
 //! The words of a report: its title, a methods paragraph, and the commands that make it again.
 
-use crate::base::number::{self, percent};
-use crate::run::capacity_config::CapacityConfig;
-use crate::run::capacity_file::CapacityFile;
-use crate::run::eval;
-use crate::run::eval_file::{EVAL_JSON, Mean};
-use crate::run::folder::{self, in_shell};
-use crate::run::report::Dossier;
-use crate::task::fitness::{Criterion, Fitness};
+use crate::base::number;
+use crate::base::number::percent;
+use crate::commands::report::Dossier;
+use crate::config::capacity::CapacityConfig;
+use crate::search::showing;
+use crate::store::capacity::CapacityFile;
+use crate::store::eval::Mean;
+use crate::store::folder::in_shell;
+use crate::store::names::CONFIG;
+use crate::store::names::EVAL_JSON;
+use crate::task::fitness::Fitness;
 use crate::task::protocol::Life;
 use crate::task::stimulus::Encoding;
 use crate::view::html::escape;
@@ -56,35 +59,18 @@ pub(super) fn methods(dossier: &Dossier) -> String {
         Life::Fresh => "a life of its own from the initial state",
         Life::Sequential => "one continuous life for all images",
     };
-    let Criterion { fitness, enough } = run.criterion();
-    let of_means;
-    let fitness = match fitness {
+    let fitness = match run.fitness() {
         Fitness::Min => {
             "the smallest distance walked towards the right side, or minus the largest one towards the wrong side"
         }
         Fitness::MeanClipped => {
-            of_means = format!(
-                "the mean distance walked towards the right side, clipped at {enough} voxel lengths, both groups weighing the same"
-            );
-            &of_means
-        }
-        Fitness::MeanHinge => {
-            of_means = format!(
-                "the mean distance walked towards the right side, of each answer at most {enough} voxel lengths, both groups weighing the same"
-            );
-            &of_means
+            "the mean distance walked towards the right side, clipped at ten voxel lengths, both groups weighing the same"
         }
         Fitness::Response => {
             "how far apart the two images of a pair, opposites of each other, move the body with all soft voxels and sensors \
              made expanding sensors, less what it walks anyway; every second pair with a start one voxel higher and without \
              length limits"
         }
-    };
-    let stages = match config.stage.len() {
-        0 => String::new(),
-        count => format!(
-            " Training went through {count} stages; the archive was evaluated anew at the beginning of each."
-        ),
     };
     let counts = |label: u8| run.training_images.iter().filter(|image| image.label == label).count();
     let images: Vec<String> =
@@ -95,7 +81,7 @@ pub(super) fn methods(dossier: &Dossier) -> String {
          The archive's dimensions are the numbers of muscle, sensor and all voxels in seven bins each{}; {} of its {} cells can be filled. \
          Each generation mutated up to {} elites; an offspring replaced an elite only if it was strictly fitter. \
          Robots were trained on {} images of {} ({}); each image was shown for {steps} control steps ({cycles} actuation cycles) in {life}, \
-         a sensor's stimulus being {encoding}. Fitness is {fitness}.{stages}",
+         a sensor's stimulus being {encoding}. Fitness is {fitness}.",
         run.generations,
         config.seed,
         run.program_version,
@@ -139,7 +125,7 @@ pub(super) fn methods(dossier: &Dossier) -> String {
 /// The commands that make a run and its tests again; audits with other criteria, and networks trained with other hyperparameters, need
 /// these besides.
 pub(super) fn commands(dossier: &Dossier) -> String {
-    let config = in_shell(&dossier.path.with_file_name(folder::CONFIG));
+    let config = in_shell(&dossier.path.with_file_name(CONFIG));
     let again = format!("again/{}-seed{}", dossier.run.name, dossier.run.config.seed);
     let [again, eval] =
         [again.clone(), format!("{again}/{EVAL_JSON}")].map(|path| in_shell(Path::new(&path)));
@@ -158,11 +144,11 @@ pub(super) fn commands(dossier: &Dossier) -> String {
             "morphcog eval --archive {again} --images {images} --seed {seed} --robots {}",
             ids.join(",")
         );
-        if report.threshold != eval::THRESHOLD {
+        if report.threshold != showing::THRESHOLD {
             line += &format!(" --threshold {}", report.threshold);
         }
         let cycles = report.control_steps / dossier.run.config.physics.cycle_steps.max(1);
-        if cycles != eval::CYCLES {
+        if cycles != showing::CYCLES {
             line += &format!(" --cycles {cycles}");
         }
         lines.push(line);

@@ -1,0 +1,384 @@
+//! `morphcog response`: how far each soft voxel and sensor moves a robot, and what it could be
+//! taught.
+
+use crate::analysis::gallery;
+use crate::base::Grid;
+use crate::base::error::Error;
+use crate::base::hash::sha256_hex;
+use crate::base::observer::{Observer, Work};
+use crate::base::stop::{Stopped, check};
+use crate::base::threads::pool;
+use crate::body::Body;
+use crate::config::Config;
+use crate::config::MAX_NUMBER;
+use crate::data::dataset::{Dataset, DatasetError, Split};
+use crate::search::probing;
+use crate::search::probing::Probing;
+use crate::search::showing;
+use crate::store::folder::{check_out, writable};
+use crate::store::images::DatasetRef;
+use crate::store::names::RESPONSE_JSON;
+use crate::store::response::{
+    EndedBy, FORMAT, FORMAT_VERSION, PICTURES, ResponseFile, RobotResponse, Setting, pictures,
+};
+use crate::store::robots::{Selection, Source};
+use crate::store::unwritten::Unwritten;
+use crate::store::whereabouts::Whereabouts;
+use crate::store::whereabouts::{load_dataset_of, see};
+use crate::task::condition::Condition;
+use crate::task::evaluation::fresh_rollouts;
+use crate::task::grouping::Grouping;
+use crate::task::response::{Example, Gait, Shown};
+use crate::task::teachable::teachable;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
+
+/// Rollouts between two looks at how well the slopes are known, and least number of a robot's: ten
+/// under each of six conditions. Larger ones overshoot what is needed; smaller ones leave cores
+/// idle at their ends.
+pub const BATCH: usize = 60;
+
+/// Most rollouts of a robot that can be asked for.
+pub const MOST_IMAGES: usize = 100_000;
+
+/// Most training images of a class by which a task is known. More cost time, and hardly narrow the
+/// interval of what could be taught.
+const IMAGES_PER_CLASS: usize = 1000;
+
+/// Least number of images of a class of a task: designs are solved with half of them, and judged by
+/// the other half.
+const LEAST_PER_CLASS: usize = 4;
+
+/// What to measure, and how.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// The run.json; `None`: the published robots.
+    pub archive: Option<PathBuf>,
+    /// Which of its robots, by name.
+    pub robots: Vec<String>,
+    /// Whether only robots will do that an audit found physical.
+    pub physical_only: bool,
+    /// Two groups of classes, to tell what robots could be taught.
+    pub task: Option<[Vec<u8>; 2]>,
+    /// Most rollouts of a robot.
+    pub images: usize,
+    /// The relative error of the slopes at which a measurement ends.
+    pub error: f64,
+    /// Seed of the random images.
+    pub seed: u64,
+    /// Where the data are, if the command line says.
+    pub data: Option<PathBuf>,
+    /// Where the results go (response.json; CSV and pictures beside it).
+    pub out: PathBuf,
+    /// Number of threads; `None`: one per core.
+    pub threads: Option<usize>,
+}
+
+/// A measurement's end.
+#[derive(Clone, Debug)]
+pub struct Finished {
+    /// The content of response.json.
+    pub file: ResponseFile,
+    /// The pictures of its robots, to be made.
+    pub pictures: Vec<[PathBuf; 2]>,
+    /// Whether a signal stopped it before the last robot.
+    pub stopped: bool,
+    /// Why what was found is not, or not as a whole, in its file, if so.
+    pub unwritten: Option<Error>,
+}
+
+/// A robot to be measured.
+struct Subject {
+    id: String,
+    gait: Gait,
+}
+
+/// Where robots are from.
+struct Origin {
+    config: Config,
+    run: String,
+    sha256: String,
+    /// The data of the run; none of the published robots.
+    dataset: Option<DatasetRef>,
+    robots: Vec<(String, Body)>,
+}
+
+/// Measures the responses of robots; results are written after every robot, so that stopping keeps
+/// what is finished. A robot that cannot be measured is left out with a warning if others can.
+///
+/// # Errors
+/// What is wrong with archive, robots, data or options.
+pub fn measure(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Result<Finished, Error> {
+    check_numbers(options)?;
+    let origin = origin(options)?;
+    let config = &origin.config;
+    let mut subjects: Vec<Subject> = Vec::new();
+    let mut refused: Vec<Error> = Vec::new();
+    for (id, body) in &origin.robots {
+        match Gait::of(body) {
+            Some(gait) => subjects.push(Subject { id: id.clone(), gait }),
+            None => refused.push(Error::input(format!(
+                "robot {id}: it has neither soft voxels nor sensors, so no image can move it"
+            ))),
+        }
+    }
+    check_names(options, &subjects)?;
+    let images = images(options, &origin)?;
+    let probing = Probing::new(&conditions(config, options.images), options.seed);
+    let pool = pool(options.threads)?;
+    let run_seed = config.seed;
+    let mut file = ResponseFile {
+        format: FORMAT.to_string(),
+        format_version: FORMAT_VERSION,
+        program_version: env!("CARGO_PKG_VERSION").to_string(),
+        run: origin.run.clone(),
+        run_seed,
+        run_sha256: origin.sha256.clone(),
+        setting: images.setting(options, config, &probing)?,
+        robots: Vec::new(),
+    };
+    if !subjects.is_empty() {
+        let label = format!("measuring {} robots:", subjects.len());
+        observer.begins(&Work::new(label, (subjects.len() * options.images) as u64, "rollouts"));
+    }
+    let measuring = Measuring { options, config, probing, images, stop };
+    let mut unwritten = Unwritten::default();
+    let mut stopped = false;
+    for (number, subject) in subjects.iter().enumerate() {
+        let found = pool.install(|| {
+            measuring.robot(subject, &mut |rollouts| {
+                observer.progress((number * options.images + rollouts) as u64)
+            })
+        });
+        match found {
+            Ok(Some(found)) => file.robots.push(found),
+            Ok(None) => refused.push(Error::input(format!(
+                "robot {}: most of its rollouts under random images are unstable, so its response cannot be measured",
+                subject.id
+            ))),
+            Err(Stopped) => {
+                stopped = true;
+                break;
+            }
+        }
+        if !file.robots.is_empty() {
+            unwritten.tried(file.write(&options.out), |text| observer.warning(text));
+        }
+    }
+    if file.robots.is_empty() && !stopped {
+        let choose = || "choose others with --robots".to_string();
+        return Err(match refused.as_slice() {
+            [one] => one.clone().hint(choose()),
+            several => {
+                let text =
+                    format!("none of the {} chosen robots can be measured: {}", several.len(), several[0]);
+                Error::input(text).hint(choose())
+            }
+        });
+    }
+    refused.iter().for_each(|error| observer.warning(&format!("{error}; left out")));
+    let ids: Vec<&str> = file.robots.iter().map(|robot| robot.id.as_str()).collect();
+    let pictures = pictures(&options.out, &ids);
+    Ok(Finished { pictures, file, stopped, unwritten: unwritten.error() })
+}
+
+fn check_numbers(options: &Options) -> Result<(), Error> {
+    let Options { images, error, seed, .. } = options;
+    if !(BATCH..=MOST_IMAGES).contains(images) {
+        let text = format!("--images {images}: expected {BATCH} to {MOST_IMAGES} random images");
+        return Err(Error::usage(text).hint("with fewer, no slope is known".to_string()));
+    }
+    if !(0.0..1.0).contains(error) {
+        return Err(Error::usage(format!("--error {error}: expected 0 or more, and below 1")));
+    }
+    if *seed > MAX_NUMBER {
+        return Err(Error::usage(format!("--seed {seed}: expected at most {MAX_NUMBER}")));
+    }
+    Ok(())
+}
+
+/// Whether results and pictures can be written, and overwrite nothing of a run.
+fn check_names(options: &Options, subjects: &[Subject]) -> Result<(), Error> {
+    let out = &options.out;
+    check_out(out, options.archive.as_deref().unwrap_or(Path::new("")), RESPONSE_JSON)?;
+    if PICTURES.iter().any(|ending| out.with_extension(ending) == *out) {
+        let text = format!("--out {}: expected another ending", out.display());
+        return Err(Error::usage(format!("{text}: the picture beside the results has that name")));
+    }
+    let ids: Vec<&str> = subjects.iter().map(|subject| subject.id.as_str()).collect();
+    pictures(out, &ids).iter().flatten().try_for_each(|picture| writable(picture))
+}
+
+/// The robots that are asked for, each once.
+fn origin(options: &Options) -> Result<Origin, Error> {
+    let Some(path) = &options.archive else {
+        let mut robots: Vec<(String, Body)> = Vec::new();
+        for name in &options.robots {
+            let robot = gallery::find(name)?
+                .ok_or_else(|| Error::input(format!("there is no published robot {name}")))?;
+            if robots.iter().all(|(other, _)| *other != robot.name) {
+                robots.push((robot.name, robot.body));
+            }
+        }
+        return Ok(Origin {
+            config: gallery::config()?,
+            run: gallery::ALL.to_string(),
+            sha256: sha256_hex(gallery::TEXT.as_bytes()),
+            dataset: None,
+            robots,
+        });
+    };
+    let source = Source::read(path)?;
+    let chosen = Selection::Ids(options.robots.clone()).physical(options.physical_only);
+    let chosen = chosen.of(std::slice::from_ref(&source), options.seed)?;
+    let robots = chosen.iter().map(|chosen| (chosen.robot.id.clone(), chosen.robot.body.clone())).collect();
+    let sha256 = source.run.fingerprint();
+    let run = &source.run;
+    Ok(Origin {
+        config: run.config.clone(),
+        run: run.name.clone(),
+        sha256,
+        dataset: Some(run.dataset.clone()),
+        robots,
+    })
+}
+
+/// The conditions of `train`, as far as there are rollouts for them.
+fn conditions(config: &Config, rollouts: usize) -> Vec<Condition> {
+    let train = config.train;
+    let all = 2 * (u64::from(train.raised_starts) + 1);
+    let turns = usize::try_from(all).map_or(rollouts, |all| all.min(rollouts));
+    Condition::by_turns(std::iter::repeat_n(0, turns), train.raised_starts, train.without_limits)
+}
+
+/// Training images of a task.
+#[derive(Default)]
+struct Images {
+    dataset: Option<DatasetRef>,
+    /// Class and what a body sees, as many of each class, class by class.
+    seen: Vec<(u8, Grid<f64>)>,
+}
+
+/// The training images of the task's classes; none without a task.
+fn images(options: &Options, origin: &Origin) -> Result<Images, Error> {
+    let Some(task) = &options.task else { return Ok(Images::default()) };
+    let config = &origin.config;
+    let mut whereabouts = Whereabouts::given(options.data.as_deref());
+    if let Some(path) = &options.archive {
+        whereabouts = whereabouts.and_of(path);
+    }
+    let dataset = load_dataset_of(origin.dataset.as_ref(), config, &whereabouts, &[Split::Train])?;
+    let classes = task.concat();
+    let mut per_class = IMAGES_PER_CLASS;
+    for &class in &classes {
+        let count = dataset.indices_of(Split::Train, class).len();
+        if count < LEAST_PER_CLASS {
+            let text = format!(
+                "--task: class {class}: expected {LEAST_PER_CLASS} training images or more, found {count}"
+            );
+            let there = dataset.classes(Split::Train);
+            return Err(Error::input(text).hint(format!("{} has the classes {there:?}", dataset.name())));
+        }
+        per_class = per_class.min(count);
+    }
+    let failed = |error: DatasetError| Error::input(error.to_string());
+    let drawn = dataset.draw(Split::Train, &classes, per_class, options.seed, 0).map_err(failed)?;
+    let labels = classes.iter().flat_map(|class| std::iter::repeat_n(*class, per_class));
+    let see = |(label, index)| Ok((label, see(config, &dataset, Split::Train, index)?));
+    let seen: Result<Vec<_>, Error> = labels.zip(drawn).map(see).collect();
+    Ok(Images { dataset: Some(reference(&dataset)), seen: seen? })
+}
+
+fn reference(dataset: &Dataset) -> DatasetRef {
+    let train_sha256 = dataset.fingerprint(Split::Train).expect("its images were read just now");
+    DatasetRef { name: dataset.name().to_string(), train_sha256 }
+}
+
+impl Images {
+    fn setting(&self, options: &Options, config: &Config, probing: &Probing) -> Result<Setting, Error> {
+        let name = |[a, b]: &[Vec<u8>; 2]| {
+            let grouping =
+                Grouping::two_groups(a, b).map_err(|error| Error::usage(format!("--task: {error}")));
+            grouping.map(|grouping| grouping.tasks()[0].name())
+        };
+        Ok(Setting {
+            seed: options.seed,
+            images: options.images,
+            error: options.error,
+            dataset: self.dataset.clone(),
+            conditions: probing.conditions().to_vec(),
+            control_steps: config.protocol.control_steps,
+            task: options.task.as_ref().map(name).transpose()?,
+        })
+    }
+
+    /// As a gait sees them; the groups weigh the same.
+    fn examples(&self, gait: &Gait, config: &Config, [a, b]: &[Vec<u8>; 2]) -> Vec<Example> {
+        let example = |(class, stimulus): &(u8, Grid<f64>)| {
+            // There are as many of each class.
+            let (right, classes) = if a.contains(class) { (1.0, a.len()) } else { (-1.0, b.len()) };
+            Example { right, weight: 1.0 / classes as f64, ..Example::new(gait, stimulus, &config.physics) }
+        };
+        self.seen.iter().map(example).collect()
+    }
+}
+
+/// What all robots are measured with.
+struct Measuring<'a> {
+    options: &'a Options,
+    config: &'a Config,
+    probing: Probing,
+    images: Images,
+    stop: &'a AtomicBool,
+}
+
+impl Measuring<'_> {
+    /// A robot's response; `None` if most of its rollouts are unstable. `progress` is told how many
+    /// rollouts are done.
+    fn robot(
+        &self,
+        Subject { id, gait }: &Subject,
+        progress: &mut dyn FnMut(usize),
+    ) -> Result<Option<RobotResponse>, Stopped> {
+        let Measuring { options, config, probing, stop, .. } = self;
+        let mut shown: Vec<Shown> = Vec::new();
+        let mut rollouts = 0;
+        loop {
+            let numbers = rollouts..options.images.min(rollouts + BATCH);
+            rollouts = numbers.end;
+            shown.extend(probing.shown(gait, &config.physics, numbers, |probe, stimuli, conditions| {
+                let (rolled, _) = fresh_rollouts(
+                    probe,
+                    stimuli,
+                    conditions,
+                    (&config.physics, &config.protocol),
+                    &|_| (),
+                    stop,
+                )?;
+                Ok(rolled.into_iter().map(Result::ok).collect())
+            })?);
+            progress(rollouts);
+            check(stop)?;
+            let Some(response) = probing::response(&shown, rollouts) else { return Ok(None) };
+            let ended_by = if response.relative_error() <= options.error {
+                EndedBy::Error
+            } else if rollouts == options.images {
+                EndedBy::Images
+            } else {
+                continue;
+            };
+            progress(options.images);
+            let taught = match &options.task {
+                None => None,
+                Some(task) => {
+                    let examples = self.images.examples(gait, config, task);
+                    let threshold = showing::THRESHOLD;
+                    teachable(&shown, response.scatter, &examples, threshold, options.seed, stop)?
+                }
+            };
+            let counts = [rollouts, rollouts - shown.len()];
+            let taught = taught.map(Into::into);
+            return Ok(Some(RobotResponse::new(id, gait, &response, counts, ended_by, taught)));
+        }
+    }
+}

@@ -1,0 +1,234 @@
+//! [`Verdict`]: what an audit makes of a robot's perturbed lives, and by which [`Criteria`].
+
+use crate::base::number;
+use crate::config::audit::Criteria;
+use crate::store::audit::PerturbedLife;
+use crate::store::audit::Verdict;
+use crate::task::direction::{Assignment, Direction};
+use crate::task::fitness::Fitness;
+use crate::task::grouping::{Group, Split};
+use crate::task::perturbation::Kind;
+use crate::task::score::Answer;
+
+/// Balanced accuracy of who always walks the same way.
+const CHANCE: f64 = 0.5;
+
+/// How a robot is to walk, and how it does in its own simulator.
+pub(crate) struct Behaviour<'a> {
+    criteria: &'a Criteria,
+    /// Displacements in the unchanged life.
+    plain: Vec<f64>,
+    /// For each image whether its class is to walk right; none if it is in no group.
+    rightward: Vec<Option<bool>>,
+    /// Images answered right.
+    answered: Vec<usize>,
+    /// Why it is no walker, if it is none.
+    flaw: Option<String>,
+}
+
+impl<'a> Behaviour<'a> {
+    /// Of a robot that performs a task, judged by some fitness, and answers these classes with these displacements.
+    pub fn new(
+        criteria: &'a Criteria,
+        (split, fitness): (&Split, Fitness),
+        classes: &[u8],
+        plain: Vec<f64>,
+    ) -> Self {
+        let answer = |(&class, &d): (&u8, &f64)| Answer { class, displacement: Some(d) };
+        let answers: Vec<_> = classes.iter().zip(&plain).map(answer).collect();
+        let assignment = Assignment::from_training(split, fitness, &answers);
+        let right = |group| assignment.expected(group) == Direction::Right;
+        let rightward: Vec<Option<bool>> =
+            classes.iter().map(|&class| split.group(class).map(right)).collect();
+        let asked: Vec<usize> = (0..plain.len()).filter(|&image| rightward[image].is_some()).collect();
+        let is_right = |&image: &usize| towards(rightward[image], plain[image]) > criteria.threshold;
+        let answered: Vec<usize> = asked.iter().copied().filter(is_right).collect();
+        // Who is wrong on many is a walker all the same, if it walks: how much it knows is for a test to say.
+        let walks = |&&image: &&usize| Direction::of(plain[image], criteria.threshold).is_some();
+        let walked = asked.iter().filter(walks).count();
+        let groups = [Group::A, Group::B].into_iter().filter(|&group| !split.classes(group).is_empty());
+        let shares: Vec<(Group, f64)> = groups
+            .map(|group| {
+                let count =
+                    |of: &[usize]| of.iter().filter(|&&i| split.group(classes[i]) == Some(group)).count();
+                (group, count(&answered) as f64 / count(&asked).max(1) as f64)
+            })
+            .collect();
+        let balanced = shares.iter().map(|(_, share)| share).sum::<f64>() / shares.len().max(1) as f64;
+        let flaw = if let Some((group, _)) = shares.iter().find(|(_, share)| *share == 0.0) {
+            let classes: Vec<String> = split.classes(*group).iter().map(u8::to_string).collect();
+            let (threshold, classes) = (criteria.threshold, classes.join(", "));
+            Some(format!("never walks more than {threshold} voxel lengths the right way for {classes}"))
+        } else if (walked as f64) < criteria.least_answered * asked.len() as f64 {
+            Some(format!("answers {walked} of {} training images", asked.len()))
+        } else if balanced <= CHANCE {
+            Some(format!(
+                "answers {} % of its training images right, balanced",
+                number::fixed(100.0 * balanced, 0)
+            ))
+        } else {
+            None
+        };
+        Behaviour { criteria, plain, rightward, answered, flaw }
+    }
+
+    /// Whether there is anything to audit.
+    pub fn is_walker(&self) -> bool {
+        self.flaw.is_none()
+    }
+
+    /// Compares a perturbed life with the unchanged one.
+    pub fn compare(&self, name: String, kind: Kind, displacements: Option<Vec<f64>>) -> PerturbedLife {
+        let along = |of: &[f64], image: usize| towards(self.rightward[image], of[image]);
+        let (mut kept, mut distance) = (0.0, 0.0);
+        if let Some(changed) = &displacements {
+            let right = self.answered.iter().filter(|&&i| along(changed, i) > self.criteria.least_walk);
+            kept = right.count() as f64 / self.answered.len().max(1) as f64;
+            let sum = |of: &[f64]| self.answered.iter().map(|&i| along(of, i)).sum::<f64>();
+            let whole = sum(&self.plain);
+            distance = if whole > 0.0 { sum(changed) / whole } else { 0.0 };
+        }
+        let persists = kept >= self.criteria.least_kept && distance >= self.criteria.least_distance;
+        PerturbedLife { name, kind, displacements, kept, distance, persists }
+    }
+
+    /// Verdict and reason.
+    pub fn judge(&self, lives: &[PerturbedLife]) -> (Verdict, String) {
+        if let Some(flaw) = &self.flaw {
+            return (Verdict::NotAWalker, flaw.clone());
+        }
+        let failed = |kind: &&Kind| lives.iter().any(|life| life.kind == **kind && !life.persists);
+        let failed: Vec<Kind> = Kind::ALL.iter().filter(failed).copied().collect();
+        let world = || lives.iter().filter(|life| life.kind.is_of_the_world());
+        let robust = world().filter(|life| life.persists).count() as f64;
+        let is_robust = robust >= self.criteria.least_robust * world().count() as f64;
+        let names = |of_the_world: bool| {
+            let names = failed.iter().filter(|kind| kind.is_of_the_world() == of_the_world);
+            names.map(|kind| kind.name().to_string()).collect::<Vec<_>>()
+        };
+        let (artefacts, mut broken) = (names(false), names(true));
+        if artefacts.is_empty() && broken.is_empty() {
+            return (Verdict::Physical, format!("persists in all {} changed lives", lives.len()));
+        }
+        if is_robust && !artefacts.is_empty() {
+            return (Verdict::Exploits, artefacts.join(", "));
+        }
+        broken.extend(artefacts);
+        (Verdict::Fragile, broken.join(", "))
+    }
+
+    /// Root mean square difference of the perturbed lives' displacements from the unchanged ones, voxel lengths;
+    /// unstable lives have none.
+    pub fn spread(&self, lives: &[PerturbedLife]) -> f64 {
+        let stable = lives.iter().filter_map(|life| life.displacements.as_ref());
+        let squares: Vec<f64> =
+            stable.flat_map(|d| d.iter().zip(&self.plain).map(|(a, b)| (a - b) * (a - b))).collect();
+        // + 0.0: the sum of nothing is −0.
+        ((squares.iter().sum::<f64>() + 0.0) / squares.len().max(1) as f64).sqrt()
+    }
+}
+
+/// How far a displacement leads to the right side.
+fn towards(rightward: Option<bool>, displacement: f64) -> f64 {
+    match rightward {
+        Some(true) => displacement,
+        Some(false) => -displacement,
+        None => f64::NEG_INFINITY,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::task::fitness::Fitness;
+    use crate::task::grouping::Grouping;
+
+    fn judged(lives: &[(Kind, [f64; 2])]) -> (Verdict, String) {
+        let criteria = Criteria::default();
+        let split = Grouping::two_groups(&[0], &[1]).unwrap().tasks()[0].clone();
+        let behaviour = Behaviour::new(&criteria, (&split, Fitness::Min), &[0, 1], vec![-10.0, 12.0]);
+        let life = |(kind, d): &(Kind, [f64; 2])| behaviour.compare(String::new(), *kind, Some(d.to_vec()));
+        behaviour.judge(&lives.iter().map(life).collect::<Vec<_>>())
+    }
+
+    const SAME: [f64; 2] = [-9.0, 13.0];
+    const LOST: [f64; 2] = [-9.0, 1.0];
+
+    #[test]
+    fn who_keeps_its_directions_in_all_lives_is_physical() {
+        let lives = Kind::ALL.map(|kind| (kind, SAME));
+        assert_eq!(judged(&lives).0, Verdict::Physical);
+    }
+
+    #[test]
+    fn who_is_broken_by_the_simulator_alone_exploits_it_and_by_the_world_is_fragile() {
+        let but =
+            |lost: &[Kind]| judged(&Kind::ALL.map(|k| (k, if lost.contains(&k) { LOST } else { SAME })));
+        assert_eq!(but(&[Kind::TimeStep]), (Verdict::Exploits, "time step".to_string()));
+        assert_eq!(but(&[Kind::Start, Kind::LengthLimits]).1, "start, length limits");
+        assert_eq!(but(&[Kind::Gravity]), (Verdict::Fragile, "gravity".to_string()));
+        let all = but(&[Kind::Gravity, Kind::Pixel, Kind::Friction, Kind::TimeStep]);
+        assert_eq!(all, (Verdict::Fragile, "friction, gravity, pixel noise, time step".to_string()));
+    }
+
+    #[test]
+    fn a_walk_persists_by_direction_threshold_and_distance() {
+        let criteria = Criteria::default();
+        let split = Grouping::two_groups(&[0], &[1]).unwrap().tasks()[0].clone();
+        let behaviour = Behaviour::new(&criteria, (&split, Fitness::Min), &[0, 1], vec![-10.0, 12.0]);
+        let compare = |d: Option<[f64; 2]>| behaviour.compare("x".into(), Kind::Start, d.map(Vec::from));
+        assert!(compare(Some([-9.0, 30.0])).persists);
+        // Just below the threshold that makes an answer.
+        assert!(compare(Some([-9.0, 2.9])).persists && !compare(Some([-9.0, 1.5])).persists);
+        let turned = compare(Some([9.0, 30.0]));
+        assert_eq!((turned.kept, turned.persists), (0.5, false));
+        let short = compare(Some([-4.0, 4.0]));
+        assert_eq!((short.kept, short.distance, short.persists), (1.0, 8.0 / 22.0, false));
+        assert!(!compare(None).persists);
+        let lives = [compare(Some([-13.0, 12.0])), compare(None), compare(Some([-10.0, 15.0]))];
+        assert_eq!(behaviour.spread(&lives), (18.0f64 / 4.0).sqrt());
+    }
+
+    #[test]
+    fn who_does_not_answer_its_images_is_not_a_walker() {
+        let criteria = Criteria::default();
+        let splits = Grouping::all_splits(&[0, 1, 2, 3], false).unwrap();
+        let split = &splits.tasks()[0];
+        let flaw =
+            |d: [f64; 4]| Behaviour::new(&criteria, (split, Fitness::Min), &[0, 1, 2, 3], d.to_vec()).flaw;
+        assert_eq!(split.name(), "0|123");
+        assert_eq!(flaw([5.0, -4.0, -9.0, -2.0]), None);
+        assert_eq!(flaw([5.0, -4.0, -1.0, -2.0]).unwrap(), "answers 2 of 4 training images");
+        assert!(flaw([2.0, -4.0, -9.0, -8.0]).is_some_and(|flaw| flaw.ends_with("the right way for 0")));
+        // Knowing little is no flaw of a walk, knowing nothing is.
+        assert_eq!(flaw([9.0, -8.0, 4.0, 4.0]), None);
+        let flaw = |d: &[f64], classes: &[u8]| {
+            Behaviour::new(&criteria, (split, Fitness::MeanClipped), classes, d.to_vec()).flaw
+        };
+        assert_eq!(flaw(&[5.0, -4.0, -9.0, -8.0, -8.0], &[0, 0, 1, 2, 3]), None);
+        let halves = [5.0, -5.0, -4.0, 4.0];
+        assert_eq!(
+            flaw(&halves, &[0, 0, 1, 2]).unwrap(),
+            "answers 50 % of its training images right, balanced"
+        );
+        let still = Behaviour::new(&criteria, (split, Fitness::Min), &[0, 1, 2, 3], vec![0.0; 4]);
+        assert_eq!(still.judge(&[]).0, Verdict::NotAWalker);
+    }
+
+    #[test]
+    fn criteria_are_read_checked_and_named() {
+        let set = |text: &str| Criteria::load(None, &[text.to_string()]);
+        assert_eq!(set("perturbations.time_step=[8]").unwrap().perturbations.time_step, [8]);
+        assert_eq!(set("threshold=2").unwrap().threshold, 2.0);
+        let wrong = [
+            "threshold=-1",
+            "least_kept=2",
+            "perturbations.time_step=[1]",
+            "treshold=1",
+            "perturbations.share=0",
+        ];
+        for wrong in wrong {
+            assert!(set(wrong).is_err(), "{wrong}");
+        }
+    }
+}

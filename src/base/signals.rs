@@ -1,0 +1,70 @@
+//! Signals: the first one asks a command that has something to save to stop and save; where there is nothing, or when that is
+//! done, a signal ends the process, as is usual.
+
+use crate::base::error::Error;
+use signal_hook::consts::{SIGINT, SIGTERM};
+use signal_hook::flag;
+use std::ops::Deref;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, OnceLock};
+
+/// Exit code after a second SIGINT: the shell's for a process that SIGINT ended.
+const AT_ONCE: i32 = 130;
+
+/// Whether signals are nobody's: they then end the process.
+static UNUSED: OnceLock<Arc<AtomicBool>> = OnceLock::new();
+
+/// A flag that SIGINT, SIGTERM and SIGUSR1 set as long as there is somebody who looks at it.
+#[derive(Debug)]
+pub struct StopFlag {
+    stop: Arc<AtomicBool>,
+    /// What there was before: signals of somebody else, or of nobody.
+    were_unused: bool,
+}
+
+impl Deref for StopFlag {
+    type Target = AtomicBool;
+    fn deref(&self) -> &AtomicBool {
+        &self.stop
+    }
+}
+
+impl Drop for StopFlag {
+    fn drop(&mut self) {
+        if let Some(unused) = UNUSED.get() {
+            unused.store(self.were_unused, Ordering::Relaxed);
+        }
+    }
+}
+
+/// A flag that SIGINT, SIGTERM and SIGUSR1 set; a second SIGINT ends the process at once. When it goes, signals end the process
+/// again.
+///
+/// # Errors
+/// If the system does not let signals be handled.
+pub fn stop_flag() -> Result<StopFlag, Error> {
+    let failed = |error: std::io::Error| Error::other(format!("signals cannot be handled: {error}"));
+    let mut signals = vec![SIGINT, SIGTERM];
+    #[cfg(unix)]
+    signals.push(signal_hook::consts::SIGUSR1);
+    let unused = match UNUSED.get() {
+        Some(unused) => unused,
+        None => {
+            let unused = UNUSED.get_or_init(|| Arc::new(AtomicBool::new(true)));
+            for &signal in &signals {
+                flag::register_conditional_default(signal, Arc::clone(unused)).map_err(failed)?;
+            }
+            unused
+        }
+    };
+    let stop = Arc::new(AtomicBool::new(false));
+    // In this order: the first SIGINT finds its flag unset and sets it, the second one finds it set.
+    let interrupted = Arc::new(AtomicBool::new(false));
+    flag::register_conditional_shutdown(SIGINT, AT_ONCE, Arc::clone(&interrupted)).map_err(failed)?;
+    flag::register(SIGINT, interrupted).map_err(failed)?;
+    for signal in signals {
+        flag::register(signal, Arc::clone(&stop)).map_err(failed)?;
+    }
+    let were_unused = unused.swap(false, Ordering::Relaxed);
+    Ok(StopFlag { stop, were_unused })
+}

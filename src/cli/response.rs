@@ -1,0 +1,125 @@
+//! `morphcog response`: its words, and what it calls.
+
+use crate::analysis::gallery;
+use crate::analysis::measure;
+use crate::analysis::measure::Options;
+use crate::base::error::Error;
+use crate::base::signals;
+use crate::cli::choice;
+use crate::cli::choice::run_json;
+use crate::cli::choice::{ROBOTS, selected};
+use crate::commands::one_by_one;
+use crate::commands::one_by_one::Named;
+use crate::search::train::groups;
+use crate::store::folder;
+use crate::store::names::RESPONSE_JSON;
+use crate::store::robots::{BEST, Selection};
+use crate::view::console::Console;
+use crate::view::reporters::Reporter;
+use crate::view::responses;
+use clap::Args;
+use std::path::{Path, PathBuf};
+
+pub(super) const EXAMPLES: &str = "\
+Examples:
+  morphcog response --archive runs/gaits
+  morphcog response --archive runs/gaits --robots top:4 --task \"4|9\"   what they could be taught
+  morphcog response --robots YJTLA                                      a published robot
+  morphcog response --archive runs/gaits --error 0.1 --images 3000      a sharper map
+then
+  morphcog train --archive runs/gaits --task \"4|9\"
+
+All soft voxels and sensors of a robot are made wide, narrow or left at rest by random images, each
+independently of the others: by how much does each move the body? A measurement ends when the slopes
+are known well enough (--error), or after --images rollouts. Images of a dataset are only needed
+with --task. Ctrl-C stops it.";
+
+/// Two groups of classes.
+type Groups = [Vec<u8>; 2];
+
+#[derive(Debug, Args)]
+pub(super) struct ResponseArgs {
+    /// The run.json, or its folder (default: the newest under runs/).
+    #[arg(short, long, value_name = "FILE", value_parser = run_json())]
+    archive: Option<PathBuf>,
+    #[arg(short, long, visible_aliases = ["robot", "select"], help = format!("{ROBOTS} [default: best]"))]
+    robots: Vec<Selection>,
+    /// Only robots that morphcog audit found physical: "best" is the best of them.
+    #[arg(long)]
+    physical_only: bool,
+    /// Two groups of classes, as 4|9, 0|123 or 10,11|3: says what robots could be taught, too.
+    #[arg(short, long, value_name = "A|B", value_parser = groups)]
+    task: Option<Groups>,
+    /// Most rollouts of a robot, each under a random image: 60 or more.
+    #[arg(short = 'n', long, default_value_t = 1000)]
+    images: usize,
+    /// The error of the slopes, relative to them, at which a robot's measurement ends; 0: never
+    /// before the last image.
+    #[arg(long, default_value_t = 0.2)]
+    error: f64,
+    /// Seed of what is drawn: random images, and robots with random:N.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Folder with the images of the task.
+    #[arg(long, value_name = "DIR")]
+    data: Option<PathBuf>,
+    /// Result file; a CSV and the picture (of several robots: one each) go beside it (default:
+    /// response.json beside run.json).
+    #[arg(short, long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Threads (default: one per core); the result does not depend on it.
+    #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    threads: Option<u16>,
+}
+
+pub(super) fn run(args: ResponseArgs, console: &Console) -> Result<(), Error> {
+    let robots = selected(args.robots)?.unwrap_or(Selection::Ids(vec![BEST.to_string()]));
+    let archive = match args.archive {
+        None if gallery::is_meant(&robots)? => None,
+        None => Some(folder::newest_run()?),
+        given => given,
+    };
+    if archive.is_none() && args.physical_only {
+        let text = "--physical-only: expected robots of an archive, not published ones";
+        return Err(Error::usage(text.to_string()).hint("morphcog audit --robots gallery".to_string()));
+    }
+    let search = one_by_one::Options {
+        robots,
+        archives: archive.iter().cloned().collect(),
+        physical_only: args.physical_only,
+        seed: args.seed,
+        data: args.data.clone(),
+    };
+    let robots = choice::one_by_one(&search, console)?;
+    let beside = || match &archive {
+        Some(path) => path.with_file_name(RESPONSE_JSON),
+        None => Path::new(&format!("gallery-{RESPONSE_JSON}")).to_path_buf(),
+    };
+    let options = Options {
+        robots: robots.into_iter().map(|Named { robot, .. }| robot).collect(),
+        physical_only: args.physical_only,
+        task: args.task,
+        images: args.images,
+        error: args.error,
+        seed: args.seed,
+        data: args.data,
+        out: args.out.unwrap_or_else(beside),
+        threads: args.threads.map(usize::from),
+        archive,
+    };
+    let stop = signals::stop_flag()?;
+    let finished = measure::measure(&options, &stop, &Reporter::new(console))?;
+    responses::response(console, &finished, &options.out);
+    if let Some(error) = finished.unwritten {
+        return Err(error);
+    }
+    responses::pictures(console, &finished)?;
+    if finished.stopped {
+        let text = match finished.file.robots.len() {
+            0 => "stopped before the first robot was measured; nothing is written".to_string(),
+            robots => format!("stopped after {robots} robots; those are saved"),
+        };
+        return Err(Error::stopped(text));
+    }
+    Ok(())
+}

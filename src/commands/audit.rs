@@ -1,0 +1,327 @@
+//! `morphcog audit`: does a robot's behaviour survive changes that no honest walker should notice?
+
+use crate::analysis::gallery;
+use crate::analysis::verdict::Behaviour;
+use crate::base::error::Error;
+use crate::base::hash::sha256_hex;
+use crate::base::observer::{Observer, Work};
+use crate::base::stop::Stopped;
+use crate::base::threads::pool;
+use crate::body::Body;
+use crate::config::Config;
+use crate::config::audit::Criteria;
+use crate::data::dataset::Split;
+use crate::search::training::Training;
+use crate::sim::{Energy, System};
+use crate::store::audit::PerturbedLife;
+use crate::store::audit::{AuditFile, RobotAudit};
+use crate::store::folder::check_out;
+use crate::store::names::AUDIT_JSON;
+use crate::store::robots;
+use crate::store::robots::Selection;
+use crate::store::run::{Robot, RunFile};
+use crate::store::unwritten::Unwritten;
+use crate::store::whereabouts::Whereabouts;
+use crate::store::whereabouts::{load_dataset_of, see};
+use crate::task::evaluation::{Job, Outcome, Savings, evaluate};
+use crate::task::fitness::Fitness;
+use crate::task::grouping::Grouping;
+use crate::task::perturbation::{Perturbation, Setting};
+use crate::task::rollout::walk;
+use rayon::prelude::*;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+
+/// Robots whose lives are lived side by side; what is finished is saved after so many.
+const BATCH: usize = 8;
+
+/// Most training images of a class that a robot is audited on: it lives them some twenty times.
+const IMAGES_PER_CLASS: usize = 16;
+
+/// Whose robots are audited.
+#[derive(Clone, Debug)]
+pub enum Source {
+    /// Those of a run.json.
+    Archive(PathBuf),
+    /// The published ones.
+    Gallery,
+}
+
+/// What to audit, and how.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// Where the robots are from.
+    pub source: Source,
+    /// Which of them; of the gallery all, or names.
+    pub robots: Selection,
+    /// Seed of `random:N`.
+    pub seed: u64,
+    /// How they are judged.
+    pub criteria: Criteria,
+    /// Where the data are, if the command line says.
+    pub data: Option<PathBuf>,
+    /// Where the verdicts go (audit.json; audit.csv beside it).
+    pub out: PathBuf,
+    /// Number of threads; `None`: one per core.
+    pub threads: Option<usize>,
+}
+
+/// An audit's end.
+#[derive(Clone, Debug)]
+pub struct Finished {
+    /// The content of audit.json.
+    pub file: AuditFile,
+    /// Ids of the robots that were asked for.
+    pub asked: Vec<String>,
+    /// Whether a signal stopped it before the last of them.
+    pub stopped: bool,
+    /// Why what was found is not, or not as a whole, in its file, if so.
+    pub unwritten: Option<Error>,
+}
+
+/// A robot to be audited.
+struct Subject {
+    id: String,
+    task: String,
+    body: Body,
+    /// Displacements its run knows.
+    known: Option<Vec<f64>>,
+}
+
+/// What all robots of a source have in common.
+struct Trial {
+    config: Config,
+    grouping: Grouping,
+    training: Training,
+    criteria: Criteria,
+}
+
+/// Audits robots. What an earlier audit of the same robots by the same criteria found is kept and not done again; the
+/// file is the same bytes however often it was stopped.
+///
+/// # Errors
+/// What is wrong with archive, data, selection or criteria.
+pub fn audit(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Result<Finished, Error> {
+    let (config, fitness, training, subjects, order, mut file) = open(options)?;
+    let grouping = config.grouping()?.with_fitness(fitness);
+    let trial = Trial { grouping, training, criteria: options.criteria.clone(), config };
+    let earlier = match options.out.exists() {
+        true => Some(AuditFile::read(&options.out).map_err(|error| {
+            error.hint("it would be written over: move it away, or write elsewhere with --out".to_string())
+        })?),
+        false => None,
+    };
+    if let Some(earlier) = earlier
+        && earlier.run_sha256 == file.run_sha256
+        && earlier.criteria != file.criteria
+    {
+        let (out, count) = (options.out.display(), earlier.robots.len());
+        let text = format!("{out}: {count} robots of this run are audited by other criteria");
+        let hint = "write elsewhere with --out, or move that file away".to_string();
+        return Err(Error::input(text).hint(hint));
+    }
+    file.add_known(&options.out);
+    let asked = subjects.iter().map(|subject| subject.id.clone()).collect();
+    let open: Vec<Subject> =
+        subjects.into_iter().filter(|subject| file.robot(&subject.id).is_none()).collect();
+    let rollouts: usize = open.iter().map(|subject| 1 + trial.perturbations(subject).len()).sum();
+    let label = format!("auditing {} robots:", open.len());
+    observer.begins(&Work::new(label, rollouts as u64, "rollouts"));
+    let pool = pool(options.threads)?;
+    let done = AtomicU64::new(0);
+    let mut unwritten = Unwritten::default();
+    for batch in open.chunks(BATCH) {
+        let found: Vec<Option<RobotAudit>> = pool.install(|| {
+            batch.par_iter().map(|subject| trial.robot(subject, stop, &done, observer)).collect()
+        });
+        let stopped = found.iter().any(Option::is_none);
+        for (subject, found) in batch.iter().zip(&found) {
+            let walked = found.as_ref().map(|found| &found.displacements);
+            if subject.known.is_some() && walked.is_some_and(|walked| *walked != subject.known) {
+                let text = "walks otherwise here than its run says: another version of the program made that";
+                observer.warning(&format!("{}: {text}", subject.id));
+            }
+        }
+        file.robots.extend(found.into_iter().flatten());
+        // Another audit of the same run may have written meanwhile.
+        file.add_known(&options.out);
+        file.robots.sort_by_key(|robot| order.iter().position(|id| *id == robot.id));
+        unwritten.tried(file.write(&options.out).map(|_| ()), |text| observer.warning(text));
+        if stopped {
+            return Ok(Finished { file, asked, stopped, unwritten: unwritten.error() });
+        }
+    }
+    unwritten.tried(file.write(&options.out).map(|_| ()), |text| observer.warning(text));
+    Ok(Finished { file, asked, stopped: false, unwritten: unwritten.error() })
+}
+
+type Opened = (Config, Fitness, Training, Vec<Subject>, Vec<String>, AuditFile);
+
+/// Config, fitness, images, the robots asked for, the ids of all there are in order, and an empty file.
+fn open(options: &Options) -> Result<Opened, Error> {
+    let data = options.data.as_deref();
+    match &options.source {
+        Source::Gallery => {
+            check_out(&options.out, Path::new(""), AUDIT_JSON)?;
+            let config = gallery::config()?;
+            let training = Training::load(&config, data)?;
+            let all = gallery::gallery()?;
+            let order: Vec<String> = all.iter().map(|robot| robot.name.clone()).collect();
+            let is_asked = |name: &str| match &options.robots {
+                Selection::Ids(ids) if !ids.iter().any(|id| id == gallery::ALL) => {
+                    ids.iter().any(|id| id.eq_ignore_ascii_case(name))
+                }
+                _ => true,
+            };
+            let subject = |robot: gallery::Published| Subject {
+                id: robot.name,
+                task: "0|1".to_string(),
+                body: robot.body,
+                known: None,
+            };
+            let subjects = all.into_iter().filter(|robot| is_asked(&robot.name)).map(subject).collect();
+            let sha = sha256_hex(gallery::TEXT.as_bytes());
+            let file = AuditFile::new("gallery", sha, order.len(), &options.criteria);
+            Ok((config, Fitness::Min, training, subjects, order, file))
+        }
+        Source::Archive(path) => {
+            let source = robots::Source::read(path)?;
+            let run = &source.run;
+            check_out(&options.out, path, AUDIT_JSON)?;
+            let whereabouts = Whereabouts::given(data).and_of(path);
+            let training = training_of(run, path, &whereabouts)?;
+            // A training may have shown images otherwise than the protocol says, which is what is judged.
+            let is_known = run.follows_protocol() && training.images == run.training_images;
+            let subject = |robot: &Robot| Subject {
+                id: robot.id.clone(),
+                task: robot.task.clone(),
+                body: robot.body.clone(),
+                known: is_known.then(|| robot.displacements.clone()),
+            };
+            let mut subjects: Vec<Subject> = Vec::new();
+            for chosen in options.robots.of(std::slice::from_ref(&source), options.seed)? {
+                if subjects.iter().all(|other| other.id != chosen.robot.id) {
+                    subjects.push(subject(chosen.robot));
+                }
+            }
+            let order: Vec<String> = run.elites.iter().map(|robot| robot.id.clone()).collect();
+            let file = AuditFile::new(&run.name, run.fingerprint(), order.len(), &options.criteria);
+            Ok((run.config.clone(), run.fitness(), training, subjects, order, file))
+        }
+    }
+}
+
+/// The images a run's robots were evolved on, of each class the first few. Of other data, verdicts would mean nothing.
+fn training_of(run: &RunFile, path: &Path, whereabouts: &Whereabouts) -> Result<Training, Error> {
+    let dataset = load_dataset_of(Some(&run.dataset), &run.config, whereabouts, &[Split::Train])?;
+    let mut taken = [0; 256];
+    let mut images = run.training_images.clone();
+    images.retain(|image| {
+        let taken = &mut taken[usize::from(image.label)];
+        *taken += 1;
+        *taken <= IMAGES_PER_CLASS
+    });
+    let see = |image: &crate::store::images::ImageRef| {
+        let seen = see(&run.config, &dataset, Split::Train, image.index);
+        seen.map_err(|error| error.within("training_images").within(&path.display().to_string()))
+    };
+    let (dataset, stimuli) = (run.dataset.clone(), images.iter().map(see).collect::<Result<Vec<_>, Error>>());
+    // As in a test, every life is lived under the same conditions, however the robot was trained.
+    let conditions = Vec::new();
+    Ok(Training { dataset, images, stimuli: stimuli?, conditions })
+}
+
+impl Trial {
+    fn perturbations(&self, subject: &Subject) -> Vec<Perturbation> {
+        Perturbation::all(&self.criteria.perturbations, &subject.body, self.config.protocol.life)
+    }
+
+    /// One robot's audit; `None` if stopped before its end.
+    fn robot(
+        &self,
+        subject: &Subject,
+        stop: &AtomicBool,
+        done: &AtomicU64,
+        observer: &dyn Observer,
+    ) -> Option<RobotAudit> {
+        let count = |lives: usize| {
+            observer.progress(done.fetch_add(lives as u64, Ordering::Relaxed) + lives as u64);
+        };
+        let setting = Setting {
+            body: subject.body.clone(),
+            physics: self.config.physics.clone(),
+            protocol: self.config.protocol.clone(),
+            stimuli: self.training.stimuli.clone(),
+        };
+        let plain = live(&setting, true, stop).ok()?;
+        count(1);
+        let (displacements, energy) = plain.map_or((None, Energy::default()), |(d, e)| (Some(d), e));
+        let classes: Vec<u8> = self.training.images.iter().map(|image| image.label).collect();
+        let still = vec![0.0; classes.len()];
+        let split = self.grouping.tasks().iter().find(|split| split.name() == subject.task);
+        // A run's robots are checked to have tasks of the run.
+        let split = split.unwrap_or(&self.grouping.tasks()[0]);
+        let behaviour = Behaviour::new(
+            &self.criteria,
+            (split, self.grouping.fitness()),
+            &classes,
+            displacements.clone().unwrap_or(still),
+        );
+        let life = |perturbation: &Perturbation| {
+            let walked = live(&perturbation.apply(&setting), false, stop).ok()?;
+            let walked = walked.map(|(d, _)| perturbation.undo(d));
+            count(1);
+            Some(behaviour.compare(perturbation.name(), perturbation.kind, walked))
+        };
+        let perturbations = self.perturbations(subject);
+        let lives: Vec<PerturbedLife> = match behaviour.is_walker() {
+            true => {
+                let lives: Option<Vec<_>> = perturbations.par_iter().map(life).collect();
+                let counts = |(life, perturbation): &(PerturbedLife, &Perturbation)| {
+                    life.displacements.is_some() || perturbation.counts_if_unstable()
+                };
+                lives?.into_iter().zip(&perturbations).filter(counts).map(|(life, _)| life).collect()
+            }
+            false => {
+                count(perturbations.len());
+                Vec::new()
+            }
+        };
+        let (verdict, reason) = behaviour.judge(&lives);
+        let persisting = lives.iter().filter(|life| life.persists).count() as f64;
+        let steps = f64::from(setting.protocol.control_steps) * setting.stimuli.len() as f64;
+        let cycles = steps / f64::from(setting.physics.cycle_steps);
+        Some(RobotAudit {
+            id: subject.id.clone(),
+            task: subject.task.clone(),
+            verdict,
+            reason,
+            persisting: persisting / lives.len().max(1) as f64,
+            spread: behaviour.spread(&lives),
+            energy_per_cycle: Energy { drive: energy.drive / cycles, limits: energy.limits / cycles },
+            displacements,
+            lives,
+        })
+    }
+}
+
+/// Displacements of a life, and energies if they are to be `measured`; `None` if it is unstable.
+fn live(setting: &Setting, measured: bool, stop: &AtomicBool) -> Result<Option<(Vec<f64>, Energy)>, Stopped> {
+    let Setting { body, physics, protocol, stimuli } = setting;
+    if measured {
+        let system = Arc::new(System::new(body, physics.clone()));
+        return Ok(walk(&system, protocol, stimuli, true, stop)?.ok());
+    }
+    let job = Job { body, order: Vec::new(), may_win: Box::new(|_| true), given_up: None };
+    let savings = Savings { early_stop: false, ..Savings::default() };
+    let evaluation = evaluate(&[job], stimuli, &[], physics, protocol, savings, stop)?.pop();
+    Ok(match evaluation.map(|evaluation| evaluation.outcome) {
+        Some(Outcome::Walked(displacements)) => Some((displacements, Energy::default())),
+        Some(Outcome::Unstable(_) | Outcome::Stopped(_)) | None => None,
+    })
+}
+
+#[cfg(test)]
+#[path = "audit_tests.rs"]
+mod tests;

@@ -1,0 +1,70 @@
+//! `morphcog data`: fetching and describing datasets.
+
+use crate::data::catalogue::{Catalogue, known_as};
+use crate::data::dataset::{Dataset, DatasetError, Split};
+use crate::data::files::Place;
+use crate::data::info::DatasetInfo;
+use std::collections::BTreeMap;
+
+/// What there is of a dataset (`morphcog data info`).
+#[derive(Debug)]
+pub struct Found {
+    /// Name, folder and the splits that can be used.
+    pub info: DatasetInfo,
+    /// Names of those of its files that are exactly the published ones.
+    pub published: Vec<String>,
+    /// Splits that are those of a dataset known by another name, and that name.
+    pub others: BTreeMap<Split, &'static str>,
+    /// Why other splits cannot be used.
+    pub problems: Vec<(Split, DatasetError)>,
+}
+
+/// Looks at both splits of a dataset, each on its own: one may be there without the other.
+///
+/// # Errors
+/// Why the training images cannot be loaded, if the test images cannot be either.
+pub fn info(name: &str, given: &[Place]) -> Result<Found, DatasetError> {
+    let mut info: Option<DatasetInfo> = None;
+    let mut problems = Vec::new();
+    for split in Split::ALL {
+        match Dataset::load(name, given, &[split]) {
+            Ok(dataset) => match &mut info {
+                Some(info) => info.splits.extend(dataset.info().splits),
+                None => info = Some(dataset.info()),
+            },
+            Err(problem) => problems.push((split, problem)),
+        }
+    }
+    let Some(info) = info else {
+        return Err(problems.swap_remove(0).1);
+    };
+    let known = Catalogue::named(name).map_or_else(|_| Vec::new(), |catalogue| catalogue.files);
+    let files = info.splits.values().flat_map(|split| &split.files);
+    let published = files.filter(|file| known.iter().any(|k| k.sha256 == file.sha256));
+    let published = published.map(|file| file.name.clone()).collect();
+    let known = info.splits.iter().filter_map(|(&split, found)| Some((split, known_as(found)?)));
+    let others = known.filter(|(_, known)| *known != name).collect();
+    Ok(Found { info, published, others, problems })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::data::files::places;
+    use crate::data::idx;
+
+    #[test]
+    fn info_shows_the_split_that_is_there_and_why_the_other_is_not() {
+        let folder = tempfile::tempdir().unwrap();
+        let given = places(Some(folder.path()), None, None);
+        assert!(info("mnist", &given).unwrap_err().to_string().contains("train images"));
+        let write = |name: &str, bytes: Vec<u8>| std::fs::write(folder.path().join(name), bytes).unwrap();
+        write("t10k-images-idx3-ubyte", [idx::header(&[2, 1, 1]), vec![0, 255]].concat());
+        write("t10k-labels-idx1-ubyte", [idx::header(&[2]), vec![3, 3]].concat());
+        let found = info("mnist", &given).unwrap();
+        assert_eq!(found.info.splits[&Split::Test].per_class[&3], 2);
+        assert!(matches!(found.problems.as_slice(), [(Split::Train, _)]));
+        assert!(found.published.is_empty());
+        assert_eq!(info("builtin", &[]).unwrap().info.splits.len(), 2);
+    }
+}

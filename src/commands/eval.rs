@@ -1,0 +1,242 @@
+//! `morphcog eval`: how well robots do on held-out images (paper, "Generalization test").
+
+use crate::analysis::gallery;
+use crate::base::error::Error;
+use crate::base::files::write_atomically;
+use crate::base::observer::{Observer, Work};
+use crate::base::threads::pool;
+use crate::commands::eval_images::HeldOutImages;
+use crate::config::Config;
+use crate::config::validation::LEAST;
+use crate::data::dataset::Split;
+use crate::search::showing::Walker;
+use crate::search::showing::control_steps;
+use crate::search::showing::task_of;
+use crate::search::validation;
+use crate::store::eval::{EvalFile, RobotReport, Trial};
+use crate::store::folder::check_out;
+use crate::store::images::HeldOut;
+use crate::store::names::EVAL_JSON;
+use crate::store::names::EVAL_VALIDATION_JSON;
+use crate::store::robots::{Chosen, Selection, Source};
+use crate::store::run::different;
+use crate::store::unwritten::Unwritten;
+use crate::store::validation::Validated;
+use crate::store::whereabouts::Whereabouts;
+use crate::store::whereabouts::load_dataset_of;
+use crate::task::protocol::MAX_STEPS;
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, AtomicU64};
+
+/// What to evaluate, and on what.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// The run.json, or those of several runs that differ in their seeds only; none: the published robots.
+    pub archives: Vec<PathBuf>,
+    /// Which of its robots.
+    pub robots: Selection,
+    /// Images in all, evenly divided between the classes.
+    pub images: usize,
+    /// Which images.
+    pub split: HeldOut,
+    /// Validation images in all, for a selection by them; `None`: as the config says.
+    pub validation: Option<usize>,
+    /// Seed of what is drawn: images, and robots with `random:N`.
+    pub seed: u64,
+    /// Displacements up to this count as wrong \[voxel lengths\].
+    pub threshold: f64,
+    /// Actuation cycles per image.
+    pub cycles: u32,
+    /// Where the data are, if the command line says.
+    pub data: Option<PathBuf>,
+    /// Another dataset than the runs', whose test images are shown.
+    pub dataset: Option<String>,
+    /// Where the results go (eval.json; eval.csv beside it).
+    pub out: PathBuf,
+    /// Number of threads; `None`: one per core.
+    pub threads: Option<usize>,
+}
+
+/// An evaluation's end.
+#[derive(Clone, Debug)]
+pub struct Finished {
+    /// The content of eval.json.
+    pub file: EvalFile,
+    /// Why that is not, or not as a whole, in its file, if so.
+    pub unwritten: Option<Error>,
+}
+
+/// Evaluates robots; results are written after every robot, so that stopping keeps what is finished.
+///
+/// # Errors
+/// What is wrong with archive, data or selection.
+pub fn eval(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Result<Finished, Error> {
+    if !(options.threshold >= 0.0 && options.threshold.is_finite()) {
+        return Err(Error::usage(format!(
+            "--threshold {}: expected 0 or more voxel lengths",
+            options.threshold
+        )));
+    }
+    let sources: Vec<Source> = match options.archives.as_slice() {
+        [] => vec![gallery::source(options.data.as_deref(), options.dataset.as_deref())?],
+        archives => archives.iter().map(|path| Source::read(path)).collect::<Result<_, _>>()?,
+    };
+    let first = &sources[0];
+    for source in &sources {
+        check_out(&options.out, &source.path, own_name(options.split))?;
+        same_setting(first, source)?;
+    }
+    different(sources.iter().map(|source| (source.path.as_path(), &source.run)))?;
+    let config = &first.run.config;
+    if options.validation.is_some() && options.robots.validated().is_none() {
+        let text =
+            "--validation: expected with --robots best-validation:N: only those are chosen by such images";
+        return Err(Error::usage(text.to_string()));
+    }
+    let validated = options.validation.unwrap_or(config.validation.images);
+    if options.robots.validated().is_some() && validated < LEAST {
+        let least = LEAST;
+        return Err(Error::usage(format!("--validation {validated}: expected {least} or more images")));
+    }
+    let grouping = config.grouping()?;
+    let other = options.dataset.as_deref().filter(|name| *name != config.data.dataset);
+    if other.is_some() && options.split == HeldOut::Validation {
+        let text = "--dataset: expected with --split test only: validation images are of the runs' own data";
+        return Err(Error::usage(text.to_string()));
+    }
+    let mut whereabouts = Whereabouts::given(options.data.as_deref());
+    for archive in &options.archives {
+        whereabouts = whereabouts.and_of(archive);
+    }
+    let own = |splits: &[Split]| {
+        load_dataset_of(Some(&first.run.dataset), config, &whereabouts, splits).map_err(|error| {
+            let hint =
+                error.hint.clone().unwrap_or("name the folder of the run's data with --data".to_string());
+            error.hint(format!("{hint}; robots are shown another dataset's images with --dataset NAME"))
+        })
+    };
+    let dataset = match other {
+        None => own(&Split::ALL)?,
+        Some(name) => whereabouts.load(&config.data.of(name), &Split::ALL)?,
+    };
+    let robots = options.robots.of(&sources, options.seed)?;
+    let (robots, unskilled): (Vec<Chosen>, Vec<Chosen>) =
+        robots.into_iter().partition(|chosen| task_of(&grouping, chosen.robot).is_some());
+    if let Some(chosen) = unskilled.first().filter(|_| !robots.is_empty()) {
+        let (count, id) = (unskilled.len(), &chosen.robot.id);
+        observer.warning(&format!("{count} robots ({id} …) walk the same way for every class; left out"));
+    }
+    if robots.is_empty() {
+        let text = "there is no robot to evaluate: those selected walk the same way for every class";
+        return Err(Error::input(text.to_string()));
+    }
+    let shown = HeldOutImages::draw(config, &sources, &dataset, options)?;
+    let test_sha256 = dataset.fingerprint(Split::Test).unwrap_or_default();
+    let steps = checked_steps(config, options.cycles)?;
+    let asked = (options.robots.describe(), options.split, options.seed, options.threshold);
+    let mut report = EvalFile::new(&sources, asked, steps, &shown.images, test_sha256);
+    if let Some(name) = other {
+        report.transfer(name, &dataset);
+    }
+    let splits = robots.iter().filter_map(|chosen| task_of(&grouping, chosen.robot));
+    report.baselines = shown.baselines(&sources, splits)?;
+    let pool = pool(options.threads)?;
+    let walker =
+        || Walker { config, control_steps: steps, pool: &pool, stop, observer, done: AtomicU64::new(0) };
+    let (robots, scores): (Vec<Chosen>, Vec<Validated>) = match options.robots.validated() {
+        None => (robots, Vec::new()),
+        Some(count) => {
+            let wanted = validation::Wanted { count, images: validated, threshold: options.threshold };
+            // Which images are for validation is known by their indices, in the run's own data only.
+            let others = other.map(|_| own(&[Split::Train])).transpose()?;
+            let Some(best) = validation::chosen(
+                &sources,
+                &robots,
+                &options.robots,
+                others.as_ref().unwrap_or(&dataset),
+                &grouping,
+                &wanted,
+                &walker,
+            )?
+            else {
+                report.stopped = true;
+                return Ok(Finished { file: report, unwritten: None });
+            };
+            best.into_iter().unzip()
+        }
+    };
+    let (count, images) = (robots.len(), shown.images.len());
+    let label = format!("evaluating {count} robots on {images} images:");
+    observer.begins(&Work::new(label, (count * images) as u64, "rollouts"));
+    let walker = walker();
+    let mut scores = scores.into_iter();
+    let mut left = robots.len();
+    report.stopped = left > 0;
+    let mut unwritten = Unwritten::default();
+    for Chosen { source, robot } in robots {
+        let Some(split) = task_of(&grouping, robot) else { continue };
+        let Some((displacements, simulated)) = walker.lives(robot, &shown.stimuli) else { break };
+        left -= 1;
+        report.stopped = left > 0;
+        let run = &sources[source].run;
+        let trial = Trial { run, robot, split, images: &shown.images, threshold: options.threshold };
+        let (validation, of_trial) = (scores.next(), RobotReport::new(&trial, displacements, simulated));
+        report.robots.push(RobotReport { run: source, validation, ..of_trial });
+        report.conclude();
+        unwritten.tried(write(options, &report), |text| observer.warning(text));
+    }
+    Ok(Finished { file: report, unwritten: unwritten.error() })
+}
+
+/// The name of the results beside a run.json if nobody says otherwise.
+pub fn own_name(split: HeldOut) -> &'static str {
+    match split {
+        HeldOut::Test => EVAL_JSON,
+        HeldOut::Validation => EVAL_VALIDATION_JSON,
+    }
+}
+
+/// Whether robots of two runs can be tested together: what they are shown, and where they live, is the same.
+fn same_setting(first: &Source, other: &Source) -> Result<(), Error> {
+    let (a, b) = (&first.run.config, &other.run.config);
+    let of_data = |config: &Config| (config.data.dataset.clone(), config.data.builtin.clone());
+    let differing = [
+        ("task", a.task != b.task),
+        ("body", a.body != b.body),
+        ("stimulus", a.stimulus != b.stimulus),
+        ("protocol", a.protocol != b.protocol),
+        ("physics", a.physics != b.physics),
+        ("data", of_data(a) != of_data(b) || first.run.dataset != other.run.dataset),
+    ];
+    match differing.into_iter().find(|(_, differs)| *differs) {
+        None => Ok(()),
+        Some((section, _)) => {
+            let (other, first) = (other.path.display(), first.path.display());
+            let text = format!("{other}: expected the same [{section}] in its config as {first}");
+            Err(Error::input(text).hint("evaluate runs of different experiments one by one".to_string()))
+        }
+    }
+}
+
+fn write(options: &Options, report: &EvalFile) -> Result<(), Error> {
+    let csv_path = options.out.with_extension("csv");
+    let csv = report.to_csv().map_err(|error| Error::other(error.to_string()))?;
+    for (path, content) in [(&options.out, report.to_json().into_bytes()), (&csv_path, csv)] {
+        write_atomically(path, &content).map_err(|error| Error::writing(path, &error))?;
+    }
+    Ok(())
+}
+
+/// The same, if a robot can be shown an image for so long.
+fn checked_steps(config: &Config, cycles: u32) -> Result<u32, Error> {
+    let steps = control_steps(config, cycles);
+    match steps <= MAX_STEPS {
+        true => Ok(steps),
+        false => {
+            let most = MAX_STEPS / config.physics.cycle_steps;
+            Err(Error::usage(format!(
+                "--cycles {cycles}: expected at most {most}, {MAX_STEPS} control steps"
+            )))
+        }
+    }
+}

@@ -1,0 +1,166 @@
+//! The images that `eval` shows, and what takes no body on them.
+
+use crate::base::Grid;
+use crate::base::error::Error;
+use crate::commands::eval::Options;
+use crate::config::Config;
+use crate::data::dataset::{Dataset, Split};
+use crate::search::held_out;
+use crate::search::held_out::images_besides;
+use crate::store::eval::Baselines;
+use crate::store::images::HeldOut;
+use crate::store::images::ImageRef;
+use crate::store::robots::Source;
+use crate::store::validation::shown as shown_for_validation;
+use crate::store::whereabouts::see;
+use crate::task::baselines::{Labelled, best_pixel, larger_group, nearest_training_image};
+use crate::task::grouping;
+use std::collections::{BTreeMap, BTreeSet};
+
+/// Training images per class on which the single-pixel baseline is chosen.
+const PIXEL_IMAGES_PER_CLASS: usize = 500;
+
+/// Test or validation images, and how robots see them.
+pub(crate) struct HeldOutImages<'a> {
+    config: &'a Config,
+    dataset: &'a Dataset,
+    options: &'a Options,
+    /// The images.
+    pub images: Vec<ImageRef>,
+    /// Of each.
+    pub stimuli: Vec<Grid<f64>>,
+}
+
+impl<'a> HeldOutImages<'a> {
+    /// As many as asked for, evenly divided between the classes; the first classes get what is left over.
+    ///
+    /// # Errors
+    /// If there are not enough images, or not one of each class is asked for.
+    pub fn draw(
+        config: &'a Config,
+        sources: &[Source],
+        dataset: &'a Dataset,
+        options: &'a Options,
+    ) -> Result<Self, Error> {
+        let (asked, least) = (options.images, config.classes().len());
+        if asked < least {
+            let text = format!("--images {asked}: expected {least} or more, one of each class");
+            return Err(Error::usage(text));
+        }
+        let (images, split) = match options.split {
+            HeldOut::Test => (test_images(config, dataset, options)?, Split::Test),
+            HeldOut::Validation => {
+                let runs: Vec<_> = sources.iter().map(|source| &source.run).collect();
+                let besides = chosen_by(config, sources, dataset, options)?;
+                (images_besides(&besides, &runs, dataset, "--images", asked)?, Split::Train)
+            }
+        };
+        let stimuli = images.iter().map(|image| see(config, dataset, split, image.index));
+        let stimuli = stimuli.collect::<Result<_, _>>()?;
+        Ok(HeldOutImages { config, dataset, options, images, stimuli })
+    }
+
+    /// The baselines of each of these tasks.
+    ///
+    /// # Errors
+    /// If an image cannot be drawn or seen.
+    pub fn baselines<'t>(
+        &self,
+        sources: &[Source],
+        tasks: impl Iterator<Item = &'t grouping::Split>,
+    ) -> Result<BTreeMap<String, Baselines>, Error> {
+        let seen = |images: &[ImageRef]| -> Result<Vec<(Grid<f64>, u8)>, Error> {
+            let stimulus = |index| see(self.config, self.dataset, Split::Train, index);
+            images.iter().map(|image| Ok((stimulus(image.index)?, image.label))).collect()
+        };
+        let choice = seen(&self.pixel_images()?)?;
+        // In another dataset, a run's training images are other ones.
+        let is_own = self.dataset.name() == self.config.data.dataset;
+        let of_runs = sources.iter().map(|source| {
+            let path = source.path.display().to_string();
+            seen(&source.run.training_images).map_err(|error| error.within("training_images").within(&path))
+        });
+        let of_runs = is_own.then(|| of_runs.collect::<Result<Vec<_>, Error>>()).transpose()?;
+        let shown = self.stimuli.iter().zip(&self.images);
+        let shown: Vec<Labelled> =
+            shown.map(|(stimulus, image)| Labelled { stimulus, class: image.label }).collect();
+        let mut all = BTreeMap::new();
+        for task in tasks {
+            if all.contains_key(&task.name()) {
+                continue;
+            }
+            let rule = best_pixel(task, &labelled(&choice));
+            let nearest = |of_run: &Vec<_>| nearest_training_image(task, &labelled(of_run), &shown);
+            let nearest_of_all =
+                of_runs.as_ref().map(|all| all.iter().map(nearest).sum::<f64>() / all.len() as f64);
+            let baselines = Baselines {
+                larger_group: larger_group(task, &shown),
+                best_single_pixel: rule.map_or(0.0, |rule| rule.accuracy(task, &shown)),
+                pixel: rule.map_or([0, 0], |rule| [rule.row, rule.column]),
+                nearest_training_image: nearest_of_all,
+            };
+            all.insert(task.name(), baselines);
+        }
+        Ok(all)
+    }
+
+    /// Training images to choose a single pixel by; none of those shown.
+    fn pixel_images(&self) -> Result<Vec<ImageRef>, Error> {
+        let shown: BTreeSet<usize> = match self.options.split {
+            HeldOut::Test => BTreeSet::new(),
+            HeldOut::Validation => self.images.iter().map(|image| image.index).collect(),
+        };
+        let mut choice = Vec::new();
+        for label in self.config.classes() {
+            let count = self.dataset.indices_of(Split::Train, label).len().min(PIXEL_IMAGES_PER_CLASS);
+            let drawn = self.dataset.draw(Split::Train, &[label], count, self.options.seed, 0);
+            let drawn = drawn.map_err(|error| Error::input(error.to_string()))?;
+            let others = drawn.into_iter().filter(|index| !shown.contains(index));
+            choice.extend(others.map(|index| ImageRef { index, label }));
+        }
+        Ok(choice)
+    }
+}
+
+fn labelled(list: &[(Grid<f64>, u8)]) -> Vec<Labelled<'_>> {
+    list.iter().map(|(stimulus, class)| Labelled { stimulus, class: *class }).collect()
+}
+
+/// Validation images that robots of each run are chosen by, if they are, now or before: whoever is named may be one of the best
+/// of `validation.json`.
+fn chosen_by(
+    config: &Config,
+    sources: &[Source],
+    dataset: &Dataset,
+    options: &Options,
+) -> Result<BTreeSet<usize>, Error> {
+    let mut all = BTreeSet::new();
+    for source in sources {
+        let count = match options.robots.validated() {
+            Some(_) => Some(options.validation.unwrap_or(config.validation.images)),
+            None => options.robots.names_any().then(|| shown_for_validation(source)).flatten(),
+        };
+        if let Some(count) = count {
+            let of_run = held_out::images(&[&source.run], dataset, "--validation", count)?;
+            all.extend(of_run.into_iter().map(|image| image.index));
+        }
+    }
+    Ok(all)
+}
+
+/// Test images, class after class.
+fn test_images(config: &Config, dataset: &Dataset, options: &Options) -> Result<Vec<ImageRef>, Error> {
+    let classes = config.classes();
+    let mut images = Vec::new();
+    for (place, &label) in classes.iter().enumerate() {
+        let count = options.images / classes.len() + usize::from(place < options.images % classes.len());
+        let drawn = dataset.draw(Split::Test, &[label], count, options.seed, 0);
+        let drawn = drawn.map_err(|error| {
+            let most = classes.iter().map(|&c| dataset.indices_of(Split::Test, c).len()).min().unwrap_or(0);
+            let hint = format!("ask for at most --images {}", most * classes.len());
+            Error::input(error.to_string()).hint(hint)
+        })?;
+        images.extend(drawn.into_iter().map(|index| ImageRef { index, label }));
+    }
+    Ok(images)
+}

@@ -1,0 +1,101 @@
+//! Robots for commands that look at them one by one (`replay`, `plot`): which they are, and of which archives.
+
+use crate::analysis::gallery;
+use crate::base::error::Error;
+use crate::base::observer::Observer;
+use crate::search::validation;
+use crate::store::folder;
+use crate::store::robots::first_physical;
+use crate::store::robots::{Selection, Source};
+use crate::store::run::{Robot, different};
+use crate::store::validation::Validated;
+use std::path::PathBuf;
+use std::sync::atomic::AtomicBool;
+
+/// Which robots, and of which archives.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// Which of them.
+    pub robots: Selection,
+    /// The archives, which are one crowd; none: the published robots if those are named, else the newest run.
+    pub archives: Vec<PathBuf>,
+    /// Whether only robots will do that an audit found physical.
+    pub physical_only: bool,
+    /// Seed of what is drawn.
+    pub seed: u64,
+    /// Where the data are, if the command line says; only a selection on validation images needs them.
+    pub data: Option<PathBuf>,
+}
+
+/// A robot, by name.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Named {
+    /// The archive it is of; none: a published one, or of the newest run.
+    pub archive: Option<PathBuf>,
+    /// Its id, the beginning of one, "best", or a published robot's name.
+    pub robot: String,
+}
+
+/// The robots that are selected. What is named of one archive is not looked for yet.
+///
+/// # Errors
+/// If there are none such, or a signal stopped the search for the best on validation images.
+pub fn named(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Result<Vec<Named>, Error> {
+    let Options { robots, archives, seed, .. } = options;
+    let of_gallery = archives.is_empty() && gallery::is_meant(robots)?;
+    let one = |robot: &String| Named { archive: archives.first().cloned(), robot: robot.clone() };
+    match robots {
+        Selection::Ids(ids) if of_gallery && ids.iter().any(|id| id == gallery::ALL) => {
+            let all = gallery::gallery()?;
+            return Ok(all.into_iter().map(|robot| Named { archive: None, robot: robot.name }).collect());
+        }
+        Selection::Ids(ids) if archives.len() < 2 => return Ok(ids.iter().map(one).collect()),
+        _ => {}
+    }
+    let paths = if archives.is_empty() { vec![folder::newest_run()?] } else { archives.clone() };
+    let sources: Vec<Source> = paths.iter().map(|path| Source::read(path)).collect::<Result<_, _>>()?;
+    different(sources.iter().map(|source| (source.path.as_path(), &source.run)))?;
+    let name = |source: &Source, robot: &Robot| Named {
+        archive: Some(source.path.clone()),
+        robot: robot.id.clone(),
+    };
+    let Some(count) = robots.validated() else {
+        let chosen = robots.clone().physical(options.physical_only).of(&sources, *seed)?;
+        return Ok(chosen.iter().map(|chosen| name(&sources[chosen.source], chosen.robot)).collect());
+    };
+    let mut all = Vec::new();
+    for source in &sources {
+        let best = ranked(options, source, count, stop, observer)?;
+        all.extend(best.iter().map(|(robot, _)| name(source, robot)));
+    }
+    Ok(all)
+}
+
+/// The so many best of each task of a run on validation images.
+fn ranked<'a>(
+    options: &Options,
+    source: &'a Source,
+    count: usize,
+    stop: &AtomicBool,
+    observer: &dyn Observer,
+) -> Result<Vec<(&'a Robot, Validated)>, Error> {
+    // Some will not be physical: then among those that are known at the run's end.
+    let known = if options.physical_only { source.run.config.validation.best } else { 0 };
+    let search = validation::Options {
+        archive: source.path.clone(),
+        best: Some(count.max(known)),
+        data: options.data.clone(),
+        threads: None,
+    };
+    let Some(best) = validation::validate(&search, stop, observer)? else {
+        let text = "stopped before the robots were chosen; nothing is shown";
+        return Err(Error::stopped(text.to_string()).hint("the same command goes on".to_string()));
+    };
+    let by_id = |validated: Validated| {
+        let mut elites = source.run.elites.iter();
+        let robot = elites.find(|robot| robot.id == validated.id && robot.task == validated.task)?;
+        Some((robot, validated))
+    };
+    let best: Vec<_> = best.into_iter().filter_map(by_id).collect();
+    if options.physical_only { first_physical(best, source, count) } else { Ok(best) }
+}

@@ -1,0 +1,158 @@
+//! [`Plan`]: what belongs to a reproduction of the paper.
+
+use crate::base::error::Error;
+use crate::base::files::read_text;
+use crate::config::audit::Criteria;
+use crate::config::capacity::CapacityConfig;
+use crate::config::{Config, reading};
+use crate::store::folder;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeSet;
+use std::path::Path;
+
+/// The built-in plan: the paper's.
+pub const PAPER_TOML: (&str, &str) = ("paper.toml", include_str!("../../configs/paper.toml"));
+
+/// What belongs to a reproduction.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Plan {
+    /// Seeds of the runs of each experiment.
+    pub seeds: Vec<u64>,
+    /// Robots of each task that are tested.
+    pub robots: usize,
+    /// Test images.
+    pub images: usize,
+    /// The experiments.
+    pub experiment: Vec<Experiment>,
+    /// How robots are judged.
+    #[serde(default)]
+    pub audit: Criteria,
+    /// The networks.
+    #[serde(default)]
+    pub capacity: CapacityConfig,
+}
+
+/// An experiment: a config, and what is changed in it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Experiment {
+    /// A config file, or the name of a built-in one.
+    pub config: String,
+    /// Changes, as with `--set`.
+    #[serde(default)]
+    pub set: Vec<String>,
+}
+
+/// Least numbers of test images and trainings at small scales.
+const LEAST: [usize; 2] = [100, 5];
+
+impl Plan {
+    /// Whether a name is that of the built-in plan, and of no file.
+    pub fn is_built_in(name: &str) -> bool {
+        let own = PAPER_TOML.0;
+        (name == own || own.strip_suffix(".toml") == Some(name)) && !Path::new(name).exists()
+    }
+
+    /// The plan as TOML, every key with its value.
+    pub fn to_toml(&self) -> String {
+        toml::to_string_pretty(self).expect("every field is a number, text, list or table, which TOML has")
+    }
+
+    /// Reads a plan: a file or, if there is none, the built-in one of that name.
+    ///
+    /// # Errors
+    /// What is wrong with it, with file, line and key.
+    pub fn load(name: &str, overrides: &[String]) -> Result<Self, Error> {
+        let text = match read_text(Path::new(name)) {
+            Err(_) if Plan::is_built_in(name) => PAPER_TOML.1.to_string(),
+            Err(error) => return Err(Error::reading(Path::new(name), &error)),
+            Ok(text) => text,
+        };
+        let is_json = name.ends_with(".json");
+        let format = if is_json { reading::Format::Json } else { reading::Format::Toml };
+        let plan: Plan = reading::read(&text, format, name)?;
+        let check = |plan: &Plan| plan.check().and_then(|()| plan.experiments().map(|_| ()));
+        reading::changed(plan, overrides, check, |error| {
+            let place = reading::place(&text, format, name, &error.message);
+            error.within(&place)
+        })
+    }
+
+    /// Checks what a type cannot.
+    fn check(&self) -> Result<(), Error> {
+        let refuse = |text: &str| Err(Error::input(text.to_string()));
+        if self.seeds.is_empty() || self.experiment.is_empty() {
+            return refuse("seeds, experiment: expected one or more of each");
+        }
+        if self.seeds.iter().collect::<BTreeSet<_>>().len() < self.seeds.len() {
+            return refuse("seeds: expected different ones");
+        }
+        if self.robots == 0 || self.images == 0 {
+            return refuse("robots, images: expected 1 or more");
+        }
+        self.audit.check().and_then(|()| self.capacity.check())
+    }
+
+    /// The experiments: what their runs are called, and their configs.
+    ///
+    /// # Errors
+    /// What is wrong with one: a slip in the last one would be found out after hours.
+    pub(crate) fn experiments(&self) -> Result<Vec<(String, Config)>, Error> {
+        let mut experiments = Vec::<(String, Config)>::new();
+        for (number, experiment) in (1..).zip(&self.experiment) {
+            let within = |error: Error| error.within(&format!("experiment {number}"));
+            let name = folder::name_of(&experiment.config);
+            if experiments.iter().any(|(other, _)| *other == name) {
+                return Err(within(Error::input(format!("config: {name}: expected once"))));
+            }
+            let config = Config::load(&experiment.config, &experiment.set).map_err(within)?;
+            for &seed in &self.seeds {
+                let seeded = Config { seed, ..config.clone() };
+                seeded.validate().map_err(|error| error.within("seeds"))?;
+            }
+            let (images, least) = (self.images, config.classes().len());
+            if images < least {
+                let text =
+                    format!("images = {images}: expected {least} or more, one of each class of {name}");
+                return Err(Error::input(text));
+            }
+            experiments.push((name, config));
+        }
+        Ok(experiments)
+    }
+
+    /// The plan at a scale: generations are multiplied by it, test images and trainings by its square root.
+    #[must_use]
+    pub(crate) fn at(&self, scale: f64) -> Self {
+        let part = |count: usize, least: usize| {
+            ((count as f64 * scale.sqrt()).round() as usize).max(least).min(count.max(least))
+        };
+        let trainings = part(self.capacity.trainings, LEAST[1].min(self.capacity.trainings));
+        Plan {
+            images: part(self.images, LEAST[0].min(self.images)),
+            capacity: CapacityConfig { trainings, ..self.capacity.clone() },
+            ..self.clone()
+        }
+    }
+}
+
+/// A config at a scale: its generations are multiplied by it.
+pub(crate) fn scaled(config: &Config, scale: f64) -> Config {
+    let generations = ((config.generations as f64 * scale).round() as u64).max(1);
+    Config { generations, ..config.clone() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_small_scale_has_fewer_images_and_trainings_but_never_too_few() {
+        let plan = Plan::load(PAPER_TOML.0, &[]).unwrap();
+        let sizes = |scale: f64| (plan.at(scale).images, plan.at(scale).capacity.trainings);
+        assert_eq!([1.0, 0.25, 0.01, 1e-6].map(sizes), [(1000, 50), (500, 25), (100, 5), (100, 5)]);
+        let few = Plan { images: 30, ..plan };
+        assert_eq!(few.at(0.01).images, 30);
+    }
+}

@@ -1,0 +1,296 @@
+//! `morphcog replay`: record a robot's life, for the pictures.
+
+use crate::analysis::gallery;
+use crate::base::Grid;
+use crate::base::error::Error;
+use crate::base::number;
+use crate::body::Body;
+use crate::config::Config;
+use crate::data::dataset::Split;
+use crate::search::training::Training;
+use crate::store::folder;
+use crate::store::images::{DatasetRef, ImageRef};
+use crate::store::robots::{Selection, Source};
+use crate::store::whereabouts::Whereabouts;
+use crate::store::whereabouts::{load_dataset_of, see};
+use crate::task::protocol::Life;
+use crate::task::recording::Recording;
+use crate::task::rollout::record;
+use std::path::PathBuf;
+use std::str::FromStr;
+
+/// Most images in one recording: pictures hold every frame.
+pub const MAX_IMAGES: usize = 20;
+
+/// Most places of points in a recording: some gigabyte.
+const MOST_PLACES: usize = 50_000_000;
+
+/// An image by split and index: `train:3`, `test:17`; without a word, a training image.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Shown {
+    /// Its split.
+    pub split: Split,
+    /// Its index there.
+    pub index: usize,
+}
+
+impl FromStr for Shown {
+    type Err = String;
+    fn from_str(text: &str) -> Result<Self, String> {
+        let (split, digits) = match text.split_once(':') {
+            Some(("test", digits)) => (Split::Test, digits),
+            Some(("train", digits)) => (Split::Train, digits),
+            None => (Split::Train, text),
+            Some((other, _)) => return Err(format!("{other}: expected train or test before the colon")),
+        };
+        let index =
+            digits.trim().parse().map_err(|_| format!("{text}: expected an index, as 3 or test:17"))?;
+        Ok(Shown { split, index })
+    }
+}
+
+/// What to record.
+#[derive(Clone, Debug, Default)]
+pub struct Options {
+    /// The robot: an id, the beginning of one, "best", or a name in the gallery.
+    pub robot: String,
+    /// Whether only robots will do that an audit found physical.
+    pub physical_only: bool,
+    /// The run.json; `None`: the newest under `runs/`.
+    pub archive: Option<PathBuf>,
+    /// The images; none: the training images.
+    pub images: Vec<Shown>,
+    /// Where the data are, if the command line says.
+    pub data: Option<PathBuf>,
+    /// Another dataset than the run's.
+    pub dataset: Option<String>,
+}
+
+/// A robot's life, and where it is from.
+#[derive(Clone, Debug)]
+pub struct Replay {
+    /// The life.
+    pub recording: Recording,
+    /// What a page says about it: words and values.
+    pub about: Vec<(String, String)>,
+    /// What the recording is called in file names.
+    pub name: String,
+}
+
+/// A robot and what it is shown: a life before it is lived.
+#[derive(Clone, Debug)]
+pub struct Subject {
+    /// The robot.
+    pub found: Found,
+    /// Images with their labels, as it sees them.
+    pub images: Vec<(String, Grid<f64>)>,
+}
+
+/// Records a robot's life as its config's protocol has it.
+///
+/// # Errors
+/// What is wrong with robot, archive, images or data.
+pub fn replay(options: &Options) -> Result<Replay, Error> {
+    let subject = subject(options)?;
+    let recording = record_subject(&subject);
+    let Found { name, config, mut about, .. } = subject.found;
+    let fresh = config.protocol.life == Life::Fresh;
+    about.push((
+        "Images".to_string(),
+        format!("{}, {:?} encoding", config.data.dataset, config.stimulus.encoding).to_lowercase(),
+    ));
+    let life = if fresh { "a fresh life for every image" } else { "one continuous life" };
+    about.push((
+        "Protocol".to_string(),
+        format!("{life}, {} control steps each", config.protocol.control_steps),
+    ));
+    Ok(Replay { recording, about, name })
+}
+
+/// Records a life.
+pub fn record_subject(subject: &Subject) -> Recording {
+    let Subject { found: Found { name, body, config, .. }, images } = subject;
+    let fresh = config.protocol.life == Life::Fresh;
+    record(name, body, &config.physics, &config.protocol, fresh, images)
+}
+
+/// Finds a robot and the images it is to be shown.
+///
+/// # Errors
+/// What is wrong with robot, archive, images or data.
+pub fn subject(options: &Options) -> Result<Subject, Error> {
+    let mut found = find(options)?;
+    let config = &mut found.config;
+    if let Some(dataset) = &options.dataset {
+        config.data = config.data.of(dataset);
+    }
+    let whereabouts = Whereabouts::given(options.data.as_deref());
+    let whereabouts = match &found.archive {
+        Some(path) => whereabouts.and_of(path),
+        None => whereabouts,
+    };
+    // Published robots come without images of their own.
+    let offer = |error: Error| match found.published {
+        true => error
+            .hint("morphcog data fetch mnist, or --dataset builtin for digits the program draws".to_string()),
+        false => error,
+    };
+    let (asks, mut shown) = (!options.images.is_empty(), options.images.clone());
+    if shown.is_empty() {
+        let own = if options.dataset.is_none() { found.training.as_slice() } else { &[] };
+        let all = match own {
+            [] => {
+                let train = whereabouts.load(&config.data, &[Split::Train]).map_err(offer)?;
+                Training::of(config, &train).map_err(offer)?.images
+            }
+            own => own.to_vec(),
+        };
+        let training = |image: &ImageRef| Shown { split: Split::Train, index: image.index };
+        shown = some(&all).iter().map(training).collect();
+    }
+    if shown.len() > MAX_IMAGES {
+        let text =
+            format!("--images: {} images, expected at most {MAX_IMAGES} in one recording", shown.len());
+        return Err(Error::usage(text));
+    }
+    let wanted: Vec<Split> =
+        Split::ALL.into_iter().filter(|split| shown.iter().any(|image| image.split == *split)).collect();
+    let own = found.dataset.as_ref().filter(|own| own.name == config.data.dataset);
+    let dataset = load_dataset_of(own, config, &whereabouts, &wanted).map_err(offer)?;
+    let mut images = Vec::new();
+    for Shown { split, index } in shown {
+        let label = dataset.label(split, index).map_err(|error| match (&options.archive, asks) {
+            (_, true) => Error::usage(format!("--images: {error}")),
+            (Some(path), _) => Error::input(format!("{}: training_images: {error}", path.display())),
+            (None, _) => Error::input(format!("training_images: {error}")),
+        })?;
+        images.push((format!("{label} ({split} {index})"), see(config, &dataset, split, index)?));
+    }
+    config.data.dataset = dataset.name().to_string();
+    check_length(config, images.len())?;
+    Ok(Subject { found, images })
+}
+
+/// Whether a life under so many images can be recorded: a recording holds every point at every moment.
+pub(crate) fn check_length(config: &Config, images: usize) -> Result<(), Error> {
+    let points = (config.body.height + 1) * (config.body.width + 1);
+    let most = MOST_PLACES / points / images.max(1);
+    let steps = config.protocol.control_steps;
+    match steps as usize > most {
+        true => Err(Error::input(format!(
+            "protocol.control_steps = {steps}: expected at most {most} to record a life under {images} images"
+        ))
+        .hint("show fewer images".to_string())),
+        false => Ok(()),
+    }
+}
+
+/// Training images to show: all, or the first of each class if they are too many.
+fn some(images: &[ImageRef]) -> Vec<ImageRef> {
+    let mut some = images.to_vec();
+    if some.len() > MAX_IMAGES {
+        let mut seen = std::collections::BTreeSet::new();
+        some.retain(|image| seen.insert(image.label));
+    }
+    some
+}
+
+/// A robot and how it lives.
+#[derive(Clone, Debug)]
+pub struct Found {
+    /// Its id, or its name in the gallery.
+    pub name: String,
+    /// Its body.
+    pub body: Body,
+    /// The config it was evolved with.
+    pub config: Config,
+    /// Its training images, as far as they are known.
+    pub training: Vec<ImageRef>,
+    /// What these are of.
+    pub dataset: Option<DatasetRef>,
+    /// What a page says about it: words and values.
+    pub about: Vec<(String, String)>,
+    /// The run.json it is from; none of a published one.
+    archive: Option<PathBuf>,
+    published: bool,
+}
+
+impl Found {
+    /// Whose picture it is, in a line: robot, run and seed.
+    pub fn title(&self) -> String {
+        let word = |key: &str| self.about.iter().find(|(word, _)| word == key).map_or("", |(_, value)| value);
+        match self.published {
+            true => format!("robot {}, published with the paper", self.name),
+            false => format!("robot {}, {}", word("Robot"), word("From")),
+        }
+    }
+}
+
+/// Finds a robot in an archive or the gallery.
+///
+/// # Errors
+/// What is wrong with robot or archive.
+pub fn find(options: &Options) -> Result<Found, Error> {
+    if options.archive.is_none()
+        && let Some(robot) = gallery::find(&options.robot)?
+    {
+        if options.physical_only {
+            let text = "--physical-only: expected a robot of an archive, not a published one";
+            return Err(Error::usage(text.to_string()).hint("morphcog audit --robots gallery".to_string()));
+        }
+        let about = vec![
+            ("Robot".to_string(), robot.name.clone()),
+            ("From".to_string(), "the robots published with the paper".to_string()),
+            ("Task".to_string(), "0|1".to_string()),
+            ("Published fitness".to_string(), format!("{} voxel lengths", number::fixed(robot.fitness, 2))),
+        ];
+        let (name, body, config) = (robot.name, robot.body, gallery::config()?);
+        return Ok(Found {
+            name,
+            body,
+            config,
+            training: Vec::new(),
+            dataset: None,
+            about,
+            archive: None,
+            published: true,
+        });
+    }
+    let archive = match &options.archive {
+        Some(path) => path.clone(),
+        None => folder::newest_run()?,
+    };
+    let source = Source::read(&archive)?;
+    let robots = Selection::Ids(vec![options.robot.clone()]).physical(options.physical_only);
+    let robots = robots.of(std::slice::from_ref(&source), 0);
+    let robots = robots.map_err(|error| {
+        let hint = error.hint.clone().unwrap_or_default();
+        let error = error.within(&archive.display().to_string());
+        // Without an archive, the robot may have been meant for a published one.
+        match options.archive {
+            None if !options.physical_only => {
+                error.hint(format!("{hint}; published robots: morphcog gallery"))
+            }
+            _ => error,
+        }
+    })?;
+    let (robot, run) = (robots[0].robot, &source.run);
+    let about = vec![
+        ("Robot".to_string(), robot.id.clone()),
+        ("From".to_string(), format!("{}, seed {}", run.name, run.config.seed)),
+        ("Task".to_string(), robot.task.clone()),
+        ("Fitness".to_string(), run.in_units(robot.objective)),
+        ("Born".to_string(), format!("generation {}", robot.generation)),
+    ];
+    let (name, body) = (robot.id.clone(), robot.body.clone());
+    Ok(Found {
+        name,
+        body,
+        training: run.training_images.clone(),
+        dataset: Some(run.dataset.clone()),
+        about,
+        archive: Some(archive),
+        published: false,
+        config: run.config.clone(),
+    })
+}

@@ -1,0 +1,228 @@
+//! `morphcog report`: gathers what is known of runs, for a page.
+
+use crate::base::Grid;
+use crate::base::error::Error;
+use crate::commands::plot::Progress;
+use crate::commands::replay;
+use crate::data::dataset::Split;
+use crate::store::audit::AuditFile;
+use crate::store::capacity::CapacityFile;
+use crate::store::eval::EvalFile;
+use crate::store::folder;
+use crate::store::images::ImageRef;
+use crate::store::names::AUDIT_JSON;
+use crate::store::names::CAPACITY_JSON;
+use crate::store::names::EVAL_JSON;
+use crate::store::names::METRICS;
+use crate::store::run::{Robot, RunFile, different};
+use crate::store::whereabouts::Whereabouts;
+use crate::store::whereabouts::{load_dataset_of, see};
+use crate::task::protocol::Life;
+use crate::task::recording::Recording;
+use crate::task::rollout::record;
+use std::path::{Path, PathBuf};
+
+/// Most images in the lives of a page: one of each class, if there are more.
+const MOST_IMAGES: usize = 4;
+
+/// All that is known of a run.
+#[derive(Clone, Debug)]
+pub struct Dossier {
+    /// Its run.json.
+    pub path: PathBuf,
+    /// The run.
+    pub run: RunFile,
+    /// How it came along; none without a metrics.csv.
+    pub progress: Option<Progress>,
+    /// What was found of it, and of nothing else.
+    pub findings: Findings,
+    /// What its robots are shown on the page: labels and stimuli.
+    pub images: Vec<(String, Grid<f64>)>,
+}
+
+/// What tests found; none of what was not done.
+#[derive(Clone, Debug, Default)]
+pub struct Findings {
+    /// From `eval`.
+    pub eval: Option<EvalFile>,
+    /// From `audit`.
+    pub audit: Option<AuditFile>,
+    /// From `capacity`.
+    pub capacity: Option<CapacityFile>,
+}
+
+impl Findings {
+    /// Those in a folder that are about these runs as they are; verdicts are on one run.
+    fn read(folder: &Path, runs: &[&RunFile], warn: &dyn Fn(&str)) -> Self {
+        let existing = |name: &str| Some(folder.join(name)).filter(|path| path.exists());
+        // A report of what can be read is better than none.
+        let told = |error: Error| warn(&format!("{error}; left out"));
+        let one = if let [run] = runs { Some(*run) } else { None };
+        let audit = existing(AUDIT_JSON)
+            .zip(one)
+            .and_then(|(path, run)| AuditFile::of_run(run, &path).map_err(told).ok());
+        let tested = existing(EVAL_JSON);
+        let eval = tested.clone().and_then(|path| EvalFile::of_runs(&path, runs).map_err(told).ok());
+        let is_of_it = |capacity: &CapacityFile| match (&eval, &tested) {
+            (Some(eval), _) => capacity.is_of(eval),
+            (None, is_there) => is_there.is_none(),
+        };
+        let capacity = existing(CAPACITY_JSON).and_then(|path| {
+            let capacity = CapacityFile::read(&path).map_err(told).ok()?;
+            if !is_of_it(&capacity) {
+                warn(&format!(
+                    "{}: it is not of the robots of the {EVAL_JSON} beside it; left out",
+                    path.display()
+                ));
+                return None;
+            }
+            Some(capacity)
+        });
+        Findings { eval, audit, capacity }
+    }
+}
+
+/// Everything for a page.
+#[derive(Clone, Debug)]
+pub struct Gathered {
+    /// The runs.
+    pub runs: Vec<Dossier>,
+    /// What was found of several runs together, above their folders.
+    pub together: Findings,
+}
+
+/// Reads runs and what lies beside them; `warn` is told what cannot be read. Without `with_lives` no images are needed.
+///
+/// # Errors
+/// What is wrong with a run, or with its images.
+pub fn gather(
+    archives: &[PathBuf],
+    data: Option<&Path>,
+    with_lives: bool,
+    warn: &dyn Fn(&str),
+) -> Result<Gathered, Error> {
+    let mut runs = Vec::new();
+    for path in archives {
+        let run = RunFile::read(path)?;
+        let folder = path.parent().unwrap_or(Path::new(""));
+        let progress = match path.with_file_name(METRICS).exists() {
+            true => Progress::of(&run, path).map_err(|error| warn(&format!("{error}; left out"))).ok(),
+            false => None,
+        };
+        let whereabouts = Whereabouts::given(data).and_of(path);
+        let images = if with_lives { images(&run, path, &whereabouts)? } else { Vec::new() };
+        let findings = Findings::read(folder, &[&run], warn);
+        runs.push(Dossier { path: path.clone(), run, progress, findings, images });
+    }
+    different(runs.iter().map(|dossier| (dossier.path.as_path(), &dossier.run)))?;
+    let together = match archives.len() {
+        0 | 1 => Findings::default(),
+        _ => {
+            let all: Vec<&RunFile> = runs.iter().map(|dossier| &dossier.run).collect();
+            Findings::read(&folder::above(archives), &all, warn)
+        }
+    };
+    Ok(Gathered { runs, together })
+}
+
+/// The training images, or one of each class if they are many.
+fn images(run: &RunFile, path: &Path, whereabouts: &Whereabouts) -> Result<Vec<(String, Grid<f64>)>, Error> {
+    let hint = |error: Error| match &error.hint {
+        None => error.hint("or --lives 0 for a report without moving pictures".to_string()),
+        Some(_) => error,
+    };
+    let dataset = load_dataset_of(Some(&run.dataset), &run.config, whereabouts, &[Split::Train]);
+    let dataset = dataset.map_err(hint)?;
+    let mut shown: Vec<ImageRef> = run.training_images.clone();
+    if shown.len() > MOST_IMAGES {
+        let mut classes = Vec::new();
+        shown.retain(|image| {
+            let is_first = !classes.contains(&image.label);
+            classes.push(image.label);
+            is_first
+        });
+    }
+    replay::check_length(&run.config, shown.len()).map_err(hint)?;
+    let one = |image: &ImageRef| {
+        let label = format!("{} (train {})", image.label, image.index);
+        let seen = see(&run.config, &dataset, Split::Train, image.index);
+        let seen = seen.map_err(|error| error.within("training_images").within(&path.display().to_string()));
+        Ok((label, seen?))
+    };
+    shown.iter().map(one).collect()
+}
+
+impl Dossier {
+    /// The life of a robot under the images.
+    pub fn record(&self, robot: &Robot) -> Recording {
+        let config = &self.run.config;
+        let fresh = config.protocol.life == Life::Fresh;
+        record(&robot.id, &robot.body, &config.physics, &config.protocol, fresh, &self.images)
+    }
+
+    /// Seconds that the run took, and offspring it made; none without a metrics.csv.
+    pub fn effort(&self) -> Option<(f64, f64)> {
+        let last = self.progress.as_ref()?.moments.last()?;
+        Some((last.seconds, last.evaluations))
+    }
+
+    /// Robots that differ most from each other: the fittest, then in turn the one whose body is farthest from all before
+    /// (in voxels that differ), among those fitter than 0.
+    pub fn most_different(&self, count: usize) -> Vec<&Robot> {
+        let able = || self.run.elites.iter().filter(|robot| robot.objective > 0.0);
+        let mut chosen: Vec<&Robot> =
+            self.run.best().filter(|best| best.objective > 0.0).into_iter().collect();
+        while !chosen.is_empty() && chosen.len() < count {
+            let nearest =
+                |robot: &Robot| chosen.iter().map(|other| distance(robot, other)).min().unwrap_or(0);
+            match able().max_by_key(|robot| nearest(robot)).filter(|robot| nearest(robot) > 0) {
+                Some(robot) => chosen.push(robot),
+                None => break,
+            }
+        }
+        chosen
+    }
+}
+
+/// Voxels in which two bodies of a size differ.
+fn distance(a: &Robot, b: &Robot) -> usize {
+    a.body.voxels().cells().iter().zip(b.body.voxels().cells()).filter(|(a, b)| a != b).count()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::store::samples;
+
+    fn dossier(robots: &[(&str, f64)]) -> Dossier {
+        let (path, run) = (PathBuf::from("run.json"), samples::run(robots));
+        Dossier { path, run, progress: None, findings: Findings::default(), images: Vec::new() }
+    }
+
+    #[test]
+    fn the_most_different_begin_with_the_fittest_and_leave_out_who_fails() {
+        let dossier = dossier(&[("a", 1.0), ("b", 9.0), ("c", -1.0), ("d", 2.0)]);
+        let chosen: Vec<&str> = dossier.most_different(9).iter().map(|robot| robot.id.as_str()).collect();
+        assert_eq!(chosen[0], "b");
+        assert!(!chosen.contains(&"c") && chosen.len() <= 3, "{chosen:?}");
+        let [a, d] = [0, 3].map(|place| distance(&dossier.run.elites[place], &dossier.run.elites[1]));
+        assert_eq!(chosen.get(1), Some(&if d >= a { "d" } else { "a" }));
+    }
+
+    #[test]
+    fn of_equals_the_first_is_the_best() {
+        let dossier = dossier(&[("a", 1.0), ("b", 9.0), ("c", 9.0)]);
+        assert_eq!(dossier.run.best().map(|robot| robot.id.as_str()), Some("b"));
+        assert_eq!(dossier.most_different(1)[0].id, "b");
+    }
+
+    #[test]
+    fn a_report_of_what_there_is_leaves_out_what_cannot_be_read() {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join(EVAL_JSON), "{").unwrap();
+        let told = std::cell::RefCell::new(Vec::new());
+        let findings = Findings::read(folder.path(), &[], &|text| told.borrow_mut().push(text.to_string()));
+        assert!(findings.eval.is_none() && findings.audit.is_none() && findings.capacity.is_none());
+        assert!(told.borrow().len() == 1 && told.borrow()[0].contains("eval.json"), "{told:?}");
+    }
+}

@@ -1,0 +1,334 @@
+//! `morphcog simulate`: any body under any stimuli.
+
+use crate::base::Grid;
+use crate::base::error::Error;
+use crate::base::files::{read_text, write_atomically};
+use crate::body::Body;
+use crate::config::reading;
+use crate::sim::{Physics, Start, System, World};
+use crate::store::folder;
+use crate::task::protocol::{MAX_COLUMN, MAX_ROW, MAX_STEPS};
+use serde::de::{Error as _, IgnoredAny, SeqAccess, Visitor};
+use serde::{Deserialize, Deserializer};
+use std::fmt;
+use std::path::Path;
+
+/// A body, what it sees, and for how long. The keys of a reference trajectory are understood too; its results are
+/// passed over.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Scenario {
+    /// The body, rows of 0…6.
+    pub body: Body,
+    /// One stimulus for the whole life: H × W in [0, 1].
+    stimulus: Option<Grid<f64>>,
+    /// Or several, each shown for `switch_every` control steps, again from the first after the last.
+    #[serde(default, deserialize_with = "bounded")]
+    stimuli: Option<Vec<Grid<f64>>>,
+    switch_every: Option<u64>,
+    /// Whether the robot goes back to its initial state at every switch.
+    #[serde(default)]
+    reset_between: bool,
+    /// Grid column of the body's left edge.
+    #[serde(default = "paper_column")]
+    start_column: i64,
+    /// Grid row of its bottom row; 2 is on the ground.
+    start_row: Option<u32>,
+    /// Control steps in all.
+    control_steps: Option<u64>,
+    /// The constants of the simulator, where they differ from the defaults.
+    #[serde(default)]
+    physics: Physics,
+    #[serde(default, rename = "name")]
+    _name: IgnoredAny,
+    #[serde(default, rename = "world_width")]
+    _world_width: IgnoredAny,
+    #[serde(default, rename = "unstable_at")]
+    _unstable_at: IgnoredAny,
+    #[serde(default, rename = "com")]
+    _com: IgnoredAny,
+    #[serde(default, rename = "points")]
+    _points: IgnoredAny,
+    #[serde(default, rename = "displacement_voxels")]
+    _displacement: IgnoredAny,
+    #[serde(default, rename = "displacement_voxels_shifted_world")]
+    _displacement_shifted: IgnoredAny,
+}
+
+/// Most memory that stimuli may need \[bytes\].
+const MOST_STIMULI: usize = 128 << 20;
+
+/// Reads stimuli as long as they need no more memory than [`MOST_STIMULI`].
+fn bounded<'de, D: Deserializer<'de>>(reader: D) -> Result<Option<Vec<Grid<f64>>>, D::Error> {
+    struct Stimuli;
+    impl<'de> Visitor<'de> for Stimuli {
+        type Value = Vec<Grid<f64>>;
+        fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
+            f.write_str("a list of stimuli")
+        }
+        fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<Self::Value, A::Error> {
+            let (mut stimuli, mut bytes) = (Vec::new(), 0);
+            while let Some(stimulus) = list.next_element::<Grid<f64>>()? {
+                // The pixels and their allocation, and the place in the list, which grows by doubling.
+                bytes += stimulus.area() * size_of::<f64>() + 16 + 2 * size_of::<Grid<f64>>();
+                if bytes > MOST_STIMULI {
+                    let (count, pixels) = (stimuli.len(), stimulus.area());
+                    let (most, each) = (MOST_STIMULI >> 20, if pixels == 1 { "pixel" } else { "pixels" });
+                    return Err(A::Error::custom(format!(
+                        "expected stimuli that need at most {most} MB of memory: {count} of {pixels} {each} do"
+                    )));
+                }
+                stimuli.push(stimulus);
+            }
+            Ok(stimuli)
+        }
+    }
+    struct Perhaps;
+    impl<'de> Visitor<'de> for Perhaps {
+        type Value = Option<Vec<Grid<f64>>>;
+        fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
+            f.write_str("a list of stimuli")
+        }
+        fn visit_none<E>(self) -> Result<Self::Value, E> {
+            Ok(None)
+        }
+        fn visit_unit<E>(self) -> Result<Self::Value, E> {
+            Ok(None)
+        }
+        fn visit_some<D: Deserializer<'de>>(self, reader: D) -> Result<Self::Value, D::Error> {
+            reader.deserialize_seq(Stimuli).map(Some)
+        }
+    }
+    reader.deserialize_option(Perhaps)
+}
+
+fn paper_column() -> i64 {
+    493
+}
+
+/// Default length of a life: ten actuation cycles.
+const CONTROL_STEPS: u64 = 500;
+
+impl Scenario {
+    /// Reads a scenario.
+    ///
+    /// # Errors
+    /// What is wrong with the file, with its line and key.
+    pub fn read(path: &Path) -> Result<Self, Error> {
+        let text = read_text(path).map_err(|error| Error::reading(path, &error))?;
+        Scenario::parse(&text, &path.display().to_string())
+    }
+
+    /// Reads its text; `name` stands in messages.
+    ///
+    /// # Errors
+    /// As [`Scenario::read`].
+    pub fn parse(text: &str, name: &str) -> Result<Self, Error> {
+        let scenario: Scenario = reading::read_json(text, name)?;
+        scenario.check().map_err(|error| error.within(name))?;
+        Ok(scenario)
+    }
+
+    fn check(&self) -> Result<(), Error> {
+        let refuse = |text: String| Err(Error::input(text));
+        self.physics.validate().map_err(|error| Error::input(format!("physics.{error}")))?;
+        if self.body.counts().total == 0 {
+            return refuse("body: expected at least one voxel that is not empty".to_string());
+        }
+        match (&self.stimulus, &self.stimuli, self.switch_every) {
+            (Some(_), Some(_), _) => {
+                return refuse("stimuli: expected either stimulus or stimuli, not both".to_string());
+            }
+            (_, Some(stimuli), _) if stimuli.is_empty() => {
+                return refuse("stimuli: expected at least one stimulus".to_string());
+            }
+            (_, Some(_), None | Some(0)) => {
+                return refuse("switch_every: expected 1 or more control steps with stimuli".to_string());
+            }
+            (_, None, Some(_)) => return refuse("switch_every: expected only with stimuli".to_string()),
+            (_, None, _) if self.reset_between => {
+                return refuse("reset_between: expected only with stimuli".to_string());
+            }
+            _ => {}
+        }
+        for (index, stimulus) in self.stimuli().iter().enumerate() {
+            let key =
+                if self.stimuli.is_some() { format!("stimuli[{index}]") } else { "stimulus".to_string() };
+            let (height, width) = (self.body.height(), self.body.width());
+            if (stimulus.height(), stimulus.width()) != (height, width) {
+                let (rows, columns) = (stimulus.height(), stimulus.width());
+                return refuse(format!(
+                    "{key}: {rows} × {columns} pixels, expected {height} × {width} as the body"
+                ));
+            }
+            if let Some(((row, column), pixel)) =
+                stimulus.iter().find(|(_, pixel)| !(0.0..=1.0).contains(*pixel))
+            {
+                return refuse(format!("{key}: row {row}, column {column}: {pixel}, expected 0 to 1"));
+            }
+        }
+        let ground = self.physics.ground_row;
+        if let Some(row) = self.start_row.filter(|row| !(ground..=MAX_ROW).contains(row)) {
+            return refuse(format!("start_row: {row}, expected {ground} (on the ground) to {MAX_ROW}"));
+        }
+        if self.control_steps() > u64::from(MAX_STEPS) {
+            let key = if self.control_steps.is_some() { "control_steps" } else { "switch_every" };
+            let steps = self.control_steps();
+            return refuse(format!("{key}: {steps} control steps in all, expected at most {MAX_STEPS}"));
+        }
+        if !(-MAX_COLUMN..=MAX_COLUMN).contains(&self.start_column) {
+            return refuse(format!("start_column: expected −{MAX_COLUMN} to {MAX_COLUMN}"));
+        }
+        Ok(())
+    }
+
+    /// What is shown, in turn; nothing if all is dark.
+    pub fn stimuli(&self) -> &[Grid<f64>] {
+        self.stimuli.as_deref().unwrap_or(self.stimulus.as_slice())
+    }
+
+    /// The constants of its simulator.
+    pub fn physics(&self) -> &Physics {
+        &self.physics
+    }
+
+    /// Control steps of the life.
+    pub fn control_steps(&self) -> u64 {
+        let shown = self.switch_every.map(|every| every.saturating_mul(self.stimuli().len() as u64));
+        self.control_steps.or(shown).unwrap_or(CONTROL_STEPS)
+    }
+}
+
+/// Lives the scenario; `line` gets the CSV's lines: `step,com_x,com_y`, then the centre of mass \[world units\] before
+/// the first and after every control step.
+///
+/// # Errors
+/// [`crate::base::error::ErrorKind::Unstable`] if the life ends early, and what `line` says.
+pub fn simulate(scenario: &Scenario, mut line: impl FnMut(String) -> Result<(), Error>) -> Result<(), Error> {
+    line("step,com_x,com_y\n".to_string())?;
+    let mut row = |step: u64, [x, y]: [f64; 2]| line(format!("{step},{},{}\n", digits17(x), digits17(y)));
+    let physics = &scenario.physics;
+    let start_row = scenario.start_row.unwrap_or(physics.ground_row);
+    let start = Start { column: scenario.start_column, row: start_row };
+    let mut world = World::new(System::new(&scenario.body, physics.clone()), start);
+    let offset = scenario.start_column as f64 * physics.cell_size;
+    let place = |world: &World| {
+        let [x, y] = world.centre_of_mass();
+        [x + offset, y]
+    };
+    let stimuli = scenario.stimuli();
+    row(0, place(&world))?;
+    for step in 0..scenario.control_steps() {
+        let every = scenario.switch_every.unwrap_or(u64::MAX);
+        if step % every == 0 && !stimuli.is_empty() {
+            let index = (step / every) % stimuli.len() as u64;
+            world.set_stimulus(&stimuli[index as usize]);
+            if scenario.reset_between {
+                world.reset();
+            }
+        }
+        world.step().map_err(|unstable| {
+            // With resets the life's own clock starts again; what is reported counts the scenario's steps.
+            let unstable = crate::sim::Unstable { control_step: step, ..unstable };
+            Error::unstable(unstable.to_string())
+        })?;
+        row(step + 1, place(&world))?;
+    }
+    Ok(())
+}
+
+/// Writes the CSV of a scenario's file to a file, also of a life that ends unstable, up to its end.
+///
+/// # Errors
+/// As [`Scenario::read`] and [`simulate`], and if the file cannot be written, or is the scenario's.
+pub fn to_file(from: &Path, path: &Path) -> Result<(), Error> {
+    let scenario = &Scenario::read(from)?;
+    if path.exists() && path.canonicalize().ok() == from.canonicalize().ok() {
+        let text =
+            format!("--out {}: expected another name: this would overwrite the scenario", path.display());
+        return Err(Error::usage(text));
+    }
+    folder::writable(path)?;
+    let mut text = String::new();
+    let outcome = simulate(scenario, |line| {
+        text.push_str(&line);
+        Ok(())
+    });
+    write_atomically(path, text.as_bytes()).map_err(|error| Error::writing(path, &error))?;
+    outcome
+}
+
+/// A number with 17 significant digits, which name every f64.
+pub fn digits17(value: f64) -> String {
+    // Nothing has no sign.
+    let value = value + 0.0;
+    let before = if value == 0.0 { 0.0 } else { libm::log10(value.abs()).floor() };
+    let decimals = (16.0 - before).clamp(0.0, 40.0) as usize;
+    format!("{value:.decimals$}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn seventeen_digits_name_every_number() {
+        for value in
+            [19.9605633802817, 1.0 / 3.0, 1e-9, -123456.789, 0.1 + 0.2, 0.0, 1e20, 9.99999999999999999]
+        {
+            assert_eq!(digits17(value).parse::<f64>().unwrap(), value, "{}", digits17(value));
+        }
+        assert_eq!(digits17(0.5), "0.50000000000000000");
+    }
+
+    fn refused(text: &str) -> String {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("scenario.json");
+        std::fs::write(&path, text).unwrap();
+        Scenario::read(&path).unwrap_err().message
+    }
+
+    #[test]
+    fn what_is_wrong_with_a_scenario_is_said_with_its_key() {
+        assert!(refused("{}").contains("missing field `body`"));
+        assert!(refused("{\"body\": [[3, 9]]}").contains("body"));
+        assert!(refused("{\"body\": [[0, 0]]}").contains("not empty"));
+        assert!(refused("{\"body\": [[3]],\n\"control_step\": 5}").contains(":2: "));
+        assert!(refused("{\"body\": [[3]], \"stimulus\": [[0.5, 1]]}").contains("1 × 2 pixels"));
+        assert!(refused("{\"body\": [[3]], \"stimulus\": [[1.5]]}").contains("expected 0 to 1"));
+        assert!(refused("{\"body\": [[3]], \"stimuli\": [[[1]]]}").contains("switch_every"));
+        assert!(refused("{\"body\": [[3]], \"start_row\": 1}").contains("start_row"));
+        assert!(refused("{\"body\": [[3]], \"stimuli\": 7}").contains("a list"));
+        let null = Scenario::parse("{\"body\": [[3]], \"stimuli\": null}", "scenario.json").unwrap();
+        assert!(null.stimuli().is_empty());
+    }
+
+    #[test]
+    fn stimuli_are_bounded_by_the_memory_that_they_need() {
+        // As a file of 240 MB: forty million of them took 3.7 GB. Refused while it is read: this one has no end.
+        let many = 2_000_000;
+        let text = format!("{{\"body\": [[3]], \"switch_every\": 1, \"stimuli\": [{}", "[[1]],".repeat(many));
+        let error = Scenario::parse(&text, "scenario.json").unwrap_err().message;
+        assert!(error.starts_with("scenario.json:1: stimuli") && error.contains("128 MB"), "{error}");
+        let some = format!(
+            "{{\"body\": [[3]], \"switch_every\": 1, \"stimuli\": [{}[[1]]]}}",
+            "[[1]],".repeat(99_999)
+        );
+        assert_eq!(Scenario::parse(&some, "scenario.json").unwrap().control_steps(), 100_000);
+    }
+
+    #[test]
+    fn a_scenario_that_would_not_end_is_refused_with_its_key() {
+        let refused = |keys: &str| refused(&format!("{{\"body\": [[3]], {keys}}}"));
+        let blown = "\"physics\": {\"blow_up_extent\": 1e10, \"time_step\": 0.5}, \"control_steps\": 2";
+        assert!(
+            refused(blown).contains("physics.blow_up_extent = 10000000000: expected at most 1000 times cell")
+        );
+        let substeps = refused("\"physics\": {\"substeps\": 4000000000}");
+        assert!(substeps.contains("physics.substeps = 4000000000: expected a whole number from 1 to 1000"));
+        assert!(refused("\"control_steps\": 1000001").contains("control_steps: 1000001"));
+        let shown = refused("\"stimuli\": [[[1]], [[0]]], \"switch_every\": 600000");
+        assert!(shown.contains("switch_every: 1200000 control steps in all, expected at most 1000000"));
+        assert!(refused("\"start_row\": 4000000000").contains("start_row: 4000000000, expected 2"));
+    }
+}

@@ -1,0 +1,139 @@
+//! The paper's table, ours beside the paper's.
+
+use crate::analysis::published;
+use crate::base::error::Error;
+use crate::base::files::write_atomically;
+use crate::baseline::curve::Crossing;
+use crate::store::capacity::CapacityFile;
+use crate::store::eval::EvalFile;
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+
+/// A row: a task.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Row {
+    /// The task, as "0|1".
+    pub task: String,
+    /// Robots tested.
+    pub robots: usize,
+    /// Those of them that are physical.
+    pub physical: usize,
+    /// Robots that were audited to find them.
+    pub audited: usize,
+    /// Their mean accuracy \[%\]; none of no robots.
+    pub accuracy: Option<f64>,
+    /// Its standard deviation over the robots \[%\].
+    pub deviation: Option<f64>,
+    /// Its 95 % bootstrap interval \[%\].
+    pub interval: Option<[f64; 2]>,
+    /// Mean balanced accuracy \[%\].
+    pub balanced_accuracy: Option<f64>,
+    /// Always answering the larger group \[%\].
+    pub larger_group: Option<f64>,
+    /// Capacity in neurons; none: no match.
+    pub mlp: Option<Crossing>,
+    /// Capacity in kernels; none: no match.
+    pub cnn: Option<Crossing>,
+    /// The paper's accuracy \[%\].
+    pub paper_accuracy: Option<f64>,
+    /// The paper's capacity in neurons; none: no match.
+    pub paper_mlp: Option<f64>,
+    /// The paper's capacity in kernels; none: no match.
+    pub paper_cnn: Option<f64>,
+}
+
+impl Row {
+    /// With what the paper says only.
+    pub(crate) fn new(dataset: &str, task: &str) -> Self {
+        let paper = published::row(dataset, task);
+        Row {
+            task: task.to_string(),
+            robots: 0,
+            physical: 0,
+            audited: 0,
+            accuracy: None,
+            deviation: None,
+            interval: None,
+            balanced_accuracy: None,
+            larger_group: None,
+            mlp: None,
+            cnn: None,
+            paper_accuracy: paper.map(|row| row.accuracy),
+            paper_mlp: paper.and_then(|row| row.mlp),
+            paper_cnn: paper.and_then(|row| row.cnn),
+        }
+    }
+
+    /// Adds what a test and networks found.
+    pub(crate) fn fill(&mut self, report: &EvalFile, capacity: &CapacityFile) {
+        if let Some(mean) = report.means.get(&self.task) {
+            self.robots = mean.robots;
+            self.accuracy = Some(100.0 * mean.accuracy);
+            self.deviation = mean.standard_deviation.map(|share| 100.0 * share);
+            self.interval = mean.interval.map(|shares| shares.map(|share| 100.0 * share));
+            self.balanced_accuracy = Some(100.0 * mean.balanced_accuracy);
+        }
+        self.larger_group = report.baselines.get(&self.task).map(|known| 100.0 * known.larger_group);
+        let task = capacity.tasks.iter().find(|task| task.task == self.task);
+        let of = |network: &str| task?.worth(network)?;
+        (self.mlp, self.cnn) = (of("mlp"), of("cnn"));
+    }
+}
+
+/// Writes `reproduction.json` and `reproduction.csv` into a folder; the files.
+///
+/// # Errors
+/// If they cannot be written.
+pub(crate) fn write(folder: &Path, scale: f64, rows: &[Row]) -> Result<Vec<PathBuf>, Error> {
+    let about = serde_json::json!({
+        "format": "morphcog-reproduction", "format_version": 1, "program_version": env!("CARGO_PKG_VERSION"),
+        "scale": scale, "rows": rows,
+    });
+    let json = folder.join("reproduction.json");
+    write_file(&json, format!("{about:#}\n").as_bytes())?;
+    let csv = folder.join("reproduction.csv");
+    let failed = |error: csv::Error| Error::other(error.to_string());
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    let header = [
+        "task",
+        "robots",
+        "physical",
+        "audited",
+        "accuracy",
+        "deviation",
+        "accuracy_low",
+        "accuracy_high",
+        "balanced_accuracy",
+        "larger_group",
+        "mlp",
+        "cnn",
+        "paper_accuracy",
+        "paper_mlp",
+        "paper_cnn",
+    ];
+    writer.write_record(header).map_err(failed)?;
+    for row in rows {
+        let [low, high] = row.interval.map_or([None, None], |interval| interval.map(Some));
+        let text = |number: Option<f64>| number.map_or(String::new(), |number| number.to_string());
+        let size = |size: Option<Crossing>| match size {
+            Some(Crossing::At(size)) => size.to_string(),
+            Some(below) => below.to_string(),
+            None => String::new(),
+        };
+        let accuracies = [row.accuracy, row.deviation, low, high, row.balanced_accuracy, row.larger_group];
+        let papers = [row.paper_accuracy, row.paper_mlp, row.paper_cnn];
+        let mut cells =
+            vec![row.task.clone(), row.robots.to_string(), row.physical.to_string(), row.audited.to_string()];
+        cells.extend(accuracies.map(text));
+        cells.extend([row.mlp, row.cnn].map(size));
+        cells.extend(papers.map(text));
+        writer.write_record(&cells).map_err(failed)?;
+    }
+    let text = writer.into_inner().map_err(|error| Error::other(error.to_string()))?;
+    write_file(&csv, &text)?;
+    Ok(vec![json, csv])
+}
+
+fn write_file(path: &Path, content: &[u8]) -> Result<(), Error> {
+    write_atomically(path, content).map_err(|error| Error::writing(path, &error))
+}

@@ -1,0 +1,78 @@
+//! [`Criteria`]: what an audit does and how it judges.
+
+use crate::base::error::Error;
+use crate::config::reading;
+use crate::task::perturbation::Sizes;
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+
+/// What an audit does and how it judges; keys of `--criteria FILE` and `--set`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Criteria {
+    /// A walk this far or shorter is no answer \[voxel lengths\]. Default 3, as in `eval`.
+    pub threshold: f64,
+    /// In a changed life a walk the right way that is longer than this is an answer still \[voxel lengths\]: else whoever
+    /// walks just beyond the threshold would be called an exploiter for a hair's breadth. Default 1.5.
+    pub least_walk: f64,
+    /// A walker answers at least this share of its training images, right or wrong. Default 0.75.
+    pub least_answered: f64,
+    /// A life persists if at least this share of the images answered right still is. Default 0.9.
+    pub least_kept: f64,
+    /// And if the walks under them, together, are at least this share of what they were. Default 0.5.
+    pub least_distance: f64,
+    /// Who keeps at least this share of the lives in a changed world (stiffness, friction, gravity, pixels) is robust; if
+    /// another change breaks it all the same, it exploits what was changed, else it is fragile. Default 0.75.
+    pub least_robust: f64,
+    /// Which changes, and how large.
+    pub perturbations: Sizes,
+}
+
+impl Default for Criteria {
+    fn default() -> Self {
+        Criteria {
+            threshold: 3.0,
+            least_walk: 1.5,
+            least_answered: 0.75,
+            least_kept: 0.9,
+            least_distance: 0.5,
+            least_robust: 0.75,
+            perturbations: Sizes::default(),
+        }
+    }
+}
+
+impl Criteria {
+    /// Reads criteria from TOML (or JSON, if the name ends so); keys that are not there have their defaults.
+    ///
+    /// # Errors
+    /// What is wrong, with file, line and key.
+    pub fn load(path: Option<&Path>, overrides: &[String]) -> Result<Self, Error> {
+        reading::load(path, overrides, Criteria::check)
+    }
+
+    /// Checks what a type cannot.
+    pub(crate) fn check(&self) -> Result<(), Error> {
+        let Sizes { raised, time_step, share, pixels, least_sensors: _, seed } = &self.perturbations;
+        let shares = [self.least_answered, self.least_kept, self.least_distance, self.least_robust];
+        let refuse = |text: &str| Err(Error::input(format!("audit criteria: {text}")));
+        if ![self.threshold, self.least_walk].iter().all(|walk| (0.0..1e9).contains(walk)) {
+            return refuse("threshold, least_walk: expected 0 or more voxel lengths");
+        }
+        if !shares.iter().all(|share| (0.0..=1.0).contains(share)) {
+            return refuse("least_…: expected shares from 0 to 1");
+        }
+        if raised.iter().any(|&rows| rows == 0 || rows > 100) {
+            return refuse("perturbations.raised: expected 1 to 100 rows");
+        }
+        if time_step.iter().any(|&by| !(2..=64).contains(&by)) {
+            return refuse("perturbations.time_step: expected divisors from 2 to 64");
+        }
+        if !(*share > 0.0 && *share < 1.0) || *pixels > 1000 || *seed > i64::MAX as u64 {
+            return refuse(
+                "perturbations: expected share above 0 and below 1, pixels up to 1000, seed below 2⁶³",
+            );
+        }
+        Ok(())
+    }
+}

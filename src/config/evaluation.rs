@@ -1,0 +1,90 @@
+//! [`EvaluationConfig`]: a config's section `[evaluation]`, and what goes with `fitness = "response"`.
+
+use crate::base::error::Error;
+use crate::body::{Body, key};
+use crate::config::Config;
+use crate::task::fitness::Fitness;
+use crate::task::protocol::Life;
+use serde::{Deserialize, Serialize};
+
+/// Fewest images that a response is measured under: two pairs in each condition, to differ.
+pub(crate) const LEAST_IMAGES: usize = 8;
+
+/// How robots are evaluated: section `[evaluation]`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct EvaluationConfig {
+    /// How answers to several images are judged together. Default the smallest margin, the paper's.
+    pub fitness: Fitness,
+}
+
+impl EvaluationConfig {
+    pub(crate) fn is_default(&self) -> bool {
+        *self == EvaluationConfig::default()
+    }
+}
+
+impl Config {
+    /// Whether fitness is a response: of the bodies' probes, under random images.
+    pub fn measures_response(&self) -> bool {
+        self.evaluation.fitness == Fitness::Response
+    }
+
+    /// What stands for a body among those that were evaluated: itself, or what a response is measured with, so that a
+    /// gait is evaluated once, whatever its sensors are.
+    pub(crate) fn known_key(&self, body: &Body) -> [u8; 16] {
+        match self.measures_response() {
+            true => key(&body.probe()),
+            false => key(body),
+        }
+    }
+
+    /// By what the fitness of a body is multiplied: 1, or, if it is a response, the square root of the number of its
+    /// soft voxels and sensors, up to a third of its grid. Of two gaits that respond as strongly, the one with more places can
+    /// be taught more: together they can move it by at most so much (Cauchy's inequality), and by that only if all respond
+    /// alike. More than a third leave too little that walks.
+    pub(crate) fn worth_of_places(&self, body: &Body) -> f64 {
+        match self.measures_response() {
+            true => {
+                let most = body.height() * body.width() / 3;
+                (body.probe().counts().sensor.clamp(1, most.max(1)) as f64).sqrt()
+            }
+            false => 1.0,
+        }
+    }
+
+    /// Checks what goes with `fitness = "response"`, if it is asked for.
+    pub(crate) fn validate_response(&self) -> Result<(), Error> {
+        if self.evaluation.fitness != Fitness::Response {
+            return Ok(());
+        }
+        let (tasks, classes) = (self.grouping()?.tasks().len(), self.classes().len());
+        let per_class = self.data.images_per_class;
+        let (images_key, found, images) = match &self.data.train_images {
+            Some(named) => ("data.train_images", format!("{} images", named.len()), named.len()),
+            None => ("data.images_per_class", per_class.to_string(), per_class.saturating_mul(classes)),
+        };
+        let enough = format!("an even number of training images in all, {LEAST_IMAGES} or more");
+        let checks = [
+            (
+                tasks > 1,
+                "task.splits",
+                format!("{tasks} tasks"),
+                "one task, as groups = [[0], [1]]: a response belongs to no task",
+            ),
+            (
+                self.protocol.life == Life::Sequential,
+                "protocol.life",
+                "\"sequential\"".to_string(),
+                "\"fresh\"",
+            ),
+            (images < LEAST_IMAGES || images % 2 == 1, images_key, found, enough.as_str()),
+        ];
+        match checks.into_iter().find(|(is_wrong, ..)| *is_wrong) {
+            Some((_, key, found, expected)) => Err(Error::input(format!(
+                "{key} = {found}: with evaluation.fitness = \"response\" expected {expected}"
+            ))),
+            None => Ok(()),
+        }
+    }
+}

@@ -1,0 +1,363 @@
+//! [`Config`]: everything a run depends on, in TOML or JSON with the same keys.
+
+pub mod audit;
+pub mod capacity;
+pub mod evaluation;
+pub mod pair;
+pub mod reading;
+pub mod task;
+pub mod train;
+pub mod validation;
+
+use crate::base::error::Error;
+use crate::base::files::read_text;
+use crate::body::MAX_SIDE;
+use crate::config::evaluation::EvaluationConfig;
+use crate::config::reading::Format;
+pub use crate::config::task::TaskConfig;
+use crate::config::train::TrainConfig;
+use crate::config::validation::LEAST;
+use crate::config::validation::ValidationConfig;
+use crate::data::builtin::BuiltinDigits;
+use crate::data::files::check_name;
+use crate::genome::{BodySpec, MutationParams};
+use crate::qd::EmitterParams;
+use crate::sim::Physics;
+use crate::task::evaluation::Savings;
+use crate::task::grouping::Grouping;
+use crate::task::protocol::{MAX_COLUMN, MAX_ROW, MAX_STEPS, Protocol};
+use crate::task::stimulus::StimulusParams;
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+
+/// Configs that are part of the program: name and text.
+pub const BUILT_IN: [(&str, &str); 6] = [
+    ("quickstart.toml", include_str!("../../configs/quickstart.toml")),
+    ("zero_one.toml", include_str!("../../configs/zero_one.toml")),
+    ("zero_one_published.toml", include_str!("../../configs/zero_one_published.toml")),
+    ("four_digit.toml", include_str!("../../configs/four_digit.toml")),
+    ("four_digit_published.toml", include_str!("../../configs/four_digit_published.toml")),
+    ("gaits.toml", include_str!("../../configs/gaits.toml")),
+];
+
+/// Largest whole number of a config, its seed's, too: TOML's are signed.
+pub const MAX_NUMBER: u64 = i64::MAX as u64;
+
+/// Largest offset of the QD score either way \[voxel lengths\].
+const MAX_OFFSET: f64 = 1e9;
+
+/// Everything a run depends on. Every key but `task` and `data` has a default.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Config {
+    /// Seed of all chance. Default 1.
+    #[serde(default = "one")]
+    pub seed: u64,
+    /// Generations, the first (random) one included. Default 30,000, the paper's.
+    #[serde(default = "paper_generations")]
+    pub generations: u64,
+    /// Size of bodies and which are valid.
+    #[serde(default)]
+    pub body: BodyConfig,
+    /// Which classes are to be told apart.
+    pub task: TaskConfig,
+    /// Which images.
+    pub data: DataConfig,
+    /// From image to stimulus.
+    #[serde(default)]
+    pub stimulus: StimulusParams,
+    /// How images are shown.
+    #[serde(default)]
+    pub protocol: Protocol,
+    /// Sizes of generations.
+    #[serde(default)]
+    pub map_elites: EmitterParams,
+    /// How the archive is measured.
+    #[serde(default)]
+    pub archive: ArchiveConfig,
+    /// Sizes of mutations.
+    #[serde(default)]
+    pub genome: MutationParams,
+    /// Savings that change no archive.
+    #[serde(default)]
+    pub savings: Savings,
+    /// When the run is saved.
+    #[serde(default)]
+    pub checkpoint: CheckpointConfig,
+    /// How robots are evaluated. Left out of files where it is the default.
+    #[serde(default, skip_serializing_if = "EvaluationConfig::is_default")]
+    pub evaluation: EvaluationConfig,
+    /// How robots are chosen on images that they were not trained on. Left out of files where it is the default.
+    #[serde(default, skip_serializing_if = "ValidationConfig::is_default")]
+    pub validation: ValidationConfig,
+    /// How gaits are taught by `morphcog train`. Left out of files where it is the default.
+    #[serde(default, skip_serializing_if = "TrainConfig::is_default")]
+    pub train: TrainConfig,
+    /// Constants of the simulator.
+    #[serde(default)]
+    pub physics: Physics,
+}
+
+fn one() -> u64 {
+    1
+}
+
+fn paper_generations() -> u64 {
+    30_000
+}
+
+/// Size of bodies and which are valid: section `[body]`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct BodyConfig {
+    /// Rows. Default 14.
+    pub height: usize,
+    /// Columns. Default 14.
+    pub width: usize,
+    /// Least number of muscle voxels. Default 3.
+    pub min_muscles: usize,
+}
+
+impl Default for BodyConfig {
+    fn default() -> Self {
+        BodyConfig { height: 14, width: 14, min_muscles: 3 }
+    }
+}
+
+/// Which images: section `[data]`.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DataConfig {
+    /// "mnist", "fashion-mnist", "builtin", or a name of one's own.
+    pub dataset: String,
+    /// Folder of its files, if neither `--data` nor `MORPHCOG_DATA` says one, nor the run where they were. Default `data/<dataset>`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub dir: Option<PathBuf>,
+    /// Training images by index, in the order in which a sequential life sees them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub train_images: Option<Vec<usize>>,
+    /// Without `train_images`: this many of each class, drawn by the run's seed. Default 1.
+    #[serde(default = "one_image")]
+    pub images_per_class: usize,
+    /// The built-in digits, for `dataset = "builtin"`.
+    #[serde(default)]
+    pub builtin: BuiltinDigits,
+}
+
+impl DataConfig {
+    /// The same with another dataset, in which its folder and its images mean nothing; its own changes nothing.
+    #[must_use]
+    pub(crate) fn of(&self, dataset: &str) -> Self {
+        if dataset == self.dataset {
+            return self.clone();
+        }
+        DataConfig { dataset: dataset.to_string(), dir: None, train_images: None, ..self.clone() }
+    }
+}
+
+fn one_image() -> usize {
+    1
+}
+
+/// How the archive is measured: section `[archive]`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct ArchiveConfig {
+    /// Fitness that counts as nothing in the QD score \[voxel lengths\]; a smaller one counts less than nothing. Default 0.
+    pub qd_offset: f64,
+    /// Elites of each task that stay in the archive after each generation, the fittest. Default: all. Few make a search greedy.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub keep: Option<usize>,
+}
+
+/// When the run is saved: section `[checkpoint]`. Whichever comes first.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct CheckpointConfig {
+    /// Every so many generations. Default 1000.
+    pub generations: u64,
+    /// Every so many seconds. Default 60.
+    pub seconds: f64,
+}
+
+impl Default for CheckpointConfig {
+    fn default() -> Self {
+        CheckpointConfig { generations: 1000, seconds: 60.0 }
+    }
+}
+
+/// A number at or below a place that is too large for a file, with its key.
+fn too_large(place: &str, value: &serde_json::Value) -> Option<(String, u64)> {
+    use serde_json::Value::{Array, Number, Object};
+    let below = |key: &str| match place {
+        "" => key.to_string(),
+        section => format!("{section}.{key}"),
+    };
+    match value {
+        Number(number) => {
+            number.as_u64().filter(|&number| number > MAX_NUMBER).map(|number| (place.to_string(), number))
+        }
+        Object(keys) => keys.iter().find_map(|(key, value)| too_large(&below(key), value)),
+        Array(values) => values.iter().find_map(|value| too_large(place, value)),
+        _ => None,
+    }
+}
+
+impl Config {
+    /// Reads a config: a file (JSON if its name ends in `.json`, else TOML) or, if there is none, the built-in config of
+    /// that name; then sets `overrides` (`key=value`, keys as `map_elites.parents`).
+    ///
+    /// # Errors
+    /// What is wrong, with file, line and key.
+    pub fn load(name: &str, overrides: &[String]) -> Result<Self, Error> {
+        let path = Path::new(name);
+        let built_in =
+            || BUILT_IN.iter().find(|(own, _)| *own == name || own.strip_suffix(".toml") == Some(name));
+        let text = match read_text(path) {
+            Ok(text) => text,
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => match built_in() {
+                Some((_, text)) => (*text).to_string(),
+                None => {
+                    let names = BUILT_IN.map(|(name, _)| name).join(", ");
+                    return Err(Error::input(format!(
+                        "{name}: there is no such file, and no built-in config of that name"
+                    ))
+                    .hint(format!("the built-in configs are {names}")));
+                }
+            },
+            Err(error) => return Err(Error::reading(path, &error)),
+        };
+        Config::parse(&text, name, overrides)
+    }
+
+    /// Reads a config's text; `name` stands in messages and, by its ending, tells JSON from TOML.
+    ///
+    /// # Errors
+    /// As [`Config::load`].
+    pub fn parse(text: &str, name: &str, overrides: &[String]) -> Result<Self, Error> {
+        let format = if name.ends_with(".json") { Format::Json } else { Format::Toml };
+        let config: Config = reading::read(text, format, name).map_err(|error| {
+            let is_lacking = error.message.contains("missing field");
+            let hint = "morphcog config zero_one.toml prints a whole one to start your own from".to_string();
+            if is_lacking { error.hint(hint) } else { error }
+        })?;
+        reading::changed(config, overrides, Config::validate, |error| {
+            let place = reading::place(text, format, name, &error.message);
+            error.within(&place)
+        })
+    }
+
+    /// The config as TOML, every key with its value.
+    pub fn to_toml(&self) -> String {
+        toml::to_string_pretty(self).expect("every field is a number, text, list or table, which TOML has")
+    }
+
+    /// What the results of a generation depend on: without how many there are, and what changes no result.
+    pub(crate) fn essence(&self) -> Config {
+        Config {
+            generations: 1,
+            savings: Savings::default(),
+            validation: ValidationConfig::default(),
+            checkpoint: CheckpointConfig::default(),
+            data: DataConfig { dir: None, ..self.data.clone() },
+            ..self.clone()
+        }
+    }
+
+    /// What bodies evolution makes.
+    pub fn body_spec(&self) -> BodySpec {
+        let BodyConfig { height, width, min_muscles } = self.body;
+        BodySpec { height, width, min_muscles }
+    }
+
+    /// The tasks.
+    ///
+    /// # Errors
+    /// If the section `[task]` makes none.
+    pub fn grouping(&self) -> Result<Grouping, Error> {
+        self.task.grouping()
+    }
+
+    /// All classes of the task, in its order.
+    pub fn classes(&self) -> Vec<u8> {
+        self.task.classes()
+    }
+
+    /// Checks what a type cannot.
+    pub(crate) fn validate(&self) -> Result<(), Error> {
+        let refuse = |key: &str, found: String, expected: &str| {
+            Err(Error::input(format!("{key} = {found}: expected {expected}")))
+        };
+        let numbers = serde_json::to_value(self).map_err(|error| Error::input(error.to_string()))?;
+        if let Some((key, number)) = too_large("", &numbers) {
+            return refuse(&key, number.to_string(), &format!("0 to {MAX_NUMBER}"));
+        }
+        self.grouping()?;
+        self.physics.validate().map_err(|error| Error::input(format!("physics.{error}")))?;
+        self.stimulus.validate().map_err(|error| Error::input(format!("stimulus: {error}")))?;
+        check_name(&self.data.dataset).map_err(|error| Error::input(format!("data.dataset: {error}")))?;
+        self.data.builtin.check().map_err(|error| Error::input(format!("data.builtin: {error}")))?;
+        for (key, side) in [("body.height", self.body.height), ("body.width", self.body.width)] {
+            if side == 0 || side > MAX_SIDE {
+                return refuse(key, side.to_string(), &format!("1 to {MAX_SIDE}"));
+            }
+        }
+        self.train.validate()?;
+        if self.body.min_muscles > self.body.height * self.body.width {
+            return refuse(
+                "body.min_muscles",
+                self.body.min_muscles.to_string(),
+                "no more than there are voxels",
+            );
+        }
+        self.validate_response()?;
+        if self.validation.images < LEAST {
+            let expected = format!("{} or more", LEAST);
+            return refuse("validation.images", self.validation.images.to_string(), &expected);
+        }
+        if self.generations == 0 {
+            return refuse("generations", self.generations.to_string(), "1 or more");
+        }
+        if self.map_elites.parents == 0 && self.map_elites.newcomers == 0 {
+            return refuse(
+                "map_elites.parents",
+                "0".to_string(),
+                "1 or more, or map_elites.newcomers above 0",
+            );
+        }
+        if !(1..=MAX_STEPS).contains(&self.protocol.control_steps) {
+            let expected = format!("1 to {MAX_STEPS}");
+            return refuse("protocol.control_steps", self.protocol.control_steps.to_string(), &expected);
+        }
+        if !(self.physics.ground_row..=MAX_ROW).contains(&self.protocol.start_row) {
+            let expected = format!("{} (on the ground) to {MAX_ROW}", self.physics.ground_row);
+            return refuse("protocol.start_row", self.protocol.start_row.to_string(), &expected);
+        }
+        if !(-MAX_COLUMN..=MAX_COLUMN).contains(&self.protocol.start_column) {
+            let expected = format!("−{MAX_COLUMN} to {MAX_COLUMN}");
+            return refuse("protocol.start_column", self.protocol.start_column.to_string(), &expected);
+        }
+        // Sums over an archive must stay finite: files cannot hold what is not.
+        if self.archive.qd_offset.is_nan() || self.archive.qd_offset.abs() > MAX_OFFSET {
+            let expected = format!("a number from −{MAX_OFFSET} to {MAX_OFFSET}");
+            return refuse("archive.qd_offset", self.archive.qd_offset.to_string(), &expected);
+        }
+        if self.archive.keep == Some(0) {
+            return refuse("archive.keep", "0".to_string(), "1 or more");
+        }
+        if self.checkpoint.generations == 0 {
+            return refuse("checkpoint.generations", "0".to_string(), "1 or more");
+        }
+        if !(self.checkpoint.seconds >= 0.0 && self.checkpoint.seconds.is_finite()) {
+            return refuse(
+                "checkpoint.seconds",
+                self.checkpoint.seconds.to_string(),
+                "a finite number, 0 or above",
+            );
+        }
+        if self.data.images_per_class == 0 || self.data.train_images.as_ref().is_some_and(Vec::is_empty) {
+            return refuse("data", "no images".to_string(), "at least one training image of each class");
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,548 @@
+//! Reading configs: errors with file, line and key; `key=value` overrides.
+
+use crate::base::error::Error;
+use crate::base::files::read_text;
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use std::path::Path;
+
+/// How a config is written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Format {
+    Toml,
+    Json,
+}
+
+/// Reads a value; `name` is the file's, for messages.
+pub(crate) fn read<T: DeserializeOwned>(text: &str, format: Format, name: &str) -> Result<T, Error> {
+    match format {
+        Format::Toml => {
+            let reader = toml::Deserializer::parse(text)
+                .map_err(|error| refused(name, line_at(text, error.span()), "", error.message()))?;
+            serde_path_to_error::deserialize(reader).map_err(|error| {
+                let inner = error.inner();
+                refused(name, line_at(text, inner.span()), &error.path().to_string(), inner.message())
+            })
+        }
+        Format::Json => read_json(text, name),
+    }
+}
+
+/// Reads an object from JSON; `name` is the file's, for messages.
+pub(crate) fn read_json<T: DeserializeOwned>(text: &str, name: &str) -> Result<T, Error> {
+    let text = text.trim_start_matches('\u{feff}');
+    // A list would be taken for an object without keys.
+    let begin = text.len() - text.trim_start().len();
+    if !text[begin..].starts_with('{') {
+        return Err(refused(name, line_at(text, Some(begin..begin)), "", "expected a JSON object, {…}"));
+    }
+    json(text, name)
+}
+
+/// Reads a list from JSON; `name` is the file's, for messages.
+pub(crate) fn read_json_list<T: DeserializeOwned>(text: &str, name: &str) -> Result<Vec<T>, Error> {
+    json(text, name)
+}
+
+fn json<T: DeserializeOwned>(text: &str, name: &str) -> Result<T, Error> {
+    let mut reader = serde_json::Deserializer::from_str(text);
+    let value = serde_path_to_error::deserialize(&mut reader).map_err(|error| {
+        let line = Some(error.inner().line()).filter(|&line| line > 0);
+        let message = error.inner().to_string();
+        // serde_json ends its messages with the place, which is said already.
+        let message = message.split(" at line ").next().unwrap_or_default();
+        refused(name, line, &error.path().to_string(), message)
+    })?;
+    let tail = reader.end().map_err(|error| refused(name, Some(error.line()), "", "text after the end"));
+    tail.map(|()| value)
+}
+
+/// Reads a JSON file of ours of a `format`, not of a version newer than `newest`.
+pub(crate) fn read_versioned<T: DeserializeOwned>(
+    text: &str,
+    name: &str,
+    format: &str,
+    newest: u32,
+) -> Result<T, Error> {
+    /// What every version has, to tell a newer or foreign file before its details are refused.
+    #[derive(serde::Deserialize)]
+    struct Head {
+        format: Option<String>,
+        format_version: Option<u32>,
+    }
+    let head: Head = read_json(text, name)?;
+    if head.format.as_deref() != Some(format) {
+        let file = format.strip_prefix("morphcog-").unwrap_or(format);
+        let text = format!("{name}: not a {file}.json of morphcog: expected \"format\": \"{format}\"");
+        return Err(Error::input(text));
+    }
+    if head.format_version.is_none_or(|version| version > newest) {
+        let text = format!("{name}: format_version: expected at most {newest}");
+        return Err(
+            Error::input(text).hint("it was written by a newer morphcog; update this one".to_string())
+        );
+    }
+    read_json(text, name)
+}
+
+/// Reads settings, a JSON file if its name ends in `.json`, else TOML; keys that are not in it have their defaults.
+/// Then sets `overrides` (`key=value`), and checks what types cannot.
+pub(crate) fn load<T: Serialize + DeserializeOwned + Default>(
+    path: Option<&Path>,
+    overrides: &[String],
+    check: impl Fn(&T) -> Result<(), Error>,
+) -> Result<T, Error> {
+    let Some(path) = path else {
+        return changed(T::default(), overrides, check, |error| error);
+    };
+    let text = read_text(path).map_err(|error| Error::reading(path, &error))?;
+    let is_json = path.extension().is_some_and(|ending| ending == "json");
+    let format = if is_json { Format::Json } else { Format::Toml };
+    let name = path.display().to_string();
+    let settings = read(&text, format, &name)?;
+    changed(settings, overrides, check, |error| {
+        let place = place(&text, format, &name, &error.message);
+        error.within(&place)
+    })
+}
+
+fn refused(name: &str, line: Option<usize>, key: &str, message: &str) -> Error {
+    let line = line.map_or(String::new(), |line| format!(":{line}"));
+    // A key that is not read to its end is a question mark.
+    let key = key.trim_end_matches(['?', '.']);
+    let key = if key.is_empty() { String::new() } else { format!("{key}: ") };
+    Error::input(format!("{name}{line}: {key}{}", spoken(message)))
+}
+
+/// A message of serde's with the type that it expected in words.
+fn spoken(message: &str) -> String {
+    let message = message.trim_end();
+    let words = [
+        ("u8", "a whole number from 0 to 255"),
+        ("u16", "a whole number from 0 to 65535"),
+        ("a nonzero u16", "a whole number from 1 to 65535"),
+        ("u32", "a whole number from 0 to 4294967295"),
+        ("u64", "a whole number from 0"),
+        ("usize", "a whole number from 0"),
+        ("i64", "a whole number"),
+        ("f64", "a number"),
+        ("a boolean", "true or false"),
+        ("a sequence", "a list"),
+    ];
+    for (kind, words) in words {
+        if let Some(start) = message.strip_suffix(&format!("expected {kind}")) {
+            return format!("{start}expected {words}");
+        }
+    }
+    message.to_string()
+}
+
+fn line_at(text: &str, span: Option<std::ops::Range<usize>>) -> Option<usize> {
+    Some(text.get(..span?.start)?.matches('\n').count() + 1)
+}
+
+/// Where in a file that stands which a message about it begins with, as `body.height = 0: …` or `stage 2: keep = 0: …`:
+/// the file and, in TOML, the line.
+pub(crate) fn place(text: &str, format: Format, name: &str, message: &str) -> String {
+    let line = (format == Format::Toml).then(|| line_of(text, message)).flatten();
+    line.map_or(name.to_string(), |line| format!("{name}:{line}"))
+}
+
+/// The key that a message begins with.
+fn key_of(message: &str) -> &str {
+    message.split([' ', ':']).next().unwrap_or_default()
+}
+
+/// List, number and what follows of a message that begins with one of a list, as `stage 2: keep = 0: …`.
+fn numbered(message: &str) -> Option<(&str, &str, &str)> {
+    let (place, rest) = message.split_once(": ")?;
+    let (list, number) = place.split_once(' ')?;
+    is_number(number).then_some((list, number, rest))
+}
+
+/// The line of what a message begins with, or of the innermost table around it that the text has.
+fn line_of(text: &str, message: &str) -> Option<usize> {
+    let table = toml::de::DeTable::parse(text).ok()?.into_inner();
+    let (mut value, key) = match numbered(message) {
+        Some((list, number, rest)) => {
+            let place = number.parse::<usize>().ok()?.checked_sub(1)?;
+            (table.get(list)?.get_ref().get(place)?, Some(key_of(rest)))
+        }
+        None => {
+            let (first, rest) = match key_of(message).split_once('.') {
+                Some((first, rest)) => (first, Some(rest)),
+                None => (key_of(message), None),
+            };
+            (table.get(first)?, rest)
+        }
+    };
+    for part in key.iter().flat_map(|key| key.split('.')) {
+        let Some(inner) = value.get_ref().get(part) else { break };
+        value = inner;
+    }
+    line_at(text, Some(value.span()))
+}
+
+/// Settings with `overrides` set, checked. What is wrong is said of the override that causes it; `in_file` puts the place in
+/// the file to an error that would be there without any.
+pub(crate) fn changed<T: Serialize + DeserializeOwned>(
+    settings: T,
+    overrides: &[String],
+    check: impl Fn(&T) -> Result<(), Error>,
+    in_file: impl Fn(Error) -> Error,
+) -> Result<T, Error> {
+    if overrides.is_empty() {
+        return check(&settings).map(|()| settings).map_err(in_file);
+    }
+    let root = match toml::Value::try_from(&settings) {
+        Ok(root) => root,
+        // Only a number from JSON can be too large for TOML; the check says which one it is.
+        Err(error) => {
+            return Err(in_file(check(&settings).err().unwrap_or(Error::input(error.to_string()))));
+        }
+    };
+    let attempt = |overrides: &[&String]| -> Result<T, Failure> {
+        let mut root = root.clone();
+        for assignment in overrides {
+            set::<T>(&mut root, assignment)
+                .map_err(|text| Failure::Of(Error::usage(format!("--set {assignment}: {text}"))))?;
+        }
+        let read = serde_path_to_error::deserialize(root)
+            .map_err(|error| Failure::Together(Error::usage(spoken(error.inner().message()))));
+        read.and_then(|settings| check(&settings).map(|()| settings).map_err(Failure::Together))
+    };
+    let all: Vec<&String> = overrides.iter().collect();
+    let error = match attempt(&all) {
+        Ok(settings) => return Ok(settings),
+        Err(Failure::Of(error)) => return Err(error),
+        Err(Failure::Together(error)) => error,
+    };
+    // Whether it stays the same under only some of them; and if not, whether all is well then.
+    let stays = |some: &[&String]| match attempt(some) {
+        Ok(_) => (false, true),
+        Err(Failure::Of(_)) => (false, false),
+        Err(Failure::Together(other)) => (other.message == error.message, false),
+    };
+    let without = |place: usize| {
+        let others: Vec<&String> = [&all[..place], &all[place + 1..]].concat();
+        stays(&others)
+    };
+    let causes: Vec<(&String, bool)> = (0..all.len())
+        .map(|place| (all[place], without(place)))
+        .filter(|(_, (stays, _))| !stays)
+        .map(|(assignment, (_, is_well))| (assignment, is_well))
+        .collect();
+    let named = causes.iter().rfind(|(assignment, _)| sets(assignment, &error.message));
+    let healed = || causes.iter().rfind(|(_, is_well)| *is_well);
+    // Where two do the same harm, neither can be left away: then it is the first of them.
+    let first = || (0..all.len()).rev().find(|&count| !stays(&all[..count]).0).map(|count| all[count]);
+    let culprit = named.or_else(healed).or(causes.last()).map(|(assignment, _)| *assignment).or_else(first);
+    Err(match culprit {
+        Some(assignment) => error.within(&format!("--set {assignment}")),
+        None => in_file(error),
+    })
+}
+
+/// Why settings cannot be.
+enum Failure {
+    /// One override is to blame, and named.
+    Of(Error),
+    /// What they make together.
+    Together(Error),
+}
+
+/// Whether an override sets what a message begins with: the key itself, the table it is of, or a key of the table that is
+/// meant.
+fn sets(assignment: &str, message: &str) -> bool {
+    let set = assignment.split_once('=').map_or(assignment, |(set, _)| set).trim();
+    let key = match numbered(message) {
+        Some((list, number, rest)) => format!("{list}.{number}.{}", key_of(rest)),
+        None => key_of(message).to_string(),
+    };
+    let is_within = |inner: &str, outer: &str| {
+        inner.strip_prefix(outer).is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
+    };
+    is_within(set, &key) || is_within(&key, set)
+}
+
+/// Changes one key: `map_elites.parents=10`, or `stage.2.keep=3` in the second of a list; without a value, `keep=`, it has
+/// its default again. What follows the sign is read as TOML, and as plain text if it is none.
+fn set<T: DeserializeOwned>(root: &mut toml::Value, assignment: &str) -> Result<(), String> {
+    let Some((key, text)) = assignment.split_once('=') else {
+        return Err("expected key=value, as in --set map_elites.parents=10".to_string());
+    };
+    let (key, text) = (key.trim(), text.trim());
+    let value = (!text.is_empty()).then(|| {
+        toml::from_str::<toml::Table>(&format!("value = {text}"))
+            .ok()
+            .and_then(|mut table| table.remove("value"))
+            .unwrap_or_else(|| toml::Value::String(text.to_string()))
+    });
+    let mut before = String::new();
+    let mut place = &mut *root;
+    let mut parts = key.split('.').peekable();
+    while let Some(part) = parts.next() {
+        let is_last = parts.peek().is_none();
+        let is_of_list = parts.peek().is_some_and(|next| is_number(next));
+        place = match place {
+            toml::Value::Table(table) => {
+                if is_last && value.is_none() {
+                    let was_there = table.remove(part).is_some();
+                    return if was_there { Ok(()) } else { is_known::<T>(root, key) };
+                }
+                table.entry(part).or_insert_with(|| match is_of_list {
+                    true => toml::Value::Array(Vec::new()),
+                    false => toml::Value::Table(toml::Table::new()),
+                })
+            }
+            toml::Value::Array(list) => {
+                let count = list.len();
+                let index = part.parse::<usize>().ok().and_then(|number| number.checked_sub(1));
+                let Some(index) = index.filter(|&index| index < count) else {
+                    // Not a list at all, perhaps.
+                    is_known::<T>(root, &before)?;
+                    return Err(match count {
+                        0 => format!("there is no {before} {part}: there is none at all"),
+                        _ => format!("there is no {before} {part}: expected a number from 1 to {count}"),
+                    });
+                };
+                if is_last && value.is_none() {
+                    list.remove(index);
+                    return Ok(());
+                }
+                &mut list[index]
+            }
+            _ => return Err(format!("{key} is not a key: there is nothing below {before}")),
+        };
+        if !before.is_empty() {
+            before.push('.');
+        }
+        before.push_str(part);
+    }
+    if let Some(value) = value {
+        *place = value;
+    }
+    Ok(())
+}
+
+fn is_number(part: &str) -> bool {
+    !part.is_empty() && part.bytes().all(|byte| byte.is_ascii_digit())
+}
+
+/// Whether settings have a key, which may be at its default and left out: if not, its reader says so.
+fn is_known<T: DeserializeOwned>(root: &toml::Value, key: &str) -> Result<(), String> {
+    let mut root = root.clone();
+    let mut place = &mut root;
+    for part in key.split('.') {
+        let inner = match place {
+            toml::Value::Table(table) => {
+                Some(table.entry(part).or_insert_with(|| toml::Value::Table(toml::Table::new())))
+            }
+            toml::Value::Array(list) => {
+                part.parse::<usize>().ok().and_then(|number| list.get_mut(number.checked_sub(1)?))
+            }
+            _ => None,
+        };
+        let Some(inner) = inner else { return Ok(()) };
+        place = inner;
+    }
+    match serde_path_to_error::deserialize::<_, T>(root) {
+        Err(error) => {
+            let message = error.inner().message();
+            let is_meant = |part: &str| message.starts_with(&format!("unknown field `{part}`"));
+            if key.split('.').any(is_meant) { Err(spoken(message)) } else { Ok(()) }
+        }
+        Ok(_) => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde::Deserialize;
+
+    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+    #[serde(deny_unknown_fields)]
+    struct Outer {
+        name: String,
+        #[serde(default)]
+        inner: Inner,
+    }
+
+    #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+    #[serde(deny_unknown_fields, default)]
+    struct Inner {
+        count: u8,
+        list: Vec<f64>,
+        maybe: Option<i64>,
+    }
+
+    fn toml_error(text: &str) -> String {
+        read::<Outer>(text, Format::Toml, "own.toml").unwrap_err().message
+    }
+
+    fn json_error(text: &str) -> String {
+        read::<Outer>(text, Format::Json, "own.json").unwrap_err().message
+    }
+
+    #[test]
+    fn what_is_wrong_in_toml_is_said_with_file_line_and_key() {
+        let error = toml_error("name = 'a'\n\n[inner]\ncount = 'x'\n");
+        assert!(
+            error.starts_with("own.toml:4: inner.count: ")
+                && error.ends_with("expected a whole number from 0 to 255"),
+            "{error}"
+        );
+        let error = toml_error("name = 'a'\n[inner]\nlist = [1.0,\n 2.0,\n 'x']\n");
+        assert!(error.starts_with("own.toml:5: inner.list[2]: "), "{error}");
+        let error = toml_error("name = 'a'\n[inner]\ncont = 1\n");
+        assert!(
+            error.starts_with("own.toml:3: ") && error.contains("cont") && error.contains("count"),
+            "{error}"
+        );
+        assert!(toml_error("name = 'a'\n[inner]\ncount = 256\n").starts_with("own.toml:3: inner.count: "));
+        assert!(toml_error("name = 'a'\nname = = 3\n").starts_with("own.toml:2: "));
+        assert!(toml_error("").contains("name"));
+    }
+
+    #[test]
+    fn what_is_wrong_in_json_is_said_with_file_line_and_key() {
+        let error = json_error("{\"name\": \"a\",\n\"inner\": {\n\"count\": -1}}");
+        assert!(
+            error.starts_with("own.json:3: inner.count: ")
+                && error.ends_with("expected a whole number from 0 to 255"),
+            "{error}"
+        );
+        assert!(!error.contains("column"), "the place is said once: {error}");
+        let error = json_error("{\"name\": \"a\",\n\"inner\": {\"list\": [1, null]}}");
+        assert!(error.starts_with("own.json:2: inner.list[1]: "), "{error}");
+        assert!(json_error("{\"name\": \"a\"}\n}").starts_with("own.json:2: "));
+        assert!(json_error("{\"name\": \"a\"").starts_with("own.json:1: "));
+        assert!(json_error("{\"nam\": \"a\"}").contains("nam"));
+        // Cut off, or no object at all: nothing of the reader's own words.
+        assert_eq!(json_error("{"), "own.json:1: EOF while parsing an object");
+        assert_eq!(json_error("{\"name\": \"a\",}"), "own.json:1: trailing comma");
+        for text in ["", " [\"a\"]", "7"] {
+            assert_eq!(json_error(text), "own.json:1: expected a JSON object, {…}");
+        }
+        assert_eq!(json_error("\n\n7"), "own.json:3: expected a JSON object, {…}");
+        // As some editors begin their files.
+        assert!(read::<Outer>("\u{feff}{\"name\": \"a\"}", Format::Json, "own.json").is_ok());
+        assert!(read::<Outer>("\u{feff}name = 'a'", Format::Toml, "own.toml").is_ok());
+    }
+
+    #[test]
+    fn what_cannot_be_is_said_with_the_line_it_stands_on() {
+        let text = "seed = 3\n\n[body]\nwidth = 5\nheight = 0\n\n[[stage]]\nkeep = 1\n\n[[stage]]\n\nkeep = 0\n[task]\n";
+        let place = |message: &str| super::place(text, Format::Toml, "own.toml", message);
+        assert_eq!(place("seed = 3: expected another"), "own.toml:1");
+        assert_eq!(place("body.height = 0: expected 1"), "own.toml:5");
+        assert_eq!(place("stage 2: keep = 0: expected 1"), "own.toml:12");
+        // Where the key itself is missing, or the whole table is meant.
+        assert_eq!(place("stage 2: expected generations: only"), "own.toml:10");
+        assert_eq!(place("body.depth: expected it"), "own.toml:3");
+        assert_eq!(place("task: expected groups"), "own.toml:13");
+        assert_eq!(place("physics.gravity = 0: expected more"), "own.toml");
+        assert_eq!(place("stage 3: keep = 0"), "own.toml");
+        assert_eq!(super::place("{}", Format::Json, "own.json", "seed = 3: expected"), "own.json");
+    }
+
+    /// What is said of an [`Outer`] whose number is not below the first of its list, or negative.
+    fn blamed(count: u8, list: &[f64], overrides: &[&str]) -> String {
+        let inner = Inner { count, list: list.to_vec(), maybe: None };
+        let overrides: Vec<String> = overrides.iter().map(|text| text.to_string()).collect();
+        let check = |outer: &Outer| {
+            let Inner { count, list, maybe } = &outer.inner;
+            let refuse = |text: String| Err(Error::input(text));
+            match (list.first(), maybe) {
+                (Some(first), _) if f64::from(*count) >= *first => {
+                    refuse(format!("inner.count = {count}: expected less than {first}"))
+                }
+                (_, Some(maybe)) if *maybe < 0 => {
+                    refuse(format!("inner.maybe = {maybe}: expected 0 or more"))
+                }
+                _ => Ok(()),
+            }
+        };
+        let outer = Outer { name: "a".to_string(), inner };
+        let error = changed(outer, &overrides, check, |error| error.within("own.toml:7")).unwrap_err();
+        error.message.split(": ").next().unwrap_or_default().to_string()
+    }
+
+    #[test]
+    fn the_override_is_blamed_that_makes_what_cannot_be() {
+        let file = "own.toml:7";
+        assert_eq!(blamed(9, &[5.0], &[]), file);
+        assert_eq!(blamed(9, &[5.0], &["name=b"]), file, "one that changes nothing of it");
+        assert_eq!(blamed(3, &[5.0], &["name=b", "inner.count=9", "inner.maybe=1"]), "--set inner.count=9");
+        // Bad only together with the file, by a key that the message does not begin with.
+        assert_eq!(blamed(3, &[5.0], &["inner.list=[2]", "name=b"]), "--set inner.list=[2]");
+        assert_eq!(blamed(3, &[5.0], &["name=b", "inner.list.1=2"]), "--set inner.list.1=2");
+        // Bad only together: the one that the message is about; and the later one of a key.
+        assert_eq!(blamed(3, &[9.0], &["inner.count=5", "inner.list=[4]"]), "--set inner.count=5");
+        assert_eq!(blamed(3, &[9.0], &["inner.list=[4]", "inner.count=5"]), "--set inner.count=5");
+        assert_eq!(blamed(3, &[9.0], &["inner.count=10", "inner.count=11"]), "--set inner.count=11");
+        assert_eq!(blamed(3, &[9.0], &["inner.count=9", "inner.count=9"]), "--set inner.count=9");
+        // Of two that are bad, that of which the message is.
+        assert_eq!(blamed(3, &[9.0], &["inner.count=9", "inner.maybe=-1"]), "--set inner.count=9");
+        assert_eq!(blamed(3, &[9.0], &["inner.maybe=-1", "inner.count=9"]), "--set inner.count=9");
+        // One that another one has mended is not bad.
+        let mended = ["inner.count=9", "inner.maybe=-1", "inner.count=1"];
+        assert_eq!(blamed(3, &[9.0], &mended), "--set inner.maybe=-1");
+        for wrong in ["inner.cont=1", "inner.cont=", "inner.count=x", "inner.list.2=1", "inner.list.2="] {
+            let set = |others: &[&'static str]| blamed(3, &[9.0], &[&[wrong], others].concat());
+            assert_eq!(set(&[]), format!("--set {wrong}"));
+            assert_eq!(set(&["name=b"]), format!("--set {wrong}"));
+        }
+    }
+
+    #[test]
+    fn nesting_without_end_is_refused_and_no_stack_overflow() {
+        let deep = 200_000;
+        assert!(json_error(&format!("{{\"name\": {}", "[".repeat(deep))).contains("own.json"));
+        assert!(toml_error(&format!("name = {}", "[".repeat(deep))).contains("own.toml"));
+        assert!(toml_error(&format!("name = {}", "{a=".repeat(deep))).contains("own.toml"));
+        assert!(toml_error(&format!("{}b = 1", "a.".repeat(deep))).contains("own.toml"));
+    }
+
+    #[test]
+    fn one_key_is_set_and_the_others_stay() {
+        let outer = Outer { name: "a".to_string(), inner: Inner { count: 3, ..Inner::default() } };
+        let set =
+            |assignment: &str| changed(outer.clone(), &[assignment.to_string()], |_| Ok(()), |error| error);
+        assert_eq!(set("inner.count=4").unwrap().inner.count, 4);
+        assert_eq!(set(" inner.count = 4 ").unwrap().inner.count, 4);
+        assert_eq!(set("inner.list=[1.5, 2]").unwrap().inner.list, [1.5, 2.0]);
+        assert_eq!(set("inner.list=['x']").unwrap_err().kind, crate::base::error::ErrorKind::Usage);
+        // A key that is not there yet, and text with or without quotes.
+        assert_eq!(set("inner.maybe=-5").unwrap().inner.maybe, Some(-5));
+        assert_eq!(set("name=b c").unwrap().name, "b c");
+        assert_eq!(set("name=\"b=c\"").unwrap().name, "b=c");
+        assert_eq!(set("name=b").unwrap().inner, outer.inner);
+        for wrong in
+            ["inner.count", "inner.count=x", "inner.count=-1", "inner.cont=1", "name.x=1", "=1", "", "name="]
+        {
+            let error = set(wrong).unwrap_err();
+            assert!(error.message.starts_with(&format!("--set {wrong}: ")), "{}", error.message);
+        }
+    }
+    #[test]
+    fn an_item_of_a_list_is_set_by_its_number_and_a_key_unset_by_no_value() {
+        let inner = Inner { count: 3, list: vec![1.0, 2.0], maybe: Some(4) };
+        let outer = Outer { name: "a".to_string(), inner };
+        let set =
+            |assignment: &str| changed(outer.clone(), &[assignment.to_string()], |_| Ok(()), |error| error);
+        assert_eq!(set("inner.list.2=7").unwrap().inner.list, [1.0, 7.0]);
+        assert_eq!(set("inner.list.1=").unwrap().inner.list, [2.0]);
+        assert_eq!(set("inner.maybe=").unwrap().inner.maybe, None);
+        assert_eq!(set(" inner.maybe = ").unwrap().inner.maybe, None);
+        assert_eq!(set("inner=").unwrap().inner, Inner::default());
+        assert!(set("name=").unwrap_err().message.contains("missing field `name`"));
+        assert!(set("inner.list.3=7").unwrap_err().message.contains("from 1 to 2"));
+        assert!(set("inner.list.0=7").unwrap_err().message.contains("from 1 to 2"));
+        // What is at its default already may be left out of what is written.
+        let bare = Outer { name: "a".to_string(), inner: Inner::default() };
+        let bare = changed(bare.clone(), &["inner.maybe=".to_string()], |_| Ok(()), |error| error);
+        assert_eq!(bare.unwrap().inner, Inner::default());
+    }
+}

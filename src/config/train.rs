@@ -1,0 +1,72 @@
+//! [`TrainConfig`]: a config's section `[train]`.
+
+use crate::base::error::Error;
+use serde::{Deserialize, Serialize};
+
+/// How gaits are taught by `morphcog train`: section `[train]`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct TrainConfig {
+    /// Training images of each class that the model sees; only a few of them are shown to robots. Default 2000, or three
+    /// quarters of the images of the scarcest class if that is less: more make designs general, and cost little.
+    pub images_per_class: usize,
+    /// Rollouts under random images that measure a gait's response. Default 300: with fewer than two for each soft voxel and
+    /// sensor the slopes are mostly noise.
+    pub random_images: usize,
+    /// Rounds in which the response is measured around the latest design, and the lesson is solved again. Default 6: more seldom
+    /// help.
+    pub rounds: usize,
+    /// Training images that a round shows. Default 120: with fewer, slopes are noisier, and the constant is off.
+    pub images: usize,
+    /// Training images under which designs and challengers are compared, half of them near the boundary. Default 400: with fewer,
+    /// challengers win by knowing those by heart.
+    pub final_images: usize,
+    /// Bodies that challenge the best design, in sensors or in a few voxels of any material. Default 60; later ones win more seldom.
+    pub challengers: usize,
+    /// Rows up to which starts are raised, by turns, so that designs do not depend on the first touch of the ground. Default 2.
+    pub raised_starts: u32,
+    /// Whether half of the images are shown to robots without length limits, so that designs do not exploit those. Default true.
+    pub without_limits: bool,
+}
+
+impl Default for TrainConfig {
+    fn default() -> Self {
+        TrainConfig {
+            images_per_class: 2000,
+            random_images: 300,
+            rounds: 6,
+            images: 120,
+            final_images: 400,
+            challengers: 60,
+            raised_starts: 2,
+            without_limits: true,
+        }
+    }
+}
+
+/// Least number of random images: with fewer, nothing can be left out for the cross-validation.
+const LEAST_RANDOM_IMAGES: usize = 20;
+
+impl TrainConfig {
+    /// Whether a file needs not say it.
+    pub(crate) fn is_default(&self) -> bool {
+        *self == TrainConfig::default()
+    }
+
+    /// Checks what a type cannot.
+    pub(crate) fn validate(&self) -> Result<(), Error> {
+        let least = [
+            ("images_per_class", self.images_per_class, 1),
+            ("random_images", self.random_images, LEAST_RANDOM_IMAGES),
+            ("rounds", self.rounds, 1),
+            ("images", self.images, 2),
+            ("final_images", self.final_images, 2),
+        ];
+        match least.into_iter().find(|(_, value, least)| value < least) {
+            Some((key, value, least)) => {
+                Err(Error::input(format!("train.{key} = {value}: expected {least} or more")))
+            }
+            None => Ok(()),
+        }
+    }
+}

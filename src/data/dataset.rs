@@ -1,0 +1,292 @@
+//! Labelled images in two splits: MNIST, look-alikes of it, and the built-in digits.
+
+use crate::base::Grid;
+use crate::base::random::{Purpose, stream};
+use crate::data::builtin::{BuiltinDigits, BuiltinError};
+use crate::data::files;
+use crate::data::files::{FilesError, Place, StoredSplit};
+pub use crate::data::info::Split;
+use crate::data::info::{DatasetInfo, SplitInfo};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// Name of the built-in digits as a dataset.
+pub const BUILTIN: &str = "builtin";
+
+/// Why a dataset cannot be loaded, or does not have what it was asked for.
+#[derive(Debug, thiserror::Error)]
+pub enum DatasetError {
+    /// The files are not there or not right.
+    #[error(transparent)]
+    Files(#[from] FilesError),
+    /// There are no such built-in digits.
+    #[error(transparent)]
+    Builtin(#[from] BuiltinError),
+    /// The split was not asked for when the dataset was loaded.
+    #[error("{dataset}: the {split} images were not loaded")]
+    NotLoaded {
+        /// Name of the dataset.
+        dataset: String,
+        /// The split.
+        split: Split,
+    },
+    /// An index beyond the end of a split.
+    #[error("{dataset}: there is no {split} image {index}: there are {len}, counted from 0")]
+    Index {
+        /// Name of the dataset.
+        dataset: String,
+        /// The split.
+        split: Split,
+        /// The index asked for.
+        index: usize,
+        /// Number of images in the split.
+        len: usize,
+    },
+    /// Fewer images of a class than asked for.
+    #[error("{dataset}: {wanted} {split} images of class {class} were asked for, there are {found}")]
+    TooFew {
+        /// Name of the dataset.
+        dataset: String,
+        /// The split.
+        split: Split,
+        /// The class.
+        class: u8,
+        /// How many were asked for.
+        wanted: usize,
+        /// How many there are.
+        found: usize,
+    },
+}
+
+/// Labelled images, with one or both splits loaded.
+#[derive(Clone, Debug)]
+pub struct Dataset {
+    name: String,
+    /// The folder with its files; none of the built-in digits.
+    folder: Option<PathBuf>,
+    origin: String,
+    splits: BTreeMap<Split, Loaded>,
+}
+
+#[derive(Clone, Debug)]
+struct Loaded {
+    labels: Vec<u8>,
+    by_class: BTreeMap<u8, Vec<usize>>,
+    images: Images,
+}
+
+#[derive(Clone, Debug)]
+enum Images {
+    Stored(StoredSplit),
+    Drawn(BuiltinDigits),
+}
+
+impl Dataset {
+    /// Loads the wanted splits of a dataset: "builtin" (the default [`BuiltinDigits`]), "mnist", "fashion-mnist", or any
+    /// other name for IDX files of one's own. The files are looked for in the first of the `given` places (see
+    /// [`files::places`]) or, if none is given, in `data/<name>`; files of splits that are not wanted may be missing.
+    ///
+    /// # Errors
+    /// [`DatasetError::Files`] naming the file, where it was looked for, what was expected and what to do.
+    pub fn load(name: &str, given: &[Place], wanted: &[Split]) -> Result<Self, DatasetError> {
+        if name == BUILTIN {
+            return Dataset::builtin(BuiltinDigits::default(), wanted);
+        }
+        let place = files::choose(name, given)?;
+        let mut splits = BTreeMap::new();
+        for &split in wanted {
+            let (labels, stored) = files::load(name, &place, split)?;
+            splits.insert(split, Loaded::new(labels, Images::Stored(stored)));
+        }
+        Ok(Dataset { name: name.to_string(), folder: Some(place.path), origin: place.origin, splits })
+    }
+
+    /// Built-in digits with parameters of one's own. Images are drawn when they are asked for.
+    ///
+    /// # Errors
+    /// [`DatasetError::Builtin`] if the classes are not different digits.
+    pub fn builtin(digits: BuiltinDigits, wanted: &[Split]) -> Result<Self, DatasetError> {
+        digits.check()?;
+        let loaded = |&split: &Split| {
+            let labels = (0..).map_while(|i| digits.label(split, i)).collect();
+            (split, Loaded::new(labels, Images::Drawn(digits.clone())))
+        };
+        let splits = wanted.iter().map(loaded).collect();
+        Ok(Dataset { name: BUILTIN.to_string(), folder: None, origin: BUILTIN.to_string(), splits })
+    }
+
+    /// Name of the dataset.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// The folder it was read from; none of the built-in digits.
+    pub fn folder(&self) -> Option<&Path> {
+        self.folder.as_deref()
+    }
+
+    /// Name, folder, and who named that: for messages.
+    pub fn place(&self) -> String {
+        match &self.folder {
+            Some(folder) => format!("{} in {} ({})", self.name, folder.display(), self.origin),
+            None => self.name.clone(),
+        }
+    }
+
+    /// Number of images in a split; 0 if it was not loaded.
+    pub fn len(&self, split: Split) -> usize {
+        self.splits.get(&split).map_or(0, |loaded| loaded.labels.len())
+    }
+
+    /// Whether a split has no images or was not loaded.
+    pub fn is_empty(&self, split: Split) -> bool {
+        self.len(split) == 0
+    }
+
+    /// The image at an index of a split: 0 background … 255 ink, row 0 on top.
+    ///
+    /// # Errors
+    /// [`DatasetError::NotLoaded`] or [`DatasetError::Index`].
+    pub fn image(&self, split: Split, index: usize) -> Result<Grid<u8>, DatasetError> {
+        let image = match &self.loaded(split)?.images {
+            Images::Stored(stored) => stored.images.image(index),
+            Images::Drawn(digits) => digits.image(split, index),
+        };
+        image.ok_or_else(|| self.no_such(split, index))
+    }
+
+    /// The class of the image at an index of a split.
+    ///
+    /// # Errors
+    /// [`DatasetError::NotLoaded`] or [`DatasetError::Index`].
+    pub fn label(&self, split: Split, index: usize) -> Result<u8, DatasetError> {
+        let label = self.loaded(split)?.labels.get(index).copied();
+        label.ok_or_else(|| self.no_such(split, index))
+    }
+
+    /// Indices of all images of a class in a split, ascending; none if the split was not loaded.
+    pub fn indices_of(&self, split: Split, class: u8) -> &[usize] {
+        self.splits.get(&split).and_then(|loaded| loaded.by_class.get(&class)).map_or(&[], Vec::as_slice)
+    }
+
+    /// The classes that occur in a split, ascending; none if it was not loaded.
+    pub fn classes(&self, split: Split) -> Vec<u8> {
+        self.splits.get(&split).map_or_else(Vec::new, |loaded| loaded.by_class.keys().copied().collect())
+    }
+
+    /// SHA-256 of a split's content (see [`SplitInfo::fingerprint`]); `None` if it was not loaded.
+    pub fn fingerprint(&self, split: Split) -> Option<String> {
+        self.splits.get(&split).map(|loaded| match &loaded.images {
+            Images::Stored(stored) => stored.fingerprint.clone(),
+            Images::Drawn(digits) => digits.fingerprint(split),
+        })
+    }
+
+    /// What to record about the dataset.
+    pub fn info(&self) -> DatasetInfo {
+        let describe = |(&split, loaded): (&Split, &Loaded)| {
+            let (height, width, files) = match &loaded.images {
+                Images::Stored(stored) => (stored.images.height, stored.images.width, stored.files.clone()),
+                Images::Drawn(_) => (BuiltinDigits::SIDE, BuiltinDigits::SIDE, Vec::new()),
+            };
+            let fingerprint = self.fingerprint(split).expect("the split is loaded");
+            let per_class = loaded.by_class.iter().map(|(&class, indices)| (class, indices.len())).collect();
+            (split, SplitInfo { images: loaded.labels.len(), height, width, fingerprint, per_class, files })
+        };
+        let splits = self.splits.iter().map(describe).collect();
+        let source = self.folder.as_ref().map_or(BUILTIN.to_string(), |folder| folder.display().to_string());
+        let (name, origin) = (self.name.clone(), self.origin.clone());
+        DatasetInfo { name, source, origin, splits }
+    }
+
+    /// Draws `per_class` different images of each class by seed: first those of `classes[0]`, then those of
+    /// `classes[1]`, …; their indices. What is drawn of one class does not depend on the other classes asked for.
+    ///
+    /// # Errors
+    /// [`DatasetError::NotLoaded`], or [`DatasetError::TooFew`] if a class has fewer images.
+    pub fn draw(
+        &self,
+        split: Split,
+        classes: &[u8],
+        per_class: usize,
+        seed: u64,
+        generation: u64,
+    ) -> Result<Vec<usize>, DatasetError> {
+        self.loaded(split)?;
+        let mut drawn = Vec::new();
+        for &class in classes {
+            let all = self.indices_of(split, class);
+            if all.len() < per_class {
+                let (dataset, found) = (self.name.clone(), all.len());
+                return Err(DatasetError::TooFew { dataset, split, class, wanted: per_class, found });
+            }
+            let child = 256 * split.code() + u64::from(class);
+            let picked = stream(seed, Purpose::Images, generation, child).sample(all.len(), per_class);
+            drawn.extend(picked.into_iter().map(|i| all[i]));
+        }
+        Ok(drawn)
+    }
+
+    fn loaded(&self, split: Split) -> Result<&Loaded, DatasetError> {
+        self.splits.get(&split).ok_or_else(|| DatasetError::NotLoaded { dataset: self.name.clone(), split })
+    }
+
+    fn no_such(&self, split: Split, index: usize) -> DatasetError {
+        DatasetError::Index { dataset: self.name.clone(), split, index, len: self.len(split) }
+    }
+}
+
+impl Loaded {
+    fn new(labels: Vec<u8>, images: Images) -> Self {
+        let mut by_class = BTreeMap::<u8, Vec<usize>>::new();
+        for (index, &label) in labels.iter().enumerate() {
+            by_class.entry(label).or_default().push(index);
+        }
+        Loaded { labels, by_class, images }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn digits() -> Dataset {
+        Dataset::load(BUILTIN, &[], &Split::ALL).unwrap()
+    }
+
+    #[test]
+    fn draws_are_even_distinct_and_fixed_by_seed_and_generation() {
+        let data = digits();
+        let drawn = data.draw(Split::Test, &[4, 9], 100, 5, 0).unwrap();
+        let labels: Vec<u8> = drawn.iter().map(|&i| data.label(Split::Test, i).unwrap()).collect();
+        assert!(labels[..100].iter().all(|&l| l == 4) && labels[100..].iter().all(|&l| l == 9));
+        let mut distinct = drawn.clone();
+        distinct.sort_unstable();
+        distinct.dedup();
+        assert_eq!(distinct.len(), 200);
+        assert_eq!(drawn, data.draw(Split::Test, &[4, 9], 100, 5, 0).unwrap());
+        assert_eq!(drawn[..100], data.draw(Split::Test, &[4], 100, 5, 0).unwrap());
+        assert_ne!(drawn, data.draw(Split::Test, &[4, 9], 100, 5, 1).unwrap());
+        assert_ne!(drawn, data.draw(Split::Test, &[4, 9], 100, 6, 0).unwrap());
+        let error = data.draw(Split::Test, &[4], 501, 5, 0).unwrap_err();
+        assert!(matches!(error, DatasetError::TooFew { class: 4, wanted: 501, found: 500, .. }), "{error}");
+    }
+
+    #[test]
+    fn indices_and_splits_that_are_not_there_are_errors() {
+        let data = Dataset::load(BUILTIN, &[], &[Split::Train]).unwrap();
+        let error = data.image(Split::Train, 10_000).unwrap_err().to_string();
+        assert_eq!(error, "builtin: there is no train image 10000: there are 10000, counted from 0");
+        assert!(matches!(data.label(Split::Test, 0), Err(DatasetError::NotLoaded { .. })));
+        assert!(matches!(data.draw(Split::Test, &[1], 1, 1, 0), Err(DatasetError::NotLoaded { .. })));
+        assert_eq!((data.len(Split::Test), data.fingerprint(Split::Test)), (0, None));
+    }
+
+    #[test]
+    fn info_of_builtin_digits_goes_through_json() {
+        let info = digits().info();
+        assert_eq!(info.splits[&Split::Train].per_class[&3], 1000);
+        let text = serde_json::to_string(&info).unwrap();
+        assert_eq!(serde_json::from_str::<DatasetInfo>(&text).unwrap(), info);
+    }
+}

@@ -1,0 +1,79 @@
+//! What is recorded about a dataset, so that a result can be traced to the very images it came from.
+
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::fmt;
+
+/// What a run records about its dataset.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct DatasetInfo {
+    /// Name: "mnist", "fashion-mnist", "builtin" or the user's own.
+    pub name: String,
+    /// The folder it was read from, or "builtin".
+    pub source: String,
+    /// Who named that folder ("--data", "MORPHCOG_DATA", `[data] dir`, "default"), or "builtin".
+    pub origin: String,
+    /// The splits that were loaded.
+    pub splits: BTreeMap<Split, SplitInfo>,
+}
+
+/// What a run records about one split.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct SplitInfo {
+    /// Number of images.
+    pub images: usize,
+    /// Rows per image.
+    pub height: usize,
+    /// Columns per image.
+    pub width: usize,
+    /// SHA-256 of the content; for files: of the unpacked image file followed by the unpacked label file (the same
+    /// whether they are gzipped or not), for built-in digits: of their parameters.
+    pub fingerprint: String,
+    /// Number of images of every class that occurs.
+    pub per_class: BTreeMap<u8, usize>,
+    /// The files as found, images first; none for built-in digits.
+    pub files: Vec<FileInfo>,
+}
+
+/// A file as found on disk.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct FileInfo {
+    /// Name within [`DatasetInfo::source`].
+    pub name: String,
+    /// Size, bytes.
+    pub bytes: u64,
+    /// SHA-256 of the file as found (compressed, if it is).
+    pub sha256: String,
+}
+
+/// One of the two parts of a dataset.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Split {
+    /// What robots are evolved on.
+    Train,
+    /// Held out: what they are tested on.
+    Test,
+}
+
+impl Split {
+    /// Both, training first.
+    pub const ALL: [Split; 2] = [Split::Train, Split::Test];
+
+    /// The split's number in names of random streams: part of every result.
+    pub(crate) fn code(self) -> u64 {
+        match self {
+            Split::Train => 0,
+            Split::Test => 1,
+        }
+    }
+}
+
+impl fmt::Display for Split {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.write_str(match self {
+            Split::Train => "train",
+            Split::Test => "test",
+        })
+    }
+}

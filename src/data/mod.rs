@@ -1,0 +1,12 @@
+//! Images: the IDX reader, where datasets lie and where they come from, the digits that the program draws.
+
+pub mod builtin;
+pub mod catalogue;
+pub mod dataset;
+#[cfg(feature = "fetch")]
+pub mod fetch;
+pub mod files;
+pub mod idx;
+pub mod info;
+pub mod pen;
+pub mod strokes;

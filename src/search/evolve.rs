@@ -1,0 +1,479 @@
+//! `morphcog evolve`: MAP-Elites over bodies, resumable, the same bits however it is run.
+
+use crate::base::error::{Error, ErrorKind};
+use crate::base::files::write_atomically;
+use crate::base::observer::{Generation, Observer};
+use crate::base::random::{Purpose, stream};
+use crate::base::stop::check;
+use crate::base::threads::pool;
+use crate::body::Body;
+use crate::config::Config;
+use crate::data::dataset::Split;
+use crate::genome::{BodySpec, Genome, GenomeError, MutationParams};
+use crate::qd::{ArchiveStats, DescriptorSpace, Evaluated, MapElites, Proposal, Variation};
+use crate::search::response::is_left_behind;
+use crate::search::training::Training;
+use crate::search::validation;
+use crate::search::{held_out, resume};
+use crate::store::checkpoint;
+use crate::store::checkpoint::{Checkpoint, KnownBodies};
+use crate::store::folder::{IfExists, RunFolder};
+use crate::store::metrics::{Metrics, Totals};
+use crate::store::names::CONFIG;
+use crate::store::names::ELITES;
+use crate::store::names::METRICS;
+use crate::store::names::RUN_JSON;
+use crate::store::names::TRAINING_JSON;
+use crate::store::run::{Dimensions, FORMAT, FORMAT_VERSION, Robot, RunFile};
+use crate::store::validation::Validated;
+use crate::store::whereabouts;
+use crate::store::whereabouts::Whereabouts;
+use crate::task::evaluation::{Evaluation, Job, MayWin, Outcome, evaluate};
+use crate::task::grouping::Grouping;
+use rayon::prelude::*;
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+/// What to evolve and where to.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// Everything the result depends on.
+    pub config: Config,
+    /// Name of the run.
+    pub name: String,
+    /// Its folder.
+    pub out: PathBuf,
+    /// What to do if there is a run in it.
+    pub if_exists: IfExists,
+    /// Where the data are, if the command line says.
+    pub data: Option<PathBuf>,
+    /// Number of threads; `None`: one per core.
+    pub threads: Option<usize>,
+}
+
+/// How a session of a run ended.
+#[derive(Clone, Debug)]
+pub struct Finished {
+    /// The run as it stands in `run.json`.
+    pub run: RunFile,
+    /// Counts of the whole run.
+    pub totals: Totals,
+    /// The best robots of each task on validation images, best first; none if the config asks for none, or it was stopped.
+    pub validated: Vec<Validated>,
+    /// Whether a signal stopped it before its end: its last generation, and the choice of robots after that.
+    pub stopped: bool,
+    /// Why its end is not, or not as a whole, in its files, if so; it goes on from its last checkpoint.
+    pub unwritten: Option<Error>,
+}
+
+impl Finished {
+    /// Id of the best robot: the first on validation images if some were chosen by them, else the fittest.
+    pub fn best(&self) -> Option<&str> {
+        let better = |a: &Validated, b: &Validated| a.balanced_accuracy > b.balanced_accuracy;
+        let first =
+            self.validated.iter().reduce(|best, other| if better(other, best) { other } else { best });
+        first.map(|robot| robot.id.as_str()).or(self.run.best().map(|robot| robot.id.as_str()))
+    }
+}
+
+/// Runs a config, or goes on with a run, and at its end chooses robots on validation images if the config says so. When `stop`
+/// is set, a generation under way is dropped: the run is saved as it was before.
+///
+/// # Errors
+/// What is wrong with config, data or folder; nothing that was there is lost.
+pub fn evolve(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Result<Finished, Error> {
+    let config = &options.config;
+    let resumes = options.if_exists == IfExists::Resume;
+    // Load, and check all that can be known before anything is written.
+    if resumes && options.out.join(TRAINING_JSON).exists() {
+        let text = format!("{}: the run in this folder is a training", options.out.display());
+        return Err(Error::occupied(text).hint("go on with it by morphcog train --resume".to_string()));
+    }
+    let mut whereabouts = Whereabouts::given(options.data.as_deref());
+    if resumes {
+        whereabouts = whereabouts.and_of(&options.out.join(RUN_JSON));
+    }
+    let dataset = whereabouts.load(&config.data, &[Split::Train])?;
+    let training = Training::of(config, &dataset)?;
+    held_out::check(config, &dataset)?;
+    let mutations = Mutations { seed: config.seed, spec: config.body_spec(), params: &config.genome, stop };
+    mutations.newcomer(0, 0).map_err(unmade)?;
+    // Open.
+    let folder = RunFolder::open(&options.out, options.if_exists)?;
+    let saved = match resumes {
+        true => resume::saved(&folder, config, &training, |text| observer.warning(&text))?,
+        false => None,
+    };
+    // A config that says the same stays as it is, with its comments: it may be what this run was asked for with.
+    let there = Config::load(&folder.path().join(CONFIG).to_string_lossy(), &[]);
+    if there.ok().as_ref() != Some(config) {
+        let path = folder.path().join(CONFIG);
+        write_atomically(&path, config.to_toml().as_bytes())
+            .map_err(|error| Error::writing(&path, &error))?;
+    }
+    whereabouts::remember(&folder, &dataset)?;
+    let pool = pool(options.threads)?;
+    let mut run = Run::new(options, training, saved)?;
+    let mut metrics = Metrics::open(folder.path(), run.generation)?;
+    if metrics.missing > 0 {
+        let (path, missing) = (folder.path().join(METRICS).display().to_string(), metrics.missing);
+        observer.warning(&format!("{path}: {missing} of {} generations are missing in it", run.generation));
+    }
+    // Evolve.
+    pool.install(|| run.evolve(&mutations, &folder, &mut metrics, stop, observer)).map_err(goes_on)?;
+    // Write, and choose robots.
+    let unwritten = metrics.flush().and_then(|()| run.save(&folder)).err().map(goes_on);
+    let (file, totals) = (run.file(), run.totals());
+    let is_whole = run.generation >= config.generations;
+    // Those of a run that is not in its file would be chosen from another.
+    let chooses = is_whole && unwritten.is_none() && config.validation.best > 0 && !file.elites.is_empty();
+    let validated = match chooses {
+        true => {
+            let archive = folder.path().join(RUN_JSON);
+            validation::at_end(&archive, &dataset, &pool, stop, observer)?
+        }
+        false => Some(Vec::new()),
+    };
+    let stopped = !is_whole || validated.is_none();
+    Ok(Finished { run: file, totals, validated: validated.unwrap_or_default(), stopped, unwritten })
+}
+
+/// An error, if it is one of a full disk, with how to go on when there is space again.
+fn goes_on(error: Error) -> Error {
+    match &error.hint {
+        Some(hint) if error.kind == ErrorKind::Other => {
+            let hint = format!("{hint}; with --resume the same command goes on from the last checkpoint");
+            error.hint(hint)
+        }
+        _ => error,
+    }
+}
+
+/// A run under way.
+struct Run<'a> {
+    options: &'a Options,
+    training: Training,
+    grouping: Grouping,
+    space: DescriptorSpace,
+    dimensions: Dimensions,
+    search: MapElites<Robot>,
+    known: KnownBodies,
+    totals: Totals,
+    /// Generations done.
+    generation: u64,
+    began: Instant,
+}
+
+/// A robot to be evaluated: its number in the generation, the cell of its parent, and itself.
+type Child = (u64, Option<usize>, Robot);
+
+impl<'a> Run<'a> {
+    fn new(options: &'a Options, training: Training, saved: Option<Checkpoint>) -> Result<Self, Error> {
+        let config = &options.config;
+        let (archive, known, totals, generation) = match saved {
+            Some(Checkpoint { run, totals, known_bodies }) => {
+                (run.archive()?, known_bodies, totals, run.generations)
+            }
+            None => Default::default(),
+        };
+        let grouping = config.grouping()?.with_fitness(config.evaluation.fitness);
+        Ok(Run {
+            options,
+            training,
+            space: DescriptorSpace::voxel_counts(grouping.tasks().len()),
+            dimensions: Dimensions::of(config)?,
+            grouping,
+            search: MapElites::new(config.seed, config.map_elites.clone(), archive),
+            known,
+            totals,
+            generation,
+            began: Instant::now(),
+        })
+    }
+
+    /// Generation after generation: ask, score, tell. A generation that is stopped leaves the run as it was before.
+    fn evolve(
+        &mut self,
+        mutations: &Mutations,
+        folder: &RunFolder,
+        metrics: &mut Metrics,
+        stop: &AtomicBool,
+        observer: &dyn Observer,
+    ) -> Result<(), Error> {
+        let config = &self.options.config;
+        let verb = if self.generation > 0 { "going on with" } else { "evolving in" };
+        let dataset = &self.training.dataset.name;
+        observer.note(&format!(
+            "{verb} {}; images from {dataset}: {}",
+            folder.path().display(),
+            self.training.listed()
+        ));
+        observer.generation(&self.progress());
+        let every = Duration::try_from_secs_f64(config.checkpoint.seconds).unwrap_or(Duration::MAX);
+        let mut saved = Instant::now();
+        while self.generation < config.generations && !stop.load(Ordering::Relaxed) {
+            match self.next_generation(mutations, stop) {
+                Err(error) if error.kind == ErrorKind::Stopped => break,
+                done => done?,
+            }
+            metrics.write(self.generation - 1, &self.stats(), &self.totals())?;
+            observer.generation(&self.progress());
+            if self.generation.is_multiple_of(config.checkpoint.generations) || saved.elapsed() >= every {
+                metrics.flush()?;
+                self.save(folder)?;
+                saved = Instant::now();
+            }
+        }
+        Ok(())
+    }
+
+    /// Makes, evaluates and tells one generation.
+    ///
+    /// # Errors
+    /// Of kind [`ErrorKind::Stopped`] if it was stopped meanwhile: all is then as it was before.
+    fn next_generation(&mut self, mutations: &Mutations, stop: &AtomicBool) -> Result<(), Error> {
+        let proposals = self.search.ask(self.generation);
+        let make = |&proposal: &Proposal| {
+            check(stop)?;
+            self.search.make(proposal, mutations).map_err(unmade)
+        };
+        let robots = proposals.par_iter().map(make).collect::<Result<Vec<Robot>, Error>>()?;
+        let children = proposals.iter().zip(robots).map(|(asked, robot)| (asked.child, asked.parent, robot));
+        let children: Vec<Child> = children.collect();
+        let count = children.len() as u64;
+        let (fresh, new) = self.unknown(children);
+        let saved = (count - fresh.len() as u64) * self.training.stimuli.len() as u64;
+        let evaluations = match self.scored(&fresh, stop) {
+            Ok(evaluations) => evaluations,
+            Err(error) => {
+                new.iter().for_each(|key| self.known.remove(key));
+                return Err(error);
+            }
+        };
+        self.totals.evaluations += count;
+        self.totals.saved_known_bodies += saved;
+        self.tell(fresh, evaluations)?;
+        self.generation += 1;
+        Ok(())
+    }
+
+    /// Those children whose bodies are to be evaluated; and the keys of bodies that are known only from now on.
+    fn unknown(&mut self, children: Vec<Child>) -> (Vec<Child>, Vec<[u8; 16]>) {
+        let config = &self.options.config;
+        // A gait whose response is known would fill the archive with its sensors.
+        let saves_known = config.savings.known_bodies || config.measures_response();
+        let (mut fresh, mut new) = (Vec::new(), Vec::new());
+        for child in children {
+            let key = config.known_key(&child.2.body);
+            let is_new = self.known.insert(key);
+            if is_new {
+                new.push(key);
+            }
+            if is_new || !saves_known {
+                fresh.push(child);
+            }
+        }
+        (fresh, new)
+    }
+
+    /// Shows the training images to children, or, where a response is measured, to their probes.
+    fn scored(&self, children: &[Child], stop: &AtomicBool) -> Result<Vec<Evaluation>, Error> {
+        let config = &self.options.config;
+        let Training { stimuli, conditions, .. } = &self.training;
+        let probes: Vec<Body> = match config.measures_response() {
+            true => children.iter().map(|(_, _, robot)| robot.body.probe()).collect(),
+            false => Vec::new(),
+        };
+        let floors = self.floors();
+        let jobs = children.iter().map(|(_, parent, robot)| self.job(*parent, robot, &floors));
+        let mut jobs: Vec<Job> = jobs.collect();
+        jobs.iter_mut().zip(&probes).for_each(|(job, probe)| job.body = probe);
+        let (physics, protocol) = (&config.physics, &config.protocol);
+        Ok(evaluate(&jobs, stimuli, conditions, physics, protocol, config.savings, stop)?)
+    }
+
+    /// Puts those into the archive that walked and are fit enough.
+    fn tell(&mut self, children: Vec<Child>, evaluations: Vec<Evaluation>) -> Result<(), Error> {
+        let floors = self.floors();
+        let mut told = Vec::new();
+        for ((child, _, robot), evaluation) in children.into_iter().zip(evaluations) {
+            self.totals.count(&evaluation);
+            match evaluation.outcome {
+                Outcome::Walked(displacements) => {
+                    told.extend(self.judged(child, robot, displacements, &floors))
+                }
+                Outcome::Unstable(_) => self.totals.unstable += 1,
+                Outcome::Stopped(_) => {}
+            }
+        }
+        self.search.tell(told).map_err(|error| Error::other(error.to_string()))?;
+        if let Some(keep) = self.options.config.archive.keep {
+            self.search.retain_fittest(keep, |robot| robot.task.clone());
+        }
+        Ok(())
+    }
+
+    /// How a robot is to be evaluated; `parent` is the cell of its parent.
+    fn job<'b>(&'b self, parent: Option<usize>, robot: &'b Robot, floors: &[Option<f64>]) -> Job<'b> {
+        let (archive, training, grouping) = (self.search.archive(), &self.training, &self.grouping);
+        let config = &self.options.config;
+        let places = config.worth_of_places(&robot.body);
+        let bins = robot.bins();
+        let to_beat = |task: usize| {
+            let cell = self.space.index(&self.cell(bins.clone(), task));
+            let in_cell = cell.and_then(|cell| archive.objective(cell));
+            in_cell.into_iter().chain(floors[task]).reduce(f64::max).map(|least| least / places)
+        };
+        let to_beat: Vec<Option<f64>> = (0..grouping.tasks().len()).map(to_beat).collect();
+        let (order, given_up) = if config.measures_response() {
+            let least = to_beat.iter().flatten().fold(f64::INFINITY, |least, next| least.min(*next));
+            let given_up = move |known: &[Option<f64>]| least.is_finite() && is_left_behind(known, least);
+            // The first pairs decide whether the others are worth it.
+            (Vec::new(), Some(Box::new(given_up) as Box<MayWin>))
+        } else {
+            let of_parent = parent
+                .and_then(|cell| archive.get(cell))
+                .map(|elite| training.answers(elite.solution.displacements.iter().copied().map(Some)));
+            (of_parent.map_or_else(Vec::new, |answers| grouping.hardest_first(&answers)), None)
+        };
+        let may_win = move |known: &[Option<f64>]| {
+            grouping.can_still_win(&training.answers(known.iter().copied()), |task| to_beat[task])
+        };
+        Job { body: &robot.body, order, may_win: Box::new(may_win), given_up }
+    }
+
+    /// A robot as it is told to the archive; `None` if it is not among the fittest that stay.
+    fn judged(
+        &self,
+        child: u64,
+        robot: Robot,
+        displacements: Vec<f64>,
+        floors: &[Option<f64>],
+    ) -> Option<Evaluated<Robot>> {
+        let answers = self.training.answers(displacements.iter().copied().map(Some));
+        let score = self.grouping.score(&answers);
+        let coordinates = self.cell(robot.bins(), score.task);
+        let cell = self.space.index(&coordinates).expect("the coordinates are bins of this very space");
+        let task = self.grouping.tasks()[score.task].name();
+        let objective = self.options.config.worth_of_places(&robot.body) * score.fitness;
+        let solution = Robot { cell: coordinates, task, objective, displacements, ..robot };
+        let is_in = floors[score.task].is_none_or(|floor| objective > floor);
+        is_in.then_some(Evaluated { child, cell, objective, solution })
+    }
+
+    /// By task the fitness of the last elite that `archive.keep` keeps; `None` while it keeps all, or there are fewer. It never
+    /// decreases, so what did not exceed it, or lost its cell, never can: early stop and known bodies stay lossless.
+    fn floors(&self) -> Vec<Option<f64>> {
+        let keep = self.options.config.archive.keep;
+        let last = |name: String| self.search.archive().nth_fittest(keep?, |robot| robot.task == name);
+        self.grouping.tasks().iter().map(|task| last(task.name())).collect()
+    }
+
+    /// Coordinates of the cell of a robot that performs a task.
+    fn cell(&self, mut bins: Vec<usize>, task: usize) -> Vec<usize> {
+        bins.extend((self.grouping.tasks().len() > 1).then_some(task));
+        bins
+    }
+
+    /// Counts so far, with the time of this session.
+    fn totals(&self) -> Totals {
+        Totals { seconds: self.totals.seconds + self.began.elapsed().as_secs_f64(), ..self.totals }
+    }
+
+    fn progress(&self) -> Generation {
+        let stats = self.stats();
+        Generation {
+            done: self.generation,
+            total: self.options.config.generations,
+            best: stats.obj_max,
+            coverage: stats.coverage,
+            evaluations: self.totals.evaluations,
+        }
+    }
+
+    fn stats(&self) -> ArchiveStats {
+        self.search.archive().stats(self.dimensions.possible_cells, self.options.config.archive.qd_offset)
+    }
+
+    /// Writes checkpoint, `run.json` and `elites.csv`.
+    fn save(&self, folder: &RunFolder) -> Result<(), Error> {
+        let checkpoint =
+            Checkpoint { run: self.file(), totals: self.totals(), known_bodies: self.known.clone() };
+        checkpoint::write(folder.path(), &checkpoint)?;
+        let run = checkpoint.run;
+        let csv = run.to_csv().map_err(|error| Error::other(error.to_string()))?;
+        for (name, content) in [(RUN_JSON, run.to_json().into_bytes()), (ELITES, csv)] {
+            let path = folder.path().join(name);
+            write_atomically(&path, &content).map_err(|error| Error::writing(&path, &error))?;
+        }
+        Ok(())
+    }
+
+    /// The run as it is now.
+    fn file(&self) -> RunFile {
+        RunFile {
+            format: FORMAT.to_string(),
+            format_version: FORMAT_VERSION,
+            program_version: env!("CARGO_PKG_VERSION").to_string(),
+            name: self.options.name.clone(),
+            config: self.options.config.clone(),
+            dataset: self.training.dataset.clone(),
+            training_images: self.training.images.clone(),
+            dimensions: self.dimensions.clone(),
+            origin: None,
+            generations: self.generation,
+            stats: self.stats(),
+            elites: self.search.archive().elites().map(|elite| elite.solution.clone()).collect(),
+            read_sha256: None,
+        }
+    }
+}
+
+/// How robots vary: newcomers and mutated offspring, each from a random stream of its own.
+struct Mutations<'a> {
+    seed: u64,
+    spec: BodySpec,
+    params: &'a MutationParams,
+    /// Once set, no more are made.
+    stop: &'a AtomicBool,
+}
+
+/// A robot that has not walked yet.
+fn newborn((genome, body): (Genome, Body), generation: u64, parent: Option<&Robot>) -> Robot {
+    Robot {
+        id: genome.id(),
+        cell: Vec::new(),
+        task: String::new(),
+        objective: 0.0,
+        displacements: Vec::new(),
+        voxels: body.counts(),
+        generation,
+        parent: parent.map(|parent| parent.id.clone()),
+        body,
+        genome,
+    }
+}
+
+/// Why there is no robot.
+fn unmade(error: GenomeError) -> Error {
+    match error {
+        GenomeError::Stopped(stopped) => stopped.into(),
+        error => Error::input(format!("body: {error}")),
+    }
+}
+
+impl Variation<Robot> for Mutations<'_> {
+    type Error = GenomeError;
+
+    fn newcomer(&self, generation: u64, child: u64) -> Result<Robot, GenomeError> {
+        let rng = &mut stream(self.seed, Purpose::Newcomer, generation, child);
+        Ok(newborn(Genome::random_unless(self.spec, self.params, rng, self.stop)?, generation, None))
+    }
+
+    fn offspring(&self, parent: &Robot, generation: u64, child: u64) -> Result<Robot, GenomeError> {
+        let rng = &mut stream(self.seed, Purpose::Mutation, generation, child);
+        let made = parent.genome.offspring_unless(self.spec, self.params, rng, self.stop)?;
+        Ok(newborn(made, generation, Some(parent)))
+    }
+}

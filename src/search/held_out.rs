@@ -1,0 +1,115 @@
+//! Images that robots are not trained on: those of the test split, and validation images. The latter are those of the training
+//! split that a run neither is trained on nor chooses its training images among, drawn by its seed.
+
+use crate::base::error::Error;
+use crate::base::random::{Purpose, stream};
+use crate::config::Config;
+use crate::config::validation::ValidationConfig;
+use crate::data::dataset::{Dataset, Split};
+use crate::search::training::Training;
+use crate::store::images::ImageRef;
+use crate::store::run::RunFile;
+use crate::store::training::Origin;
+use std::collections::BTreeSet;
+
+/// Indices of all images that a run was trained on, and before that its gaits.
+pub(crate) fn trained_on(run: &RunFile, dataset: &Dataset) -> Result<BTreeSet<usize>, Error> {
+    let mut seen: BTreeSet<usize> =
+        run.origin.iter().flat_map(|origin: &Origin| &origin.trained_on).copied().collect();
+    seen.extend(run.training_images.iter().map(|image| image.index));
+    seen.extend(Training::indices(&run.config, dataset)?);
+    Ok(seen)
+}
+
+/// Of each class the images that are not among those seen.
+fn left(config: &Config, seen: &BTreeSet<usize>, dataset: &Dataset) -> Vec<Vec<ImageRef>> {
+    let of_class = |&label: &u8| {
+        let all = dataset.indices_of(Split::Train, label).iter();
+        let free = all.filter(|&index| !seen.contains(index));
+        free.map(|&index| ImageRef { index, label }).collect()
+    };
+    config.classes().iter().map(of_class).collect()
+}
+
+/// How many are to be taken of each class, for `count` in all; `asked` says where that many were asked for, `or` what else to do.
+///
+/// # Errors
+/// If a class has not as many.
+fn per_class(
+    config: &Config,
+    left: &[Vec<ImageRef>],
+    asked: &str,
+    count: usize,
+    or: &str,
+) -> Result<usize, Error> {
+    let per_class = count.div_ceil(left.len().max(1));
+    match config.classes().iter().zip(left).min_by_key(|(_, left)| left.len()) {
+        Some((label, scarcest)) if scarcest.len() < per_class => {
+            let text = format!(
+                "{asked} {count}: expected {per_class} images of class {label} that the run is not trained on, found {}",
+                scarcest.len()
+            );
+            let most = scarcest.len() * left.len();
+            Err(Error::input(text).hint(format!("ask for at most {most}{or}")))
+        }
+        _ => Ok(per_class),
+    }
+}
+
+/// Whether a run that is to choose robots when it ends will have images for that: to be known before it begins.
+///
+/// # Errors
+/// If of a class there are not enough.
+pub(crate) fn check(config: &Config, dataset: &Dataset) -> Result<(), Error> {
+    let ValidationConfig { images, best } = config.validation;
+    if best == 0 {
+        return Ok(());
+    }
+    let or = ", train on fewer (images_per_class), or choose none (validation.best = 0)";
+    let seen = Training::indices(config, dataset)?.into_iter().collect();
+    per_class(config, &left(config, &seen, dataset), "validation.images =", images, or).map(|_| ())
+}
+
+/// `count` validation images of some runs of one experiment together, evenly divided between the classes, which take turns: so
+/// are the first of them. Of the same runs, in whichever order, they are always the same, and fewer of them the first of more. `asked` says
+/// where so many were asked for.
+///
+/// # Errors
+/// If there are not enough images.
+pub fn images(
+    runs: &[&RunFile],
+    dataset: &Dataset,
+    asked: &str,
+    count: usize,
+) -> Result<Vec<ImageRef>, Error> {
+    images_besides(&BTreeSet::new(), runs, dataset, asked, count)
+}
+
+/// The same, none of these among them.
+///
+/// # Errors
+/// As of [`images`].
+pub(crate) fn images_besides(
+    besides: &BTreeSet<usize>,
+    runs: &[&RunFile],
+    dataset: &Dataset,
+    asked: &str,
+    count: usize,
+) -> Result<Vec<ImageRef>, Error> {
+    let first = runs.iter().map(|run| &run.config).min_by_key(|config| config.seed);
+    let Some(config) = first else { return Ok(Vec::new()) };
+    let mut seen = besides.clone();
+    for run in runs {
+        seen.extend(trained_on(run, dataset)?);
+    }
+    let left = left(config, &seen, dataset);
+    let per_class = per_class(config, &left, asked, count, "")?;
+    let draw = |(&label, free): (&u8, Vec<ImageRef>)| -> Vec<ImageRef> {
+        let mut random = stream(config.seed, Purpose::Validation, 0, u64::from(label));
+        random.sample(free.len(), per_class).into_iter().map(|i| free[i]).collect()
+    };
+    let drawn: Vec<Vec<ImageRef>> = config.classes().iter().zip(left).map(draw).collect();
+    let turns =
+        (0..per_class).flat_map(|turn| drawn.iter().filter_map(move |class| class.get(turn).copied()));
+    Ok(turns.take(count).collect())
+}

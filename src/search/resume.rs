@@ -1,0 +1,98 @@
+//! Going on with a saved run: only from its own checkpoint, under the same config, on the same images.
+
+use crate::base::error::Error;
+use crate::config::Config;
+use crate::search::training::Training;
+use crate::store::checkpoint;
+use crate::store::checkpoint::Checkpoint;
+use crate::store::folder::RunFolder;
+use crate::store::names::RUN_JSON;
+use std::collections::BTreeMap;
+
+const ANEW: &str = "start the run anew with --force";
+
+/// What to go on from; `None` if there is no run in the folder yet. A broken newest checkpoint is passed over, and said
+/// with `warn`.
+///
+/// # Errors
+/// If there are only broken checkpoints, or none beside a `run.json`, or the run is another one; nothing is changed.
+pub(crate) fn saved(
+    folder: &RunFolder,
+    config: &Config,
+    training: &Training,
+    mut warn: impl FnMut(String),
+) -> Result<Option<Checkpoint>, Error> {
+    let place = folder.path().display().to_string();
+    let mut is_newest_broken = false;
+    let tell = |text| {
+        is_newest_broken = true;
+        warn(text);
+    };
+    match checkpoint::read(folder.path(), tell)? {
+        Some(saved) => {
+            compatible(&saved, config, training).map_err(|error| error.within(&place))?;
+            if is_newest_broken {
+                checkpoint::take_back(folder.path())?;
+            }
+            Ok(Some(saved))
+        }
+        None if folder.path().join(RUN_JSON).exists() => {
+            let text = format!("{place}: there is a {RUN_JSON}, but no checkpoint to go on from");
+            Err(Error::input(text).hint(format!("write elsewhere with --out, or {ANEW}")))
+        }
+        None => Ok(None),
+    }
+}
+
+/// Whether a saved run can be gone on with under a config: all that its results depend on must be the same.
+fn compatible(saved: &Checkpoint, config: &Config, training: &Training) -> Result<(), Error> {
+    let hint = || format!("resume with the config it was started with, or {ANEW}");
+    let (theirs, ours) = (&saved.run.program_version, env!("CARGO_PKG_VERSION"));
+    if theirs != ours {
+        let text = format!(
+            "the run in this folder was made by morphcog {theirs}; this is {ours}, whose numbers may be others"
+        );
+        return Err(Error::input(text).hint(format!("go on with morphcog {theirs}, or {ANEW}")));
+    }
+    let (theirs, ours) = (keys(&saved.run.config), keys(config));
+    let differs = |key: &&String| theirs.get(*key) != ours.get(*key);
+    let value = |keys: &Keys, key: &str| keys.get(key).map_or("not set".to_string(), ToString::to_string);
+    if let Some(key) = theirs.keys().chain(ours.keys()).find(differs) {
+        let (theirs, ours) = (value(&theirs, key), value(&ours, key));
+        let text = format!("the run in this folder has another config: {key} = {theirs} there, {ours} now");
+        return Err(Error::input(text).hint(hint()));
+    }
+    if saved.run.dataset != training.dataset || saved.run.training_images != training.images {
+        let text =
+            "data: the run in this folder was made with other images: the dataset has changed".to_string();
+        return Err(Error::input(text).hint(hint()));
+    }
+    let (done, asked) = (saved.run.generations, config.generations);
+    if done > asked {
+        let text = format!("generations = {asked}: the run in this folder has {done} already");
+        return Err(Error::input(text).hint(format!("ask for {done} or more, or {ANEW}")));
+    }
+    Ok(())
+}
+
+type Keys = BTreeMap<String, toml::Value>;
+
+/// All keys that results depend on, as `map_elites.parents`, with their values.
+fn keys(config: &Config) -> Keys {
+    let mut keys = Keys::new();
+    let root = toml::Value::try_from(config.essence());
+    flatten("", root.expect("every field is a number, text, list or table, which TOML has"), &mut keys);
+    keys
+}
+
+fn flatten(name: &str, value: toml::Value, keys: &mut Keys) {
+    match value {
+        toml::Value::Table(table) => {
+            let below = |key: String| if name.is_empty() { key } else { format!("{name}.{key}") };
+            table.into_iter().for_each(|(key, value)| flatten(&below(key), value, keys));
+        }
+        value => {
+            keys.insert(name.to_string(), value);
+        }
+    }
+}

@@ -1,0 +1,59 @@
+//! Robots are shown held-out images, as in the paper's test: each in a fresh rollout.
+
+use crate::base::Grid;
+use crate::base::observer::{Observer, Work};
+use crate::config::Config;
+use crate::store::run::Robot;
+use crate::task::evaluation::fresh_rollouts;
+use crate::task::grouping::{self, Grouping};
+use crate::task::protocol::{Life, Protocol};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+
+/// Displacements up to this count as wrong in the paper's test \[voxel lengths\].
+pub const THRESHOLD: f64 = 3.0;
+/// Actuation cycles per image in the paper's test.
+pub const CYCLES: u32 = 10;
+
+/// Control steps of so many actuation cycles.
+pub(crate) fn control_steps(config: &Config, cycles: u32) -> u32 {
+    cycles.saturating_mul(config.physics.cycle_steps)
+}
+
+/// The recognition task a robot performs; none if it always walks the same way.
+pub(crate) fn task_of<'a>(grouping: &'a Grouping, robot: &Robot) -> Option<&'a grouping::Split> {
+    grouping.tasks().iter().find(|split| split.name() == robot.task && !split.is_same_way())
+}
+
+/// Shows images to robots.
+pub(crate) struct Walker<'a> {
+    pub config: &'a Config,
+    /// Of one showing.
+    pub control_steps: u32,
+    pub pool: &'a rayon::ThreadPool,
+    pub stop: &'a AtomicBool,
+    pub observer: &'a dyn Observer,
+    /// Showings so far.
+    pub done: AtomicU64,
+}
+
+impl Walker<'_> {
+    /// A validation begins: so many robots, the best of them on so many images; showings in all.
+    pub fn validating(&self, robots: usize, images: usize, showings: u64) {
+        let label = format!("validating {robots} robots on up to {images} images:");
+        self.observer.begins(&Work::new(label, showings, "rollouts"));
+    }
+
+    /// The displacement under each image (`None`: unstable), and the number of lives it took: images that show the sensors
+    /// the same pixels are one life. `None` if stopped before the end.
+    pub fn lives(&self, robot: &Robot, stimuli: &[Grid<f64>]) -> Option<(Vec<Option<f64>>, usize)> {
+        let Walker { config, stop, observer, done, .. } = self;
+        let protocol =
+            Protocol { life: Life::Fresh, control_steps: self.control_steps, ..config.protocol.clone() };
+        let told = |count: u64| observer.progress(done.fetch_add(count, Ordering::Relaxed) + count);
+        let found = self
+            .pool
+            .install(|| fresh_rollouts(&robot.body, stimuli, &[], (&config.physics, &protocol), &told, stop));
+        let (displacements, simulated) = found.ok()?;
+        Some((displacements.into_iter().map(Result::ok).collect(), simulated))
+    }
+}

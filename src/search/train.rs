@@ -1,0 +1,553 @@
+//! `morphcog train`: the gaits of an archive are taught to tell two groups of images apart.
+//!
+//! [`teach`](crate::task::teach) says how. Everything that is simulated is kept in `training.json` beside `run.json`; a
+//! training that goes on takes from there what was simulated before, so that it ends with the same bits.
+
+use crate::base::Grid;
+use crate::base::error::Error;
+use crate::base::files::{read_text, write_atomically};
+use crate::base::hash::sha256_hex;
+use crate::base::number;
+use crate::base::observer::Observer;
+use crate::base::threads::pool;
+use crate::body::Body;
+use crate::config::DataConfig;
+use crate::config::evaluation::EvaluationConfig;
+use crate::config::task::TaskConfig;
+use crate::config::validation::ValidationConfig;
+use crate::config::{Config, reading};
+use crate::data::dataset::{Dataset, Split};
+use crate::qd::{Archive, DescriptorSpace, Elite};
+use crate::search::held_out;
+use crate::search::probing::{Probing, response};
+use crate::search::training::Training;
+use crate::search::validation;
+use crate::store::folder::{IfExists, RunFolder};
+use crate::store::images::ImageRef;
+use crate::store::metrics::{Metrics, Totals};
+use crate::store::names::CONFIG;
+use crate::store::names::ELITES;
+use crate::store::names::RUN_JSON;
+use crate::store::names::TRAINING_JSON;
+use crate::store::robots::{Selection, Source};
+use crate::store::run::{Dimensions, FORMAT, FORMAT_VERSION, Robot, RunFile};
+use crate::store::training::Batch;
+use crate::store::training::FILE;
+use crate::store::training::File;
+use crate::store::training::Origin;
+use crate::store::validation::Validated;
+use crate::store::whereabouts;
+use crate::store::whereabouts::Whereabouts;
+use crate::task::condition::Condition;
+use crate::task::evaluation::fresh_rollouts;
+use crate::task::fitness::Fitness;
+use crate::task::protocol::{Life, Protocol};
+use crate::task::refine::Challenge;
+use crate::task::response::{Example, Gait, Response};
+use crate::task::teach::{FINALISTS, Image, Plan, Rollouts, Round, Taught, Teacher};
+use std::path::PathBuf;
+use std::sync::atomic::AtomicBool;
+use std::time::{Duration, Instant};
+
+/// How often the rollouts are saved. A power cut costs as much.
+const SAVE_EVERY: Duration = Duration::from_secs(5);
+
+/// Least number of training images of a class.
+const LEAST_PER_CLASS: usize = 2;
+
+/// What to train and where to.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// The run.json whose robots walk.
+    pub archive: PathBuf,
+    /// Which of them are tried; the one that can be taught most is taught.
+    pub robots: Selection,
+    /// The two groups of classes.
+    pub groups: [Vec<u8>; 2],
+    /// Seed of all chance; `None`: that of the run.
+    pub seed: Option<u64>,
+    /// Keys of the config that differ from those of the run, as `train.rounds=10`.
+    pub set: Vec<String>,
+    /// Name of the run that is made.
+    pub name: String,
+    /// Its folder.
+    pub out: PathBuf,
+    /// What to do if there is a run in it.
+    pub if_exists: IfExists,
+    /// Where the data are, if the command line says.
+    pub data: Option<PathBuf>,
+    /// Number of threads; `None`: one per core.
+    pub threads: Option<usize>,
+}
+
+/// How a training ended.
+#[derive(Clone, Debug)]
+pub struct Finished {
+    /// The run as it stands in `run.json`.
+    pub run: RunFile,
+    /// Rollouts simulated in all, validation left out.
+    pub rollouts: usize,
+    /// How the robot did on validation images; `None` if that was stopped.
+    pub validated: Option<Vec<Validated>>,
+}
+
+/// Reads two groups of classes, as in "4|9", "0|123" or "10,11|3".
+///
+/// # Errors
+/// What was expected.
+pub fn groups(text: &str) -> Result<[Vec<u8>; 2], String> {
+    let expected = || format!("{text}: expected two groups of classes, as in 4|9, 0|123 or 10,11|3");
+    let group = |part: &str| -> Result<Vec<u8>, String> {
+        let classes: Option<Vec<u8>> = match part.contains(',') {
+            true => part.split(',').map(|class| class.trim().parse().ok()).collect(),
+            false => part.trim().chars().map(|c| c.to_digit(10).and_then(|d| u8::try_from(d).ok())).collect(),
+        };
+        classes.filter(|classes| !classes.is_empty()).ok_or_else(expected)
+    };
+    let (a, b) = text.split_once('|').ok_or_else(expected)?;
+    let groups = [group(a)?, group(b)?];
+    crate::task::grouping::Grouping::two_groups(&groups[0], &groups[1])
+        .map_err(|error| format!("{text}: {error}"))?;
+    Ok(groups)
+}
+
+/// A gait to be tried.
+struct Walker<'a> {
+    robot: &'a Robot,
+    gait: Gait,
+}
+
+/// Trains a robot, and validates it.
+///
+/// # Errors
+/// What is wrong with archive, options, data or folder; that it was stopped (the same with
+/// [`IfExists::Resume`] goes on). Nothing that was there is lost.
+pub fn train(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Result<Finished, Error> {
+    let source = Source::read(&options.archive)?;
+    let whereabouts = Whereabouts::given(options.data.as_deref())
+        .and_of(&options.out.join(RUN_JSON))
+        .and_of(&options.archive);
+    let config = config(&source.run.config, options)?;
+    let dataset = whereabouts.load(&config.data, &[Split::Train])?;
+    let config = with_images(config, &dataset)?;
+    let mut training = Training::of(&config, &dataset)?;
+    let classes = training.images.iter().map(|image| image.label);
+    training.conditions =
+        Condition::by_turns(classes, config.train.raised_starts, config.train.without_limits);
+    let origin = origin(&source, &dataset)?;
+    held_out::check(&config, &dataset)?;
+    let walkers = walkers(&source, &options.robots, config.seed)?;
+    let [log, run] = [TRAINING_JSON, RUN_JSON].map(|name| options.out.join(name));
+    if options.if_exists == IfExists::Resume && run.exists() && !log.exists() {
+        let text = format!("{}: the run in this folder is no training", options.out.display());
+        return Err(
+            Error::occupied(text).hint("write elsewhere with --out, or replace it by --force".to_string())
+        );
+    }
+    let folder = RunFolder::open(&options.out, options.if_exists)?;
+    let write = |name: &str, content: &[u8]| {
+        let path = folder.path().join(name);
+        write_atomically(&path, content).map_err(|error| Error::writing(&path, &error))
+    };
+    let key = key(&config, &walkers, &training);
+    let mut log = Log::open(log, key, stop)?;
+    write(CONFIG, config.to_toml().as_bytes())?;
+    whereabouts::remember(&folder, &dataset)?;
+    let pool = pool(options.threads)?;
+    let began = Instant::now();
+    let (gaits, images) = (walkers.len(), training.images.len());
+    observer
+        .note(&format!("training in {}: {gaits} gaits, {images} training images", folder.path().display()));
+    let probing = Probing::new(&training.conditions, config.seed);
+    let trainer = Trainer { config: &config, training: &training, probing };
+    let taught = pool.install(|| trainer.train(&walkers, &mut log, observer));
+    // What was simulated is kept, however it ended.
+    let saved = log.save();
+    let (walker, taught) = taught?;
+    saved?;
+    let run = run_file(options, &config, &training, origin, walker, &taught)?;
+    let seconds = began.elapsed().as_secs_f64();
+    let totals = Totals { evaluations: 1, simulated: log.simulated as u64, seconds, ..Totals::default() };
+    let csv = run.to_csv().map_err(|error| Error::other(error.to_string()))?;
+    let mut metrics = Metrics::open(folder.path(), 0)?;
+    metrics.write(0, &run.stats, &totals)?;
+    metrics.flush()?;
+    write(ELITES, &csv)?;
+    write(RUN_JSON, run.to_json().as_bytes())?;
+    let archive = folder.path().join(RUN_JSON);
+    let validated = match config.validation.best {
+        0 => Some(Vec::new()),
+        _ => validation::at_end(&archive, &dataset, &pool, stop, observer)?,
+    };
+    Ok(Finished { run, rollouts: log.simulated, validated })
+}
+
+/// The config of the run that is made: that of the walkers' run with another task.
+fn config(of_walkers: &Config, options: &Options) -> Result<Config, Error> {
+    let evaluation = EvaluationConfig { fitness: Fitness::MeanClipped };
+    let base = Config {
+        seed: options.seed.unwrap_or(of_walkers.seed),
+        generations: 1,
+        task: TaskConfig { groups: Some(options.groups.clone()), ..TaskConfig::default() },
+        data: DataConfig { train_images: None, ..of_walkers.data.clone() },
+        protocol: Protocol { life: Life::Fresh, ..of_walkers.protocol.clone() },
+        evaluation,
+        validation: ValidationConfig { best: 1, ..ValidationConfig::default() },
+        ..of_walkers.clone()
+    };
+    reading::changed(base, &options.set, |config: &Config| config.validate(), |error| error)
+}
+
+/// The same with as many training images as there are beside those that validate.
+fn with_images(config: Config, dataset: &Dataset) -> Result<Config, Error> {
+    let mut fewest = usize::MAX;
+    for class in config.classes() {
+        let count = dataset.indices_of(Split::Train, class).len();
+        if count < LEAST_PER_CLASS {
+            let text = format!(
+                "--task: class {class}: expected {LEAST_PER_CLASS} training images or more, found {count}"
+            );
+            let classes = dataset.classes(Split::Train);
+            return Err(Error::input(text).hint(format!("{} has the classes {classes:?}", dataset.name())));
+        }
+        fewest = fewest.min(count);
+    }
+    let per_class = config.train.images_per_class.min((fewest * 3 / 4).max(1));
+    let data = DataConfig { images_per_class: per_class, ..config.data.clone() };
+    let config = Config { data, ..config };
+    config.validate()?;
+    Ok(config)
+}
+
+/// What the walkers were trained on: not for validation.
+fn origin(source: &Source, dataset: &Dataset) -> Result<Origin, Error> {
+    let run = &source.run;
+    let is_same = dataset.fingerprint(Split::Train).is_some_and(|sha256| sha256 == run.dataset.train_sha256);
+    let trained_on = if is_same { held_out::trained_on(run, dataset)? } else { Default::default() };
+    Ok(Origin {
+        name: run.name.clone(),
+        generations: run.generations,
+        sha256: run.fingerprint(),
+        trained_on: trained_on.into_iter().collect(),
+    })
+}
+
+/// The gaits of the chosen robots, each once.
+fn walkers<'a>(source: &'a Source, robots: &Selection, seed: u64) -> Result<Vec<Walker<'a>>, Error> {
+    let mut walkers: Vec<Walker> = Vec::new();
+    for chosen in robots.of(std::slice::from_ref(source), seed)? {
+        let Some(gait) = Gait::of(&chosen.robot.body) else { continue };
+        if walkers.iter().all(|other| other.gait.probe() != gait.probe()) {
+            walkers.push(Walker { robot: chosen.robot, gait });
+        }
+    }
+    if walkers.is_empty() {
+        let text = format!(
+            "{}: none of the chosen robots has a soft voxel or a sensor: there is nothing to train",
+            source.path.display()
+        );
+        return Err(Error::input(text).hint("choose others with --robots".to_string()));
+    }
+    Ok(walkers)
+}
+
+/// Of all that rollouts depend on.
+fn key(config: &Config, walkers: &[Walker], training: &Training) -> String {
+    let bodies: Vec<String> = walkers.iter().map(|walker| walker.robot.body.to_string()).collect();
+    let images: Vec<usize> = training.images.iter().map(|image| image.index).collect();
+    let essence = config.essence().to_toml();
+    let train = config.train;
+    let text = format!(
+        "{} {essence} {train:?} {bodies:?} {} {images:?}",
+        env!("CARGO_PKG_VERSION"),
+        training.dataset.train_sha256
+    );
+    sha256_hex(text.as_bytes())
+}
+
+/// What is simulated, and was in sessions before.
+struct Log<'a> {
+    path: PathBuf,
+    key: String,
+    batches: Vec<Batch>,
+    /// Batches asked for so far.
+    asked: usize,
+    /// Rollouts in them.
+    simulated: usize,
+    saved: (usize, Instant),
+    stop: &'a AtomicBool,
+}
+
+impl<'a> Log<'a> {
+    fn open(path: PathBuf, key: String, stop: &'a AtomicBool) -> Result<Self, Error> {
+        let mut batches = Vec::new();
+        if path.exists() {
+            let text = read_text(&path).map_err(|error| Error::reading(&path, &error))?;
+            let name = path.display().to_string();
+            let anew = || "train anew with --force".to_string();
+            let file: File =
+                reading::read_versioned(&text, &name, FILE.0, FILE.1).map_err(|e| e.hint(anew()))?;
+            if file.key != key {
+                let text = format!(
+                    "{name}: expected the training that began here: other robots, images or settings"
+                );
+                return Err(Error::usage(text).hint(
+                    "go on with those, write elsewhere with --out, or train anew with --force".to_string(),
+                ));
+            }
+            batches = file.rollouts;
+        }
+        let saved = (batches.len(), Instant::now());
+        Ok(Log { path, key, batches, asked: 0, simulated: 0, saved, stop })
+    }
+
+    /// Rollouts of a body under stimuli and conditions.
+    fn rollouts(
+        &mut self,
+        body: &Body,
+        stimuli: &[Grid<f64>],
+        conditions: &[Condition],
+        config: &Config,
+    ) -> Result<Batch, Error> {
+        let number = self.asked;
+        self.asked += 1;
+        self.simulated += stimuli.len();
+        if let Some(batch) = self.batches.get(number) {
+            return match batch.len() == stimuli.len() {
+                true => Ok(batch.clone()),
+                false => {
+                    let text = format!(
+                        "{}: rollouts {number}: expected {}, found {}",
+                        self.path.display(),
+                        stimuli.len(),
+                        batch.len()
+                    );
+                    Err(Error::input(text).hint("train anew with --force".to_string()))
+                }
+            };
+        }
+        let setting = (&config.physics, &config.protocol);
+        let found = fresh_rollouts(body, stimuli, conditions, setting, &|_| (), self.stop);
+        let (found, _) = found.map_err(|_| {
+            Error::stopped("stopped; what was simulated is saved".to_string())
+                .hint("the same command with --resume goes on".to_string())
+        })?;
+        let batch: Batch = found.into_iter().map(Result::ok).collect();
+        self.batches.push(batch.clone());
+        if self.saved.1.elapsed() >= SAVE_EVERY {
+            self.save()?;
+        }
+        Ok(batch)
+    }
+
+    fn save(&mut self) -> Result<(), Error> {
+        if self.saved.0 == self.batches.len() && self.path.exists() {
+            return Ok(());
+        }
+        let file = File {
+            format: FILE.0.to_string(),
+            format_version: FILE.1,
+            key: self.key.clone(),
+            rollouts: self.batches.clone(),
+        };
+        let text = serde_json::to_string(&file).expect("numbers are finite and keys are text") + "\n";
+        write_atomically(&self.path, text.as_bytes()).map_err(|error| Error::writing(&self.path, &error))?;
+        self.saved = (self.batches.len(), Instant::now());
+        Ok(())
+    }
+}
+
+/// What all gaits are trained with.
+struct Trainer<'a> {
+    config: &'a Config,
+    training: &'a Training,
+    probing: Probing,
+}
+
+/// Rollouts that are kept.
+struct Kept<'a, 'b> {
+    config: &'a Config,
+    conditions: &'a [Condition],
+    log: &'a mut Log<'b>,
+}
+
+impl Rollouts for Kept<'_, '_> {
+    type Error = Error;
+
+    fn roll(&mut self, body: &Body, stimuli: &[Grid<f64>], conditions: &[usize]) -> Result<Batch, Error> {
+        let conditions: Vec<Condition> = conditions.iter().map(|number| self.conditions[*number]).collect();
+        self.log.rollouts(body, stimuli, &conditions, self.config)
+    }
+}
+
+impl Trainer<'_> {
+    /// Measures a gait's response; `None` if most of its rollouts are unstable.
+    fn response(&self, gait: &Gait, log: &mut Log) -> Result<Option<Response>, Error> {
+        let Trainer { config, probing, .. } = self;
+        let count = config.train.random_images;
+        let shown = probing.shown(gait, &config.physics, 0..count, |probe, stimuli, conditions| {
+            log.rollouts(probe, stimuli, conditions, config)
+        })?;
+        Ok(response(&shown, count))
+    }
+
+    /// The training images as a gait sees them; both groups weigh the same.
+    fn images(&self, gait: &Gait) -> Vec<Image> {
+        let Trainer { config, training, probing } = self;
+        let all = probing.conditions();
+        let [a, b] = config.task.groups.as_ref().expect("a training has two groups");
+        let of =
+            |classes: &[u8]| training.images.iter().filter(|image| classes.contains(&image.label)).count();
+        let (of_a, of_b) = (of(a) as f64, of(b) as f64);
+        let image = |((image, stimulus), condition): ((&ImageRef, &Grid<f64>), &Condition)| {
+            let is_a = a.contains(&image.label);
+            let (right, weight) = if is_a { (1.0, 0.5 / of_a) } else { (-1.0, 0.5 / of_b) };
+            let condition = all.iter().position(|other| other == condition).expect("it is one of all");
+            Image {
+                stimulus: stimulus.clone(),
+                example: Example { right, weight, ..Example::new(gait, stimulus, &config.physics) },
+                condition,
+            }
+        };
+        training.images.iter().zip(&training.stimuli).zip(&training.conditions).map(image).collect()
+    }
+
+    fn plan(&self) -> Plan {
+        let train = &self.config.train;
+        Plan {
+            seed: self.config.seed,
+            rounds: train.rounds,
+            images: train.images,
+            final_images: train.final_images,
+            challengers: train.challengers,
+            min_muscles: self.config.body.min_muscles,
+        }
+    }
+
+    /// Teaches all gaits in one round, and goes on with the one that could be taught most.
+    fn train<'w>(
+        &self,
+        walkers: &'w [Walker<'w>],
+        log: &mut Log,
+        observer: &dyn Observer,
+    ) -> Result<(&'w Walker<'w>, Taught), Error> {
+        let plan = self.plan();
+        let Trainer { config, probing, .. } = self;
+        let mut best: Option<(&Walker, Teacher)> = None;
+        for walker in walkers {
+            let gait = &walker.gait;
+            let Some(response) = self.response(gait, log)? else { continue };
+            told_response(observer, &walker.robot.id, gait, &response);
+            let mut teacher = Teacher::new(gait, &response, self.images(gait), plan, &config.physics);
+            let conditions = probing.conditions();
+            let round = teacher.round(&mut Kept { config, conditions, log })?;
+            told_round(observer, &walker.robot.id, &round, &plan);
+            if best.as_ref().is_none_or(|(_, best)| teacher.predicted() > best.predicted()) {
+                best = Some((walker, teacher));
+            }
+        }
+        let Some((walker, mut teacher)) = best else {
+            let text = "none of the chosen robots is stable under random images: there is nothing to train";
+            return Err(Error::input(text.to_string()).hint("choose others with --robots".to_string()));
+        };
+        let mut rollouts = Kept { config, conditions: probing.conditions(), log };
+        for _ in 1..plan.rounds {
+            let round = teacher.round(&mut rollouts)?;
+            told_round(observer, &walker.robot.id, &round, &plan);
+        }
+        let told = |challenge: &Challenge| told_challenge(observer, challenge, &plan);
+        Ok((walker, teacher.finish(&mut rollouts, told)?))
+    }
+}
+
+fn told_response(observer: &dyn Observer, robot: &str, gait: &Gait, response: &Response) {
+    let (places, share) = (gait.places().len(), number::fixed(100.0 * response.r_squared, 0));
+    let noise = number::fixed(response.noise, 1);
+    observer.note(&format!(
+        "{robot}: {places} soft voxels and sensors explain {share} % of its response; the rest is {noise} voxel lengths"
+    ));
+}
+
+fn told_round(observer: &dyn Observer, robot: &str, round: &Round, plan: &Plan) {
+    let Round { round, predicted, measured, off, changed, rollouts } = round;
+    let [p, m] = [predicted, measured].map(|fitness| number::fixed(*fitness, 2));
+    observer.note(&format!("{robot}: round {round} of {}: fitness {m}, predicted {p}", plan.rounds));
+    observer.finding(
+        "round",
+        &serde_json::json!({
+            "robot": robot, "round": round, "rollouts": rollouts, "predicted": predicted, "measured": measured, "off": off,
+            "changed": changed,
+        }),
+    );
+}
+
+fn told_challenge(observer: &dyn Observer, challenge: &Challenge, plan: &Plan) {
+    let Challenge { number, other_gait, shown, fitness, won } = challenge;
+    let what = if *other_gait { "another gait" } else { "other sensors" };
+    if *won {
+        let fitness = number::fixed(*fitness, 3);
+        observer.note(&format!(
+            "challenger {number} of up to {}: {what}: fitness {fitness}",
+            plan.challengers + FINALISTS - 1
+        ));
+    }
+    observer.finding(
+        "challenge",
+        &serde_json::json!({
+            "challenger": number, "other_gait": other_gait, "images": shown, "fitness": fitness, "won": won,
+        }),
+    );
+}
+
+/// The run with the robot that was taught.
+fn run_file(
+    options: &Options,
+    config: &Config,
+    training: &Training,
+    origin: Origin,
+    walker: &Walker,
+    taught: &Taught,
+) -> Result<RunFile, Error> {
+    let body = taught.body.clone();
+    let genome = walker.robot.genome.with_body(&body).map_err(|error| Error::other(error.to_string()))?;
+    let training_images: Vec<ImageRef> = taught.shown.iter().map(|image| training.images[*image]).collect();
+    let grouping = config.grouping()?.with_fitness(config.evaluation.fitness);
+    let answers =
+        crate::store::images::answers(&training_images, taught.displacements.iter().copied().map(Some));
+    let score = grouping.score(&answers);
+    let mut robot = Robot {
+        id: genome.id(),
+        cell: Vec::new(),
+        task: grouping.tasks()[score.task].name(),
+        objective: score.fitness,
+        displacements: taught.displacements.clone(),
+        voxels: body.counts(),
+        generation: 0,
+        parent: Some(walker.robot.id.clone()),
+        body,
+        genome,
+    };
+    robot.cell = robot.bins();
+    let dimensions = Dimensions::of(config)?;
+    let space = DescriptorSpace::voxel_counts(grouping.tasks().len());
+    let cell = space.index(&robot.cell).expect("bins of voxel counts are a cell of one task's archive");
+    let mut archive = Archive::new();
+    let elite = Elite { cell, objective: robot.objective, solution: robot };
+    archive.insert(elite).map_err(|error| Error::other(error.to_string()))?;
+    let stats = archive.stats(dimensions.possible_cells, config.archive.qd_offset);
+    Ok(RunFile {
+        format: FORMAT.to_string(),
+        format_version: FORMAT_VERSION,
+        program_version: env!("CARGO_PKG_VERSION").to_string(),
+        name: options.name.clone(),
+        config: config.clone(),
+        dataset: training.dataset.clone(),
+        training_images,
+        dimensions,
+        origin: Some(origin),
+        generations: 1,
+        stats,
+        elites: archive.elites().map(|elite| elite.solution.clone()).collect(),
+        read_sha256: None,
+    })
+}

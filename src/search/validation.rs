@@ -1,0 +1,295 @@
+//! Choosing robots by their answers to images that are neither training nor test images.
+//!
+//! [`held_out`](crate::search::held_out) says which images. Robots are screened in rounds: all on a tenth of them, the better third
+//! of each task on three tenths, the better tenth on all. Results are kept beside the run.
+
+use crate::base::error::Error;
+use crate::base::files::write_atomically;
+use crate::base::hash::sha256_hex;
+use crate::base::observer::Observer;
+use crate::base::threads::pool;
+use crate::config::Config;
+use crate::data::dataset::{Dataset, Split};
+use crate::search::held_out::images;
+use crate::search::showing;
+use crate::search::showing::Walker;
+use crate::store::eval::{RobotReport, Trial};
+use crate::store::images::ImageRef;
+use crate::store::names::VALIDATION_JSON;
+use crate::store::robots::first_physical;
+use crate::store::robots::{Chosen, Selection, Source};
+use crate::store::run::{Robot, RunFile};
+use crate::store::validation::ValidationFile;
+use crate::store::validation::{FORMAT, Validated};
+use crate::store::whereabouts::Whereabouts;
+use crate::store::whereabouts::{load_dataset_of, see};
+use crate::task::grouping;
+use crate::task::grouping::Grouping;
+use std::collections::BTreeMap;
+use std::mem::replace;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, AtomicU64};
+
+/// A round: of the images, and of the robots of each task the share that gets so far.
+const ROUNDS: [(f64, f64); 3] = [(0.1, 1.0), (0.3, 1.0 / 3.0), (1.0, 0.1)];
+
+/// How robots are to be chosen.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Wanted {
+    /// So many of each task.
+    pub count: usize,
+    /// Images in all.
+    pub images: usize,
+    /// Displacements up to this count as wrong \[voxel lengths\].
+    pub threshold: f64,
+}
+
+/// Which robots of a run are to be chosen.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// The run.json.
+    pub archive: PathBuf,
+    /// How many of each task; `None`: as the config says.
+    pub best: Option<usize>,
+    /// Where the data are, if the command line says.
+    pub data: Option<PathBuf>,
+    /// Number of threads; `None`: one per core.
+    pub threads: Option<usize>,
+}
+
+/// Chooses the best robots of a run on the images of its section `[validation]`, as `eval` does it, and keeps them beside
+/// the run; `None` if stopped.
+///
+/// # Errors
+/// What is wrong with run or data, or that there are not enough images.
+pub fn validate(
+    options: &Options,
+    stop: &AtomicBool,
+    observer: &dyn Observer,
+) -> Result<Option<Vec<Validated>>, Error> {
+    let source = Source::read(&options.archive)?;
+    let config = &source.run.config;
+    let count = options.best.unwrap_or(config.validation.best);
+    let whereabouts = Whereabouts::given(options.data.as_deref()).and_of(&source.path);
+    let dataset = load_dataset_of(Some(&source.run.dataset), config, &whereabouts, &[Split::Train])?;
+    let pool = pool(options.threads)?;
+    ranked(&source, count, &dataset, &pool, stop, observer)
+}
+
+/// The same when a run ends, of the so many best that its config asks for, on data that are loaded already.
+///
+/// # Errors
+/// As of [`validate`].
+pub(crate) fn at_end(
+    archive: &Path,
+    dataset: &Dataset,
+    pool: &rayon::ThreadPool,
+    stop: &AtomicBool,
+    observer: &dyn Observer,
+) -> Result<Option<Vec<Validated>>, Error> {
+    let source = Source::read(archive)?;
+    ranked(&source, source.run.config.validation.best, dataset, pool, stop, observer)
+}
+
+fn ranked(
+    source: &Source,
+    count: usize,
+    dataset: &Dataset,
+    pool: &rayon::ThreadPool,
+    stop: &AtomicBool,
+    observer: &dyn Observer,
+) -> Result<Option<Vec<Validated>>, Error> {
+    let config = &source.run.config;
+    let grouping = config.grouping()?;
+    let control_steps = showing::control_steps(config, showing::CYCLES);
+    let walker = Walker { config, control_steps, pool, stop, observer, done: AtomicU64::new(0) };
+    let chosen = Selection::Validated(count).of(std::slice::from_ref(source), 0)?;
+    let skilled = |robot: &&Robot| showing::task_of(&grouping, robot).is_some();
+    let robots = chosen.iter().map(|chosen| chosen.robot).filter(skilled).collect();
+    let wanted = Wanted { count, images: config.validation.images, threshold: showing::THRESHOLD };
+    let best = best(source, dataset, &grouping, robots, &wanted, &walker)?;
+    Ok(best.map(|best| best.into_iter().map(|(_, validated)| validated).collect()))
+}
+
+/// The best of each run and task among some robots, or the best physical ones if the selection says so, with how they did;
+/// `None` if stopped.
+///
+/// # Errors
+/// As of [`best`] and [`first_physical`].
+pub(crate) fn chosen<'a>(
+    sources: &'a [Source],
+    robots: &[Chosen<'a>],
+    selection: &Selection,
+    dataset: &Dataset,
+    grouping: &Grouping,
+    wanted: &Wanted,
+    walker: &impl Fn() -> Walker<'a>,
+) -> Result<Option<Vec<(Chosen<'a>, Validated)>>, Error> {
+    let mut all = Vec::new();
+    for (number, source) in sources.iter().enumerate() {
+        let own = robots.iter().filter(|chosen| chosen.source == number).map(|chosen| chosen.robot).collect();
+        let is_physical = matches!(selection, Selection::Physical(_));
+        // Among those that are known at the run's end, in any case, since some will not be physical.
+        let count =
+            if is_physical { wanted.count.max(source.run.config.validation.best) } else { wanted.count };
+        let searched = Wanted { count, ..*wanted };
+        let Some(ranked) = best(source, dataset, grouping, own, &searched, &walker())? else {
+            return Ok(None);
+        };
+        let ranked = if is_physical { first_physical(ranked, source, wanted.count)? } else { ranked };
+        all.extend(ranked.into_iter().map(|(robot, score)| (Chosen { source: number, robot }, score)));
+    }
+    Ok(Some(all))
+}
+
+/// The best of each task among some robots of a run, best first, with how they did; `None` if stopped.
+///
+/// # Errors
+/// If there are not enough images, or the result cannot be kept.
+pub(crate) fn best<'a>(
+    source: &'a Source,
+    dataset: &Dataset,
+    grouping: &Grouping,
+    robots: Vec<&'a Robot>,
+    wanted: &Wanted,
+    walker: &Walker,
+) -> Result<Option<Vec<(&'a Robot, Validated)>>, Error> {
+    let run = &source.run;
+    let images = images(&[run], dataset, "--validation", wanted.images)?;
+    // Whoever asks for fewer than the run's end has found gets the first of those.
+    let searched = &Wanted { count: wanted.count.max(run.config.validation.best), ..*wanted };
+    let shown = (dataset.fingerprint(Split::Train).expect("its images were drawn just now"), &images[..]);
+    let key = key(run, &robots, searched, shown, walker.control_steps);
+    let path = source.path.with_file_name(VALIDATION_JSON);
+    let known = ValidationFile::read(&path);
+    let by_id = |validated: &Validated| {
+        let robot = robots.iter().find(|robot| robot.id == validated.id && robot.task == validated.task)?;
+        Some((*robot, validated.clone()))
+    };
+    let first = |all: &[Validated]| {
+        let before =
+            |place: usize, task: &str| all[..place].iter().filter(|other| other.task == task).count();
+        let is_first = |(place, robot): &(usize, &Validated)| before(*place, &robot.task) < wanted.count;
+        all.iter().enumerate().filter(is_first).filter_map(|(_, robot)| by_id(robot)).collect()
+    };
+    if let Some(file) = known.filter(|file| file.key == key) {
+        return Ok(Some(first(&file.robots)));
+    }
+    let Some(chosen) = screened(run, dataset, grouping, &robots, searched, &images, walker)? else {
+        return Ok(None);
+    };
+    let file = ValidationFile {
+        format: FORMAT.0.to_string(),
+        format_version: FORMAT.1,
+        run_sha256: run.fingerprint(),
+        key,
+        robots: chosen,
+    };
+    let text = serde_json::to_string(&file).map_err(|error| Error::other(error.to_string()))? + "\n";
+    if let Err(error) = write_atomically(&path, text.as_bytes()) {
+        let error = Error::writing(&path, &error);
+        walker.observer.warning(&format!("{error}; the next time robots are chosen anew"));
+    }
+    Ok(Some(first(&file.robots)))
+}
+
+/// Of all that the result depends on.
+fn key(
+    run: &RunFile,
+    robots: &[&Robot],
+    wanted: &Wanted,
+    (data, images): (String, &[ImageRef]),
+    control_steps: u32,
+) -> String {
+    let ids: Vec<&str> = robots.iter().map(|robot| robot.id.as_str()).collect();
+    let images: Vec<usize> = images.iter().map(|image| image.index).collect();
+    let Wanted { count, threshold, .. } = wanted;
+    sha256_hex(
+        format!(
+            "{} {} {data} {ids:?} {count} {images:?} {threshold} {control_steps}",
+            env!("CARGO_PKG_VERSION"),
+            run.fingerprint()
+        )
+        .as_bytes(),
+    )
+}
+
+/// Robots and images of each round, for some robots of a task of which `count` are wanted; of each class, which take turns, an image
+/// or more.
+fn rounds(robots: usize, count: usize, (images, classes): (usize, usize)) -> [(usize, usize); 3] {
+    ROUNDS.map(|(of_images, of_robots)| {
+        let kept = ((robots as f64 * of_robots).ceil() as usize).max(count).min(robots);
+        (kept, ((images as f64 * of_images).ceil() as usize).max(classes).min(images))
+    })
+}
+
+fn screened(
+    run: &RunFile,
+    dataset: &Dataset,
+    grouping: &Grouping,
+    robots: &[&Robot],
+    &Wanted { count, threshold, .. }: &Wanted,
+    images: &[ImageRef],
+    walker: &Walker,
+) -> Result<Option<Vec<Validated>>, Error> {
+    let config: &Config = &run.config;
+    let stimuli: Result<Vec<_>, Error> =
+        images.iter().map(|image| see(config, dataset, Split::Train, image.index)).collect();
+    let stimuli = stimuli?;
+    let split_of = |robot: &Robot| -> Option<&grouping::Split> {
+        grouping.tasks().iter().find(|split| split.name() == robot.task)
+    };
+    let mut tasks = BTreeMap::<&str, Vec<&Robot>>::new();
+    robots.iter().for_each(|robot| tasks.entry(&robot.task).or_default().push(robot));
+    let of = (images.len(), config.classes().len());
+    let showings = |all: &Vec<&Robot>| {
+        let mut before = 0;
+        rounds(all.len(), count, of).map(|(robots, shown)| robots * (shown - replace(&mut before, shown)))
+    };
+    let showings = tasks.values().flat_map(showings);
+    walker.validating(robots.len(), images.len(), showings.sum::<usize>() as u64);
+    let mut chosen = Vec::new();
+    for (_, all) in tasks {
+        // With its displacements so far.
+        let mut left: Vec<_> = all.iter().map(|robot| (*robot, Vec::new())).collect();
+        let mut scores = Vec::new();
+        for (keep, shown) in rounds(all.len(), count, of) {
+            left.truncate(keep);
+            scores = Vec::with_capacity(left.len());
+            for (robot, mut displacements) in left {
+                let Some(split) = split_of(robot) else { continue };
+                let Some((others, _)) = walker.lives(robot, &stimuli[displacements.len()..shown]) else {
+                    return Ok(None);
+                };
+                displacements.extend(others);
+                let trial = Trial { run, robot, split, images: &images[..shown], threshold };
+                scores.push((robot, RobotReport::new(&trial, displacements, 0)));
+            }
+            // Stable: equals stay in the order of the round before, at first of their fitness.
+            scores.sort_by(|(_, a), (_, b)| b.balanced_accuracy.total_cmp(&a.balanced_accuracy));
+            left = scores.iter().map(|(robot, report)| (*robot, report.displacements.clone())).collect();
+        }
+        chosen.extend(scores.into_iter().take(count).map(|(robot, report)| Validated {
+            id: robot.id.clone(),
+            task: robot.task.clone(),
+            images: report.images,
+            right: report.right,
+            balanced_accuracy: report.balanced_accuracy,
+        }));
+    }
+    Ok(Some(chosen))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_round_shows_every_class_and_the_last_one_all_images() {
+        for of in [(40, 10), (40, 2), (400, 4)] {
+            let rounds = rounds(100, 3, of);
+            assert!(rounds.iter().all(|(_, shown)| *shown >= of.1), "{rounds:?}");
+            assert_eq!((rounds[0].0, rounds[2]), (100, (10, of.0)));
+        }
+    }
+}

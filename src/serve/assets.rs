@@ -1,0 +1,28 @@
+//! The page's files, part of the program.
+
+use crate::serve::http::Response;
+
+const JS: &str = "text/javascript; charset=utf-8";
+const CSS: &str = "text/css; charset=utf-8";
+
+/// The file at a path.
+pub fn asset(path: &str) -> Option<Response> {
+    let (content_type, text) = match path {
+        "/" => ("text/html; charset=utf-8", include_str!("page/page.html")),
+        "/icon.svg" => ("image/svg+xml", include_str!("page/icon.svg")),
+        // The looks of the page that `replay` writes, and what is new here.
+        "/replay.css" => (CSS, include_str!("../view/replay.css")),
+        "/page.css" => (CSS, include_str!("page/page.css")),
+        "/drawing.js" => (JS, include_str!("../view/drawing.js")),
+        "/main.js" => (JS, include_str!("page/main.js")),
+        "/api.js" => (JS, include_str!("page/api.js")),
+        "/stage.js" => (JS, include_str!("page/stage.js")),
+        "/life.js" => (JS, include_str!("page/life.js")),
+        "/pad.js" => (JS, include_str!("page/pad.js")),
+        "/images.js" => (JS, include_str!("page/images.js")),
+        "/robots.js" => (JS, include_str!("page/robots.js")),
+        "/editor.js" => (JS, include_str!("page/editor.js")),
+        _ => return None,
+    };
+    Some(Response::file(content_type, text))
+}

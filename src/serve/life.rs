@@ -1,0 +1,241 @@
+//! One life, simulated at the pace that is asked for, and told moment by moment.
+
+use crate::serve::judge::{Answer, answer};
+use crate::serve::lives::{Control, Slot};
+use crate::serve::request::{MAX_STEPS, Pace, Plan, Seen};
+use crate::sim::System;
+use crate::task::recording::{Frame, VoxelCorners};
+use crate::task::rollout::Rollout;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+/// Control steps in a second of a robot's own time.
+pub const STEPS_PER_SECOND: f64 = 50.0;
+/// Moments that are told together where nobody waits for each.
+const BATCH: u32 = 20;
+/// Time from one telling to the next in real time.
+const TICK: Duration = Duration::from_millis(40);
+/// What takes longer is told in parts.
+const MOST_AT_ONCE: Duration = Duration::from_millis(100);
+/// How often a life that stands still says that it is there; so it learns, too, that nobody listens any more.
+const HEARTBEAT: Duration = Duration::from_millis(400);
+/// A life that cannot keep its pace does not try to make up for more than this.
+const MOST_BEHIND: f64 = 0.5;
+
+/// What is told of a life.
+pub enum Event<'a> {
+    /// It begins, at rest.
+    Begin {
+        /// Its number.
+        id: u64,
+        /// Who lives, and what is shown for how long.
+        plan: &'a Plan,
+        /// The voxels with their corners.
+        voxels: Vec<VoxelCorners>,
+        /// How it stands.
+        frame: Frame,
+    },
+    /// Another image is shown.
+    Seen {
+        /// After how many control steps.
+        step: u32,
+        /// The last control step under it.
+        until: u32,
+        /// The image.
+        seen: &'a Seen,
+    },
+    /// It lived on.
+    Lived {
+        /// Control steps lived at the last of the moments.
+        step: u32,
+        /// The moments, one per control step.
+        frames: &'a [Frame],
+        /// What it has come to.
+        answer: Answer,
+    },
+    /// It stands still.
+    Still,
+    /// It has ended.
+    End {
+        /// Control steps lived.
+        step: u32,
+        /// What it has come to.
+        answer: Answer,
+        /// Why it ended early, if it did.
+        unstable: Option<String>,
+    },
+}
+
+/// Nobody listens any more.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Gone;
+
+/// Lives a life; `tell` is told what happens.
+///
+/// # Errors
+/// [`Gone`] as soon as `tell` says so.
+pub fn live(slot: &Slot, plan: &Plan, mut tell: impl FnMut(Event) -> Result<(), Gone>) -> Result<(), Gone> {
+    let who = &plan.who;
+    let judge = who.judge.as_ref();
+    let system = Arc::new(System::new(&who.body, who.physics.clone()));
+    let mut rollout = Rollout::new(&system, &who.protocol);
+    rollout.look_at(&plan.seen.stimulus);
+    tell(Event::Begin { id: slot.id, plan, voxels: rollout.voxels(), frame: rollout.frame() })?;
+    let shown_for = who.protocol.control_steps;
+    let (mut step, mut until) = (0, shown_for);
+    let mut clock = Clock::new(plan.pace);
+    let mut frames = Vec::new();
+    loop {
+        let news = slot.control.news();
+        if let Some(seen) = &news.seen {
+            rollout.look_at(&seen.stimulus);
+            until = (step + shown_for).min(MAX_STEPS);
+            tell(Event::Seen { step, until, seen })?;
+        }
+        clock.set(news.pace, news.paused);
+        if news.end || step >= until {
+            return tell(Event::End { step, answer: answer(judge, rollout.moved()), unstable: None });
+        }
+        let due = match clock.due(step) {
+            Some(due) => due.min(until - step),
+            None => {
+                tell(Event::Still)?;
+                slot.control.wait(HEARTBEAT);
+                continue;
+            }
+        };
+        frames.clear();
+        let begin = Instant::now();
+        for _ in 0..due {
+            let before = rollout.moved();
+            let Ok(stepped) = rollout.step_unless(&slot.control.over) else {
+                return tell(Event::End { step, answer: answer(judge, before), unstable: None });
+            };
+            if let Err(unstable) = stepped {
+                let answer = answer(judge, before);
+                if !frames.is_empty() {
+                    tell(Event::Lived { step, frames: &frames, answer: answer.clone() })?;
+                }
+                return tell(Event::End { step, answer, unstable: Some(unstable.to_string()) });
+            }
+            step += 1;
+            frames.push(rollout.frame());
+            // Large bodies are told of as they live.
+            if begin.elapsed() > MOST_AT_ONCE {
+                break;
+            }
+        }
+        if !frames.is_empty() {
+            tell(Event::Lived { step, frames: &frames, answer: answer(judge, rollout.moved()) })?;
+        }
+        clock.sleep(&slot.control);
+    }
+}
+
+/// When the next control steps are due.
+struct Clock {
+    pace: Pace,
+    paused: bool,
+    /// The moment at which `first` control steps had been lived; none before the first look.
+    begin: Option<(Instant, u32)>,
+}
+
+impl Clock {
+    fn new(pace: Pace) -> Self {
+        Clock { pace, paused: false, begin: None }
+    }
+
+    fn set(&mut self, pace: Option<Pace>, paused: Option<bool>) {
+        if pace.is_some() || paused.is_some() {
+            self.pace = pace.unwrap_or(self.pace);
+            self.paused = paused.unwrap_or(self.paused);
+            self.begin = None;
+        }
+    }
+
+    /// How many control steps are due after so many lived; none if it stands still.
+    fn due(&mut self, step: u32) -> Option<u32> {
+        let Pace::Times(times) = self.pace else {
+            return (!self.paused).then_some(BATCH);
+        };
+        if self.paused {
+            return None;
+        }
+        let rate = times * STEPS_PER_SECOND;
+        let now = Instant::now();
+        let (begin, first) = *self.begin.get_or_insert((now, step));
+        let target = f64::from(first) + (now - begin).as_secs_f64() * rate;
+        let due = target - f64::from(step);
+        if due > rate * MOST_BEHIND {
+            self.begin = None;
+        }
+        Some(due.clamp(0.0, f64::from(BATCH).max(rate / 10.0)) as u32)
+    }
+
+    fn sleep(&self, control: &Control) {
+        if self.pace != Pace::Free {
+            control.wait(TICK);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::base::Grid;
+    use crate::serve::lives::Lives;
+    use crate::serve::request::Who;
+    use crate::sim::Physics;
+    use crate::task::protocol::Protocol;
+    use crate::task::stimulus::StimulusParams;
+
+    #[test]
+    fn a_life_ends_in_the_middle_of_a_control_step_when_it_is_to_end() {
+        let who = Who {
+            body: "3434/4343".parse().unwrap(),
+            // A control step of a quarter of an hour.
+            physics: Physics { substeps: u32::MAX, ..Physics::default() },
+            protocol: Protocol::default(),
+            encoding: StimulusParams::default(),
+            judge: None,
+        };
+        let seen = Seen { stimulus: Grid::filled(2, 4, 0.0), label: None };
+        let plan = Plan { who: who.clone(), seen, pace: Pace::Free };
+        let lives = Lives::default();
+        let slot = lives.begin(who).unwrap();
+        let begin = Instant::now();
+        let mut ends = 0;
+        std::thread::scope(|threads| {
+            threads.spawn(|| {
+                std::thread::sleep(Duration::from_millis(50));
+                lives.close();
+            });
+            live(&slot, &plan, |event| {
+                ends += u32::from(matches!(event, Event::End { step: 0, .. }));
+                Ok(())
+            })
+            .unwrap();
+        });
+        assert_eq!(ends, 1);
+        assert!(begin.elapsed().as_secs() < 5, "{:?}", begin.elapsed());
+    }
+
+    #[test]
+    fn a_clock_keeps_its_pace_and_forgives_what_cannot_be_made_up_for() {
+        let mut free = Clock::new(Pace::Free);
+        assert_eq!(free.due(7), Some(BATCH));
+        free.set(None, Some(true));
+        assert_eq!(free.due(7), None);
+
+        let mut clock = Clock::new(Pace::Times(2.0));
+        assert_eq!(clock.due(0), Some(0));
+        let ago = |ms| Instant::now().checked_sub(Duration::from_millis(ms));
+        clock.begin = ago(100).map(|begin| (begin, 0));
+        assert!((10..=12).contains(&clock.due(0).unwrap()));
+        assert!((5..=8).contains(&clock.due(5).unwrap()) && clock.begin.is_some());
+        clock.begin = ago(60_000).map(|begin| (begin, 0));
+        assert_eq!((clock.due(5), clock.begin), (Some(BATCH), None));
+        clock.set(Some(Pace::Times(1.0)), None);
+        assert_eq!(clock.due(25), Some(0));
+    }
+}

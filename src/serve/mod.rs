@@ -1,0 +1,159 @@
+//! `morphcog serve`: what the page asks for, answered with the real engine. Knows nothing of HTTP: that is
+//! [`server`]'s.
+
+pub mod assets;
+pub mod catalogue;
+pub mod http;
+pub mod images;
+pub mod judge;
+pub mod life;
+pub mod lives;
+pub mod refusal;
+pub mod request;
+pub mod routes;
+pub mod server;
+pub mod stream;
+
+use crate::base::error::Error;
+use crate::body::Body;
+use crate::commands::simulate::Scenario;
+use crate::sim::Physics;
+use catalogue::Catalogue;
+use images::ImageSets;
+use lives::Lives;
+use refusal::Refusal;
+use request::Plan;
+use serde::Serialize;
+use std::path::PathBuf;
+
+/// What to serve.
+#[derive(Clone, Debug, Default)]
+pub struct Options {
+    /// The run.json files to browse.
+    pub archives: Vec<PathBuf>,
+    /// Where the data are, if the command line says.
+    pub data: Option<PathBuf>,
+}
+
+/// Everything a page can ask for.
+pub struct Service {
+    /// Robots to choose from.
+    pub catalogue: Catalogue,
+    /// Test images to choose from.
+    pub images: ImageSets,
+    /// What runs at the moment.
+    pub lives: Lives,
+}
+
+/// What `/api/status` says.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub struct Status {
+    /// Version of the program.
+    pub version: &'static str,
+    /// Lives running now.
+    pub lives: usize,
+    /// Most lives at once.
+    pub max_lives: usize,
+    /// Lives begun so far.
+    pub begun: u64,
+}
+
+/// What a body is found to be.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Checked {
+    /// Whether all its voxels hang together, and there is one.
+    pub connected: bool,
+    /// Muscle voxels.
+    pub muscle: usize,
+    /// Sensor voxels.
+    pub sensor: usize,
+    /// All voxels.
+    pub total: usize,
+    /// Why it cannot live; none if it can.
+    pub problem: Option<&'static str>,
+    /// What is worth knowing of one that can.
+    pub note: Option<&'static str>,
+}
+
+/// A scenario of `morphcog simulate`, as far as the page can show it.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Loaded {
+    /// The body.
+    pub body: Body,
+    /// What it sees; none: all dark.
+    pub stimulus: Option<crate::base::Grid<f64>>,
+    /// Length of the life, cut to what the page allows.
+    pub control_steps: u64,
+    /// What of it is not shown.
+    pub note: Option<&'static str>,
+}
+
+impl Service {
+    /// Reads the archives and finds the images; what could not be found without being asked for by name is told in
+    /// the notes.
+    ///
+    /// # Errors
+    /// What is wrong with an archive.
+    pub fn open(options: &Options) -> Result<(Self, Vec<String>), Error> {
+        let (catalogue, mut notes) = Catalogue::open(&options.archives)?;
+        let (images, missing) = ImageSets::open(&catalogue, options.data.as_deref())?;
+        notes.extend(missing);
+        Ok((Service { catalogue, images, lives: Lives::default() }, notes))
+    }
+
+    /// How it is doing.
+    pub fn status(&self) -> Status {
+        Status {
+            version: env!("CARGO_PKG_VERSION"),
+            lives: self.lives.running(),
+            max_lives: lives::MAX_LIVES,
+            begun: self.lives.begun(),
+        }
+    }
+
+    /// Whether a body can live.
+    pub fn check(&self, body: &Body) -> Checked {
+        let counts = body.counts();
+        let connected = body.is_connected();
+        let problem = match (counts.total, connected) {
+            (0, _) => Some("there is no voxel yet"),
+            (_, false) => Some("its voxels do not all hang together through their sides"),
+            _ => None,
+        };
+        let note = match (problem, counts.muscle, counts.sensor) {
+            (None, 0, _) => Some("without a muscle it does not walk"),
+            (None, _, 0) => Some("without a sensor it is blind"),
+            _ => None,
+        };
+        let crate::body::VoxelCounts { muscle, sensor, total } = counts;
+        Checked { connected, muscle, sensor, total, problem, note }
+    }
+
+    /// Reads a scenario of `morphcog simulate`.
+    ///
+    /// # Errors
+    /// What is wrong with it, or that the page cannot show it.
+    pub fn load(&self, text: &str) -> Result<Loaded, Refusal> {
+        let scenario = Scenario::parse(text, "scenario")?;
+        if *scenario.physics() != Physics::default() {
+            let text =
+                "scenario: physics: the page has EvoGym's constants only; morphcog simulate takes others";
+            return Err(Refusal::Wrong(text.to_string()));
+        }
+        let note = (scenario.stimuli().len() > 1).then_some("of its stimuli the first is shown");
+        Ok(Loaded {
+            stimulus: scenario.stimuli().first().cloned(),
+            control_steps: scenario.control_steps().clamp(1, u64::from(request::MAX_STEPS)),
+            body: scenario.body,
+            note,
+        })
+    }
+
+    /// What a request for a life means.
+    ///
+    /// # Errors
+    /// What is wrong with it.
+    pub fn plan(&self, request: request::LifeRequest) -> Result<Plan, Refusal> {
+        request.plan(&self.catalogue, &self.images)
+    }
+}

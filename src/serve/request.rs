@@ -1,0 +1,255 @@
+//! Requests for lives: from what the page sends to what is simulated, everything checked and bounded.
+
+use crate::base::Grid;
+use crate::body::Body;
+use crate::serve::catalogue::Catalogue;
+use crate::serve::images::{ImageName, ImageSets};
+use crate::serve::judge::Judge;
+use crate::serve::refusal::Refusal;
+use crate::sim::Physics;
+use crate::task::protocol::Protocol;
+use crate::task::stimulus::{Encoding, Reduction, StimulusParams, stimulus};
+use serde::Deserialize;
+
+/// Most control steps in a life, images changed on the way included: a hundred actuation cycles.
+pub const MAX_STEPS: u32 = 5000;
+/// Largest side of a picture \[pixels\].
+pub const MAX_PICTURE: usize = 128;
+/// Fastest pace that is not "as fast as possible".
+pub const MAX_SPEED: f64 = 16.0;
+
+/// Which body, and how it sees: a robot of a collection, or any body.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Subject {
+    /// Number of the collection.
+    archive: Option<usize>,
+    /// Id of the robot there.
+    robot: Option<String>,
+    /// Or a body of one's own.
+    body: Option<Body>,
+    /// How that body's stimulus is made from an image.
+    encoding: Option<StimulusParams>,
+}
+
+/// What it is shown: at most one of the three; none is dark.
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Shown {
+    /// A drawing: 0 paper … 255 ink, rows from the top.
+    drawing: Option<Grid<u8>>,
+    /// A test image.
+    image: Option<ImageName>,
+    /// A stimulus as it is, one number from 0 to 1 per voxel.
+    stimulus: Option<Grid<f64>>,
+}
+
+/// A life to begin.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LifeRequest {
+    /// Who lives.
+    subject: Subject,
+    /// What it sees.
+    #[serde(default)]
+    shown: Shown,
+    /// For how many control steps an image is shown; default: the robot's protocol.
+    control_steps: Option<u32>,
+    /// Times real time; 0: as fast as possible. Default 1.
+    speed: Option<f64>,
+}
+
+/// What a body sees of an image, without a life.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SeeRequest {
+    subject: Subject,
+    #[serde(default)]
+    shown: Shown,
+}
+
+/// A change of a life that goes on.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ChangeRequest {
+    /// What it sees from now on.
+    pub shown: Option<Shown>,
+    /// Times real time; 0: as fast as possible.
+    pub speed: Option<f64>,
+    /// Whether it stands still.
+    pub paused: Option<bool>,
+}
+
+/// How fast a life goes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Pace {
+    /// So many times real time.
+    Times(f64),
+    /// As fast as possible.
+    Free,
+}
+
+impl Pace {
+    /// From a number, 0 for as fast as possible.
+    ///
+    /// # Errors
+    /// If it is no speed.
+    pub fn of(speed: f64) -> Result<Self, Refusal> {
+        match speed {
+            0.0 => Ok(Pace::Free),
+            times if (0.1..=MAX_SPEED).contains(&times) => Ok(Pace::Times(times)),
+            _ => Err(Refusal::Wrong(format!(
+                "speed: {speed}: expected 0 (as fast as possible) or 0.1 to {MAX_SPEED}"
+            ))),
+        }
+    }
+}
+
+/// Which body, with all that its life depends on.
+#[derive(Clone, Debug)]
+pub struct Who {
+    /// The body.
+    pub body: Body,
+    /// The constants of its world.
+    pub physics: Physics,
+    /// Where it starts, and how long it sees an image.
+    pub protocol: Protocol,
+    /// How it sees.
+    pub encoding: StimulusParams,
+    /// What its walks say; none of a body without a task.
+    pub judge: Option<Judge>,
+}
+
+/// What is seen, and of which class it is if that is known.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Seen {
+    /// H × W in \[0, 1\].
+    pub stimulus: Grid<f64>,
+    /// The class of a test image.
+    pub label: Option<u8>,
+}
+
+/// A life that can be begun.
+#[derive(Clone, Debug)]
+pub struct Plan {
+    /// Who lives.
+    pub who: Who,
+    /// What it sees at first.
+    pub seen: Seen,
+    /// How fast.
+    pub pace: Pace,
+}
+
+impl Subject {
+    fn find(self, catalogue: &Catalogue) -> Result<Who, Refusal> {
+        let wrong = |text: &str| Err(Refusal::Wrong(text.to_string()));
+        match self {
+            Subject { archive: Some(index), robot: Some(id), body: None, encoding: None } => {
+                let collection = catalogue.collection(index)?;
+                let robot = collection.robot(&id)?;
+                let config = &collection.config;
+                Ok(Who {
+                    body: robot.body.clone(),
+                    physics: config.physics.clone(),
+                    protocol: config.protocol.clone(),
+                    encoding: config.stimulus,
+                    judge: robot.judge.clone(),
+                })
+            }
+            Subject { archive: None, robot: None, body: Some(body), encoding } => {
+                if !body.is_connected() {
+                    return wrong(
+                        "subject.body: expected at least one voxel, and all hanging together through their sides",
+                    );
+                }
+                let encoding = encoding.unwrap_or(StimulusParams {
+                    reduction: Reduction::Area,
+                    encoding: Encoding::Saturated,
+                    ..StimulusParams::default()
+                });
+                let (physics, protocol) = (Physics::default(), Protocol::default());
+                Ok(Who { body, physics, protocol, encoding, judge: None })
+            }
+            _ => wrong("subject: expected either archive and robot, or body (perhaps with encoding)"),
+        }
+    }
+}
+
+impl Shown {
+    /// As a body sees it.
+    ///
+    /// # Errors
+    /// What is wrong with it.
+    pub fn seen(self, who: &Who, images: &ImageSets) -> Result<Seen, Refusal> {
+        let (height, width) = (who.body.height(), who.body.width());
+        let reduce = |pixels: &Grid<u8>| {
+            let (rows, columns) = (pixels.height(), pixels.width());
+            if rows > MAX_PICTURE || columns > MAX_PICTURE {
+                return Err(Refusal::Wrong(format!(
+                    "shown.drawing: {rows} × {columns} pixels, expected at most {MAX_PICTURE} × {MAX_PICTURE}"
+                )));
+            }
+            stimulus(pixels, height, width, &who.encoding)
+                .map_err(|error| Refusal::Wrong(format!("shown: {error}")))
+        };
+        match self {
+            Shown { drawing: None, image: None, stimulus: None } => {
+                Ok(Seen { stimulus: Grid::filled(height, width, 0.0), label: None })
+            }
+            Shown { drawing: Some(pixels), image: None, stimulus: None } => {
+                Ok(Seen { stimulus: reduce(&pixels)?, label: None })
+            }
+            Shown { drawing: None, image: Some(name), stimulus: None } => {
+                let image = images.image(&name)?;
+                Ok(Seen { stimulus: reduce(&image.pixels)?, label: Some(image.label) })
+            }
+            Shown { drawing: None, image: None, stimulus: Some(given) } => {
+                if (given.height(), given.width()) != (height, width) {
+                    let (rows, columns) = (given.height(), given.width());
+                    return Err(Refusal::Wrong(format!(
+                        "shown.stimulus: {rows} × {columns} pixels, expected {height} × {width} as the body"
+                    )));
+                }
+                if given.cells().iter().any(|pixel| !(0.0..=1.0).contains(pixel)) {
+                    return Err(Refusal::Wrong("shown.stimulus: expected numbers from 0 to 1".to_string()));
+                }
+                Ok(Seen { stimulus: given, label: None })
+            }
+            _ => Err(Refusal::Wrong("shown: expected one of drawing, image, stimulus".to_string())),
+        }
+    }
+}
+
+impl LifeRequest {
+    pub(crate) fn plan(self, catalogue: &Catalogue, images: &ImageSets) -> Result<Plan, Refusal> {
+        let mut who = self.subject.find(catalogue)?;
+        let steps = self.control_steps.unwrap_or(who.protocol.control_steps.min(MAX_STEPS));
+        if !(1..=MAX_STEPS).contains(&steps) {
+            return Err(Refusal::Wrong(format!("control_steps: {steps}: expected 1 to {MAX_STEPS}")));
+        }
+        who.protocol.control_steps = steps;
+        let seen = self.shown.seen(&who, images)?;
+        Ok(Plan { who, seen, pace: Pace::of(self.speed.unwrap_or(1.0))? })
+    }
+}
+
+impl SeeRequest {
+    /// What the body sees.
+    ///
+    /// # Errors
+    /// What is wrong with the request.
+    pub fn seen(self, catalogue: &Catalogue, images: &ImageSets) -> Result<Seen, Refusal> {
+        let who = self.subject.find(catalogue)?;
+        self.shown.seen(&who, images)
+    }
+}
+
+/// Reads a request.
+///
+/// # Errors
+/// What is wrong with it, with its key.
+pub fn read<T: serde::de::DeserializeOwned>(body: &[u8]) -> Result<T, Refusal> {
+    let text =
+        std::str::from_utf8(body).map_err(|_| Refusal::Wrong("request: not UTF-8 text".to_string()))?;
+    crate::config::reading::read_json(text, "request").map_err(Refusal::from)
+}

@@ -1,0 +1,145 @@
+//! Which answer a request gets.
+
+use crate::body::Body;
+use crate::serve::Service;
+use crate::serve::assets::asset;
+use crate::serve::http::{Request, Response};
+use crate::serve::refusal::Refusal;
+use crate::serve::request;
+use crate::serve::request::{ChangeRequest, LifeRequest, Pace, Plan, SeeRequest};
+use crate::serve::stream;
+use serde::Deserialize;
+use serde_json::json;
+
+/// What is done about a request.
+pub enum Reply {
+    /// It is answered as a whole.
+    Whole(Response),
+    /// A life begins.
+    Life(Box<Plan>),
+}
+
+/// Answers a request to the server at a port.
+pub fn reply(service: &Service, port: u16, request: &Request) -> Reply {
+    if let Err(refusal) = no_stranger(port, request) {
+        return Reply::Whole(refusal);
+    }
+    let parts: Vec<&str> = request.path.split('/').skip(1).collect();
+    let get = matches!(request.method.as_str(), "GET" | "HEAD");
+    let post = request.method == "POST";
+    let reading = |answer: &dyn Fn() -> Result<Response, Refusal>| {
+        let answer = if get { answer().unwrap_or_else(refused) } else { Response::wrong_method("GET, HEAD") };
+        Reply::Whole(answer)
+    };
+    let posting = |answer: &dyn Fn() -> Result<Response, Refusal>| {
+        let answer = if post { answer().unwrap_or_else(refused) } else { Response::wrong_method("POST") };
+        Reply::Whole(answer)
+    };
+    match parts.as_slice() {
+        ["api", "status"] => reading(&|| Ok(Response::json(&service.status()))),
+        ["api", "materials"] => reading(&|| Ok(Response::json(&stream::materials()))),
+        ["api", "archives"] => reading(&|| Ok(Response::json(&service.catalogue.list()))),
+        ["api", "archives", index] => reading(&|| archive(service, index)),
+        ["api", "images"] => reading(&|| images(service, request)),
+        ["api", "body"] => posting(&|| {
+            #[derive(Deserialize)]
+            #[serde(deny_unknown_fields)]
+            struct Posted {
+                body: Body,
+            }
+            let Posted { body } = request::read(&request.body)?;
+            Ok(Response::json(&service.check(&body)))
+        }),
+        ["api", "stimulus"] => posting(&|| {
+            let asked: SeeRequest = request::read(&request.body)?;
+            let seen = asked.seen(&service.catalogue, &service.images)?;
+            Ok(Response::json(&json!({ "stimulus": seen.stimulus, "label": seen.label })))
+        }),
+        ["api", "scenario"] => posting(&|| {
+            let text = std::str::from_utf8(&request.body);
+            let text = text.map_err(|_| Refusal::Wrong("scenario: not UTF-8 text".to_string()))?;
+            Ok(Response::json(&service.load(text)?))
+        }),
+        ["api", "lives"] if post => {
+            let plan = request::read::<LifeRequest>(&request.body).and_then(|asked| service.plan(asked));
+            plan.map_or_else(|refusal| Reply::Whole(refused(refusal)), |plan| Reply::Life(Box::new(plan)))
+        }
+        ["api", "lives"] => Reply::Whole(Response::wrong_method("POST")),
+        ["api", "lives", id] => posting(&|| change(service, id, &request.body)),
+        _ => match asset(&request.path) {
+            Some(_) if !get => Reply::Whole(Response::wrong_method("GET, HEAD")),
+            Some(file) => Reply::Whole(file),
+            None => Reply::Whole(Response::refusal(404, "there is nothing here; the page is at /")),
+        },
+    }
+}
+
+/// What a refusal is in HTTP.
+pub fn refused(refusal: Refusal) -> Response {
+    let status = match refusal {
+        Refusal::Wrong(_) => 400,
+        Refusal::Unknown(_) => 404,
+        Refusal::Busy(_) => 503,
+    };
+    Response::refusal(status, &refusal.to_string())
+}
+
+/// Refuses other sites that let a name of theirs point here (DNS rebinding), and requests that other sites' pages send.
+fn no_stranger(port: u16, request: &Request) -> Result<(), Response> {
+    let names = ["127.0.0.1", "localhost"];
+    let mut own = names.map(|name| format!("{name}:{port}")).to_vec();
+    if port == 80 {
+        // HTTP's own port is not named.
+        own.extend(names.map(str::to_string));
+    }
+    match request.header("host")? {
+        None => return Err(Response::refusal(400, "expected a Host header")),
+        Some(host) if !own.iter().any(|name| name.eq_ignore_ascii_case(host)) => {
+            return Err(Response::refusal(403, &format!("Host: expected {}", own.join(" or "))));
+        }
+        Some(_) => {}
+    }
+    let sent = request.header("origin")?;
+    let is_own = |origin: &str| own.iter().any(|name| origin.eq_ignore_ascii_case(&format!("http://{name}")));
+    // Programs like curl send none; browsers always do where it matters.
+    let foreign = request.method == "POST" && sent.is_some_and(|origin| !is_own(origin));
+    match foreign {
+        true => Err(Response::refusal(403, "Origin: requests from other sites are refused")),
+        false => Ok(()),
+    }
+}
+
+fn number<T: std::str::FromStr>(text: &str, what: &str) -> Result<T, Refusal> {
+    text.parse().map_err(|_| Refusal::Wrong(format!("{what}: {text:?}: expected a number")))
+}
+
+fn archive(service: &Service, index: &str) -> Result<Response, Refusal> {
+    let collection = service.catalogue.collection(number(index, "archive")?)?;
+    Ok(Response::json(&json!({
+        "name": collection.name,
+        "bins": collection.bins,
+        "tasks": collection.tasks,
+        "encoding": collection.config.stimulus,
+        "control_steps": collection.config.protocol.control_steps,
+        "dataset": collection.config.data.dataset,
+        "robots": collection.robots,
+    })))
+}
+
+fn images(service: &Service, request: &Request) -> Result<Response, Refusal> {
+    let Some(set) = request.asked("set") else {
+        return Ok(Response::json(&service.images.list()));
+    };
+    let or = |key: &str, default: usize| request.asked(key).map_or(Ok(default), |text| number(text, key));
+    let class = request.asked("class").map_or(Ok(0), |text| number(text, "class"))?;
+    let page = service.images.page(set, class, or("from", 0)?, or("count", 24)?)?;
+    Ok(Response::json(&page))
+}
+
+fn change(service: &Service, id: &str, body: &[u8]) -> Result<Response, Refusal> {
+    let life = service.lives.life(number(id, "life")?)?;
+    let ChangeRequest { shown, speed, paused } = request::read(body)?;
+    let seen = shown.map(|shown| shown.seen(&life.who, &service.images)).transpose()?;
+    life.change(speed.map(Pace::of).transpose()?, paused, seen);
+    Ok(Response::done())
+}

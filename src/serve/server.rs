@@ -1,0 +1,163 @@
+//! `morphcog serve`: the page, and what it asks for, over HTTP on this machine only.
+
+use crate::base::error::Error;
+use crate::serve::Service;
+use crate::serve::http::Response;
+use crate::serve::life::{Gone, live};
+use crate::serve::lives::Control;
+use crate::serve::request::Plan;
+use crate::serve::routes::Reply;
+use crate::serve::{http, routes, stream};
+use std::io::{self, ErrorKind, Write};
+use std::net::{Ipv4Addr, SocketAddr, TcpListener, TcpStream};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::time::{Duration, Instant};
+
+/// Most connections at once; a browser needs about six.
+const MAX_CONNECTIONS: usize = 64;
+/// How long lives may take to end when the server ends.
+const TO_END: Duration = Duration::from_secs(2);
+/// How often the server looks whether it is to end.
+const LOOK: Duration = Duration::from_millis(50);
+
+/// A server that is bound to its port.
+pub struct Server {
+    listener: TcpListener,
+    address: SocketAddr,
+    service: Arc<Service>,
+}
+
+impl Server {
+    /// Binds a port of this machine that no other machine can reach; 0: any that is free.
+    ///
+    /// # Errors
+    /// If the port is taken, or the system does not allow it.
+    pub fn bind(service: Service, port: u16) -> Result<Self, Error> {
+        let refuse = |error: std::io::Error| match error.kind() {
+            std::io::ErrorKind::AddrInUse => {
+                Error::occupied(format!("port {port} is taken by another program"))
+                    .hint("name another with --port, or none for one that is free".to_string())
+            }
+            _ => Error::other(format!("port {port} of 127.0.0.1 cannot be used: {error}")),
+        };
+        let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, port)).map_err(refuse)?;
+        let address = listener.local_addr().map_err(refuse)?;
+        Ok(Server { listener, address, service: Arc::new(service) })
+    }
+
+    /// Where the page is.
+    pub fn url(&self) -> String {
+        format!("http://{}/", self.address)
+    }
+
+    /// Serves until `stop` is set; then ends all lives.
+    pub fn run(self, stop: &AtomicBool) {
+        let Server { listener, address, service } = self;
+        let ended = Arc::new(AtomicBool::new(false));
+        let (own, over) = (Arc::clone(&service), Arc::clone(&ended));
+        std::thread::spawn(move || accept(&listener, address.port(), &own, &over));
+        while !stop.load(Ordering::Relaxed) {
+            std::thread::sleep(LOOK);
+        }
+        ended.store(true, Ordering::Relaxed);
+        service.lives.close();
+        // The thread that accepts wakes up, and sees.
+        drop(TcpStream::connect_timeout(&address, LOOK));
+        let until = Instant::now() + TO_END;
+        while service.lives.running() > 0 && Instant::now() < until {
+            std::thread::sleep(Duration::from_millis(5));
+        }
+    }
+}
+
+fn accept(listener: &TcpListener, port: u16, service: &Arc<Service>, ended: &AtomicBool) {
+    let connections = Arc::new(AtomicUsize::new(0));
+    for stream in listener.incoming() {
+        if ended.load(Ordering::Relaxed) {
+            return;
+        }
+        let Ok(mut stream) = stream else {
+            // Too many open files, or a connection that went at once: there will be others.
+            std::thread::sleep(LOOK);
+            continue;
+        };
+        if connections.fetch_add(1, Ordering::AcqRel) >= MAX_CONNECTIONS {
+            connections.fetch_sub(1, Ordering::AcqRel);
+            let busy = Response::refusal(503, "too many connections at once");
+            let _ = stream.set_write_timeout(Some(LOOK)).and_then(|()| busy.send(&mut stream, false));
+            continue;
+        }
+        let place = Place(Arc::clone(&connections));
+        let service = Arc::clone(service);
+        // If the system has no thread left, the connection is closed and its place is free again.
+        let _ = std::thread::Builder::new().name("connection".to_string()).spawn(move || {
+            let _place = place;
+            connection(&service, port, &mut stream);
+        });
+    }
+}
+
+/// A connection's place among those at once, free again however the connection ends.
+struct Place(Arc<AtomicUsize>);
+
+impl Drop for Place {
+    fn drop(&mut self) {
+        self.0.fetch_sub(1, Ordering::AcqRel);
+    }
+}
+
+fn connection(service: &Service, port: u16, stream: &mut TcpStream) {
+    let (response, head_only) = match http::read(stream) {
+        Ok(None) => return,
+        Err(refusal) => (refusal, false),
+        Ok(Some(request)) => match routes::reply(service, port, &request) {
+            Reply::Whole(response) => (response, request.method == "HEAD"),
+            Reply::Life(plan) => match life(service, &plan, stream) {
+                None => return,
+                Some(refusal) => (refusal, false),
+            },
+        },
+    };
+    // Where nobody listens any more there is nobody left to tell.
+    if response.send(stream, head_only).is_ok() {
+        http::close(stream);
+    }
+}
+
+/// Lives a life over a connection; it ends when that does. What is to be answered if there is no place for it.
+fn life(service: &Service, plan: &Plan, stream: &mut TcpStream) -> Option<Response> {
+    let slot = match service.lives.begin(plan.who.clone()) {
+        Ok(slot) => slot,
+        Err(refusal) => return Some(routes::refused(refusal)),
+    };
+    let begun = http::begin_events(stream).and_then(|()| end_with(stream, &slot.control)).map_err(|_| Gone);
+    let told = begun.and_then(|()| {
+        live(&slot, plan, |event| stream.write_all(stream::text(&event).as_bytes()).map_err(|_| Gone))
+    });
+    // Whoever watches the connection has nothing left to do.
+    slot.control.end();
+    drop(slot);
+    if told.is_ok() {
+        http::close(stream);
+    }
+    None
+}
+
+/// Ends a life when the other side closes its connection: a write would fail only after that, and in between the life would go on.
+fn end_with(stream: &TcpStream, control: &Arc<Control>) -> io::Result<()> {
+    let (stream, control) = (stream.try_clone()?, Arc::clone(control));
+    stream.set_read_timeout(Some(LOOK))?;
+    let watch = move || {
+        while !control.is_over() {
+            match stream.peek(&mut [0]) {
+                // Somebody who talks on.
+                Ok(count) if count > 0 => std::thread::sleep(LOOK),
+                Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => {}
+                Err(error) if error.kind() == ErrorKind::Interrupted => {}
+                Ok(_) | Err(_) => control.end(),
+            }
+        }
+    };
+    std::thread::Builder::new().name("watch".to_string()).spawn(watch).map(|_| ())
+}

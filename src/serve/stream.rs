@@ -1,0 +1,74 @@
+//! A life as server-sent events: JSON, positions as 16-bit numbers in base64.
+//!
+//! As in the page of a replay: steps of 1/200 voxel length from an origin per moment, near the centre of mass.
+
+use crate::body::Material;
+use crate::serve::judge::THRESHOLD;
+use crate::serve::life::{Event, STEPS_PER_SECOND};
+use crate::serve::request::{Plan, Seen};
+use crate::task::recording::{Frame, VoxelCorners};
+use crate::view::colour::{TONE_AREAS, tones};
+use crate::view::html::{STEPS, quantised};
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD as BASE64;
+use serde_json::{Value, json};
+
+/// What a page has to know of materials to draw them.
+pub fn materials() -> Value {
+    let material = |m: Material| json!({ "name": m.name(), "tones": tones(m), "sensor": m.is_sensor(), "muscle": m.is_muscle() });
+    json!({ "areas": TONE_AREAS, "list": Material::ALL.map(material) })
+}
+
+/// An event as it goes over the line.
+pub fn text(event: &Event) -> String {
+    let (name, data) = match event {
+        Event::Begin { id, plan, voxels, frame } => ("begin", begin(*id, plan, voxels, frame)),
+        Event::Seen { step, until, seen } => ("seen", looks(*step, *until, seen)),
+        Event::Lived { step, frames, answer } => {
+            ("lived", json!({ "step": step, "frames": positions(frames), "answer": answer }))
+        }
+        // A comment: nothing to do for the page.
+        Event::Still => return ":\n\n".to_string(),
+        Event::End { step, answer, unstable } => {
+            ("end", json!({ "step": step, "answer": answer, "unstable": unstable }))
+        }
+    };
+    format!("event: {name}\ndata: {data}\n\n")
+}
+
+fn begin(id: u64, plan: &Plan, voxels: &[VoxelCorners], frame: &Frame) -> Value {
+    let body = &plan.who.body;
+    let corners = |v: &VoxelCorners| {
+        let material = body.at(v.row as isize, v.column as isize);
+        json!([material.code(), v.corners, v.row, v.column])
+    };
+    json!({
+        "id": id,
+        "body": body.to_string(),
+        "voxels": voxels.iter().map(corners).collect::<Vec<_>>(),
+        "points": frame.points.len(),
+        "unit": STEPS,
+        "rate": STEPS_PER_SECOND,
+        "threshold": THRESHOLD,
+        "cycle": plan.who.physics.cycle_steps,
+        "judge": plan.who.judge,
+        "frames": positions(std::slice::from_ref(frame)),
+        "seen": looks(0, plan.who.protocol.control_steps, &plan.seen),
+    })
+}
+
+fn looks(step: u32, until: u32, seen: &Seen) -> Value {
+    json!({ "step": step, "until": until, "label": seen.label, "stimulus": seen.stimulus })
+}
+
+/// Moments: per moment the origin [x, y], two 64-bit floats, then two 16-bit numbers per point; little-endian.
+fn positions(frames: &[Frame]) -> String {
+    let mut bytes = Vec::new();
+    for frame in frames {
+        let origin = frame.centre.map(|v| (v * STEPS).round() / STEPS);
+        origin.iter().for_each(|v| bytes.extend_from_slice(&v.to_le_bytes()));
+        let numbers = frame.points.iter().flat_map(|point| quantised(*point, origin));
+        numbers.for_each(|number| bytes.extend_from_slice(&number.to_le_bytes()));
+    }
+    BASE64.encode(bytes)
+}

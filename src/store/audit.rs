@@ -1,0 +1,288 @@
+//! `audit.json` and `audit.csv`: the verdicts on a run's robots, beside its `run.json`.
+
+use crate::base::error::Error;
+use crate::base::files::{read_text, write_atomically};
+use crate::config::audit::Criteria;
+use crate::config::reading;
+use crate::sim::Energy;
+use crate::store::names::AUDIT_JSON;
+use crate::store::run::RunFile;
+use crate::task::perturbation::Kind;
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+
+/// What `audit.json` calls itself.
+pub const FORMAT: &str = "morphcog-audit";
+/// Version of its schema.
+pub const FORMAT_VERSION: u32 = 1;
+
+/// The content of `audit.json`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct AuditFile {
+    /// [`FORMAT`].
+    pub format: String,
+    /// [`FORMAT_VERSION`].
+    pub format_version: u32,
+    /// Version of morphcog that wrote it.
+    pub program_version: String,
+    /// Name of the run the robots are from.
+    pub run: String,
+    /// SHA-256 of that run's content: verdicts on another state of it are stale.
+    pub run_sha256: String,
+    /// Robots in that run.
+    pub elites: usize,
+    /// By what was judged.
+    pub criteria: Criteria,
+    /// The robots audited so far, in the order of the run.
+    pub robots: Vec<RobotAudit>,
+}
+
+/// What an audit found of one robot.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RobotAudit {
+    /// Its id.
+    pub id: String,
+    /// Its task.
+    pub task: String,
+    /// The verdict.
+    pub verdict: Verdict,
+    /// Why: of an exploiter, what it lives off.
+    pub reason: String,
+    /// Share of the perturbed lives in which its behaviour persists.
+    pub persisting: f64,
+    /// Root mean square difference of displacements from the unchanged life's, voxel lengths.
+    pub spread: f64,
+    /// Energies put in per actuation cycle in the unchanged life \[mass·wu²/s²\].
+    pub energy_per_cycle: Energy,
+    /// Displacement under each training image in the unchanged life, voxel lengths; none if unstable.
+    pub displacements: Option<Vec<f64>>,
+    /// The perturbed lives; none for one that is not a walker.
+    pub lives: Vec<PerturbedLife>,
+}
+
+impl RobotAudit {
+    /// Whether the verdict is physical.
+    pub fn is_physical(&self) -> bool {
+        self.verdict == Verdict::Physical
+    }
+
+    /// Verdict and reason in one: "exploits: time step".
+    pub fn conclusion(&self) -> String {
+        match self.verdict {
+            Verdict::Physical => self.verdict.name().to_string(),
+            verdict => format!("{}: {}", verdict.name(), self.reason),
+        }
+    }
+}
+
+impl AuditFile {
+    /// Without robots as yet.
+    pub fn new(run: &str, run_sha256: String, elites: usize, criteria: &Criteria) -> Self {
+        AuditFile {
+            format: FORMAT.to_string(),
+            format_version: FORMAT_VERSION,
+            program_version: env!("CARGO_PKG_VERSION").to_string(),
+            run: run.to_string(),
+            run_sha256,
+            elites,
+            criteria: criteria.clone(),
+            robots: Vec::new(),
+        }
+    }
+
+    /// Reads `audit.json`.
+    ///
+    /// # Errors
+    /// What is wrong with the file, with its line and key.
+    pub fn read(path: &Path) -> Result<Self, Error> {
+        let text = read_text(path).map_err(|error| Error::reading(path, &error))?;
+        reading::read_versioned(&text, &path.display().to_string(), FORMAT, FORMAT_VERSION)
+    }
+
+    /// The verdicts on a run, from its file.
+    ///
+    /// # Errors
+    /// If there is none, it is broken, or it is about another state of the run.
+    pub fn of_run(run: &RunFile, path: &Path) -> Result<Self, Error> {
+        let archive = path.with_file_name(crate::store::names::RUN_JSON);
+        let make = format!("morphcog audit --archive {}", archive.display());
+        if !path.exists() {
+            let text =
+                format!("{}: there is no such file: these robots have not been audited", path.display());
+            return Err(Error::input(text).hint(make));
+        }
+        let file = AuditFile::read(path)?;
+        if file.run_sha256 != run.fingerprint() {
+            let text = format!(
+                "{}: stale: it is about another state of the run (SHA-256 of its content {}…, expected {}…)",
+                path.display(),
+                file.run_sha256.get(..10).unwrap_or_default(),
+                &run.fingerprint()[..10]
+            );
+            return Err(Error::input(text).hint(format!("{make} audits the run as it is now")));
+        }
+        Ok(file)
+    }
+
+    /// The verdicts on a run with this fingerprint, from an audit in a folder or in a folder in it.
+    ///
+    /// # Errors
+    /// If there is none, or it is broken.
+    pub fn near(folder: &Path, run_sha256: &str) -> Result<Self, Error> {
+        let here = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
+        let mut folders: Vec<PathBuf> =
+            std::fs::read_dir(here).into_iter().flatten().flatten().map(|entry| entry.path()).collect();
+        folders.sort();
+        folders.insert(0, folder.to_path_buf());
+        for path in folders.into_iter().map(|folder| folder.join(AUDIT_JSON)).filter(|path| path.exists()) {
+            let file = AuditFile::read(&path)?;
+            if file.run_sha256 == run_sha256 {
+                return Ok(file);
+            }
+        }
+        let short = run_sha256.get(..10).unwrap_or_default();
+        let text = format!(
+            "{}: expected an {AUDIT_JSON} there, or in a folder there, about the run with SHA-256 {short}…",
+            here.display()
+        );
+        Err(Error::input(text).hint("morphcog audit --archive … makes one beside the run".to_string()))
+    }
+
+    /// Adds what a file of verdicts on the same run, by the same criteria and version, says of other robots.
+    pub(crate) fn add_known(&mut self, path: &Path) {
+        let Ok(known) = AuditFile::read(path) else { return };
+        let head = |file: &AuditFile| AuditFile { robots: Vec::new(), ..file.clone() };
+        if head(&known) == head(self) {
+            let others = known.robots.into_iter().filter(|robot| self.robot(&robot.id).is_none());
+            let others: Vec<RobotAudit> = others.collect();
+            self.robots.extend(others);
+        }
+    }
+
+    /// What was found of a robot.
+    pub fn robot(&self, id: &str) -> Option<&RobotAudit> {
+        self.robots.iter().find(|robot| robot.id == id)
+    }
+
+    /// Its text: the head on one line, then one line per robot.
+    pub fn to_json(&self) -> String {
+        let head = AuditFile { robots: Vec::new(), ..self.clone() };
+        // Numbers are finite and keys are text: JSON has all of it.
+        let head = serde_json::to_string(&head).expect("JSON has all of it");
+        let lines: Vec<String> = self
+            .robots
+            .iter()
+            .map(|robot| serde_json::to_string(robot).expect("JSON has all of it"))
+            .collect();
+        format!("{}\n{}\n]}}\n", head.strip_suffix("]}").unwrap_or(&head), lines.join(",\n"))
+    }
+
+    /// `audit.csv`: a line per robot and life, the unchanged one first.
+    ///
+    /// # Errors
+    /// If it cannot be written to memory.
+    pub fn to_csv(&self) -> Result<Vec<u8>, csv::Error> {
+        let images = self.robots.iter().filter_map(|r| r.displacements.as_ref()).map(Vec::len).max();
+        let images = images.unwrap_or(0);
+        let mut writer = csv::Writer::from_writer(Vec::new());
+        let mut header: Vec<String> = [
+            "id",
+            "task",
+            "verdict",
+            "reason",
+            "persisting",
+            "spread",
+            "drive_per_cycle",
+            "limits_per_cycle",
+        ]
+        .map(str::to_string)
+        .to_vec();
+        header.extend(["life", "kept", "distance", "persists"].map(str::to_string));
+        header.extend((0..images).map(|image| format!("displacement_{image}")));
+        writer.write_record(&header)?;
+        for robot in &self.robots {
+            let mut about = vec![robot.id.clone(), robot.task.clone(), robot.verdict.name().to_string()];
+            about.extend([robot.reason.clone(), robot.persisting.to_string(), robot.spread.to_string()]);
+            let energy = robot.energy_per_cycle;
+            about.extend([energy.drive, energy.limits].map(|e| e.to_string()));
+            let mut row = |life: [String; 4], displacements: &Option<Vec<f64>>| {
+                let walks = (0..images).map(|i| displacements.as_ref().and_then(|d| d.get(i)));
+                let walks = walks.map(|d| d.map_or(String::new(), f64::to_string));
+                writer.write_record(about.iter().cloned().chain(life).chain(walks))
+            };
+            row(
+                ["unchanged".to_string(), String::new(), String::new(), String::new()],
+                &robot.displacements,
+            )?;
+            for life in &robot.lives {
+                let about = [
+                    life.name.clone(),
+                    life.kept.to_string(),
+                    life.distance.to_string(),
+                    life.persists.to_string(),
+                ];
+                row(about, &life.displacements)?;
+            }
+        }
+        writer.into_inner().map_err(|error| csv::Error::from(error.into_error()))
+    }
+
+    /// Writes it, and its CSV beside it; the files written.
+    ///
+    /// # Errors
+    /// If they cannot be written.
+    pub fn write(&self, path: &Path) -> Result<[PathBuf; 2], Error> {
+        let csv_path = path.with_extension("csv");
+        let csv = self.to_csv().map_err(|error| Error::other(error.to_string()))?;
+        for (path, content) in [(path, self.to_json().into_bytes()), (&csv_path, csv)] {
+            write_atomically(path, &content).map_err(|error| Error::writing(path, &error))?;
+        }
+        Ok([path.to_path_buf(), csv_path])
+    }
+}
+
+/// What an audit finds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Verdict {
+    /// Its directions survive every change.
+    Physical,
+    /// Small changes of the world break it.
+    Fragile,
+    /// The world may change, but not how it is computed or how images are shown: it lives off that.
+    Exploits,
+    /// It does not answer its training images to begin with, or no better than who always walks the same way.
+    NotAWalker,
+}
+
+impl Verdict {
+    /// For people.
+    pub fn name(self) -> &'static str {
+        match self {
+            Verdict::Physical => "physical",
+            Verdict::Fragile => "fragile",
+            Verdict::Exploits => "exploits",
+            Verdict::NotAWalker => "not a walker",
+        }
+    }
+}
+
+/// A perturbed life.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PerturbedLife {
+    /// What was changed, and how much.
+    pub name: String,
+    /// What was changed.
+    pub kind: Kind,
+    /// Displacement under each training image, voxel lengths (a mirrored life's mirrored back); none if unstable.
+    pub displacements: Option<Vec<f64>>,
+    /// Share of the images answered right in the unchanged life under which it still walks the right way.
+    pub kept: f64,
+    /// Walks under them, towards the right sides, as a share of the unchanged life's.
+    pub distance: f64,
+    /// Whether the behaviour persists.
+    pub persists: bool,
+}

@@ -1,0 +1,165 @@
+//! `capacity.json`: what networks the robots are worth (paper, "Morphological cognition capacity").
+
+use crate::base::error::Error;
+use crate::base::files::read_text;
+use crate::baseline::curve::Crossing;
+use crate::config::reading;
+use crate::store::eval::EvalFile;
+use crate::store::names::CAPACITY_JSON;
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+
+/// What `capacity.json` calls itself.
+pub const FORMAT: &str = "morphcog-capacity";
+/// Version of its schema.
+pub const FORMAT_VERSION: u32 = 1;
+
+/// The content of `capacity.json`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CapacityFile {
+    /// [`FORMAT`].
+    pub format: String,
+    /// [`FORMAT_VERSION`].
+    pub format_version: u32,
+    /// Version of morphcog that wrote it.
+    pub program_version: String,
+    /// Name of the evaluated run, or of the runs.
+    pub run: String,
+    /// How the robots were selected, for people.
+    pub selected: String,
+    /// Name of the dataset.
+    pub dataset: String,
+    /// What training waited on: "test" as in the paper, or "validation".
+    pub patience_on: String,
+    /// Trainings from scratch per size.
+    pub trainings: usize,
+    /// Whether only those of the robots count that an audit found physical.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub physical_only: bool,
+    /// Whether a signal stopped it before the end.
+    pub stopped: bool,
+    /// The tasks.
+    pub tasks: Vec<TaskCapacity>,
+}
+
+/// What a file needs not say.
+fn is_false(value: &bool) -> bool {
+    !value
+}
+
+/// The capacity of the robots of one task.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TaskCapacity {
+    /// Its name, as "0|1".
+    pub task: String,
+    /// Robots evaluated.
+    pub robots: usize,
+    /// Their mean accuracy on test images, 0 to 1.
+    pub accuracy: f64,
+    /// A curve per kind of network.
+    pub curves: Vec<Curve>,
+}
+
+/// Accuracy over size for one kind of network.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Curve {
+    /// "mlp" (size: hidden neurons) or "cnn" (size: kernels).
+    pub network: String,
+    /// The points, by size.
+    pub points: Vec<Point>,
+    /// c0, c1, c2 of accuracy ≈ c0 + c1·size + c2·size², least squares through the points.
+    pub fit: Option<[f64; 3]>,
+    /// The smallest size at which the fit reaches the robots' accuracy, or that it is above it from the smallest network on;
+    /// none if it never reaches it.
+    pub capacity: Option<Crossing>,
+}
+
+/// One size of network.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Point {
+    /// Hidden neurons, or kernels.
+    pub size: usize,
+    /// Mean test accuracy over the trainings, 0 to 1.
+    pub mean: f64,
+    /// Standard deviation over the trainings; none of one.
+    pub standard_deviation: Option<f64>,
+    /// Trainable parameters.
+    pub parameters: usize,
+}
+
+impl CapacityFile {
+    /// Reads `capacity.json`.
+    ///
+    /// # Errors
+    /// What is wrong with the file, with its line and key.
+    pub fn read(path: &Path) -> Result<Self, Error> {
+        let text = read_text(path).map_err(|error| Error::reading(path, &error))?;
+        reading::read_versioned(&text, &path.display().to_string(), FORMAT, FORMAT_VERSION)
+    }
+
+    /// The analysis beside an `eval.json`, if there is one of just the robots and images that the evaluation is of.
+    pub fn of(report: &EvalFile, eval: &Path) -> Option<Self> {
+        let found = Self::read(&eval.with_file_name(CAPACITY_JSON)).ok()?;
+        found.is_of(report).then_some(found)
+    }
+
+    /// Whether it is of just the robots and images that an evaluation is of.
+    pub fn is_of(&self, report: &EvalFile) -> bool {
+        let same = |task: &TaskCapacity| {
+            report.means.get(&task.task).is_some_and(|mean| {
+                let is_whole = mean.robots == task.robots && (mean.accuracy - task.accuracy).abs() < 1e-9;
+                is_whole || self.physical_only && task.robots <= mean.robots
+            })
+        };
+        self.dataset == report.dataset && self.selected == report.selected && self.tasks.iter().all(same)
+    }
+
+    /// `capacity.csv`: a line per task, network and size.
+    ///
+    /// # Errors
+    /// If it cannot be written to memory.
+    pub fn to_csv(&self) -> Result<Vec<u8>, csv::Error> {
+        let mut writer = csv::Writer::from_writer(Vec::new());
+        let columns =
+            ["task", "network", "size", "parameters", "mean", "standard_deviation", "fit", "robots"];
+        writer.write_record(columns)?;
+        for task in &self.tasks {
+            for curve in &task.curves {
+                for point in &curve.points {
+                    let fit = curve.value(point.size as f64).map_or(String::new(), |value| value.to_string());
+                    let mut row = vec![task.task.clone(), curve.network.clone()];
+                    row.extend([point.size, point.parameters].map(|count| count.to_string()));
+                    let deviation = point.standard_deviation.map_or(String::new(), |value| value.to_string());
+                    row.extend([point.mean.to_string(), deviation]);
+                    row.extend([fit, task.accuracy.to_string()]);
+                    writer.write_record(&row)?;
+                }
+            }
+        }
+        writer.into_inner().map_err(|error| csv::Error::from(error.into_error()))
+    }
+
+    /// Its text.
+    pub fn to_json(&self) -> String {
+        // Numbers are finite, keys are text: JSON has all of it.
+        serde_json::to_string_pretty(self).expect("JSON has all of it") + "\n"
+    }
+}
+
+impl TaskCapacity {
+    /// The capacity as one kind of network tells it, if that was trained; none within: no match.
+    pub fn worth(&self, network: &str) -> Option<Option<Crossing>> {
+        self.curves.iter().find(|curve| curve.network == network).map(|curve| curve.capacity)
+    }
+}
+
+impl Curve {
+    /// The fit at a size.
+    pub fn value(&self, size: f64) -> Option<f64> {
+        self.fit.map(|[c0, c1, c2]| c0 + size * (c1 + size * c2))
+    }
+}

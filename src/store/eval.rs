@@ -1,0 +1,360 @@
+//! `eval.json` and `eval.csv`: what an evaluation found.
+
+use crate::base::error::Error;
+use crate::base::files::read_text;
+use crate::base::statistics::{bootstrap, standard_deviation, wilson};
+use crate::config::reading;
+use crate::data::dataset;
+use crate::data::dataset::Dataset;
+use crate::store::images::HeldOut;
+use crate::store::images::{DatasetRef, ImageRef};
+use crate::store::robots::Source;
+use crate::store::run::{Robot, RunFile};
+use crate::store::setting::{RunRef, Setting};
+use crate::store::validation::Validated;
+use crate::task::direction::Assignment;
+use crate::task::grouping::{Group, Split};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::mem::replace;
+use std::path::Path;
+
+/// What `eval.json` calls itself.
+pub const FORMAT: &str = "morphcog-eval";
+/// Version of its schema.
+pub const FORMAT_VERSION: u32 = 1;
+
+/// The content of `eval.json`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct EvalFile {
+    /// [`FORMAT`].
+    pub format: String,
+    /// [`FORMAT_VERSION`].
+    pub format_version: u32,
+    /// Version of morphcog that wrote it.
+    pub program_version: String,
+    /// Name of the (first) run the robots are from.
+    pub run: String,
+    /// Seed of that run.
+    pub run_seed: u64,
+    /// All runs the robots are from.
+    #[serde(default)]
+    pub runs: Vec<RunRef>,
+    /// What robots were shown.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub setting: Option<Setting>,
+    /// How the robots were selected.
+    pub selected: String,
+    /// Name of the dataset.
+    pub dataset: String,
+    /// SHA-256 of its test split.
+    pub test_sha256: String,
+    /// What the robots were trained on, if that is another dataset.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub trained_on: Option<DatasetRef>,
+    /// Which images: those of the test split, or validation images.
+    #[serde(default, skip_serializing_if = "HeldOut::is_default")]
+    pub split: HeldOut,
+    /// Seed of what was drawn.
+    pub seed: u64,
+    /// Control steps per image, each a fresh life.
+    pub control_steps: u32,
+    /// Displacements up to this counted as wrong \[voxel lengths\].
+    pub threshold: f64,
+    /// Whether it ended before the last robot, by a signal or otherwise.
+    pub stopped: bool,
+    /// The images.
+    pub images: Vec<ImageRef>,
+    /// By task: what takes no body at all.
+    pub baselines: BTreeMap<String, Baselines>,
+    /// By task: averages over its robots.
+    pub means: BTreeMap<String, Mean>,
+    /// The robots, in the order of their selection.
+    pub robots: Vec<RobotReport>,
+}
+
+/// Accuracies on the same images that take no body.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Baselines {
+    /// Always answering the larger group.
+    pub larger_group: f64,
+    /// One pixel and a threshold, chosen on training images.
+    pub best_single_pixel: f64,
+    /// That pixel: row, column.
+    pub pixel: [usize; 2],
+    /// The group of the nearest of the run's training images; none if those are of another dataset.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub nearest_training_image: Option<f64>,
+}
+
+/// Averages over the robots of a task.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Mean {
+    /// Robots.
+    pub robots: usize,
+    /// Mean accuracy.
+    pub accuracy: f64,
+    /// Mean balanced accuracy.
+    pub balanced_accuracy: f64,
+    /// Standard deviation of the accuracy over the robots; none of a single one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub standard_deviation: Option<f64>,
+    /// 95 % bootstrap interval of the mean accuracy (percentiles of 10,000 resamples of the robots).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub interval: Option<[f64; 2]>,
+}
+
+/// What one robot did.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RobotReport {
+    /// Its id.
+    pub id: String,
+    /// Its run, by its place in `runs`.
+    #[serde(default)]
+    pub run: usize,
+    /// Its task.
+    pub task: String,
+    /// Its fitness on the training images, voxel lengths.
+    pub objective: f64,
+    /// Which way the classes before the task's bar are to walk: "left" or "right", as on the training images.
+    pub first_group_walks: String,
+    /// Images answered right.
+    pub right: usize,
+    /// Images in all.
+    pub images: usize,
+    /// Share answered right.
+    pub accuracy: f64,
+    /// Its 95 % Wilson interval.
+    pub interval: [f64; 2],
+    /// Mean over the two groups of the share answered right.
+    pub balanced_accuracy: f64,
+    /// Share answered right, by class.
+    pub per_class: BTreeMap<u8, f64>,
+    /// Mean |displacement|, voxel lengths, of the stable lives.
+    pub mean_distance: f64,
+    /// Share of images under which it moved no farther than the threshold.
+    pub not_moved: f64,
+    /// Images under which its life became unstable (counted as wrong).
+    pub unstable: usize,
+    /// Lives simulated.
+    pub simulated: usize,
+    /// How it did on the validation images, if it was selected on them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub validation: Option<Validated>,
+    /// Displacement under each image, voxel lengths; none if unstable.
+    pub displacements: Vec<Option<f64>>,
+}
+
+/// One robot's test.
+pub(crate) struct Trial<'a> {
+    pub run: &'a RunFile,
+    pub robot: &'a Robot,
+    pub split: &'a Split,
+    pub images: &'a [ImageRef],
+    pub threshold: f64,
+}
+
+impl RobotReport {
+    pub(crate) fn new(trial: &Trial, displacements: Vec<Option<f64>>, simulated: usize) -> Self {
+        let Trial { run, robot, split, images, threshold } = *trial;
+        let assignment = Assignment::from_training(split, run.fitness(), &run.answers(robot));
+        let is_right = |(image, displacement): (&ImageRef, &Option<f64>)| {
+            let (group, displacement) = (split.group(image.label), *displacement);
+            group.zip(displacement).is_some_and(|(g, d)| assignment.is_right(g, d, threshold))
+        };
+        let verdicts: Vec<(u8, bool)> =
+            images.iter().zip(&displacements).map(|pair| (pair.0.label, is_right(pair))).collect();
+        let share = |of: &dyn Fn(u8) -> bool| {
+            let chosen = verdicts.iter().filter(|(class, _)| of(*class));
+            let (right, all) =
+                chosen.fold((0usize, 0usize), |(r, n), (_, right)| (r + usize::from(*right), n + 1));
+            (right as f64 / all.max(1) as f64, right)
+        };
+        let (accuracy, right) = share(&|_| true);
+        let group = |g: Group| share(&|class| split.group(class) == Some(g)).0;
+        let classes: std::collections::BTreeSet<u8> = images.iter().map(|image| image.label).collect();
+        let moved: Vec<f64> = displacements.iter().flatten().map(|d| d.abs()).collect();
+        let count = images.len().max(1) as f64;
+        RobotReport {
+            id: robot.id.clone(),
+            run: 0,
+            task: robot.task.clone(),
+            objective: robot.objective,
+            first_group_walks: format!("{:?}", assignment.expected(Group::A)).to_lowercase(),
+            right,
+            images: images.len(),
+            accuracy,
+            interval: wilson(right, images.len()),
+            balanced_accuracy: (group(Group::A) + group(Group::B)) / 2.0,
+            per_class: classes.into_iter().map(|class| (class, share(&|c| c == class).0)).collect(),
+            mean_distance: moved.iter().sum::<f64>() / moved.len().max(1) as f64,
+            not_moved: moved.iter().filter(|&&d| d <= threshold).count() as f64 / count,
+            unstable: displacements.len() - moved.len(),
+            simulated,
+            validation: None,
+            displacements,
+        }
+    }
+}
+
+impl RobotReport {
+    /// The report in short: its figures.
+    pub fn without_displacements(&self) -> Self {
+        RobotReport { displacements: Vec::new(), ..self.clone() }
+    }
+}
+
+impl EvalFile {
+    pub(crate) fn new(
+        sources: &[Source],
+        (selected, split, seed, threshold): (String, HeldOut, u64, f64),
+        control_steps: u32,
+        images: &[ImageRef],
+        test_sha256: String,
+    ) -> Self {
+        let first = sources.first().map(|source| &source.run);
+        EvalFile {
+            format: FORMAT.to_string(),
+            format_version: FORMAT_VERSION,
+            program_version: env!("CARGO_PKG_VERSION").to_string(),
+            run: first.map_or(String::new(), |run| run.name.clone()),
+            run_seed: first.map_or(0, |run| run.config.seed),
+            runs: sources.iter().map(|source| RunRef::new(&source.run)).collect(),
+            setting: first.map(Setting::new),
+            selected,
+            dataset: first.map_or(String::new(), |run| run.dataset.name.clone()),
+            test_sha256,
+            trained_on: None,
+            split,
+            seed,
+            control_steps,
+            threshold,
+            stopped: false,
+            images: images.to_vec(),
+            baselines: BTreeMap::new(),
+            means: BTreeMap::new(),
+            robots: Vec::new(),
+        }
+    }
+
+    /// Says that the images are of another dataset than that the robots were trained on.
+    pub(crate) fn transfer(&mut self, name: &str, dataset: &Dataset) {
+        self.dataset = name.to_string();
+        if let Some(setting) = &mut self.setting {
+            let train_sha256 = dataset.fingerprint(dataset::Split::Train).unwrap_or_default();
+            let train_sha256 = replace(&mut setting.train_sha256, train_sha256);
+            let shown = setting.data.of(name);
+            let own = replace(&mut setting.data, shown).dataset;
+            self.trained_on = Some(DatasetRef { name: own, train_sha256 });
+        }
+    }
+
+    /// Averages over the robots so far.
+    pub(crate) fn conclude(&mut self) {
+        let mut by_task = BTreeMap::<&str, Vec<&RobotReport>>::new();
+        self.robots.iter().for_each(|robot| by_task.entry(&robot.task).or_default().push(robot));
+        let mean = |robots: &[&RobotReport], of: fn(&RobotReport) -> f64| {
+            robots.iter().map(|robot| of(robot)).sum::<f64>() / robots.len() as f64
+        };
+        let means = by_task.into_iter().map(|(task, robots)| {
+            let (accuracy, balanced_accuracy) =
+                (mean(&robots, |r| r.accuracy), mean(&robots, |r| r.balanced_accuracy));
+            let accuracies: Vec<f64> = robots.iter().map(|robot| robot.accuracy).collect();
+            let (standard_deviation, interval) = (standard_deviation(&accuracies), bootstrap(&accuracies));
+            let robots = robots.len();
+            (task.to_string(), Mean { robots, accuracy, balanced_accuracy, standard_deviation, interval })
+        });
+        self.means = means.collect();
+    }
+
+    /// How the robots were selected, for people; if they were trained on another dataset, or a signal came before the last of them,
+    /// that, too.
+    pub fn selection(&self) -> String {
+        let stopped = if self.stopped { "; stopped before the last of them" } else { "" };
+        let trained =
+            self.trained_on.as_ref().map_or(String::new(), |own| format!(", trained on {}", own.name));
+        format!("{}{trained}{stopped}", self.selected)
+    }
+
+    /// Reads an evaluation of robots of these runs as they are now, and of no others.
+    ///
+    /// # Errors
+    /// As of [`EvalFile::read`]; or that it is about other runs, or another state of them.
+    pub fn of_runs(path: &Path, runs: &[&RunFile]) -> Result<Self, Error> {
+        let file = Self::read(path)?;
+        let now: Vec<String> = runs.iter().map(|run| run.fingerprint()).collect();
+        match file.runs.iter().find(|run| !now.contains(&run.sha256)) {
+            None => Ok(file),
+            Some(run) => {
+                let text = format!(
+                    "{}: stale: it is about another run, or another state of this one ({}, generation {}, SHA-256 of its \
+                    content {}…)",
+                    path.display(),
+                    run.name,
+                    run.generations,
+                    run.sha256.get(..10).unwrap_or_default()
+                );
+                Err(Error::input(text).hint("morphcog eval tests the run as it is now".to_string()))
+            }
+        }
+    }
+
+    /// Reads `eval.json`.
+    ///
+    /// # Errors
+    /// What is wrong with the file, with its line and key.
+    pub fn read(path: &Path) -> Result<Self, Error> {
+        let text = read_text(path).map_err(|error| Error::reading(path, &error))?;
+        let name = path.display().to_string();
+        let file: EvalFile = reading::read_versioned(&text, &name, FORMAT, FORMAT_VERSION)?;
+        let checked = file.setting.as_ref().map_or(Ok(()), Setting::check);
+        checked.map(|()| file).map_err(|error| error.within(&name))
+    }
+
+    /// Its text, one line.
+    pub fn to_json(&self) -> String {
+        // Numbers are finite, keys are text or whole numbers: JSON has all of it.
+        serde_json::to_string(self).expect("JSON has all of it") + "\n"
+    }
+
+    /// `eval.csv`: a line per robot.
+    ///
+    /// # Errors
+    /// If it cannot be written to memory.
+    pub fn to_csv(&self) -> Result<Vec<u8>, csv::Error> {
+        let classes: Vec<u8> =
+            self.robots.first().map_or(Vec::new(), |robot| robot.per_class.keys().copied().collect());
+        let mut writer = csv::Writer::from_writer(Vec::new());
+        let mut header: Vec<String> = [
+            "id",
+            "run_seed",
+            "task",
+            "objective",
+            "first_group_walks",
+            "right",
+            "images",
+            "accuracy",
+            "accuracy_low",
+            "accuracy_high",
+            "balanced_accuracy",
+        ]
+        .map(str::to_string)
+        .to_vec();
+        header.extend(classes.iter().map(|class| format!("accuracy_{class}")));
+        header.extend(["mean_distance", "not_moved", "unstable", "simulated"].map(str::to_string));
+        writer.write_record(&header)?;
+        for robot in &self.robots {
+            let seed = self.runs.get(robot.run).map_or(self.run_seed, |run| run.seed);
+            let mut row = vec![robot.id.clone(), seed.to_string()];
+            row.extend([robot.task.clone(), robot.objective.to_string()]);
+            row.extend([robot.first_group_walks.clone(), robot.right.to_string(), robot.images.to_string()]);
+            let [low, high] = robot.interval;
+            row.extend([robot.accuracy, low, high, robot.balanced_accuracy].map(|v| v.to_string()));
+            row.extend(robot.per_class.values().map(f64::to_string));
+            row.extend([robot.mean_distance, robot.not_moved].map(|v| v.to_string()));
+            row.extend([robot.unstable, robot.simulated].map(|v| v.to_string()));
+            writer.write_record(&row)?;
+        }
+        writer.into_inner().map_err(|error| csv::Error::from(error.into_error()))
+    }
+}

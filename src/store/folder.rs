@@ -1,0 +1,223 @@
+//! A run's folder: made, locked, and never overwritten by accident.
+
+use crate::base::error::Error;
+use crate::base::files::{check_writable, remove_half_written};
+use crate::store::names::AUDIT_JSON;
+use crate::store::names::CAPACITY_JSON;
+use crate::store::names::CHECKPOINTS;
+use crate::store::names::CONFIG;
+use crate::store::names::DATA_FOLDER;
+use crate::store::names::ELITES;
+use crate::store::names::EVAL_JSON;
+use crate::store::names::EVAL_VALIDATION_JSON;
+use crate::store::names::METRICS;
+use crate::store::names::RESPONSE_JSON;
+use crate::store::names::RUN_JSON;
+use crate::store::names::TRAINING_JSON;
+use crate::store::names::VALIDATION_JSON;
+use crate::store::run::RunFile;
+use std::ffi::OsStr;
+use std::fs::{File, TryLockError};
+use std::path::{Path, PathBuf};
+
+const LOCK: &str = ".lock";
+
+const OF_RUN: &str = "expected another name: this would overwrite a file of a run";
+
+/// What commands find, beside a run.
+const RESULTS: [&str; 6] =
+    [AUDIT_JSON, CAPACITY_JSON, EVAL_JSON, EVAL_VALIDATION_JSON, RESPONSE_JSON, VALIDATION_JSON];
+
+/// What to do with a folder that holds a run already.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum IfExists {
+    /// Refuse.
+    Refuse,
+    /// Go on with the run in it.
+    Resume,
+    /// Delete the run in it.
+    Overwrite,
+}
+
+/// A run's folder, in use by this process as long as the value lives.
+#[derive(Debug)]
+pub struct RunFolder {
+    path: PathBuf,
+    /// The operating system lets the lock go when the process ends, however it ends.
+    _lock: File,
+}
+
+impl RunFolder {
+    /// Makes the folder if there is none, and takes it into use.
+    ///
+    /// # Errors
+    /// If another process uses it, or it holds a run and `if_exists` says to refuse, or it cannot be written.
+    pub fn open(path: &Path, if_exists: IfExists) -> Result<Self, Error> {
+        std::fs::create_dir_all(path).map_err(|error| Error::writing(path, &error))?;
+        let holds_run = RunFolder::files().iter().any(|name| path.join(name).exists());
+        if holds_run && if_exists == IfExists::Refuse {
+            let text = format!("{}: there is a run in this folder already", path.display());
+            let hint = "go on with it by --resume, write elsewhere with --out, or replace it by --force";
+            return Err(Error::occupied(text).hint(hint.to_string()));
+        }
+        let lock = path.join(LOCK);
+        let file = File::options().create(true).truncate(false).write(true).open(&lock);
+        let file = file.map_err(|error| Error::writing(&lock, &error))?;
+        match file.try_lock() {
+            Ok(()) => {}
+            Err(TryLockError::WouldBlock) => {
+                let text = format!("{}: another morphcog is using this run folder", path.display());
+                return Err(Error::occupied(text)
+                    .hint("wait for it to end, or write elsewhere with --out".to_string()));
+            }
+            Err(TryLockError::Error(error)) => return Err(Error::writing(&lock, &error)),
+        }
+        remove_half_written(path, &RunFolder::files()).map_err(|error| Error::writing(path, &error))?;
+        if if_exists == IfExists::Overwrite {
+            for name in RunFolder::files() {
+                let file = path.join(name);
+                match std::fs::remove_file(&file) {
+                    Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+                        return Err(Error::writing(&file, &error));
+                    }
+                    _ => {}
+                }
+            }
+        }
+        Ok(RunFolder { path: path.to_path_buf(), _lock: file })
+    }
+
+    /// Where it is.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Names of the files of a run.
+    pub(crate) fn files() -> [&'static str; 8] {
+        let [newest, previous] = CHECKPOINTS;
+        [RUN_JSON, CONFIG, ELITES, METRICS, DATA_FOLDER, TRAINING_JSON, newest, previous]
+    }
+}
+
+/// What a run of a config is called: the config's name without folder and ending.
+pub fn name_of(config: &str) -> String {
+    let path = Path::new(config);
+    // The config of a run makes that run again.
+    let beside = path.with_file_name(RUN_JSON);
+    if path.file_name().is_some_and(|name| name == CONFIG)
+        && beside.exists()
+        && let Ok(run) = RunFile::read(&beside)
+    {
+        return run.name;
+    }
+    path.file_stem().map_or("run".to_string(), |stem| stem.to_string_lossy().into_owned())
+}
+
+/// A path as a shell reads it, for commands that people copy.
+pub fn in_shell(path: &Path) -> String {
+    let text = path.display().to_string();
+    let is_plain = |c: char| c.is_alphanumeric() || "_-./:@%+,".contains(c);
+    match !text.is_empty() && text.chars().all(is_plain) {
+        true => text,
+        false => format!("'{}'", text.replace('\'', r"'\''")),
+    }
+}
+
+/// Whether results can be written to a file, with a CSV beside it, and overwrite neither each other nor what lies beside the run or
+/// result file that they are of: files of the run, or what other commands found, each under the name of its command. `own` is
+/// the name of these results if nobody says otherwise.
+///
+/// # Errors
+/// If not.
+pub(crate) fn check_out(out: &Path, of: &Path, own: &str) -> Result<(), Error> {
+    let refuse = |text: &str| Err(Error::usage(format!("--out {}: {text}", out.display())));
+    let csv = out.with_extension("csv");
+    if csv == *out {
+        return refuse("expected another ending: the CSV beside the results has that name");
+    }
+    let folder_of =
+        |path: &Path| path.parent().and_then(|folder| Path::new(".").join(folder).canonicalize().ok());
+    let same_folder = folder_of(out) == folder_of(of);
+    for path in [out, csv.as_path()] {
+        let name = path.file_name();
+        if is_of_run(path) || same_folder && name == of.file_name() {
+            return refuse(OF_RUN);
+        }
+        let is_others = |other: &&&str| {
+            **other != own && name.is_some_and(|name| before_dot(name) == before_dot(other.as_ref()))
+        };
+        if let Some(other) = RESULTS.iter().find(is_others).filter(|_| same_folder || holds_run(path)) {
+            return refuse(&format!(
+                "expected another name: this is what {other} and what goes with it are called"
+            ));
+        }
+        writable(path)?;
+    }
+    Ok(())
+}
+
+/// Whether there is a run beside a file.
+fn holds_run(path: &Path) -> bool {
+    path.with_file_name(RUN_JSON).exists()
+}
+
+/// Whether a file is, or would be, one of those of a run.
+fn is_of_run(path: &Path) -> bool {
+    holds_run(path) && RunFolder::files().iter().any(|file| path.file_name() == Some(file.as_ref()))
+}
+
+/// Whether a file can be written, and is none of a run: to be known before what goes into it is made.
+///
+/// # Errors
+/// Why not.
+pub fn writable(path: &Path) -> Result<(), Error> {
+    if is_of_run(path) {
+        return Err(Error::usage(format!("{}: {OF_RUN}", path.display())));
+    }
+    check_writable(path).map_err(|error| Error::writing(path, &error))
+}
+
+/// Whether a path can be one of a file: it ends with a name.
+///
+/// # Errors
+/// If not.
+pub fn of_file(path: &Path) -> Result<(), Error> {
+    let last = path.as_os_str().as_encoded_bytes().last();
+    let ends_open = last.is_some_and(|&byte| std::path::is_separator(byte.into()));
+    match ends_open || path.file_name().is_none() {
+        true => Err(Error::usage(format!("--out {}: expected a file, this is a folder", path.display()))),
+        false => Ok(()),
+    }
+}
+
+/// What a file's name says of whose it is: capacity.trainings.json is capacity's, too.
+fn before_dot(name: &OsStr) -> Option<&[u8]> {
+    name.as_encoded_bytes().split(|&byte| byte == b'.').next()
+}
+
+/// The run.json that is meant by its path or its folder's.
+pub fn run_json(path: PathBuf) -> PathBuf {
+    if path.is_dir() { path.join(RUN_JSON) } else { path }
+}
+
+/// The folder of a run.json; of several, the nearest that all of them lie in.
+pub fn above(archives: &[PathBuf]) -> PathBuf {
+    let folders: Vec<&Path> = archives.iter().map(|path| path.parent().unwrap_or(Path::new(""))).collect();
+    let Some(first) = folders.first() else { return PathBuf::new() };
+    let holds = |folder: &&Path| folders.iter().all(|other| other.starts_with(folder));
+    first.ancestors().find(holds).unwrap_or(Path::new("")).to_path_buf()
+}
+
+/// The run.json under `runs/` that was written last: what commands look at when they are not told.
+///
+/// # Errors
+/// If there is none.
+pub fn newest_run() -> Result<PathBuf, Error> {
+    let runs = std::fs::read_dir("runs").into_iter().flatten().flatten();
+    let files = runs.map(|entry| entry.path().join(RUN_JSON));
+    let dated = files.filter_map(|file| Some((file.metadata().ok()?.modified().ok()?, file)));
+    dated.max().map(|(_, file)| file).ok_or_else(|| {
+        let hint = "name one with --archive, or make one: morphcog evolve --config quickstart.toml";
+        Error::input("there is no run under runs/".to_string()).hint(hint.to_string())
+    })
+}

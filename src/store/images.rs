@@ -1,0 +1,68 @@
+//! Which images a run was made with and robots are shown: by their places in a dataset, and as robots see them.
+
+use crate::task::score::Answer;
+use serde::{Deserialize, Serialize};
+use std::fmt;
+use std::str::FromStr;
+
+/// An image by its place in a dataset.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ImageRef {
+    /// Index in its split.
+    pub index: usize,
+    /// Its class.
+    pub label: u8,
+}
+
+/// Which data a run was made with, wherever they lay: the same data have the same fingerprint.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct DatasetRef {
+    /// Name of the dataset.
+    pub name: String,
+    /// SHA-256 of the training split's content.
+    pub train_sha256: String,
+}
+
+/// Which images that robots are not trained on.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum HeldOut {
+    /// Those of the test split, which nothing should be chosen by.
+    #[default]
+    Test,
+    /// Validation images.
+    Validation,
+}
+
+impl HeldOut {
+    /// Whether a file needs not say it.
+    pub(crate) fn is_default(&self) -> bool {
+        *self == HeldOut::default()
+    }
+}
+
+impl fmt::Display for HeldOut {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            HeldOut::Test => "test",
+            HeldOut::Validation => "validation",
+        })
+    }
+}
+
+impl FromStr for HeldOut {
+    type Err = String;
+    fn from_str(text: &str) -> Result<Self, String> {
+        let found = [HeldOut::Test, HeldOut::Validation].into_iter().find(|split| split.to_string() == text);
+        found.ok_or_else(|| "expected test or validation".to_string())
+    }
+}
+
+/// The answers that displacements under images are, in their order; those that are missing are still to come.
+pub(crate) fn answers(
+    images: &[ImageRef],
+    displacements: impl IntoIterator<Item = Option<f64>>,
+) -> Vec<Answer> {
+    let all = displacements.into_iter().chain(std::iter::repeat(None));
+    images.iter().zip(all).map(|(image, displacement)| Answer { class: image.label, displacement }).collect()
+}

@@ -1,0 +1,193 @@
+//! `metrics.csv`: a line per generation, with pyribs' names.
+
+use crate::base::error::Error;
+use crate::base::files::write_atomically;
+use crate::qd::ArchiveStats;
+use crate::task::evaluation::Evaluation;
+use serde::{Deserialize, Serialize};
+use std::fs::File;
+use std::io::{BufWriter, ErrorKind, Write};
+use std::path::{Path, PathBuf};
+
+/// What a run has done so far. *Showings* are images shown to robots (fresh lives, or phases of sequential ones).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Totals {
+    /// Offspring made.
+    pub evaluations: u64,
+    /// Showings simulated.
+    pub simulated: u64,
+    /// Showings saved because the body was known.
+    pub saved_known_bodies: u64,
+    /// Showings saved by stopping early (or because an earlier one was unstable).
+    pub saved_early_stop: u64,
+    /// Showings saved because another image looks the same to the sensors.
+    pub saved_shared_lives: u64,
+    /// Offspring found unstable.
+    pub unstable: u64,
+    /// Wall-clock time, all sessions of the run together \[s\].
+    pub seconds: f64,
+}
+
+impl Totals {
+    /// Showings saved altogether.
+    pub fn saved(&self) -> u64 {
+        self.saved_known_bodies + self.saved_early_stop + self.saved_shared_lives
+    }
+
+    /// Counts one evaluation.
+    pub fn count(&mut self, evaluation: &Evaluation) {
+        self.simulated += evaluation.simulated;
+        self.saved_early_stop += evaluation.stopped;
+        self.saved_shared_lives += evaluation.shared;
+    }
+}
+
+const HEADER: &str = "generation,num_elites,coverage,qd_score,norm_qd_score,obj_max,obj_mean,evaluations,\
+simulated,saved,saved_known_bodies,saved_early_stop,saved_shared_lives,unstable,seconds";
+
+/// Writes `metrics.csv`.
+pub struct Metrics {
+    path: PathBuf,
+    file: BufWriter<File>,
+    /// Generations before the one it goes on with that have no line in it any more.
+    pub missing: u64,
+}
+
+impl Metrics {
+    /// Opens it to go on after `generations` lines; later ones, from before an interruption, are dropped.
+    ///
+    /// # Errors
+    /// If it cannot be read or written.
+    pub fn open(folder: &Path, generations: u64) -> Result<Self, Error> {
+        let path = folder.join("metrics.csv");
+        let old = match std::fs::read(&path) {
+            _ if generations == 0 => String::new(),
+            // What is no text is no whole line, and left out as such.
+            Ok(bytes) => String::from_utf8_lossy(&bytes).into_owned(),
+            Err(error) if error.kind() == ErrorKind::NotFound => String::new(),
+            Err(error) => return Err(Error::reading(&path, &error)),
+        };
+        let number = |line: &&str| line.split(',').next().and_then(|first| first.parse::<u64>().ok());
+        let whole = old.split_inclusive('\n').filter(|line| line.ends_with('\n')).map(str::trim_end);
+        let kept = whole.filter(|line| number(line).is_some_and(|generation| generation < generations));
+        let kept: Vec<String> = kept.map(str::to_string).collect();
+        let missing = generations.saturating_sub(kept.len() as u64);
+        let mut text = std::iter::once(HEADER.to_string()).chain(kept).collect::<Vec<_>>().join("\n");
+        text.push('\n');
+        write_atomically(&path, text.as_bytes()).map_err(|error| Error::writing(&path, &error))?;
+        let file = File::options().append(true).open(&path).map_err(|error| Error::writing(&path, &error))?;
+        Ok(Metrics { path, file: BufWriter::new(file), missing })
+    }
+
+    /// Adds the line of a generation (from 0).
+    ///
+    /// # Errors
+    /// If it cannot be written.
+    pub fn write(&mut self, generation: u64, stats: &ArchiveStats, totals: &Totals) -> Result<(), Error> {
+        let ArchiveStats { num_elites, coverage, qd_score, norm_qd_score, obj_max, obj_mean } = stats;
+        let number = |value: &Option<f64>| value.map_or(String::new(), |value| value.to_string());
+        let (obj_max, obj_mean) = (number(obj_max), number(obj_mean));
+        let Totals { evaluations, simulated, unstable, seconds, .. } = totals;
+        writeln!(
+            self.file,
+            "{generation},{num_elites},{coverage},{qd_score},{norm_qd_score},{obj_max},{obj_mean},{evaluations},\
+             {simulated},{},{},{},{},{unstable},{seconds:.3}",
+            totals.saved(),
+            totals.saved_known_bodies,
+            totals.saved_early_stop,
+            totals.saved_shared_lives,
+        )
+        .map_err(|error| Error::writing(&self.path, &error))
+    }
+
+    /// Hands what was written to the system.
+    ///
+    /// # Errors
+    /// If it cannot be written.
+    pub fn flush(&mut self) -> Result<(), Error> {
+        self.file.flush().map_err(|error| Error::writing(&self.path, &error))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::qd::Archive;
+
+    fn lines(folder: &Path) -> Vec<String> {
+        let text = std::fs::read_to_string(folder.join("metrics.csv")).unwrap();
+        assert!(text.ends_with('\n'));
+        text.lines().map(str::to_string).collect()
+    }
+
+    fn write(folder: &Path, from: u64, to: u64, evaluations: u64) {
+        let mut metrics = Metrics::open(folder, from).unwrap();
+        let stats = Archive::<()>::new().stats(90, 0.0);
+        let totals = Totals { evaluations, ..Totals::default() };
+        (from..to).for_each(|generation| metrics.write(generation, &stats, &totals).unwrap());
+        metrics.flush().unwrap();
+    }
+
+    #[test]
+    fn every_line_has_a_field_per_column_and_none_for_what_there_is_not() {
+        let folder = tempfile::tempdir().unwrap();
+        write(folder.path(), 0, 2, 7);
+        let lines = lines(folder.path());
+        let columns = HEADER.split(',').count();
+        assert!(lines.len() == 3 && lines.iter().all(|line| line.split(',').count() == columns), "{lines:?}");
+        assert_eq!(lines[1], "0,0,0,0,0,,,7,0,0,0,0,0,0,0.000");
+    }
+
+    #[test]
+    fn lines_after_the_resumed_generation_are_dropped_and_written_anew() {
+        let folder = tempfile::tempdir().unwrap();
+        write(folder.path(), 0, 5, 1);
+        write(folder.path(), 3, 6, 2);
+        let evaluations: Vec<String> = lines(folder.path())[1..]
+            .iter()
+            .map(|line| line.split(',').nth(7).unwrap().to_string())
+            .collect();
+        assert_eq!(evaluations, ["1", "1", "1", "2", "2", "2"]);
+    }
+
+    #[test]
+    fn a_line_that_is_no_text_is_dropped_and_no_other() {
+        let folder = tempfile::tempdir().unwrap();
+        write(folder.path(), 0, 3, 1);
+        let path = folder.path().join("metrics.csv");
+        let mut bytes = std::fs::read(&path).unwrap();
+        bytes.extend(b"abc\xff\n");
+        std::fs::write(&path, bytes).unwrap();
+        write(folder.path(), 3, 4, 1);
+        assert_eq!(lines(folder.path()).len(), 1 + 4);
+    }
+
+    #[test]
+    fn a_line_cut_short_is_dropped_even_if_its_number_is_right() {
+        let folder = tempfile::tempdir().unwrap();
+        write(folder.path(), 0, 3, 1);
+        let path = folder.path().join("metrics.csv");
+        let text = std::fs::read_to_string(&path).unwrap();
+        std::fs::write(&path, &text[..text.len() - 4]).unwrap();
+        assert_eq!(
+            {
+                write(folder.path(), 3, 3, 1);
+                lines(folder.path()).len()
+            },
+            3
+        );
+    }
+
+    #[test]
+    fn a_new_run_begins_a_new_file() {
+        let folder = tempfile::tempdir().unwrap();
+        write(folder.path(), 0, 3, 1);
+        write(folder.path(), 0, 0, 1);
+        assert_eq!(lines(folder.path()), [HEADER]);
+        std::fs::remove_file(folder.path().join("metrics.csv")).unwrap();
+        write(folder.path(), 4, 5, 1);
+        assert_eq!(lines(folder.path()).len(), 2, "a lost file is no reason not to go on");
+        assert_eq!([5, 4].map(|from| Metrics::open(folder.path(), from).unwrap().missing), [4, 4]);
+    }
+}

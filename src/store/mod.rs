@@ -1,0 +1,22 @@
+//! Every file that a run folder may hold, as plain data with reading and writing; which robots of a run are meant; names and locks.
+
+pub mod audit;
+pub mod capacity;
+pub mod checkpoint;
+pub mod eval;
+pub mod folder;
+pub mod images;
+pub mod metrics;
+pub mod names;
+pub mod response;
+pub mod robots;
+pub mod run;
+#[cfg(test)]
+pub(crate) mod samples;
+pub mod setting;
+pub mod training;
+#[cfg(feature = "networks")]
+pub mod trainings;
+pub mod unwritten;
+pub mod validation;
+pub mod whereabouts;

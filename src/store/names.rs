@@ -1,0 +1,40 @@
+//! Names of the files in and beside a run's folder.
+
+/// Its name beside `run.json`.
+pub const AUDIT_JSON: &str = "audit.json";
+
+/// Its name beside `eval.json`.
+pub const CAPACITY_JSON: &str = "capacity.json";
+
+/// Its name beside `run.json`.
+pub const EVAL_JSON: &str = "eval.json";
+
+/// The name of one on validation images.
+pub const EVAL_VALIDATION_JSON: &str = "eval-validation.json";
+
+/// Its name beside `run.json`.
+pub const RESPONSE_JSON: &str = "response.json";
+
+/// What a training keeps of its rollouts, beside `run.json`.
+pub const TRAINING_JSON: &str = "training.json";
+
+/// Its name beside `run.json`.
+pub const VALIDATION_JSON: &str = "validation.json";
+
+/// What a run remembers where its images were in, beside `run.json`.
+pub const DATA_FOLDER: &str = "data-folder.json";
+
+/// Files a run writes into its folder.
+pub const RUN_JSON: &str = "run.json";
+
+/// The resolved config.
+pub const CONFIG: &str = "config.toml";
+
+/// The elites for pyribs.
+pub const ELITES: &str = "elites.csv";
+
+/// Figures per generation.
+pub const METRICS: &str = "metrics.csv";
+
+/// File names of the newest checkpoint and the one before.
+pub const CHECKPOINTS: [&str; 2] = ["checkpoint.json", "checkpoint.previous.json"];

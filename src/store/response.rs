@@ -1,0 +1,251 @@
+//! `response.json` and `response.csv`: the responses of robots' gaits, beside the run's `run.json`.
+
+use crate::base::error::Error;
+use crate::base::files::write_atomically;
+use crate::body::Body;
+use crate::store::images::DatasetRef;
+use crate::task::condition::Condition;
+use crate::task::response::{Gait, Response};
+use crate::task::teachable::{Estimate, Teachable};
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+
+/// What `response.json` calls itself.
+pub const FORMAT: &str = "morphcog-response";
+/// Version of its schema.
+pub const FORMAT_VERSION: u32 = 1;
+
+/// Endings of a robot's picture beside the results.
+pub const PICTURES: [&str; 2] = ["svg", "png"];
+
+/// Why a value becomes JSON.
+const JSON: &str = "JSON has all of it: keys are texts, and numbers are finite";
+
+/// The content of `response.json`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ResponseFile {
+    /// [`FORMAT`].
+    pub format: String,
+    /// [`FORMAT_VERSION`].
+    pub format_version: u32,
+    /// Version of morphcog that wrote it.
+    pub program_version: String,
+    /// Name of the run the robots are from.
+    pub run: String,
+    /// Its seed.
+    pub run_seed: u64,
+    /// SHA-256 of its `run.json`.
+    pub run_sha256: String,
+    /// How responses were measured.
+    pub setting: Setting,
+    /// The robots, in the order in which they were chosen.
+    pub robots: Vec<RobotResponse>,
+}
+
+/// How responses were measured.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Setting {
+    /// Seed of the random images.
+    pub seed: u64,
+    /// Most rollouts of a robot.
+    pub images: usize,
+    /// The relative error of the slopes at which a measurement ends.
+    pub error: f64,
+    /// The dataset that the task's images are of.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub dataset: Option<DatasetRef>,
+    /// What images were shown under by turns.
+    pub conditions: Vec<Condition>,
+    /// For how many control steps each.
+    pub control_steps: u32,
+    /// The task that robots could be taught, if one was named.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub task: Option<String>,
+}
+
+/// Why a measurement ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum EndedBy {
+    /// The slopes were known well enough.
+    Error,
+    /// There were as many rollouts as there might be.
+    Images,
+}
+
+/// The response of a robot's gait.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RobotResponse {
+    /// Its id, or the name of a published robot.
+    pub id: String,
+    /// Its body.
+    pub body: Body,
+    /// Rollouts that were simulated.
+    pub rollouts: usize,
+    /// Of these, how many became unstable; they tell nothing.
+    pub unstable: usize,
+    /// Why there were no more.
+    pub ended_by: EndedBy,
+    /// How far off the slopes are, as a share of what they are: 0 to 1.
+    pub relative_error: f64,
+    /// Share of the displacements' variance that slopes fitted to other rollouts explain.
+    pub r_squared: f64,
+    /// What these leave unexplained of a displacement: standard deviation \[voxel lengths\].
+    pub noise: f64,
+    /// What the true slopes would leave unexplained \[voxel lengths\].
+    pub scatter: f64,
+    /// The penalty of the ridge regression.
+    pub ridge: f64,
+    /// Displacement of a body whose places all had no width, the mean over conditions \[voxel
+    /// lengths\].
+    pub intercept: f64,
+    /// The same under each condition; none of one without stable rollouts.
+    pub intercepts: Vec<Option<f64>>,
+    /// The soft voxels and sensors, row-major.
+    pub places: Vec<Place>,
+    /// What the gait could be taught, if that was asked for.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub taught: Option<Taught>,
+}
+
+/// A soft voxel or a sensor.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Place {
+    /// Its row, from 0 at the top.
+    pub row: usize,
+    /// Its column, from 0 on the left.
+    pub column: usize,
+    /// By how much it moves the body to the right when it is wider by one rest width \[voxel
+    /// lengths\].
+    pub slope: f64,
+    /// The standard error of that \[voxel lengths\].
+    pub error: f64,
+}
+
+impl Place {
+    /// Whether the slope cannot be told from none: it is within two standard errors.
+    pub fn is_uncertain(&self) -> bool {
+        self.slope.abs() < 2.0 * self.error
+    }
+}
+
+/// What a gait could be taught, by the linear model.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Taught {
+    /// Mean worth of its answers, `mean_clipped`: from −1 to 1.
+    pub fitness: f64,
+    /// Its 95 % interval.
+    pub fitness_interval: [f64; 2],
+    /// Share of right answers, both groups weighing the same.
+    pub accuracy: f64,
+    /// Its 95 % interval.
+    pub accuracy_interval: [f64; 2],
+}
+
+impl From<Teachable> for Taught {
+    fn from(teachable: Teachable) -> Self {
+        let interval = |estimate: Estimate, least: f64| estimate.interval().map(|end| end.clamp(least, 1.0));
+        let Teachable { fitness, accuracy } = teachable;
+        Taught {
+            fitness: fitness.value,
+            fitness_interval: interval(fitness, -1.0),
+            accuracy: accuracy.value,
+            accuracy_interval: interval(accuracy, 0.0),
+        }
+    }
+}
+
+impl RobotResponse {
+    /// What `rollouts` told of a gait.
+    pub(crate) fn new(
+        id: &str,
+        gait: &Gait,
+        response: &Response,
+        [rollouts, unstable]: [usize; 2],
+        ended_by: EndedBy,
+        taught: Option<Taught>,
+    ) -> Self {
+        let places = gait.places().iter().zip(response.slopes.iter().zip(&response.errors));
+        let place = |(&(row, column), (&slope, &error)): (&(usize, usize), (&f64, &f64))| Place {
+            row,
+            column,
+            slope,
+            error,
+        };
+        RobotResponse {
+            id: id.to_string(),
+            body: gait.built(&gait.design()),
+            rollouts,
+            unstable,
+            ended_by,
+            relative_error: response.relative_error(),
+            r_squared: response.r_squared,
+            noise: response.noise,
+            scatter: response.scatter,
+            ridge: response.ridge,
+            intercept: response.intercept,
+            intercepts: response.intercepts.clone(),
+            places: places.map(place).collect(),
+            taught,
+        }
+    }
+}
+
+impl ResponseFile {
+    /// Its text: the head on one line, then one line per robot.
+    pub fn to_json(&self) -> String {
+        let head = ResponseFile { robots: Vec::new(), ..self.clone() };
+        let head = serde_json::to_string(&head).expect(JSON);
+        let lines: Vec<String> =
+            self.robots.iter().map(|robot| serde_json::to_string(robot).expect(JSON)).collect();
+        // `robots` is the last key.
+        let head = head.strip_suffix("]}").unwrap_or(&head);
+        format!("{head}\n{}\n]}}\n", lines.join(",\n"))
+    }
+
+    /// `response.csv`: a line per robot and place.
+    ///
+    /// # Errors
+    /// If it cannot be written to memory.
+    pub fn to_csv(&self) -> Result<Vec<u8>, csv::Error> {
+        let mut writer = csv::Writer::from_writer(Vec::new());
+        writer.write_record(["id", "row", "column", "material", "slope", "error"])?;
+        for robot in &self.robots {
+            for Place { row, column, slope, error } in &robot.places {
+                let material = robot.body.voxels()[(*row, *column)].code().to_string();
+                let numbers =
+                    [row.to_string(), column.to_string(), material, slope.to_string(), error.to_string()];
+                writer.write_record(std::iter::once(robot.id.clone()).chain(numbers))?;
+            }
+        }
+        writer.into_inner().map_err(|error| csv::Error::from(error.into_error()))
+    }
+
+    /// Writes it, and its CSV beside it.
+    ///
+    /// # Errors
+    /// If they cannot be written.
+    pub fn write(&self, path: &Path) -> Result<(), Error> {
+        let csv = self.to_csv().map_err(|error| Error::other(error.to_string()))?;
+        for (path, content) in [(path, self.to_json().into_bytes()), (&path.with_extension("csv"), csv)] {
+            write_atomically(path, &content).map_err(|error| Error::writing(path, &error))?;
+        }
+        Ok(())
+    }
+}
+
+/// The pictures of robots beside results in `out`, as SVG and as PNG; of one robot they have the
+/// results' name.
+pub fn pictures(out: &Path, ids: &[&str]) -> Vec<[PathBuf; 2]> {
+    let stem = out.file_stem().unwrap_or_default().to_string_lossy();
+    let named = |id: &&str| match ids.len() {
+        1 => PICTURES.map(|ending| out.with_extension(ending)),
+        _ => PICTURES.map(|ending| out.with_file_name(format!("{stem}-{id}.{ending}"))),
+    };
+    ids.iter().map(named).collect()
+}

@@ -1,0 +1,484 @@
+//! Choosing robots of one run or several: all, the fittest, some at random, or by id.
+
+use crate::base::error::Error;
+use crate::base::random::{Purpose, stream};
+use crate::store::audit::AuditFile;
+use crate::store::names::AUDIT_JSON;
+use crate::store::run::{Robot, RunFile};
+use crate::store::validation::Validated;
+use crate::store::validation::ranking;
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+
+/// The word for the best robot.
+pub const BEST: &str = "best";
+
+/// A run, and where it lies.
+#[derive(Clone, Debug)]
+pub struct Source {
+    /// Its run.json; what else is known of its robots lies beside it.
+    pub path: PathBuf,
+    /// Its content.
+    pub run: RunFile,
+}
+
+impl Source {
+    /// Reads a run.json.
+    ///
+    /// # Errors
+    /// As [`RunFile::read`].
+    pub fn read(path: &Path) -> Result<Self, Error> {
+        Ok(Source { path: path.to_path_buf(), run: RunFile::read(path)? })
+    }
+}
+
+/// A robot, and the run it is of, by its place among several.
+#[derive(Clone, Copy, Debug)]
+pub struct Chosen<'a> {
+    /// Which of the runs.
+    pub source: usize,
+    /// The robot.
+    pub robot: &'a Robot,
+}
+
+/// Which robots of one run, or of several together.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Selection {
+    /// All of them, fittest first.
+    All,
+    /// The so many fittest of each task.
+    Top(usize),
+    /// So many of each task, drawn at random.
+    Random(usize),
+    /// The so many best of each run and task on validation images; only `eval` shows those.
+    Validated(usize),
+    /// Those with these ids, or unique beginnings of ids; "best" is the first on validation images if the runs ranked their robots
+    /// by those (validation.json), else the fittest.
+    Ids(Vec<String>),
+    /// These, by the place of their run and by id, and how they were come by.
+    Drawn {
+        /// The robots.
+        robots: Vec<(usize, String)>,
+        /// For people.
+        about: String,
+    },
+    /// So selected, but from those robots only that an audit found physical.
+    Physical(Box<Selection>),
+}
+
+/// What can be read as a selection.
+const EXPECTED: &str = "expected all, top:N, random:N, best-validation:N, or, separated by commas, ids or their beginnings, best, \
+names of published robots or gallery";
+
+impl FromStr for Selection {
+    type Err = String;
+    fn from_str(text: &str) -> Result<Self, String> {
+        let count = |digits: &str| {
+            let count = digits.parse().ok().filter(|&count| count > 0);
+            count.ok_or_else(|| format!("{text}: expected a number from 1 after the colon"))
+        };
+        match text.split_once(':') {
+            None if text == "all" => Ok(Selection::All),
+            Some(("top", digits)) => count(digits).map(Selection::Top),
+            Some(("random", digits)) => count(digits).map(Selection::Random),
+            Some(("best-validation", digits)) => count(digits).map(Selection::Validated),
+            None if text == "best-validation" => Ok(Selection::Validated(1)),
+            Some(_) => Err(EXPECTED.to_string()),
+            None => Ok(Selection::Ids(text.split(',').map(|id| id.trim().to_string()).collect())),
+        }
+    }
+}
+
+impl Selection {
+    /// The same among the robots only that the audits beside the runs found physical, if `only` says so.
+    #[must_use]
+    pub fn physical(self, only: bool) -> Self {
+        if only { Selection::Physical(Box::new(self)) } else { self }
+    }
+
+    /// How many of the selected are to be chosen by validation, if that is asked for.
+    pub fn validated(&self) -> Option<usize> {
+        match self {
+            Selection::Validated(count) => Some(*count),
+            Selection::Physical(of) => of.validated(),
+            _ => None,
+        }
+    }
+
+    /// Whether it names robots by their ids.
+    pub(crate) fn names_any(&self) -> bool {
+        match self {
+            Selection::Ids(_) | Selection::Drawn { .. } => true,
+            Selection::Physical(of) => of.names_any(),
+            _ => false,
+        }
+    }
+
+    /// What it says, for people.
+    pub fn describe(&self) -> String {
+        match self {
+            Selection::All => "all elites".to_string(),
+            Selection::Top(count) => format!("the {count} fittest of each task on the training images"),
+            Selection::Random(count) => format!("{count} elites of each task, drawn at random"),
+            Selection::Validated(count) => {
+                format!("the {count} best of each run and task on validation images")
+            }
+            Selection::Drawn { about, .. } => about.clone(),
+            Selection::Ids(ids) => format!("chosen by id: {}", ids.join(", ")),
+            Selection::Physical(of) => format!("{}, of those audited as physical", of.describe()),
+        }
+    }
+
+    /// The robots; where no order is given: task by task, the fittest first. `seed` is for the random ones. For a
+    /// validation: all that are to be looked at.
+    ///
+    /// # Errors
+    /// If there is no robot, or no single one, of an id; if only physical ones are asked for, and they are not known.
+    pub fn of<'a>(&self, sources: &'a [Source], seed: u64) -> Result<Vec<Chosen<'a>>, Error> {
+        let robots = |(source, from): (usize, &'a Source)| {
+            from.run.elites.iter().map(move |robot| Chosen { source, robot })
+        };
+        let mut fittest: Vec<Chosen> = sources.iter().enumerate().flat_map(robots).collect();
+        // Stable: equally fit ones stay in the order of their runs and cells.
+        fittest.sort_by(|a, b| b.robot.objective.total_cmp(&a.robot.objective));
+        if fittest.is_empty() {
+            let names: Vec<String> = sources.iter().map(|source| source.path.display().to_string()).collect();
+            return Err(Error::input(format!("{}: the archive is empty", names.join(", "))));
+        }
+        self.among(fittest, sources, seed)
+    }
+
+    /// The same robots of several runs, each run's by their ids, so that runs can be looked at one after the other: `None` for
+    /// a run of which there are none. Who is best on validation images is told run by run as it is.
+    ///
+    /// # Errors
+    /// As [`Selection::of`].
+    pub fn of_each(&self, sources: &[Source], seed: u64) -> Result<Vec<Option<Selection>>, Error> {
+        if sources.len() < 2 || self.validated().is_some() {
+            return Ok(vec![Some(self.clone()); sources.len()]);
+        }
+        let mut ids = vec![Vec::new(); sources.len()];
+        for chosen in self.of(sources, seed)? {
+            ids[chosen.source].push(chosen.robot.id.clone());
+        }
+        Ok(ids.into_iter().map(|ids| (!ids.is_empty()).then_some(Selection::Ids(ids))).collect())
+    }
+
+    fn among<'a>(
+        &self,
+        fittest: Vec<Chosen<'a>>,
+        sources: &'a [Source],
+        seed: u64,
+    ) -> Result<Vec<Chosen<'a>>, Error> {
+        let by_task = || {
+            let tasks = sources.first().map_or(&[][..], |source| &source.run.dimensions.tasks);
+            let of = |task: &String| fittest.iter().filter(|c| c.robot.task == *task).copied().collect();
+            tasks.iter().map(of).collect::<Vec<Vec<Chosen>>>()
+        };
+        match self {
+            Selection::All | Selection::Validated(_) => Ok(fittest),
+            Selection::Top(count) => {
+                Ok(by_task().into_iter().flat_map(|of_task| of_task.into_iter().take(*count)).collect())
+            }
+            Selection::Random(count) => {
+                let draw = |(number, of_task): (u64, Vec<Chosen<'a>>)| {
+                    let picked = stream(seed, Purpose::Robots, 0, number).sample(of_task.len(), *count);
+                    picked.into_iter().map(|index| of_task[index]).collect::<Vec<_>>()
+                };
+                Ok((0..).zip(by_task()).flat_map(draw).collect())
+            }
+            Selection::Ids(ids) => {
+                // Whoever is named twice is one robot.
+                let named = ids.iter().map(|id| match id == BEST {
+                    true => Ok(best(&fittest, sources).into_iter().collect()),
+                    false => by_id(&fittest, id),
+                });
+                let named: Result<Vec<_>, Error> = named.collect();
+                let mut once: Vec<Chosen> = Vec::new();
+                for chosen in named?.into_iter().flatten() {
+                    if !once.iter().any(|other| std::ptr::eq(other.robot, chosen.robot)) {
+                        once.push(chosen);
+                    }
+                }
+                Ok(once)
+            }
+            Selection::Drawn { robots, .. } => {
+                let of_run = |source: usize| fittest.iter().filter(move |c| c.source == source).copied();
+                let find = |(source, id): &(usize, String)| by_id(&of_run(*source).collect::<Vec<_>>(), id);
+                let found: Result<Vec<_>, Error> = robots.iter().map(find).collect();
+                Ok(found?.into_iter().flatten().collect())
+            }
+            // The first in a ranking can be told without the last; it is asked when they are ranked.
+            Selection::Physical(of) if of.validated().is_some() && !all_audited(&fittest, sources)? => {
+                Ok(fittest)
+            }
+            Selection::Physical(of) => of.among(physical(of, fittest, sources)?, sources, seed),
+        }
+    }
+}
+
+/// The best of some robots, given fittest first: the first on validation images if all runs ranked their robots by those, and
+/// ranked one of these; else the fittest.
+fn best<'a>(fittest: &[Chosen<'a>], sources: &'a [Source]) -> Option<Chosen<'a>> {
+    let rankings: Option<Vec<Vec<Validated>>> = sources.iter().map(ranking).collect();
+    let mut first: Option<(Chosen, f64)> = None;
+    for (source, ranked) in rankings.iter().flatten().enumerate() {
+        for Validated { id, task, balanced_accuracy, .. } in ranked {
+            let is_it = |c: &&Chosen| c.source == source && c.robot.id == *id && c.robot.task == *task;
+            // Of equals the first stays, which was fitter.
+            if first.is_none_or(|(_, accuracy)| *balanced_accuracy > accuracy)
+                && let Some(chosen) = fittest.iter().find(is_it)
+            {
+                first = Some((*chosen, *balanced_accuracy));
+            }
+        }
+    }
+    first.map(|(chosen, _)| chosen).or(fittest.first().copied())
+}
+
+/// The robot of an id, or of the unique beginning of one. Of several runs that have it all, as when they started from one
+/// archive, from each.
+pub(crate) fn by_id<'a>(robots: &[Chosen<'a>], id: &str) -> Result<Vec<Chosen<'a>>, Error> {
+    let lower = id.to_ascii_lowercase();
+    let found: Vec<Chosen> = robots
+        .iter()
+        .filter(|chosen| !id.is_empty() && chosen.robot.id.to_ascii_lowercase().starts_with(&lower))
+        .copied()
+        .collect();
+    let list =
+        |some: &[Chosen]| some.iter().take(5).map(|c| c.robot.id.as_str()).collect::<Vec<_>>().join(", ");
+    match found.as_slice() {
+        [first, others @ ..] if others.iter().all(|other| other.robot.id == first.robot.id) => Ok(found),
+        [] => {
+            let hint = format!("there are {} robots, the fittest are {}", robots.len(), list(robots));
+            Err(Error::input(format!("there is no robot {id}")).hint(hint))
+        }
+        several => {
+            let text = format!("{} robots have ids that begin with {id}: {}", several.len(), list(several));
+            Err(Error::input(text).hint("give more digits".to_string()))
+        }
+    }
+}
+
+/// The file of verdicts beside a run.
+fn path(source: &Source) -> PathBuf {
+    source.path.with_file_name(AUDIT_JSON)
+}
+
+fn audits(sources: &[Source]) -> Result<Vec<AuditFile>, Error> {
+    sources.iter().map(|source| AuditFile::of_run(&source.run, &path(source))).collect()
+}
+
+/// Whether there are verdicts on all of them.
+///
+/// # Errors
+/// As of [`AuditFile::of_run`].
+pub(crate) fn all_audited(robots: &[Chosen], sources: &[Source]) -> Result<bool, Error> {
+    let audits = audits(sources)?;
+    Ok(robots.iter().all(|chosen| audits[chosen.source].robot(&chosen.robot.id).is_some()))
+}
+
+/// The physical ones, fittest first; those that are named must be among them.
+pub(crate) fn physical<'a>(
+    selection: &Selection,
+    fittest: Vec<Chosen<'a>>,
+    sources: &'a [Source],
+) -> Result<Vec<Chosen<'a>>, Error> {
+    let audits = audits(sources)?;
+    let name = |chosen: &Chosen| path(&sources[chosen.source]).display().to_string();
+    let found = |chosen: &Chosen| audits[chosen.source].robot(&chosen.robot.id);
+    let hint = "morphcog audit goes on with the robots that are missing; give it the same --archive";
+    let mut named = Vec::new();
+    if let Selection::Ids(ids) = selection {
+        for id in ids.iter().filter(|id| *id != BEST) {
+            named.extend(by_id(&fittest, id)?);
+        }
+    }
+    // Who names robots needs to know of those only; of a part of an archive nothing can be drawn fairly.
+    let is_named = matches!(selection, Selection::Ids(ids) if !ids.iter().any(|id| id == BEST));
+    for chosen in if is_named { &named } else { &fittest } {
+        if found(chosen).is_none() {
+            let audit = &audits[chosen.source];
+            let (name, known, all) = (name(chosen), audit.robots.len(), audit.elites);
+            let id = &chosen.robot.id;
+            let text = format!("{name}: robot {id} has not been audited ({known} of {all} have)");
+            return Err(Error::input(text).hint(hint.to_string()));
+        }
+    }
+    for chosen in &named {
+        if let Some(found) = found(chosen).filter(|found| !found.is_physical()) {
+            let text =
+                format!("{}: robot {} is not physical: {}", name(chosen), found.id, found.conclusion());
+            return Err(
+                Error::input(text).hint("leave --physical-only away to take it all the same".to_string())
+            );
+        }
+    }
+    let physical: Vec<Chosen> =
+        fittest.iter().filter(|chosen| found(chosen).is_some_and(|r| r.is_physical())).copied().collect();
+    if physical.is_empty() {
+        let names: Vec<String> = sources.iter().map(|source| path(source).display().to_string()).collect();
+        return Err(Error::input(format!(
+            "{}: none of {} robots is physical",
+            names.join(", "),
+            fittest.len()
+        )));
+    }
+    Ok(physical)
+}
+
+/// Of robots of a run, best on validation images first, the first so many of each task that are physical. What comes after them
+/// need not have been audited.
+///
+/// # Errors
+/// If one that comes before them has not been, or none of a task is physical.
+pub(crate) fn first_physical<'a>(
+    ranked: Vec<(&'a Robot, Validated)>,
+    source: &Source,
+    count: usize,
+) -> Result<Vec<(&'a Robot, Validated)>, Error> {
+    let path = path(source);
+    let audit = AuditFile::of_run(&source.run, &path)?;
+    let (name, archive) = (path.display(), source.path.display());
+    let mut chosen = Vec::new();
+    for task in &source.run.dimensions.tasks {
+        let of_task: Vec<_> = ranked.iter().filter(|(robot, _)| robot.task == *task).collect();
+        let mut physical = 0;
+        for (place, (robot, validated)) in of_task.iter().enumerate() {
+            if physical == count {
+                break;
+            }
+            let Some(found) = audit.robot(&robot.id) else {
+                let (id, place) = (&robot.id, place + 1);
+                let text = format!(
+                    "{name}: robot {id}, number {place} of {task} on validation images, has not been audited"
+                );
+                let hint = format!("morphcog audit --archive {archive} --robots best-validation:{place}");
+                return Err(Error::input(text).hint(hint));
+            };
+            if found.is_physical() {
+                physical += 1;
+                chosen.push((*robot, validated.clone()));
+            }
+        }
+        if physical == 0 && !of_task.is_empty() {
+            let text = format!(
+                "{name}: none of the {} best of {task} on validation images is physical",
+                of_task.len()
+            );
+            let hint = format!("morphcog audit --archive {archive} makes all its robots eligible");
+            return Err(Error::input(text).hint(hint));
+        }
+    }
+    Ok(chosen)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::store::samples;
+
+    fn source(robots: &[(&str, f64)]) -> Source {
+        Source { path: PathBuf::from("run.json"), run: samples::run(robots) }
+    }
+
+    fn of(text: &str, seed: u64, sources: &[Source]) -> Result<Vec<String>, Error> {
+        let robots = Selection::from_str(text).unwrap().of(sources, seed)?;
+        Ok(robots.into_iter().map(|chosen| chosen.robot.id.clone()).collect())
+    }
+
+    fn selected(text: &str, seed: u64) -> Result<Vec<String>, Error> {
+        let run = source(&[("aa10", 1.0), ("ab20", 3.0), ("b300", 2.0), ("b3ff", 3.0), ("c400", -1.0)]);
+        of(text, seed, &[run])
+    }
+
+    #[test]
+    fn a_robot_that_is_named_twice_is_one() {
+        assert_eq!(selected("aa,b300,aa10", 1).unwrap(), ["aa10", "b300"]);
+    }
+
+    #[test]
+    fn a_robot_that_several_runs_have_is_taken_of_each() {
+        let runs = [source(&[("aa10", 1.0), ("ab20", 3.0)]), source(&[("ab20", 2.0), ("b3ff", 4.0)])];
+        assert_eq!(of("ab20,best", 1, &runs).unwrap(), ["ab20", "ab20", "b3ff"]);
+        let chosen = Selection::Ids(vec!["ab".to_string()]).of(&runs, 1).unwrap();
+        assert_eq!(chosen.iter().map(|c| c.source).collect::<Vec<_>>(), [0, 1]);
+        assert!(of("a", 1, &runs).unwrap_err().message.contains("3 robots"));
+    }
+
+    #[test]
+    fn several_runs_are_one_crowd() {
+        let runs = [source(&[("aa10", 1.0), ("ab20", 3.0)]), source(&[("b300", 2.0), ("b3ff", 4.0)])];
+        assert_eq!(of("top:3", 1, &runs).unwrap(), ["b3ff", "ab20", "b300"]);
+        assert_eq!(of("ab,b30", 1, &runs).unwrap(), ["ab20", "b300"]);
+        assert_eq!(of("random:9", 1, &runs).unwrap().len(), 4);
+        let chosen = Selection::All.of(&runs, 1).unwrap();
+        assert_eq!(chosen.iter().map(|c| c.source).collect::<Vec<_>>(), [1, 0, 1, 0]);
+    }
+
+    #[test]
+    fn robots_of_several_runs_are_named_run_by_run_and_a_wrong_name_is_known_before_the_first() {
+        let runs = [source(&[("aa10", 1.0), ("ab20", 3.0)]), source(&[("b300", 2.0), ("b3ff", 4.0)])];
+        let each = |text: &str, runs: &[Source]| Selection::from_str(text).unwrap().of_each(runs, 1);
+        let ids = |ids: &[&str]| Some(Selection::Ids(ids.iter().map(ToString::to_string).collect()));
+        assert_eq!(each("b3f,aa", &runs).unwrap(), [ids(&["aa10"]), ids(&["b3ff"])]);
+        assert_eq!(each("top:1", &runs).unwrap(), [None, ids(&["b3ff"])]);
+        assert!(each("aa,c", &runs).unwrap_err().message.contains("no robot c"));
+        let validated = Selection::Validated(3);
+        assert_eq!(validated.of_each(&runs, 1).unwrap(), [Some(validated.clone()), Some(validated.clone())]);
+        assert_eq!(each("aa", &runs[..1]).unwrap(), [ids(&["aa"])]);
+    }
+
+    #[test]
+    fn so_many_are_so_many_of_each_task() {
+        let mut run = source(&[("aa10", 1.0), ("ab20", 3.0), ("b300", 2.0), ("b3ff", 4.0), ("c400", 5.0)]);
+        run.run.dimensions.tasks = vec!["0|1".to_string(), "1|0".to_string()];
+        for place in [1, 3] {
+            run.run.elites[place].task = "1|0".to_string();
+        }
+        let runs = [run];
+        assert_eq!(of("top:2", 1, &runs).unwrap(), ["c400", "b300", "b3ff", "ab20"]);
+        assert_eq!(of("random:2", 1, &runs).unwrap().len(), 4);
+    }
+
+    #[test]
+    fn all_and_top_are_the_fittest_first_and_equally_fit_ones_in_the_order_of_their_cells() {
+        assert_eq!(selected("all", 1).unwrap(), ["ab20", "b3ff", "b300", "aa10", "c400"]);
+        assert_eq!(selected("top:2", 1).unwrap(), ["ab20", "b3ff"]);
+        assert_eq!(selected("top:99", 1).unwrap().len(), 5);
+    }
+
+    #[test]
+    fn random_ones_are_different_robots_fixed_by_the_seed() {
+        let drawn = selected("random:3", 7).unwrap();
+        assert_eq!(selected("random:3", 7).unwrap(), drawn);
+        assert!((0..20).any(|seed| selected("random:3", seed).unwrap() != drawn));
+        for seed in 0..20 {
+            let mut all = selected("random:9", seed).unwrap();
+            all.sort();
+            assert_eq!(all, ["aa10", "ab20", "b300", "b3ff", "c400"]);
+        }
+    }
+
+    #[test]
+    fn ids_are_found_by_unique_beginnings_in_the_order_given() {
+        assert_eq!(selected("c, aa,best,B3F", 1).unwrap(), ["c400", "aa10", "ab20", "b3ff"]);
+        let error = selected("aa,b3", 1).unwrap_err();
+        assert!(error.message.contains("2 robots") && error.message.contains("b3ff, b300"), "{error}");
+        assert!(error.hint.is_some());
+        for none in ["d", "aa100", "aa,,c", "aa 10"] {
+            let error = selected(none, 1).unwrap_err();
+            assert!(error.message.contains("no robot"), "{error}");
+            assert!(error.hint.is_some_and(|hint| hint.contains("ab20")), "the fittest are offered");
+        }
+    }
+
+    #[test]
+    fn words_that_select_nothing_are_refused() {
+        for wrong in ["top:0", "top:", "top:-1", "random:x", "random:0", "worst:3", "top:1:2"] {
+            assert!(Selection::from_str(wrong).is_err(), "{wrong}");
+        }
+        let empty = [source(&[])];
+        assert!(Selection::All.of(&empty, 1).unwrap_err().message.contains("empty"));
+    }
+}

@@ -1,0 +1,359 @@
+//! `run.json`: a run's archive with everything that made it; the file that `eval` and `replay` read.
+
+use crate::base::error::Error;
+use crate::base::files::read_text;
+use crate::base::hash::sha256_hex;
+use crate::base::number;
+use crate::body::{Body, VoxelCounts};
+use crate::config::Config;
+use crate::genome::Genome;
+use crate::qd::descriptor::{count_bin, possible_cells};
+use crate::qd::{Archive, ArchiveStats, DescriptorSpace, Elite};
+use crate::store::images::{DatasetRef, ImageRef, answers};
+use crate::store::training::Origin;
+use crate::task::fitness::Fitness;
+use crate::task::score::Answer;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeSet;
+use std::path::Path;
+
+/// What `run.json` calls itself.
+pub const FORMAT: &str = "morphcog-run";
+/// Version of its schema; a reader refuses newer ones.
+pub const FORMAT_VERSION: u32 = 1;
+
+/// Why a value becomes JSON.
+const JSON: &str = "JSON has all of it: keys are texts, and nothing fails to be written";
+
+/// A robot: a genome, its body, and what it did on the training images.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Robot {
+    /// Content hash of the genome (ten hexadecimal digits).
+    pub id: String,
+    /// Its cell, one bin per dimension of the archive.
+    pub cell: Vec<usize>,
+    /// The task it performs, as "0|123": classes before the bar walk one way, the others the other.
+    pub task: String,
+    /// Its fitness, in the fitness's [unit](crate::task::fitness::Fitness::unit).
+    pub objective: f64,
+    /// Displacement under each training image, voxel lengths, right positive; with `response` those
+    /// of its probe under as many random images.
+    pub displacements: Vec<f64>,
+    /// Its voxels by kind.
+    pub voxels: VoxelCounts,
+    /// Generation it was born in.
+    pub generation: u64,
+    /// Id of its parent; none for a random individual.
+    pub parent: Option<String>,
+    /// Its body.
+    pub body: Body,
+    /// Its genome.
+    pub genome: Genome,
+}
+
+impl Robot {
+    /// Bins of its three voxel counts.
+    pub fn bins(&self) -> Vec<usize> {
+        let area = self.body.voxels().area();
+        let VoxelCounts { muscle, sensor, total, .. } = self.voxels;
+        [muscle, sensor, total].map(|count| count_bin(count, area)).to_vec()
+    }
+}
+
+/// Dimensions of an archive.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Dimensions {
+    /// Names: muscle, sensor, total, and with several tasks, task.
+    pub names: Vec<String>,
+    /// Number of bins of each.
+    pub bins: Vec<usize>,
+    /// Cells that a body can have at all: what coverage is a fraction of.
+    pub possible_cells: usize,
+    /// Names of the tasks, in the order of their bins.
+    pub tasks: Vec<String>,
+}
+
+impl Dimensions {
+    /// Those of the archive of a config.
+    ///
+    /// # Errors
+    /// If the config has no tasks.
+    pub fn of(config: &Config) -> Result<Self, Error> {
+        let grouping = config.grouping()?;
+        let tasks: Vec<String> = grouping.tasks().iter().map(|split| split.name()).collect();
+        let space = DescriptorSpace::voxel_counts(tasks.len());
+        let (names, bins) = space.dimensions().iter().cloned().unzip();
+        let area = config.body.height * config.body.width;
+        let possible_cells = possible_cells(area, config.body.min_muscles, tasks.len()).len();
+        Ok(Dimensions { names, bins, possible_cells, tasks })
+    }
+}
+
+/// The content of `run.json`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RunFile {
+    /// [`FORMAT`].
+    pub format: String,
+    /// [`FORMAT_VERSION`].
+    pub format_version: u32,
+    /// Version of morphcog that wrote it.
+    pub program_version: String,
+    /// Name of the run: its config's.
+    pub name: String,
+    /// The config, every key resolved; the physics are in it.
+    pub config: Config,
+    /// The data.
+    pub dataset: DatasetRef,
+    /// The training images.
+    pub training_images: Vec<ImageRef>,
+    /// The archive's dimensions.
+    pub dimensions: Dimensions,
+    /// The run whose gaits it was trained from, if it was.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub origin: Option<Origin>,
+    /// Generations done.
+    pub generations: u64,
+    /// Figures of the archive.
+    pub stats: ArchiveStats,
+    /// The elites, in the order of their cells.
+    pub elites: Vec<Robot>,
+    /// SHA-256 of the bytes of the file that it was read from; none of a run that was not read from its file.
+    #[serde(skip)]
+    pub read_sha256: Option<String>,
+}
+
+impl RunFile {
+    /// Reads `run.json`.
+    ///
+    /// # Errors
+    /// What is wrong with the file, with its line and key.
+    pub fn read(path: &Path) -> Result<Self, Error> {
+        let text = read_text(path).map_err(|error| Error::reading(path, &error))?;
+        RunFile::parse(&text, &path.display().to_string())
+    }
+
+    /// Reads its text; `name` stands in messages.
+    ///
+    /// # Errors
+    /// As [`RunFile::read`].
+    pub fn parse(text: &str, name: &str) -> Result<Self, Error> {
+        let run: RunFile = crate::config::reading::read_versioned(text, name, FORMAT, FORMAT_VERSION)?;
+        run.check().map_err(|error| error.within(name))?;
+        Ok(RunFile { read_sha256: Some(sha256_hex(text.as_bytes())), ..run })
+    }
+
+    /// Whether it is a run that this program can have made, wherever it was read.
+    ///
+    /// # Errors
+    /// What is wrong with it; without the name of the file.
+    pub(crate) fn check(&self) -> Result<(), Error> {
+        if self.format != FORMAT || self.format_version > FORMAT_VERSION {
+            let text = format!("format: expected {FORMAT}, format_version up to {FORMAT_VERSION}");
+            return Err(Error::input(text));
+        }
+        self.config.validate()?;
+        let (done, all) = (self.generations, self.config.generations);
+        if done > all {
+            let text = format!("generations = {done}: expected at most config.generations, {all}");
+            return Err(Error::input(text));
+        }
+        if self.dimensions != Dimensions::of(&self.config)? {
+            return Err(Error::input("dimensions: they are not those of the config".to_string()));
+        }
+        let shown: BTreeSet<u8> = self.training_images.iter().map(|image| image.label).collect();
+        if shown != self.config.classes().into_iter().collect() {
+            let text = "training_images: their labels are not the classes of the config's task";
+            return Err(Error::input(text.to_string()));
+        }
+        let space = self.space();
+        for robot in &self.elites {
+            let refuse = |what: &str| Err(Error::input(format!("elite {}: {what}", robot.id)));
+            let (height, width) = (self.config.body.height, self.config.body.width);
+            if (robot.body.height(), robot.body.width()) != (height, width) {
+                return refuse(&format!("its body is not {height} × {width} voxels, as the config says"));
+            }
+            if robot.genome.id() != robot.id {
+                return refuse("its id is not its genome's");
+            }
+            if robot.genome.body(height, width).as_ref() != Ok(&robot.body) {
+                return refuse("its body is not what its genome describes");
+            }
+            if robot.voxels != robot.body.counts() {
+                return refuse("its voxel counts are not its body's");
+            }
+            if !self.dimensions.tasks.contains(&robot.task) {
+                return refuse("there is no such task in this run");
+            }
+            if space.index(&robot.cell).is_none() {
+                return refuse("there is no such cell in the archive");
+            }
+            if robot.displacements.len() != self.training_images.len() {
+                return refuse("it has not one displacement per training image");
+            }
+        }
+        self.archive().map(|_| ())
+    }
+
+    fn space(&self) -> DescriptorSpace {
+        let Dimensions { names, bins, .. } = &self.dimensions;
+        DescriptorSpace::new(names.iter().cloned().zip(bins.iter().copied()).collect())
+    }
+
+    /// How its elites' answers were judged.
+    pub fn fitness(&self) -> Fitness {
+        self.config.evaluation.fitness
+    }
+
+    /// A fitness for people, with its unit.
+    pub fn in_units(&self, objective: f64) -> String {
+        let unit = self.fitness().unit().map_or(String::new(), |unit| format!(" {unit}"));
+        format!("{}{unit}", number::fixed(objective, 2))
+    }
+
+    /// Whether both are of one run, however far it had got: the same config and seed make the same robots.
+    fn is_one_with(&self, other: &RunFile) -> bool {
+        let essence = |run: &RunFile| (run.config.essence(), run.dataset.clone());
+        self.fingerprint() == other.fingerprint() || essence(self) == essence(other)
+    }
+
+    /// Its fittest elite; of equals the one in the first cell.
+    pub fn best(&self) -> Option<&Robot> {
+        let fitter = |best: &&Robot, robot: &&Robot| robot.objective > best.objective;
+        self.elites.iter().reduce(|best, robot| if fitter(&best, &robot) { robot } else { best })
+    }
+
+    /// What an elite answered to the training images.
+    pub fn answers(&self, robot: &Robot) -> Vec<Answer> {
+        answers(&self.training_images, robot.displacements.iter().copied().map(Some))
+    }
+
+    /// Whether its displacements are those of its bodies under the training images as the config's protocol has them: not
+    /// of probes, nor from raised starts or without length limits.
+    pub fn follows_protocol(&self) -> bool {
+        !self.config.measures_response() && self.origin.is_none()
+    }
+
+    /// The elites as an archive to go on with.
+    ///
+    /// # Errors
+    /// If two elites are in one cell.
+    pub fn archive(&self) -> Result<Archive<Robot>, Error> {
+        let space = self.space();
+        let mut archive = Archive::new();
+        for robot in &self.elites {
+            let cell =
+                space.index(&robot.cell).expect("elites are in cells of their archive: a file's are checked");
+            if archive.get(cell).is_some() {
+                return Err(Error::input(format!("elite {}: another one is in its cell", robot.id)));
+            }
+            let elite = Elite { cell, objective: robot.objective, solution: robot.clone() };
+            archive.insert(elite).map_err(|error| Error::input(error.to_string()))?;
+        }
+        Ok(archive)
+    }
+
+    /// Its text: the head on one line, then one line per elite.
+    pub fn to_json(&self) -> String {
+        let head = RunFile { elites: Vec::new(), ..self.clone() };
+        let head = serde_json::to_string(&head).expect(JSON);
+        let lines: Vec<String> =
+            self.elites.iter().map(|robot| serde_json::to_string(robot).expect(JSON)).collect();
+        // `elites` is the last key.
+        let head = head.strip_suffix("]}").unwrap_or(&head);
+        format!("{head}\n{}\n]}}\n", lines.join(",\n"))
+    }
+
+    /// What identifies it: SHA-256 of the bytes of its file, or of those that would be written, in hexadecimal digits.
+    pub fn fingerprint(&self) -> String {
+        self.read_sha256.clone().unwrap_or_else(|| sha256_hex(self.to_json().as_bytes()))
+    }
+
+    /// `elites.csv`: what pyribs' `ArchiveDataFrame` reads. `index`: cell; `objective`; `measures_i`: voxel counts (and
+    /// task); `solution_i`: voxels row-major; then id, task, generation and displacements.
+    ///
+    /// # Errors
+    /// If it cannot be written to memory.
+    pub fn to_csv(&self) -> Result<Vec<u8>, csv::Error> {
+        let space = self.space();
+        let voxels = self.config.body.height * self.config.body.width;
+        let numbered =
+            |name: &str, count: usize| (0..count).map(|i| format!("{name}_{i}")).collect::<Vec<_>>();
+        let mut header = vec!["index".to_string(), "objective".to_string()];
+        header.extend(numbered("measures", self.dimensions.bins.len()));
+        header.extend(numbered("solution", voxels));
+        header.extend(["id", "task", "generation"].map(str::to_string));
+        header.extend(numbered("displacement", self.training_images.len()));
+        let mut writer = csv::Writer::from_writer(Vec::new());
+        writer.write_record(&header)?;
+        for robot in &self.elites {
+            let index =
+                space.index(&robot.cell).expect("elites are in cells of their archive: a file's are checked");
+            let VoxelCounts { muscle, sensor, total } = robot.voxels;
+            let mut row = vec![index.to_string(), robot.objective.to_string()];
+            row.extend([muscle, sensor, total].map(|count| count.to_string()));
+            row.extend(robot.cell.get(3).map(usize::to_string));
+            row.extend(robot.body.voxels().cells().iter().map(|material| material.code().to_string()));
+            row.extend([robot.id.clone(), robot.task.clone(), robot.generation.to_string()]);
+            row.extend(robot.displacements.iter().map(f64::to_string));
+            // Empty where it did not have to be shown an image.
+            row.resize(header.len(), String::new());
+            writer.write_record(&row)?;
+        }
+        writer.into_inner().map_err(|error| csv::Error::from(error.into_error()))
+    }
+}
+
+/// Whether runs, each with its path, are different ones: the same twice would count twice.
+///
+/// # Errors
+/// Which are the same.
+pub fn different<'a>(runs: impl IntoIterator<Item = (&'a Path, &'a RunFile)>) -> Result<(), Error> {
+    let mut known: Vec<(&Path, &RunFile)> = Vec::new();
+    for (path, run) in runs {
+        if let Some((first, other)) = known.iter().find(|(_, other)| other.is_one_with(run)) {
+            let (first, path) = (first.display(), path.display());
+            let these = match other.generations == run.generations {
+                true => "these are the same",
+                false => "these are two states of one",
+            };
+            return Err(Error::usage(format!("{first} and {path}: expected different runs, {these}")));
+        }
+        known.push((path, run));
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::store::samples;
+
+    #[test]
+    fn a_run_is_identified_by_the_bytes_of_its_file() {
+        let mut run = samples::run(&[("a", 1.5), ("b", -0.25)]);
+        run.elites.iter_mut().for_each(|robot| robot.id = robot.genome.id());
+        let text = run.to_json();
+        let read = |text: &str| RunFile::parse(text, "run.json").unwrap();
+        // As it is written, so it is known to whoever made it.
+        assert_eq!(read(&text).fingerprint(), run.fingerprint());
+        // What says the same in other bytes is another file, and its hash is the one that sha256sum says.
+        for other in [text.replace("1.5", "1.50"), format!("{text}\n"), format!("\u{feff}{text}")] {
+            assert_ne!(other, text);
+            assert_eq!(read(&other).to_json(), text);
+            assert_eq!(read(&other).fingerprint(), sha256_hex(other.as_bytes()));
+        }
+        // But no other run.
+        let twice = [(Path::new("a.json"), &read(&text)), (Path::new("b.json"), &read(&format!("{text}\n")))];
+        assert!(different(twice).is_err());
+    }
+
+    #[test]
+    fn an_empty_archive_is_told_with_its_file() {
+        let source = crate::store::robots::Source { path: "runs/a/run.json".into(), run: samples::run(&[]) };
+        let error = crate::store::robots::Selection::All.of(&[source], 1).unwrap_err();
+        assert!(error.message.starts_with("runs/a/run.json: "), "{error}");
+    }
+}

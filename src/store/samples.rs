@@ -1,0 +1,45 @@
+//! Runs made up for tests.
+
+use crate::base::random::{Purpose, stream};
+use crate::config::{BUILT_IN, Config};
+use crate::genome::Genome;
+use crate::qd::Archive;
+use crate::store::images::{DatasetRef, ImageRef};
+use crate::store::run::{Dimensions, FORMAT, FORMAT_VERSION, Robot, RunFile};
+
+/// A run of the quick-start config with robots of these ids and objectives, each in a cell of its own.
+pub fn run(robots: &[(&str, f64)]) -> RunFile {
+    let config = Config::parse(BUILT_IN[0].1, BUILT_IN[0].0, &[]).unwrap();
+    let image = |label| ImageRef { index: usize::from(label), label };
+    let robot = |(number, (id, objective)): (usize, &(&str, f64))| {
+        let rng = &mut stream(1, Purpose::Newcomer, 0, number as u64);
+        let (genome, body) = Genome::random(config.body_spec(), &config.genome, rng).unwrap();
+        Robot {
+            id: id.to_string(),
+            cell: vec![number % 7, number / 7, 6],
+            task: "0|1".to_string(),
+            objective: *objective,
+            displacements: vec![*objective, -*objective],
+            voxels: body.counts(),
+            generation: 0,
+            parent: None,
+            body,
+            genome,
+        }
+    };
+    RunFile {
+        format: FORMAT.to_string(),
+        format_version: FORMAT_VERSION,
+        program_version: "0".to_string(),
+        name: "sample".to_string(),
+        dataset: DatasetRef { name: "builtin".to_string(), train_sha256: "0".to_string() },
+        training_images: vec![image(0), image(1)],
+        dimensions: Dimensions::of(&config).unwrap(),
+        origin: None,
+        generations: 1,
+        stats: Archive::<Robot>::new().stats(1, 0.0),
+        elites: robots.iter().enumerate().map(robot).collect(),
+        config,
+        read_sha256: None,
+    }
+}

@@ -1,0 +1,85 @@
+//! Trainings of networks, kept beside the results so that none is done twice.
+
+use crate::base::error::Error;
+use crate::base::files::{read_text, write_atomically};
+use crate::baseline::Trained;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// What the file calls itself, and the version of its schema.
+const FORMAT: (&str, u32) = ("morphcog-trainings", 2);
+
+/// Known trainings.
+#[derive(Debug)]
+pub(crate) struct Trainings {
+    path: PathBuf,
+    content: Content,
+}
+
+#[derive(Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Content {
+    format: String,
+    format_version: u32,
+    /// By what was trained on what (a hash) and by size: accuracy and parameters of each training, in order.
+    trainings: BTreeMap<String, BTreeMap<usize, Vec<(f64, usize)>>>,
+}
+
+impl Trainings {
+    /// Those beside a result file: `capacity.trainings.json` beside `capacity.json`. None if there are none, or they cannot
+    /// be read: then all is trained again.
+    pub fn read(results: &Path) -> Self {
+        let path = results.with_extension("trainings.json");
+        let text = read_text(&path).unwrap_or_default();
+        let content: Content = serde_json::from_str(&text).unwrap_or_default();
+        let ours = (content.format.as_str(), content.format_version) == FORMAT;
+        let trainings = if ours { content.trainings } else { BTreeMap::new() };
+        Trainings {
+            path,
+            content: Content { format: FORMAT.0.to_string(), format_version: FORMAT.1, trainings },
+        }
+    }
+
+    /// The trainings of a size: accuracy, parameters.
+    pub fn of(&self, key: &str, size: usize) -> &[(f64, usize)] {
+        self.content.trainings.get(key).and_then(|sizes| sizes.get(&size)).map_or(&[], Vec::as_slice)
+    }
+
+    /// Adds the next ones of a size.
+    pub fn extend(&mut self, key: &str, size: usize, trained: &[Trained]) {
+        let sizes = self.content.trainings.entry(key.to_string()).or_default();
+        sizes.entry(size).or_default().extend(trained.iter().map(|t| (t.accuracy, t.parameters)));
+    }
+
+    /// Writes them.
+    ///
+    /// # Errors
+    /// If they cannot be written.
+    pub fn write(&self) -> Result<(), Error> {
+        let text =
+            serde_json::to_string(&self.content).map_err(|error| Error::other(error.to_string()))? + "\n";
+        write_atomically(&self.path, text.as_bytes()).map_err(|error| Error::writing(&self.path, &error))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_was_trained_is_known_again_and_anything_else_is_not() {
+        let folder = tempfile::tempdir().unwrap();
+        let out = folder.path().join("capacity.json");
+        let mut trainings = Trainings::read(&out);
+        let trained = [0.5, 0.75].map(|accuracy| Trained { accuracy, epochs: 9, parameters: 12 });
+        trainings.extend("a", 3, &trained[..1]);
+        trainings.extend("a", 3, &trained[1..]);
+        trainings.write().unwrap();
+        let again = Trainings::read(&out);
+        assert_eq!(again.of("a", 3), [(0.5, 12), (0.75, 12)]);
+        assert!(again.of("a", 4).is_empty() && again.of("b", 3).is_empty());
+        std::fs::write(folder.path().join("capacity.trainings.json"), "{\"format\": 1").unwrap();
+        assert!(Trainings::read(&out).of("a", 3).is_empty(), "a broken file is no reason to fail");
+    }
+}

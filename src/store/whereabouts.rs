@@ -1,0 +1,197 @@
+//! [`Whereabouts`]: where images are looked for. A run remembers where its own were, in a file beside its `run.json`.
+
+use crate::base::Grid;
+use crate::base::error::Error;
+use crate::base::files::{read_text, write_atomically};
+use crate::config::BodyConfig;
+use crate::config::Config;
+use crate::config::DataConfig;
+use crate::config::reading;
+use crate::data::dataset::{BUILTIN, Dataset, DatasetError, Split};
+use crate::data::files::{Place, places};
+use crate::store::folder::RunFolder;
+use crate::store::images::DatasetRef;
+use crate::store::names::DATA_FOLDER;
+use crate::task::stimulus::StimulusParams;
+use crate::task::stimulus::stimulus;
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+
+/// What the file calls itself, and the version of its schema.
+const FORMAT: (&str, u32) = ("morphcog-data-folder", 1);
+
+/// The content of `data-folder.json`.
+#[derive(Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct DataFolder {
+    format: String,
+    format_version: u32,
+    /// Name of the dataset.
+    dataset: String,
+    /// The folder with its files; if it is not absolute, as someone may write it: from the run's folder on.
+    folder: PathBuf,
+}
+
+/// Where images are looked for, in this order: in the folder that the command line says, in that of `MORPHCOG_DATA`, in the one that a
+/// run remembers (if it is still there), in the config's `[data] dir`, or else in `data/<name>`.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Whereabouts {
+    /// The folder that the command line says.
+    data: Option<PathBuf>,
+    /// Files that may say where a run's images were.
+    remembered: Vec<PathBuf>,
+    /// The run.json, or the first of several, for messages.
+    run_json: Option<PathBuf>,
+}
+
+impl Whereabouts {
+    /// What is known without a run: `data` is the folder that the command line says.
+    pub fn given(data: Option<&Path>) -> Self {
+        Whereabouts { data: data.map(Path::to_path_buf), remembered: Vec::new(), run_json: None }
+    }
+
+    /// What is known with a run.json, or another file beside one.
+    #[must_use]
+    pub fn and_of(mut self, run_json: &Path) -> Self {
+        self.remembered.push(run_json.with_file_name(DATA_FOLDER));
+        self.run_json.get_or_insert_with(|| run_json.to_path_buf());
+        self
+    }
+
+    /// An error about the images that a run asks for, with the file that does.
+    pub(crate) fn asked_by(&self, error: Error) -> Error {
+        match &self.run_json {
+            Some(path) => error.within(&path.display().to_string()),
+            None => error,
+        }
+    }
+
+    /// Loads the dataset of a section `[data]`.
+    ///
+    /// # Errors
+    /// What is missing or broken, where it was looked for and what to do.
+    pub fn load(&self, config: &DataConfig, wanted: &[Split]) -> Result<Dataset, Error> {
+        let refuse = |error: DatasetError| Error::input(error.to_string());
+        if config.dataset == BUILTIN {
+            return Dataset::builtin(config.builtin.clone(), wanted).map_err(refuse);
+        }
+        let mut given = places(self.data.as_deref(), std::env::var_os("MORPHCOG_DATA"), None);
+        let (there, gone) = match given.is_empty() {
+            true => self.remembered(&config.dataset)?,
+            false => (None, None),
+        };
+        given.extend(there);
+        given.extend(places(None, None, config.dir.as_deref()));
+        Dataset::load(&config.dataset, &given, wanted).map_err(|error| match gone {
+            Some(gone) => refuse(error).hint(format!(
+                "the images of this run were in {gone}, which is not there any more; name their folder with --data"
+            )),
+            None => refuse(error),
+        })
+    }
+
+    /// The first remembered folder with a dataset of this name that is still there; and the first that is not.
+    fn remembered(&self, dataset: &str) -> Result<(Option<Place>, Option<Place>), Error> {
+        let mut gone = None;
+        for path in self.remembered.iter().filter(|path| path.exists()) {
+            let text = read_text(path).map_err(|error| Error::reading(path, &error))?;
+            let name = path.display().to_string();
+            let found: DataFolder = reading::read_versioned(&text, &name, FORMAT.0, FORMAT.1)
+                .map_err(|error| error.hint("delete it, and name the folder with --data".to_string()))?;
+            if found.dataset != dataset {
+                continue;
+            }
+            let folder = path.parent().unwrap_or(Path::new("")).join(found.folder);
+            let place = Place { origin: name, path: folder };
+            match place.path.is_dir() {
+                true => return Ok((Some(place), None)),
+                false => _ = gone.get_or_insert(place),
+            }
+        }
+        Ok((None, gone))
+    }
+}
+
+/// Writes down where a run's images are; nothing of those that the program draws.
+///
+/// # Errors
+/// If it cannot be written.
+pub(crate) fn remember(folder: &RunFolder, dataset: &Dataset) -> Result<(), Error> {
+    let path = folder.path().join(DATA_FOLDER);
+    let failed = |error: &std::io::Error| Error::writing(&path, error);
+    let Some(source) = dataset.folder() else { return Ok(()) };
+    let absolute = std::path::absolute(source).map_err(|error| failed(&error))?;
+    // A name that is no text cannot be written down: then it is named with --data, as before.
+    if absolute.to_str().is_none() {
+        return Ok(());
+    }
+    let file = DataFolder {
+        format: FORMAT.0.to_string(),
+        format_version: FORMAT.1,
+        dataset: dataset.name().to_string(),
+        folder: absolute,
+    };
+    let text = serde_json::to_string(&file).expect("texts and a number are JSON") + "\n";
+    write_atomically(&path, text.as_bytes()).map_err(|error| failed(&error))
+}
+
+/// Loads the dataset of a config; `data` is the folder given on the command line.
+///
+/// # Errors
+/// What is missing or broken, where it was looked for and what to do.
+pub fn load_dataset(config: &Config, data: Option<&Path>, wanted: &[Split]) -> Result<Dataset, Error> {
+    Whereabouts::given(data).load(&config.data, wanted)
+}
+
+/// Loads the dataset that a run was made with; any, if none is said. Where only other splits are wanted, it is known by its training
+/// images if these are there.
+///
+/// # Errors
+/// As [`load_dataset`]; or that it is another one: images of the same index would be others.
+pub fn load_dataset_of(
+    run: Option<&DatasetRef>,
+    config: &Config,
+    data: &Whereabouts,
+    wanted: &[Split],
+) -> Result<Dataset, Error> {
+    let Some(run) = run else { return data.load(&config.data, wanted) };
+    let loaded = data.load(&config.data, wanted).map_err(|error| data.asked_by(error))?;
+    let train = match loaded.fingerprint(Split::Train) {
+        None => data.load(&config.data, &[Split::Train]).ok().and_then(|set| set.fingerprint(Split::Train)),
+        known => known,
+    };
+    match train.is_none_or(|train| train == run.train_sha256) {
+        true => Ok(loaded),
+        false => {
+            let text = format!(
+                "{}: the training images here are not those the run was made with (another SHA-256)",
+                loaded.place()
+            );
+            Err(data.asked_by(Error::input(text)).hint("name their folder with --data".to_string()))
+        }
+    }
+}
+
+/// What a robot of a config sees of an image.
+///
+/// # Errors
+/// If the image does not go with the body's size.
+pub fn see(config: &Config, dataset: &Dataset, split: Split, index: usize) -> Result<Grid<f64>, Error> {
+    seen(&config.body, &config.stimulus, dataset, split, index)
+}
+
+/// What a robot of this size sees of an image.
+///
+/// # Errors
+/// If the image does not go with the body's size.
+pub fn seen(
+    &BodyConfig { height, width, .. }: &BodyConfig,
+    params: &StimulusParams,
+    dataset: &Dataset,
+    split: Split,
+    index: usize,
+) -> Result<Grid<f64>, Error> {
+    let image = dataset.image(split, index).map_err(|error| Error::input(error.to_string()))?;
+    stimulus(&image, height, width, params)
+        .map_err(|error| Error::input(format!("stimulus.reduction: {error}")))
+}

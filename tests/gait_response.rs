@@ -1,0 +1,187 @@
+//! `morphcog response`: what it measures is true of other rollouts, the files are the same bytes on
+//! any threads, what cannot be measured is a clear error.
+
+mod common;
+
+use common::program::{Sandbox, TINY, files};
+use morphcog::base::stop::{NEVER, Stopped};
+use morphcog::body::Body;
+use morphcog::genome::Genome;
+use morphcog::search::probing::Probing;
+use morphcog::store::response::{EndedBy, ResponseFile};
+use morphcog::store::run::Robot;
+use morphcog::task::evaluation::fresh_rollouts;
+use morphcog::task::response::Gait;
+
+/// An evolved walker: 28 soft voxels and sensors.
+const WALKER: &str = "2222222/2222222/2225222/2441433/6661333/6661333/3333333";
+/// One of muscles and rigid voxels alone.
+const BLIND: &str = "3333333/4444444/1111111/3333333/4444444/1111111/3333333";
+
+/// A run of these bodies, the first of them the fittest.
+fn run_of(bodies: &[&str]) -> Sandbox {
+    let sandbox = Sandbox::new();
+    let large = TINY.replace("= 5\n", "= 7\n").replace("control_steps = 20", "control_steps = 150");
+    sandbox.write("tiny.toml", large);
+    sandbox.run("evolve -q -c tiny.toml -o run --set protocol.control_steps=1 -g 1").ended(0, &[]);
+    let mut run = sandbox.run_file("run");
+    run.config.protocol.control_steps = 150;
+    let robot = |(number, body): (usize, &&str)| {
+        let body: Body = body.parse().unwrap();
+        let genome = Genome::initial().with_body(&body).unwrap();
+        let mut robot = Robot {
+            id: genome.id(),
+            cell: Vec::new(),
+            task: "0|1".to_string(),
+            objective: -(number as f64),
+            displacements: vec![0.0, 0.0],
+            voxels: body.counts(),
+            generation: 0,
+            parent: None,
+            body,
+            genome,
+        };
+        robot.cell = robot.bins();
+        robot
+    };
+    run.elites = bodies.iter().enumerate().map(robot).collect();
+    sandbox.write("run/run.json", run.to_json());
+    sandbox.run_file("run");
+    sandbox
+}
+
+fn responses(sandbox: &Sandbox, name: &str) -> ResponseFile {
+    serde_json::from_str(&sandbox.read(name)).unwrap()
+}
+
+#[test]
+fn slopes_predict_other_rollouts_of_a_real_body_as_well_as_is_said() {
+    let sandbox = run_of(&[WALKER]);
+    sandbox.run("response -q -a run").ended(0, &[]);
+    let file = responses(&sandbox, "run/response.json");
+    let [robot] = &file.robots[..] else { panic!("{} robots", file.robots.len()) };
+    let (config, gait) = (sandbox.run_file("run").config, Gait::of(&robot.body).unwrap());
+    let places: Vec<(usize, usize)> = robot.places.iter().map(|place| (place.row, place.column)).collect();
+    assert_eq!(places, gait.places());
+    // Random images of another seed.
+    let probing = Probing::new(&file.setting.conditions, file.setting.seed + 1);
+    let shown = probing.shown(&gait, &config.physics, 0..240, |probe, stimuli, conditions| {
+        let setting = (&config.physics, &config.protocol);
+        let (found, _) = fresh_rollouts(probe, stimuli, conditions, setting, &|_| (), &NEVER)?;
+        Ok::<_, Stopped>(found.into_iter().map(Result::ok).collect())
+    });
+    let shown = shown.unwrap();
+    assert_eq!(shown.len(), 240);
+    let mean = shown.iter().map(|shown| shown.displacement).sum::<f64>() / 240.0;
+    let (mut missed, mut spread) = (0.0, 0.0);
+    for shown in &shown {
+        let moved: f64 =
+            shown.widths.iter().zip(&robot.places).map(|(width, place)| width * place.slope).sum();
+        let off = shown.displacement - robot.intercepts[shown.condition].unwrap() - moved;
+        missed += off * off;
+        spread += (shown.displacement - mean) * (shown.displacement - mean);
+    }
+    let (found, said) = (1.0 - missed / spread, robot.r_squared);
+    assert!(found > 0.6 && (found - said).abs() < 0.1, "found {found}, said {said}");
+}
+
+#[test]
+fn a_measurement_is_the_same_bytes_on_any_threads() {
+    let sandbox = run_of(&[WALKER]);
+    for (threads, seed) in [(1, 1), (2, 1), (2, 2)] {
+        let line = format!("response -q -a run --task 3|14 -n 60 --threads {threads} --seed {seed}");
+        sandbox.run(&format!("{line} -o {threads}-{seed}.json")).ended(0, &[]);
+    }
+    let read = |name: &str, ending: &str| std::fs::read(sandbox.path(&format!("{name}.{ending}"))).unwrap();
+    for ending in ["json", "csv", "svg", "png"] {
+        assert!(read("1-1", ending) == read("2-1", ending), "{ending}");
+        assert!(read("2-1", ending) != read("2-2", ending), "{ending}");
+    }
+    let file = responses(&sandbox, "1-1.json");
+    assert_eq!(file.setting.task.as_deref(), Some("3|14"));
+    let taught = file.robots[0].taught.unwrap();
+    let [low, high] = taught.accuracy_interval;
+    assert!(low < taught.accuracy && taught.accuracy < high && (0.0..=1.0).contains(&low), "{taught:?}");
+}
+
+#[test]
+fn results_and_pictures_lie_beside_the_run_and_say_why_a_measurement_ended() {
+    let sandbox = run_of(&[WALKER, BLIND, &WALKER.replace("666", "444")]);
+    let said = sandbox.run("response -a run -n 130 --error 0").ended(0, &[]);
+    let file = responses(&sandbox, "run/response.json");
+    let [robot] = &file.robots[..] else { panic!("{} robots", file.robots.len()) };
+    assert_eq!((robot.rollouts, robot.unstable, robot.ended_by), (130, 0, EndedBy::Images));
+    assert!(said.out.contains("130") && said.out.contains("--images"), "{}", said.out);
+    assert_eq!(file.setting.conditions.len(), 6);
+    assert!(robot.intercepts.len() == 6 && robot.intercepts.iter().all(Option::is_some));
+    let run = sandbox.run_file("run");
+    assert_eq!((&file.run, &file.run_sha256), (&run.name, &run.fingerprint()));
+    for (name, material) in [("slope", "2"), ("error", "6")] {
+        let csv = sandbox.read("run/response.csv");
+        assert!(
+            csv.lines().next().unwrap().contains(name) && csv.contains(&format!(",{material},")),
+            "{csv}"
+        );
+    }
+    assert_eq!(sandbox.read("run/response.csv").lines().count(), 1 + robot.places.len());
+    let png = std::fs::read(sandbox.path("run/response.png")).unwrap();
+    // 85 mm at 300 pixels per inch.
+    let size = [16, 20].map(|at| u32::from_be_bytes(png[at..at + 4].try_into().unwrap()));
+    assert!(size[0] == 1005 && (700..1100).contains(&size[1]), "{size:?}");
+    assert!(sandbox.read("run/response.svg").contains("voxel lengths"));
+    // Less is enough for rough slopes. Of several robots each has a picture; one that nothing can
+    // move is left out.
+    let said = sandbox.run("response -a run --robots all --error 0.6 -o some.json");
+    let said = said.ended(0, &["warning:", &run.elites[1].id, "neither soft voxels nor sensors"]);
+    let file = responses(&sandbox, "some.json");
+    assert!(file.robots.len() == 2 && said.out.contains("--error"), "{said:?}");
+    for robot in &file.robots {
+        assert!(robot.ended_by == EndedBy::Error && robot.rollouts < 1000, "{robot:?}");
+        assert!(sandbox.path(&format!("some-{}.png", robot.id)).exists());
+    }
+    // A published robot needs neither archive nor data.
+    sandbox.run("response -q --robots YJTLA,yjtla -n 60").ended(0, &[]);
+    assert_eq!(responses(&sandbox, "gallery-response.json").robots.len(), 1);
+    assert!(sandbox.path("gallery-response.png").exists());
+}
+
+#[test]
+fn what_cannot_be_measured_is_one_clear_error_and_writes_nothing() {
+    let sandbox = run_of(&[BLIND, WALKER]);
+    let run = sandbox.run_file("run");
+    let (blind, walker) = (run.elites[0].id.clone(), run.elites[1].id.clone());
+    let before = files(&sandbox.path("run"));
+    let refused = |options: &str, code: i32, words: &[&str]| {
+        let said = sandbox.run(&format!("response -q -a run {options}")).ended(code, words);
+        assert_eq!(said.err.matches("error:").count(), 1, "{said:?}");
+        assert_eq!(files(&sandbox.path("run")), before, "{options}");
+    };
+    refused("", 3, &[&blind, "neither soft voxels nor sensors", "--robots"]);
+    let to_walker = |options: &str| format!("--robots {walker} {options}");
+    for (options, words) in [
+        ("--images 59", ["--images 59", "60 to 100000"]),
+        ("--images 100001", ["--images 100001", "60 to 100000"]),
+        ("--error 1", ["--error 1", "below 1"]),
+        ("--error=-0.1", ["--error -0.1", "0 or more"]),
+        ("--error nan", ["--error NaN", "0 or more"]),
+        ("-o run/run.json", ["run/run.json", "overwrite"]),
+        ("-o run/eval.json", ["run/eval.json", "expected another name"]),
+        ("-o map.png", ["map.png", "the picture"]),
+        ("-o map.csv", ["map.csv", "the CSV"]),
+        ("--task 4", ["--task", "4|9"]),
+    ] {
+        refused(&to_walker(options), 2, &words);
+    }
+    refused(&to_walker("--task 3|10,11"), 3, &["--task", "class 10", "found 0"]);
+    refused("--robots nobody", 3, &["there is no robot nobody"]);
+    sandbox.run("response --robots YJTLA --task 0|1").ended(3, &["mnist", "data fetch"]);
+    sandbox.run("response --robots YJTLA --physical-only").ended(2, &["--physical-only"]);
+    // Where nearly every rollout is unstable.
+    let text = sandbox.read("run/run.json");
+    let unstable = text.replace("\"blow_up_extent\":10.0", "\"blow_up_extent\":0.12");
+    assert_ne!(text, unstable);
+    sandbox.write("other/run.json", unstable);
+    let before = files(&sandbox.path("other"));
+    sandbox.run(&format!("response -a other --robots {walker}")).ended(3, &[&walker, "unstable", "--robots"]);
+    assert_eq!(files(&sandbox.path("other")), before);
+}
