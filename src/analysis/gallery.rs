@@ -2,8 +2,7 @@
 
 use crate::base::error::Error;
 use crate::body::Body;
-use crate::config::BUILT_IN;
-use crate::config::Config;
+use crate::config::{BUILT_IN, Config};
 use crate::data::catalogue;
 use crate::genome::Genome;
 use crate::qd::Archive;

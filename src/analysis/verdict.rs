@@ -2,8 +2,7 @@
 
 use crate::base::number;
 use crate::config::audit::Criteria;
-use crate::store::audit::PerturbedLife;
-use crate::store::audit::Verdict;
+use crate::store::audit::{PerturbedLife, Verdict};
 use crate::task::direction::{Assignment, Direction};
 use crate::task::fitness::Fitness;
 use crate::task::grouping::{Group, Split};

@@ -46,16 +46,28 @@ pub struct Error {
     pub message: String,
     /// What to do about it.
     pub hint: Option<String>,
+    /// The key that it is about, if it is about one of a config: its path in dots, items of lists by their number from 1.
+    pub key: Option<String>,
 }
 
 impl Error {
     fn new(kind: ErrorKind, message: String) -> Self {
-        Error { kind, message: one_line(&message), hint: None }
+        Error { kind, message: one_line(&message), hint: None, key: None }
     }
 
     /// A file the user gave is wrong.
     pub fn input(message: String) -> Self {
         Error::new(ErrorKind::Input, message)
+    }
+
+    /// A key of a config has a value that cannot be.
+    pub fn value(key: &str, found: impl fmt::Display, expected: &str) -> Self {
+        Error::input(format!("{key} = {found}: expected {expected}")).of(key)
+    }
+
+    /// Something is wrong about a key of a config.
+    pub fn at(key: &str, text: impl fmt::Display) -> Self {
+        Error::input(format!("{key}: {text}")).of(key)
     }
 
     /// The command line is wrong.
@@ -107,6 +119,12 @@ impl Error {
     pub fn hint(mut self, hint: String) -> Self {
         self.hint = Some(one_line(&hint));
         self
+    }
+
+    /// The same about a key.
+    #[must_use]
+    pub fn of(self, key: &str) -> Self {
+        Error { key: Some(key.to_string()), ..self }
     }
 
     /// The same with where it is.

@@ -1,23 +1,15 @@
 //! The words of the command line: clap's types, help and examples.
 
-use crate::cli::audit;
 use crate::cli::audit::AuditArgs;
-use crate::cli::capacity;
 use crate::cli::capacity::CapacityArgs;
-use crate::cli::choice::run_json;
-use crate::cli::choice::{Archives, ROBOTS};
-use crate::cli::plot;
+use crate::cli::choice::{Archives, ROBOTS, run_json};
 use crate::cli::plot::PlotArgs;
-use crate::cli::report;
 use crate::cli::report::ReportArgs;
-use crate::cli::reproduce;
 use crate::cli::reproduce::ReproduceArgs;
-use crate::cli::response;
 use crate::cli::response::ResponseArgs;
-use crate::cli::serve;
 use crate::cli::serve::ServeArgs;
-use crate::cli::train;
 use crate::cli::train::TrainArgs;
+use crate::cli::{audit, capacity, plot, report, reproduce, response, serve, train};
 use crate::commands::replay::Shown;
 use crate::config;
 use crate::data::dataset::BUILTIN;

@@ -2,8 +2,7 @@
 
 use crate::base::error::Error;
 use crate::base::number;
-use crate::cli::choice::Archives;
-use crate::cli::choice::run_json;
+use crate::cli::choice::{Archives, run_json};
 use crate::commands::report;
 use crate::store::folder;
 use crate::view::console::Console;

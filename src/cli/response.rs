@@ -1,13 +1,11 @@
 //! `morphcog response`: its words, and what it calls.
 
-use crate::analysis::gallery;
-use crate::analysis::measure;
 use crate::analysis::measure::Options;
+use crate::analysis::{gallery, measure};
 use crate::base::error::Error;
 use crate::base::signals;
 use crate::cli::choice;
-use crate::cli::choice::run_json;
-use crate::cli::choice::{ROBOTS, selected};
+use crate::cli::choice::{ROBOTS, run_json, selected};
 use crate::commands::one_by_one;
 use crate::commands::one_by_one::Named;
 use crate::search::train::groups;

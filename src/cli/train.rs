@@ -2,8 +2,7 @@
 
 use crate::base::error::Error;
 use crate::base::signals;
-use crate::cli::choice::run_json;
-use crate::cli::choice::{ROBOTS, selected};
+use crate::cli::choice::{ROBOTS, run_json, selected};
 use crate::commands::audit;
 use crate::config;
 use crate::config::audit::Criteria;
@@ -11,8 +10,7 @@ use crate::search::train;
 use crate::search::train::{Finished, Options, groups};
 use crate::store::folder;
 use crate::store::folder::IfExists;
-use crate::store::names::AUDIT_JSON;
-use crate::store::names::RUN_JSON;
+use crate::store::names::{AUDIT_JSON, RUN_JSON};
 use crate::store::robots::Selection;
 use crate::view::console::Console;
 use crate::view::reporters::Reporter;

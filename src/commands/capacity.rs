@@ -15,8 +15,7 @@ use crate::store::capacity::{CapacityFile, Curve, FORMAT, FORMAT_VERSION, Point,
 use crate::store::eval::{EvalFile, RobotReport};
 use crate::store::folder::check_out;
 use crate::store::images::HeldOut;
-use crate::store::names::CAPACITY_JSON;
-use crate::store::names::RUN_JSON;
+use crate::store::names::{CAPACITY_JSON, RUN_JSON};
 use crate::store::run::RunFile;
 use crate::store::trainings::Trainings;
 use crate::store::unwritten::Unwritten;

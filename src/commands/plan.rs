@@ -73,25 +73,23 @@ impl Plan {
         let format = if is_json { reading::Format::Json } else { reading::Format::Toml };
         let plan: Plan = reading::read(&text, format, name)?;
         let check = |plan: &Plan| plan.check().and_then(|()| plan.experiments().map(|_| ()));
-        reading::changed(plan, overrides, check, |error| {
-            let place = reading::place(&text, format, name, &error.message);
-            error.within(&place)
-        })
+        reading::changed(plan, overrides, check, |error| reading::placed(error, &text, format, name))
     }
 
     /// Checks what a type cannot.
     fn check(&self) -> Result<(), Error> {
-        let refuse = |text: &str| Err(Error::input(text.to_string()));
+        let refuse = |key: &str, text: &str| Err(Error::input(text.to_string()).of(key));
         if self.seeds.is_empty() || self.experiment.is_empty() {
-            return refuse("seeds, experiment: expected one or more of each");
+            return refuse("experiment", "seeds, experiment: expected one or more of each");
         }
         if self.seeds.iter().collect::<BTreeSet<_>>().len() < self.seeds.len() {
-            return refuse("seeds: expected different ones");
+            return refuse("seeds", "seeds: expected different ones");
         }
         if self.robots == 0 || self.images == 0 {
-            return refuse("robots, images: expected 1 or more");
+            return refuse("images", "robots, images: expected 1 or more");
         }
-        self.audit.check().and_then(|()| self.capacity.check())
+        self.audit.check().map_err(|error| error.of("audit"))?;
+        self.capacity.check().map_err(|error| error.of("capacity"))
     }
 
     /// The experiments: what their runs are called, and their configs.
@@ -101,7 +99,8 @@ impl Plan {
     pub(crate) fn experiments(&self) -> Result<Vec<(String, Config)>, Error> {
         let mut experiments = Vec::<(String, Config)>::new();
         for (number, experiment) in (1..).zip(&self.experiment) {
-            let within = |error: Error| error.within(&format!("experiment {number}"));
+            let key = format!("experiment.{number}");
+            let within = |error: Error| error.within(&format!("experiment {number}")).of(&key);
             let name = folder::name_of(&experiment.config);
             if experiments.iter().any(|(other, _)| *other == name) {
                 return Err(within(Error::input(format!("config: {name}: expected once"))));
@@ -109,13 +108,12 @@ impl Plan {
             let config = Config::load(&experiment.config, &experiment.set).map_err(within)?;
             for &seed in &self.seeds {
                 let seeded = Config { seed, ..config.clone() };
-                seeded.validate().map_err(|error| error.within("seeds"))?;
+                seeded.validate().map_err(|error| error.within("seeds").of("seeds"))?;
             }
             let (images, least) = (self.images, config.classes().len());
             if images < least {
-                let text =
-                    format!("images = {images}: expected {least} or more, one of each class of {name}");
-                return Err(Error::input(text));
+                let expected = format!("{least} or more, one of each class of {name}");
+                return Err(Error::value("images", images, &expected));
             }
             experiments.push((name, config));
         }

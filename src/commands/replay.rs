@@ -1,9 +1,8 @@
 //! `morphcog replay`: record a robot's life, for the pictures.
 
 use crate::analysis::gallery;
-use crate::base::Grid;
 use crate::base::error::Error;
-use crate::base::number;
+use crate::base::{Grid, number};
 use crate::body::Body;
 use crate::config::Config;
 use crate::data::dataset::Split;
@@ -11,8 +10,7 @@ use crate::search::training::Training;
 use crate::store::folder;
 use crate::store::images::{DatasetRef, ImageRef};
 use crate::store::robots::{Selection, Source};
-use crate::store::whereabouts::Whereabouts;
-use crate::store::whereabouts::{load_dataset_of, see};
+use crate::store::whereabouts::{Whereabouts, load_dataset_of, see};
 use crate::task::protocol::Life;
 use crate::task::recording::Recording;
 use crate::task::rollout::record;

@@ -55,21 +55,25 @@ impl Criteria {
     pub(crate) fn check(&self) -> Result<(), Error> {
         let Sizes { raised, time_step, share, pixels, least_sensors: _, seed } = &self.perturbations;
         let shares = [self.least_answered, self.least_kept, self.least_distance, self.least_robust];
-        let refuse = |text: &str| Err(Error::input(format!("audit criteria: {text}")));
+        let refuse = |key: &str, text: &str| Err(Error::input(format!("audit criteria: {text}")).of(key));
         if ![self.threshold, self.least_walk].iter().all(|walk| (0.0..1e9).contains(walk)) {
-            return refuse("threshold, least_walk: expected 0 or more voxel lengths");
+            return refuse("threshold", "threshold, least_walk: expected 0 or more voxel lengths");
         }
         if !shares.iter().all(|share| (0.0..=1.0).contains(share)) {
-            return refuse("least_…: expected shares from 0 to 1");
+            return refuse("least_kept", "least_…: expected shares from 0 to 1");
         }
         if raised.iter().any(|&rows| rows == 0 || rows > 100) {
-            return refuse("perturbations.raised: expected 1 to 100 rows");
+            return refuse("perturbations.raised", "perturbations.raised: expected 1 to 100 rows");
         }
         if time_step.iter().any(|&by| !(2..=64).contains(&by)) {
-            return refuse("perturbations.time_step: expected divisors from 2 to 64");
+            return refuse(
+                "perturbations.time_step",
+                "perturbations.time_step: expected divisors from 2 to 64",
+            );
         }
         if !(*share > 0.0 && *share < 1.0) || *pixels > 1000 || *seed > i64::MAX as u64 {
             return refuse(
+                "perturbations",
                 "perturbations: expected share above 0 and below 1, pixels up to 1000, seed below 2⁶³",
             );
         }

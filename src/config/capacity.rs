@@ -64,26 +64,33 @@ impl CapacityConfig {
 
     /// Checks what a type cannot.
     pub(crate) fn check(&self) -> Result<(), Error> {
-        let refuse = |text: &str| Err(Error::input(format!("capacity: {text}")));
+        let refuse = |key: &str, text: &str| Err(Error::input(format!("capacity: {text}")).of(key));
         let [from, to] = self.sizes;
         if from == 0 || to < from || to > MOST {
-            return refuse(&format!(
-                "sizes = [{from}, {to}]: expected two sizes from 1 to {MOST}, the smaller first"
-            ));
+            return refuse(
+                "sizes",
+                &format!("sizes = [{from}, {to}]: expected two sizes from 1 to {MOST}, the smaller first"),
+            );
         }
         if self.trainings > MOST_TRAININGS {
-            return refuse(&format!("trainings = {}: expected 1 to {MOST_TRAININGS}", self.trainings));
+            return refuse(
+                "trainings",
+                &format!("trainings = {}: expected 1 to {MOST_TRAININGS}", self.trainings),
+            );
         }
         if self.step == 0 || self.trainings == 0 || self.networks.is_empty() || self.waiting_images == 0 {
-            return refuse("step, trainings, networks, waiting_images: expected one or more of each");
+            return refuse("step", "step, trainings, networks, waiting_images: expected one or more of each");
         }
         for (name, hyper) in [("mlp", &self.mlp), ("cnn", &self.cnn)] {
             let rate = hyper.learning_rate;
             if !(rate > 0.0 && rate <= 10.0) {
-                return refuse(&format!("{name}.learning_rate = {rate}: expected more than 0, up to 10"));
+                return refuse(
+                    &format!("{name}.learning_rate"),
+                    &format!("{name}.learning_rate = {rate}: expected more than 0, up to 10"),
+                );
             }
             if hyper.epochs == 0 || hyper.patience == 0 || hyper.kernel == 0 {
-                return refuse(&format!("{name}: epochs, patience, kernel: expected 1 or more"));
+                return refuse(name, &format!("{name}: epochs, patience, kernel: expected 1 or more"));
             }
         }
         Ok(())

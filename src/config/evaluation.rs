@@ -81,9 +81,11 @@ impl Config {
             (images < LEAST_IMAGES || images % 2 == 1, images_key, found, enough.as_str()),
         ];
         match checks.into_iter().find(|(is_wrong, ..)| *is_wrong) {
-            Some((_, key, found, expected)) => Err(Error::input(format!(
-                "{key} = {found}: with evaluation.fitness = \"response\" expected {expected}"
-            ))),
+            Some((_, key, found, expected)) => {
+                let text =
+                    format!("{key} = {found}: with evaluation.fitness = \"response\" expected {expected}");
+                Err(Error::input(text).of(key))
+            }
             None => Ok(()),
         }
     }

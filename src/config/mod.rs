@@ -16,8 +16,7 @@ use crate::config::evaluation::EvaluationConfig;
 use crate::config::reading::Format;
 pub use crate::config::task::TaskConfig;
 use crate::config::train::TrainConfig;
-use crate::config::validation::LEAST;
-use crate::config::validation::ValidationConfig;
+use crate::config::validation::{LEAST, ValidationConfig};
 use crate::data::builtin::BuiltinDigits;
 use crate::data::files::check_name;
 use crate::genome::{BodySpec, MutationParams};
@@ -242,8 +241,7 @@ impl Config {
             if is_lacking { error.hint(hint) } else { error }
         })?;
         reading::changed(config, overrides, Config::validate, |error| {
-            let place = reading::place(text, format, name, &error.message);
-            error.within(&place)
+            reading::placed(error, text, format, name)
         })
     }
 
@@ -285,18 +283,18 @@ impl Config {
 
     /// Checks what a type cannot.
     pub(crate) fn validate(&self) -> Result<(), Error> {
-        let refuse = |key: &str, found: String, expected: &str| {
-            Err(Error::input(format!("{key} = {found}: expected {expected}")))
-        };
+        let refuse = |key: &str, found: String, expected: &str| Err(Error::value(key, found, expected));
         let numbers = serde_json::to_value(self).map_err(|error| Error::input(error.to_string()))?;
         if let Some((key, number)) = too_large("", &numbers) {
             return refuse(&key, number.to_string(), &format!("0 to {MAX_NUMBER}"));
         }
         self.grouping()?;
-        self.physics.validate().map_err(|error| Error::input(format!("physics.{error}")))?;
-        self.stimulus.validate().map_err(|error| Error::input(format!("stimulus: {error}")))?;
-        check_name(&self.data.dataset).map_err(|error| Error::input(format!("data.dataset: {error}")))?;
-        self.data.builtin.check().map_err(|error| Error::input(format!("data.builtin: {error}")))?;
+        self.physics
+            .validate()
+            .map_err(|error| Error::value(&format!("physics.{}", error.name), error.value, error.expected))?;
+        self.stimulus.validate().map_err(|error| Error::at("stimulus", error))?;
+        check_name(&self.data.dataset).map_err(|error| Error::at("data.dataset", error))?;
+        self.data.builtin.check().map_err(|error| Error::at("data.builtin", error))?;
         for (key, side) in [("body.height", self.body.height), ("body.width", self.body.width)] {
             if side == 0 || side > MAX_SIDE {
                 return refuse(key, side.to_string(), &format!("1 to {MAX_SIDE}"));

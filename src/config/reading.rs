@@ -100,10 +100,7 @@ pub(crate) fn load<T: Serialize + DeserializeOwned + Default>(
     let format = if is_json { Format::Json } else { Format::Toml };
     let name = path.display().to_string();
     let settings = read(&text, format, &name)?;
-    changed(settings, overrides, check, |error| {
-        let place = place(&text, format, &name, &error.message);
-        error.within(&place)
-    })
+    changed(settings, overrides, check, |error| placed(error, &text, format, &name))
 }
 
 fn refused(name: &str, line: Option<usize>, key: &str, message: &str) -> Error {
@@ -141,43 +138,25 @@ fn line_at(text: &str, span: Option<std::ops::Range<usize>>) -> Option<usize> {
     Some(text.get(..span?.start)?.matches('\n').count() + 1)
 }
 
-/// Where in a file that stands which a message about it begins with, as `body.height = 0: …` or `stage 2: keep = 0: …`:
-/// the file and, in TOML, the line.
-pub(crate) fn place(text: &str, format: Format, name: &str, message: &str) -> String {
-    let line = (format == Format::Toml).then(|| line_of(text, message)).flatten();
-    line.map_or(name.to_string(), |line| format!("{name}:{line}"))
+/// An error with where in a file its key stands, or the innermost table around it that the text has: the file and, in TOML, the
+/// line.
+pub(crate) fn placed(error: Error, text: &str, format: Format, name: &str) -> Error {
+    let line = error.key.as_deref().filter(|_| format == Format::Toml).and_then(|key| line_of(text, key));
+    let place = line.map_or(name.to_string(), |line| format!("{name}:{line}"));
+    error.within(&place)
 }
 
-/// The key that a message begins with.
-fn key_of(message: &str) -> &str {
-    message.split([' ', ':']).next().unwrap_or_default()
-}
-
-/// List, number and what follows of a message that begins with one of a list, as `stage 2: keep = 0: …`.
-fn numbered(message: &str) -> Option<(&str, &str, &str)> {
-    let (place, rest) = message.split_once(": ")?;
-    let (list, number) = place.split_once(' ')?;
-    is_number(number).then_some((list, number, rest))
-}
-
-/// The line of what a message begins with, or of the innermost table around it that the text has.
-fn line_of(text: &str, message: &str) -> Option<usize> {
+/// The line of a key, or of the innermost table around it that the text has.
+fn line_of(text: &str, key: &str) -> Option<usize> {
     let table = toml::de::DeTable::parse(text).ok()?.into_inner();
-    let (mut value, key) = match numbered(message) {
-        Some((list, number, rest)) => {
-            let place = number.parse::<usize>().ok()?.checked_sub(1)?;
-            (table.get(list)?.get_ref().get(place)?, Some(key_of(rest)))
-        }
-        None => {
-            let (first, rest) = match key_of(message).split_once('.') {
-                Some((first, rest)) => (first, Some(rest)),
-                None => (key_of(message), None),
-            };
-            (table.get(first)?, rest)
-        }
-    };
-    for part in key.iter().flat_map(|key| key.split('.')) {
-        let Some(inner) = value.get_ref().get(part) else { break };
+    let mut parts = key.split('.');
+    let mut value = table.get(parts.next()?)?;
+    for part in parts {
+        let inner = match part.parse::<usize>() {
+            Ok(number) => number.checked_sub(1).and_then(|place| value.get_ref().get(place)),
+            Err(_) => value.get_ref().get(part),
+        };
+        let Some(inner) = inner else { break };
         value = inner;
     }
     line_at(text, Some(value.span()))
@@ -201,71 +180,50 @@ pub(crate) fn changed<T: Serialize + DeserializeOwned>(
             return Err(in_file(check(&settings).err().unwrap_or(Error::input(error.to_string()))));
         }
     };
-    let attempt = |overrides: &[&String]| -> Result<T, Failure> {
+    let attempt = |overrides: &[&String]| -> Result<T, Error> {
         let mut root = root.clone();
         for assignment in overrides {
             set::<T>(&mut root, assignment)
-                .map_err(|text| Failure::Of(Error::usage(format!("--set {assignment}: {text}"))))?;
+                .map_err(|text| Error::usage(format!("--set {assignment}: {text}")).of(SET))?;
         }
-        let read = serde_path_to_error::deserialize(root)
-            .map_err(|error| Failure::Together(Error::usage(spoken(error.inner().message()))));
-        read.and_then(|settings| check(&settings).map(|()| settings).map_err(Failure::Together))
+        let settings: T = serde_path_to_error::deserialize(root)
+            .map_err(|error| Error::usage(spoken(error.inner().message())).of(&error.path().to_string()))?;
+        check(&settings).map(|()| settings)
     };
     let all: Vec<&String> = overrides.iter().collect();
     let error = match attempt(&all) {
         Ok(settings) => return Ok(settings),
-        Err(Failure::Of(error)) => return Err(error),
-        Err(Failure::Together(error)) => error,
+        Err(error) if error.key.as_deref() == Some(SET) => return Err(error),
+        Err(error) => error,
     };
-    // Whether it stays the same under only some of them; and if not, whether all is well then.
-    let stays = |some: &[&String]| match attempt(some) {
-        Ok(_) => (false, true),
-        Err(Failure::Of(_)) => (false, false),
-        Err(Failure::Together(other)) => (other.message == error.message, false),
+    // Those without which it would not be; of these the one that sets the key it is about, else the last.
+    let is_cause = |place: &usize| {
+        let others: Vec<&String> = [&all[..*place], &all[place + 1..]].concat();
+        attempt(&others).err().is_none_or(|other| other.message != error.message)
     };
-    let without = |place: usize| {
-        let others: Vec<&String> = [&all[..place], &all[place + 1..]].concat();
-        stays(&others)
-    };
-    let causes: Vec<(&String, bool)> = (0..all.len())
-        .map(|place| (all[place], without(place)))
-        .filter(|(_, (stays, _))| !stays)
-        .map(|(assignment, (_, is_well))| (assignment, is_well))
-        .collect();
-    let named = causes.iter().rfind(|(assignment, _)| sets(assignment, &error.message));
-    let healed = || causes.iter().rfind(|(_, is_well)| *is_well);
-    // Where two do the same harm, neither can be left away: then it is the first of them.
-    let first = || (0..all.len()).rev().find(|&count| !stays(&all[..count]).0).map(|count| all[count]);
-    let culprit = named.or_else(healed).or(causes.last()).map(|(assignment, _)| *assignment).or_else(first);
+    let causes: Vec<usize> = (0..all.len()).filter(is_cause).collect();
+    let named = |place: &&usize| error.key.as_deref().is_some_and(|key| sets(all[**place], key));
+    let every: Vec<usize> = (0..all.len()).collect();
+    let culprit = causes.iter().rfind(named).or(causes.last()).or_else(|| every.iter().rfind(named));
     Err(match culprit {
-        Some(assignment) => error.within(&format!("--set {assignment}")),
+        Some(place) => error.within(&format!("--set {}", all[*place])),
         None => in_file(error),
     })
 }
 
-/// Why settings cannot be.
-enum Failure {
-    /// One override is to blame, and named.
-    Of(Error),
-    /// What they make together.
-    Together(Error),
-}
+/// What stands for the key of an error that names its override already.
+const SET: &str = "--set";
 
-/// Whether an override sets what a message begins with: the key itself, the table it is of, or a key of the table that is
-/// meant.
-fn sets(assignment: &str, message: &str) -> bool {
+/// Whether an override sets a key: itself, the table it is of, or a key of that table.
+fn sets(assignment: &str, key: &str) -> bool {
     let set = assignment.split_once('=').map_or(assignment, |(set, _)| set).trim();
-    let key = match numbered(message) {
-        Some((list, number, rest)) => format!("{list}.{number}.{}", key_of(rest)),
-        None => key_of(message).to_string(),
-    };
     let is_within = |inner: &str, outer: &str| {
         inner.strip_prefix(outer).is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
     };
-    is_within(set, &key) || is_within(&key, set)
+    is_within(set, key) || is_within(key, set)
 }
 
-/// Changes one key: `map_elites.parents=10`, or `stage.2.keep=3` in the second of a list; without a value, `keep=`, it has
+/// Changes one key: `map_elites.parents=10`, or `task.groups.2=[1]` for the second of a list; without a value, `keep=`, it has
 /// its default again. What follows the sign is read as TOML, and as plain text if it is none.
 fn set<T: DeserializeOwned>(root: &mut toml::Value, assignment: &str) -> Result<(), String> {
     let Some((key, text)) = assignment.split_once('=') else {
@@ -433,18 +391,21 @@ mod tests {
 
     #[test]
     fn what_cannot_be_is_said_with_the_line_it_stands_on() {
-        let text = "seed = 3\n\n[body]\nwidth = 5\nheight = 0\n\n[[stage]]\nkeep = 1\n\n[[stage]]\n\nkeep = 0\n[task]\n";
-        let place = |message: &str| super::place(text, Format::Toml, "own.toml", message);
-        assert_eq!(place("seed = 3: expected another"), "own.toml:1");
-        assert_eq!(place("body.height = 0: expected 1"), "own.toml:5");
-        assert_eq!(place("stage 2: keep = 0: expected 1"), "own.toml:12");
+        let text = "seed = 3\n\n[body]\nwidth = 5\nheight = 0\n\n[[item]]\nkeep = 1\n\n[[item]]\n\nkeep = 0\n[task]\n";
+        let place = |key: &str| placed(Error::at(key, "wrong"), text, Format::Toml, "own.toml").message;
+        let line = |key: &str| place(key).split(": ").next().unwrap_or_default().to_string();
+        assert_eq!(place("seed"), "own.toml:1: seed: wrong");
+        assert_eq!(line("body.height"), "own.toml:5");
+        assert_eq!(line("item.2.keep"), "own.toml:12");
         // Where the key itself is missing, or the whole table is meant.
-        assert_eq!(place("stage 2: expected generations: only"), "own.toml:10");
-        assert_eq!(place("body.depth: expected it"), "own.toml:3");
-        assert_eq!(place("task: expected groups"), "own.toml:13");
-        assert_eq!(place("physics.gravity = 0: expected more"), "own.toml");
-        assert_eq!(place("stage 3: keep = 0"), "own.toml");
-        assert_eq!(super::place("{}", Format::Json, "own.json", "seed = 3: expected"), "own.json");
+        assert_eq!(line("item.2.generations"), "own.toml:10");
+        assert_eq!(line("body.depth"), "own.toml:3");
+        assert_eq!(line("task"), "own.toml:13");
+        assert_eq!(line("physics.gravity"), "own.toml");
+        assert_eq!(
+            placed(Error::at("seed", "wrong"), "{}", Format::Json, "own.json").message,
+            "own.json: seed: wrong"
+        );
     }
 
     /// What is said of an [`Outer`] whose number is not below the first of its list, or negative.
@@ -453,14 +414,11 @@ mod tests {
         let overrides: Vec<String> = overrides.iter().map(|text| text.to_string()).collect();
         let check = |outer: &Outer| {
             let Inner { count, list, maybe } = &outer.inner;
-            let refuse = |text: String| Err(Error::input(text));
             match (list.first(), maybe) {
                 (Some(first), _) if f64::from(*count) >= *first => {
-                    refuse(format!("inner.count = {count}: expected less than {first}"))
+                    Err(Error::value("inner.count", count, &format!("less than {first}")))
                 }
-                (_, Some(maybe)) if *maybe < 0 => {
-                    refuse(format!("inner.maybe = {maybe}: expected 0 or more"))
-                }
+                (_, Some(maybe)) if *maybe < 0 => Err(Error::value("inner.maybe", maybe, "0 or more")),
                 _ => Ok(()),
             }
         };

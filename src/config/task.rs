@@ -30,14 +30,14 @@ impl TaskConfig {
             (Some([a, b]), None) if !same_way_bin => Grouping::two_groups(a, b),
             (None, Some(classes)) => Grouping::all_splits(classes, *same_way_bin),
             (Some(_), None) => {
-                return Err(Error::input("task.same_way_bin: expected only with task.splits".to_string()));
+                return Err(Error::at("task.same_way_bin", "expected only with task.splits"));
             }
             _ => {
-                let text = "task: expected either groups, as in groups = [[0], [1]], or splits, as in splits = [0, 1, 2, 3]";
-                return Err(Error::input(text.to_string()));
+                let text = "expected either groups, as in groups = [[0], [1]], or splits, as in splits = [0, 1, 2, 3]";
+                return Err(Error::at("task", text));
             }
         };
-        grouping.map_err(|error| Error::input(format!("task: {error}")))
+        grouping.map_err(|error| Error::at("task", error))
     }
 
     /// All classes of the task, in its order.

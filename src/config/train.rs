@@ -64,7 +64,7 @@ impl TrainConfig {
         ];
         match least.into_iter().find(|(_, value, least)| value < least) {
             Some((key, value, least)) => {
-                Err(Error::input(format!("train.{key} = {value}: expected {least} or more")))
+                Err(Error::value(&format!("train.{key}"), value, &format!("{least} or more")))
             }
             None => Ok(()),
         }

@@ -3,38 +3,29 @@
 //! [`teach`](crate::task::teach) says how. Everything that is simulated is kept in `training.json` beside `run.json`; a
 //! training that goes on takes from there what was simulated before, so that it ends with the same bits.
 
-use crate::base::Grid;
 use crate::base::error::Error;
 use crate::base::files::{read_text, write_atomically};
 use crate::base::hash::sha256_hex;
-use crate::base::number;
 use crate::base::observer::Observer;
 use crate::base::threads::pool;
+use crate::base::{Grid, number};
 use crate::body::Body;
-use crate::config::DataConfig;
 use crate::config::evaluation::EvaluationConfig;
 use crate::config::task::TaskConfig;
 use crate::config::validation::ValidationConfig;
-use crate::config::{Config, reading};
+use crate::config::{Config, DataConfig, reading};
 use crate::data::dataset::{Dataset, Split};
 use crate::qd::{Archive, DescriptorSpace, Elite};
-use crate::search::held_out;
 use crate::search::probing::{Probing, response};
 use crate::search::training::Training;
-use crate::search::validation;
+use crate::search::{held_out, validation};
 use crate::store::folder::{IfExists, RunFolder};
 use crate::store::images::ImageRef;
 use crate::store::metrics::{Metrics, Totals};
-use crate::store::names::CONFIG;
-use crate::store::names::ELITES;
-use crate::store::names::RUN_JSON;
-use crate::store::names::TRAINING_JSON;
+use crate::store::names::{CONFIG, ELITES, RUN_JSON, TRAINING_JSON};
 use crate::store::robots::{Selection, Source};
 use crate::store::run::{Dimensions, FORMAT, FORMAT_VERSION, Robot, RunFile};
-use crate::store::training::Batch;
-use crate::store::training::FILE;
-use crate::store::training::File;
-use crate::store::training::Origin;
+use crate::store::training::{Batch, FILE, File, Origin};
 use crate::store::validation::Validated;
 use crate::store::whereabouts;
 use crate::store::whereabouts::Whereabouts;

@@ -5,8 +5,7 @@ use crate::base::error::Error;
 use crate::data::dataset::{BUILTIN, Dataset, Split};
 use crate::serve::catalogue::Catalogue;
 use crate::serve::refusal::Refusal;
-use crate::store::whereabouts::Whereabouts;
-use crate::store::whereabouts::load_dataset_of;
+use crate::store::whereabouts::{Whereabouts, load_dataset_of};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 

@@ -1,13 +1,11 @@
 //! Which answer a request gets.
 
 use crate::body::Body;
-use crate::serve::Service;
 use crate::serve::assets::asset;
 use crate::serve::http::{Request, Response};
 use crate::serve::refusal::Refusal;
-use crate::serve::request;
 use crate::serve::request::{ChangeRequest, LifeRequest, Pace, Plan, SeeRequest};
-use crate::serve::stream;
+use crate::serve::{Service, request, stream};
 use serde::Deserialize;
 use serde_json::json;
 

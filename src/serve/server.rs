@@ -1,13 +1,12 @@
 //! `morphcog serve`: the page, and what it asks for, over HTTP on this machine only.
 
 use crate::base::error::Error;
-use crate::serve::Service;
 use crate::serve::http::Response;
 use crate::serve::life::{Gone, live};
 use crate::serve::lives::Control;
 use crate::serve::request::Plan;
 use crate::serve::routes::Reply;
-use crate::serve::{http, routes, stream};
+use crate::serve::{Service, http, routes, stream};
 use std::io::{self, ErrorKind, Write};
 use std::net::{Ipv4Addr, SocketAddr, TcpListener, TcpStream};
 use std::sync::Arc;

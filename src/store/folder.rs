@@ -2,19 +2,10 @@
 
 use crate::base::error::Error;
 use crate::base::files::{check_writable, remove_half_written};
-use crate::store::names::AUDIT_JSON;
-use crate::store::names::CAPACITY_JSON;
-use crate::store::names::CHECKPOINTS;
-use crate::store::names::CONFIG;
-use crate::store::names::DATA_FOLDER;
-use crate::store::names::ELITES;
-use crate::store::names::EVAL_JSON;
-use crate::store::names::EVAL_VALIDATION_JSON;
-use crate::store::names::METRICS;
-use crate::store::names::RESPONSE_JSON;
-use crate::store::names::RUN_JSON;
-use crate::store::names::TRAINING_JSON;
-use crate::store::names::VALIDATION_JSON;
+use crate::store::names::{
+    AUDIT_JSON, CAPACITY_JSON, CHECKPOINTS, CONFIG, DATA_FOLDER, ELITES, EVAL_JSON, EVAL_VALIDATION_JSON,
+    METRICS, RESPONSE_JSON, RUN_JSON, TRAINING_JSON, VALIDATION_JSON,
+};
 use crate::store::run::RunFile;
 use std::ffi::OsStr;
 use std::fs::{File, TryLockError};

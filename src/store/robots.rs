@@ -5,8 +5,7 @@ use crate::base::random::{Purpose, stream};
 use crate::store::audit::AuditFile;
 use crate::store::names::AUDIT_JSON;
 use crate::store::run::{Robot, RunFile};
-use crate::store::validation::Validated;
-use crate::store::validation::ranking;
+use crate::store::validation::{Validated, ranking};
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 

@@ -1,11 +1,10 @@
 //! What evaluations say of the runs they are of: enough to show others the same images.
 
 use crate::base::error::Error;
-use crate::config::Config;
 use crate::config::evaluation::EvaluationConfig;
 use crate::config::train::TrainConfig;
 use crate::config::validation::ValidationConfig;
-use crate::config::{ArchiveConfig, BodyConfig, CheckpointConfig, DataConfig, TaskConfig};
+use crate::config::{ArchiveConfig, BodyConfig, CheckpointConfig, Config, DataConfig, TaskConfig};
 use crate::genome::MutationParams;
 use crate::qd::EmitterParams;
 use crate::sim::Physics;

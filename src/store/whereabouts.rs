@@ -3,17 +3,13 @@
 use crate::base::Grid;
 use crate::base::error::Error;
 use crate::base::files::{read_text, write_atomically};
-use crate::config::BodyConfig;
-use crate::config::Config;
-use crate::config::DataConfig;
-use crate::config::reading;
+use crate::config::{BodyConfig, Config, DataConfig, reading};
 use crate::data::dataset::{BUILTIN, Dataset, DatasetError, Split};
 use crate::data::files::{Place, places};
 use crate::store::folder::RunFolder;
 use crate::store::images::DatasetRef;
 use crate::store::names::DATA_FOLDER;
-use crate::task::stimulus::StimulusParams;
-use crate::task::stimulus::stimulus;
+use crate::task::stimulus::{StimulusParams, stimulus};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 

@@ -3,9 +3,8 @@
 //! To start at another column is none: the simulator is the same bits wherever on the ground a robot stands (but for
 //! pegs below the ground, which a robot can reach only by tunnelling). A raised start also changes the column.
 
-use crate::base::Grid;
-use crate::base::number;
 use crate::base::random::{Purpose, stream};
+use crate::base::{Grid, number};
 use crate::body::Body;
 use crate::sim::Physics;
 use crate::task::protocol::{Life, Protocol};

@@ -1,15 +1,14 @@
 //! Animated GIFs of recordings: one palette, and per frame only what changed.
 
 use crate::task::recording::Recording;
-use crate::view::colour;
 use crate::view::colour::Colour;
 use crate::view::error::{PictureError, write_whole};
 use crate::view::palette::Palette;
 use crate::view::panel::present;
-use crate::view::raster;
 use crate::view::scene::Look;
 use crate::view::stage::Stage;
 use crate::view::walk::Walk;
+use crate::view::{colour, raster};
 use ::gif::{DisposalMethod, Encoder, Frame, Repeat};
 use rayon::prelude::*;
 use std::path::Path;

@@ -3,12 +3,11 @@
 
 use crate::base::number;
 use crate::body::{Body, Material};
-use crate::view::colour;
 use crate::view::colour::Colour;
-use crate::view::font;
 use crate::view::scene::{Primitive, ruler};
 use crate::view::stage::Stage;
 use crate::view::walk::Walk;
+use crate::view::{colour, font};
 
 /// Side of the stimulus picture at zoom 1, pixels.
 const STIMULUS: f64 = 84.0;

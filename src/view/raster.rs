@@ -2,11 +2,10 @@
 
 use crate::view::colour::Colour;
 use crate::view::error::{PictureError, write_whole};
-use crate::view::panel;
-use crate::view::scene;
 use crate::view::scene::Primitive;
 use crate::view::stage::Stage;
 use crate::view::walk::Walk;
+use crate::view::{panel, scene};
 use std::path::Path;
 use tiny_skia::{FillRule, LineCap, LineJoin, Paint, PathBuilder, Pixmap, Stroke, Transform};
 

@@ -2,8 +2,7 @@
 
 use crate::base::number;
 use crate::commands::audit::Finished;
-use crate::store::audit::Verdict;
-use crate::store::audit::{AuditFile, RobotAudit};
+use crate::store::audit::{AuditFile, RobotAudit, Verdict};
 use crate::view::console::{Console, Mode};
 use std::path::Path;
 

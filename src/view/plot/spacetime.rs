@@ -9,8 +9,7 @@ use crate::view::plot::axes::{AXIS, Axis, MARGIN, Plot, heading, left_space};
 use crate::view::plot::canvas::{Canvas, Pen, TEXT, Words, number};
 use crate::view::plot::figure::{COLUMN, Figure, PAGE};
 use crate::view::plot::robot;
-use crate::view::walk::Walk;
-use crate::view::walk::area;
+use crate::view::walk::{Walk, area};
 use std::ops::Range;
 
 /// Rows of a panel at most: finer ones would not be seen in print.

@@ -8,10 +8,9 @@ mod words;
 
 use crate::commands::report::{Dossier, Findings, Gathered};
 use crate::view::error::PictureError;
-use crate::view::html;
 use crate::view::html::{escape, fill};
-use crate::view::plot;
 use crate::view::plot::Figure;
+use crate::view::{html, plot};
 use maps::Lives;
 
 /// What goes into a page.
