@@ -1,4 +1,4 @@
-//! Floor 1: bodies, which are the simulator's, and what they are known by.
+//! Bodies, which are the simulator's, and what they are known by.
 
 use crate::base::hash;
 pub use morphcog_sim::body::*;

@@ -220,6 +220,88 @@ fn numbers_for_people_are_made_in_one_place_where_none_is_minus_nothing() {
     }
 }
 
+/// Paths that follow `crate::`, each as far as it is written, braces opened.
+fn paths<'a>(tokens: &[&'a str]) -> Vec<Vec<&'a str>> {
+    let mut found = Vec::new();
+    let mut at = 0;
+    while at + 2 < tokens.len() {
+        if tokens[at..at + 3] == ["crate", ":", ":"] {
+            at = branch(tokens, at + 3, &[], &mut found);
+        } else {
+            at += 1;
+        }
+    }
+    found
+}
+
+/// Reads one path from a place on, after a prefix; where it ends.
+fn branch<'a>(tokens: &[&'a str], mut at: usize, prefix: &[&'a str], found: &mut Vec<Vec<&'a str>>) -> usize {
+    let mut path = prefix.to_vec();
+    loop {
+        match tokens.get(at).copied() {
+            Some("{") => {
+                at += 1;
+                while at < tokens.len() && tokens[at] != "}" {
+                    at = if tokens[at] == "," { at + 1 } else { branch(tokens, at, &path, found) };
+                }
+                return at + 1;
+            }
+            Some(name) => path.push(name),
+            None => break,
+        }
+        at += 1;
+        if tokens.get(at..at + 2) != Some(&[":", ":"]) {
+            break;
+        }
+        at += 2;
+    }
+    found.push(path);
+    at
+}
+
+#[test]
+fn no_import_cycle_has_more_than_two_files() {
+    let src = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+    let name = |file: &PathBuf| {
+        let path = file.strip_prefix(&src).unwrap().with_extension("");
+        let names: Vec<String> = path.iter().map(|part| part.to_string_lossy().into_owned()).collect();
+        names.join("::").trim_end_matches("::mod").to_string()
+    };
+    let files = sources(&src);
+    let modules: Vec<String> = files.iter().map(&name).collect();
+    let uses = |file: &PathBuf| -> Vec<usize> {
+        let source = std::fs::read_to_string(file).unwrap();
+        let bare = bare(source.split("#[cfg(test)]\nmod tests").next().unwrap());
+        let own = name(file);
+        let resolved = paths(&tokens(&bare)).into_iter().filter_map(|path| {
+            let longest = (1..=path.len()).rev().map(|count| path[..count].join("::"));
+            longest.filter_map(|path| modules.iter().position(|module| *module == path)).next()
+        });
+        resolved.filter(|used| modules[*used] != own).collect()
+    };
+    let graph: Vec<Vec<usize>> = files.iter().map(uses).collect();
+    let reached = |from: usize| {
+        let (mut seen, mut open) = (vec![false; graph.len()], vec![from]);
+        while let Some(next) = open.pop() {
+            for &used in &graph[next] {
+                if !std::mem::replace(&mut seen[used], true) {
+                    open.push(used);
+                }
+            }
+        }
+        seen
+    };
+    let reached: Vec<Vec<bool>> = (0..graph.len()).map(reached).collect();
+    assert!(graph.iter().map(Vec::len).sum::<usize>() > 500, "imports are found");
+    for (number, module) in modules.iter().enumerate() {
+        let cycle: Vec<&String> = (0..graph.len())
+            .filter(|other| reached[number][*other] && reached[*other][number])
+            .map(|other| &modules[other])
+            .collect();
+        assert!(cycle.len() <= 2, "{module} is in an import cycle: {cycle:?}");
+    }
+}
+
 #[test]
 fn the_map_in_lib_rs_names_every_room() {
     let lib = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("src/lib.rs")).unwrap();

@@ -1,4 +1,4 @@
-//! Floor 0: what every room stands on (random generators, hashes, files, numbers and lines as text).
+//! What every module stands on (random generators, hashes, files, numbers and lines as text).
 
 pub mod clock;
 pub mod error;

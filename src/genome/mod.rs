@@ -1,4 +1,4 @@
-//! Floor 2: genomes. A [`Genome`] describes a [`Body`]; it knows nothing of physics, tasks or archives.
+//! Genomes. A [`Genome`] describes a [`Body`]; it knows nothing of physics, tasks or archives.
 
 pub mod cppn;
 mod edits;

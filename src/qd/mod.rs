@@ -1,4 +1,4 @@
-//! Floor 2: quality diversity. Knows neither genomes nor bodies: a solution is any type `S`.
+//! Quality diversity. Knows neither genomes nor bodies: a solution is any type `S`.
 
 pub mod archive;
 pub mod descriptor;

@@ -1,4 +1,4 @@
-//! Floor 3: what a robot is asked to do: images, stimuli, protocols, rollouts and their scores.
+//! What a robot is asked to do: stimuli, protocols, rollouts and their scores; how a gait responds, and how it is taught.
 
 pub mod baselines;
 pub mod condition;
