@@ -12,6 +12,7 @@ use crate::body::Body;
 use crate::config::{Config, MAX_NUMBER};
 use crate::data::dataset::{Dataset, DatasetError, Split};
 use crate::search::probing::Probing;
+use crate::search::training::scarcest;
 use crate::search::{probing, showing};
 use crate::store::folder::{check_out, writable};
 use crate::store::images::DatasetRef;
@@ -91,7 +92,7 @@ struct Subject {
 }
 
 /// Where robots are from.
-struct Origin {
+struct Provenance {
     config: Config,
     run: String,
     sha256: String,
@@ -107,11 +108,11 @@ struct Origin {
 /// What is wrong with archive, robots, data or options.
 pub fn measure(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Result<Finished, Error> {
     check_numbers(options)?;
-    let origin = origin(options)?;
-    let config = &origin.config;
+    let provenance = provenance(options)?;
+    let config = &provenance.config;
     let mut subjects: Vec<Subject> = Vec::new();
     let mut refused: Vec<Error> = Vec::new();
-    for (id, body) in &origin.robots {
+    for (id, body) in &provenance.robots {
         match Gait::of(body) {
             Some(gait) => subjects.push(Subject { id: id.clone(), gait }),
             None => refused.push(Error::input(format!(
@@ -120,7 +121,7 @@ pub fn measure(options: &Options, stop: &AtomicBool, observer: &dyn Observer) ->
         }
     }
     check_names(options, &subjects)?;
-    let images = images(options, &origin)?;
+    let images = images(options, &provenance)?;
     let probing = Probing::new(&conditions(config, options.images), options.seed);
     let pool = pool(options.threads)?;
     let run_seed = config.seed;
@@ -128,9 +129,9 @@ pub fn measure(options: &Options, stop: &AtomicBool, observer: &dyn Observer) ->
         format: FORMAT.to_string(),
         format_version: FORMAT_VERSION,
         program_version: env!("CARGO_PKG_VERSION").to_string(),
-        run: origin.run.clone(),
+        run: provenance.run.clone(),
         run_seed,
-        run_sha256: origin.sha256.clone(),
+        run_sha256: provenance.sha256.clone(),
         setting: images.setting(options, config, &probing)?,
         robots: Vec::new(),
     };
@@ -207,7 +208,7 @@ fn check_names(options: &Options, subjects: &[Subject]) -> Result<(), Error> {
 }
 
 /// The robots that are asked for, each once.
-fn origin(options: &Options) -> Result<Origin, Error> {
+fn provenance(options: &Options) -> Result<Provenance, Error> {
     let Some(path) = &options.archive else {
         let mut robots: Vec<(String, Body)> = Vec::new();
         for name in &options.robots {
@@ -217,7 +218,7 @@ fn origin(options: &Options) -> Result<Origin, Error> {
                 robots.push((robot.name, robot.body));
             }
         }
-        return Ok(Origin {
+        return Ok(Provenance {
             config: gallery::config()?,
             run: gallery::ALL.to_string(),
             sha256: sha256_hex(gallery::TEXT.as_bytes()),
@@ -231,7 +232,7 @@ fn origin(options: &Options) -> Result<Origin, Error> {
     let robots = chosen.iter().map(|chosen| (chosen.robot.id.clone(), chosen.robot.body.clone())).collect();
     let sha256 = source.run.fingerprint();
     let run = &source.run;
-    Ok(Origin {
+    Ok(Provenance {
         config: run.config.clone(),
         run: run.name.clone(),
         sha256,
@@ -257,27 +258,16 @@ struct Images {
 }
 
 /// The training images of the task's classes; none without a task.
-fn images(options: &Options, origin: &Origin) -> Result<Images, Error> {
+fn images(options: &Options, provenance: &Provenance) -> Result<Images, Error> {
     let Some(task) = &options.task else { return Ok(Images::default()) };
-    let config = &origin.config;
+    let config = &provenance.config;
     let mut whereabouts = Whereabouts::given(options.data.as_deref());
     if let Some(path) = &options.archive {
         whereabouts = whereabouts.and_of(path);
     }
-    let dataset = load_dataset_of(origin.dataset.as_ref(), config, &whereabouts, &[Split::Train])?;
+    let dataset = load_dataset_of(provenance.dataset.as_ref(), config, &whereabouts, &[Split::Train])?;
     let classes = task.concat();
-    let mut per_class = IMAGES_PER_CLASS;
-    for &class in &classes {
-        let count = dataset.indices_of(Split::Train, class).len();
-        if count < LEAST_PER_CLASS {
-            let text = format!(
-                "--task: class {class}: expected {LEAST_PER_CLASS} training images or more, found {count}"
-            );
-            let there = dataset.classes(Split::Train);
-            return Err(Error::input(text).hint(format!("{} has the classes {there:?}", dataset.name())));
-        }
-        per_class = per_class.min(count);
-    }
+    let per_class = IMAGES_PER_CLASS.min(scarcest(&dataset, &classes, LEAST_PER_CLASS)?);
     let failed = |error: DatasetError| Error::input(error.to_string());
     let drawn = dataset.draw(Split::Train, &classes, per_class, options.seed, 0).map_err(failed)?;
     let labels = classes.iter().flat_map(|class| std::iter::repeat_n(*class, per_class));

@@ -33,8 +33,6 @@ pub enum Purpose {
     Networks = 23,
     /// Images that a network's training waits on.
     Waiting = 24,
-    /// Which pixels of training images are inverted.
-    InvertedPixels = 25,
     /// Pixels of random images, under which a gait's response is measured.
     RandomImages = 26,
     /// Training of designs: the order in which places are tried, and images shown.

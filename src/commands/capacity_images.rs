@@ -37,7 +37,8 @@ pub(crate) struct Seen {
 impl Images {
     pub fn of(report: &EvalFile, setting: &Setting, options: &Options) -> Result<Images, Error> {
         let dataset = whereabouts(options).load(&setting.data, &Split::ALL)?;
-        let [train, test] = Split::ALL.map(|split| dataset.fingerprint(split).unwrap_or_default());
+        let [train, test] =
+            Split::ALL.map(|split| dataset.fingerprint(split).expect("both splits were loaded just now"));
         if train != setting.train_sha256 || test != report.test_sha256 {
             let text = format!(
                 "{}: the images here are not those of {} (another SHA-256)",

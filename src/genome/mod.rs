@@ -19,6 +19,7 @@ pub use file::CppnError;
 pub use params::MutationParams;
 use serde::{Deserialize, Serialize};
 use std::sync::atomic::AtomicBool;
+pub use voxels::other_voxel;
 
 /// What evolution varies: a network that describes a body, and single voxels in which the body differs from that. In files
 /// `{"cppn": …, "edits": …}`, see [`Cppn`] and [`Edits`].

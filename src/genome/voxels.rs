@@ -1,5 +1,6 @@
 //! Mutations of single voxels, whatever the network describes.
 
+use crate::base::Grid;
 use crate::base::random::Stream;
 use crate::base::stop::check;
 use crate::body::{Body, Material};
@@ -27,6 +28,13 @@ impl Genome {
     }
 }
 
+/// A place, (row, column), and one of the six materials that it is not made of; all are as likely.
+pub fn other_voxel(voxels: &Grid<Material>, rng: &mut Stream) -> ((usize, usize), Material) {
+    let place = (rng.below(voxels.height()), rng.below(voxels.width()));
+    let step = 1 + rng.below(Material::ALL.len() - 1);
+    (place, Material::ALL[(usize::from(voxels[place].code()) + step) % Material::ALL.len()])
+}
+
 /// Edits of what a network describes, with one more voxel of another material, drawn anew until their body is valid; with that.
 fn one_voxel_changed(
     edits: &Edits,
@@ -39,10 +47,7 @@ fn one_voxel_changed(
     let now = edits.apply(described);
     for _ in 0..MAX_MUTATIONS {
         check(stop)?;
-        let place = (rng.below(height), rng.below(width));
-        // One of the six others.
-        let step = 1 + rng.below(Material::ALL.len() - 1);
-        let material = Material::ALL[(usize::from(now[place].code()) + step) % Material::ALL.len()];
+        let (place, material) = other_voxel(&now, rng);
         let mut edits = edits.clone();
         edits.set(place, material, described.voxels()[place]);
         let body = Body::new(edits.apply(described))?;

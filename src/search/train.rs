@@ -17,7 +17,7 @@ use crate::config::{Config, DataConfig, reading};
 use crate::data::dataset::{Dataset, Split};
 use crate::qd::{Archive, DescriptorSpace, Elite};
 use crate::search::probing::{Probing, response};
-use crate::search::training::Training;
+use crate::search::training::{Training, scarcest};
 use crate::search::{held_out, validation};
 use crate::store::folder::{IfExists, RunFolder};
 use crate::store::images::ImageRef;
@@ -191,18 +191,7 @@ fn config(of_walkers: &Config, options: &Options) -> Result<Config, Error> {
 
 /// The same with as many training images as there are beside those that validate.
 fn with_images(config: Config, dataset: &Dataset) -> Result<Config, Error> {
-    let mut fewest = usize::MAX;
-    for class in config.classes() {
-        let count = dataset.indices_of(Split::Train, class).len();
-        if count < LEAST_PER_CLASS {
-            let text = format!(
-                "--task: class {class}: expected {LEAST_PER_CLASS} training images or more, found {count}"
-            );
-            let classes = dataset.classes(Split::Train);
-            return Err(Error::input(text).hint(format!("{} has the classes {classes:?}", dataset.name())));
-        }
-        fewest = fewest.min(count);
-    }
+    let fewest = scarcest(dataset, &config.classes(), LEAST_PER_CLASS)?;
     let per_class = config.train.images_per_class.min((fewest * 3 / 4).max(1));
     let data = DataConfig { images_per_class: per_class, ..config.data.clone() };
     let config = Config { data, ..config };
@@ -247,9 +236,8 @@ fn key(config: &Config, walkers: &[Walker], training: &Training) -> String {
     let bodies: Vec<String> = walkers.iter().map(|walker| walker.robot.body.to_string()).collect();
     let images: Vec<usize> = training.images.iter().map(|image| image.index).collect();
     let essence = config.essence().to_toml();
-    let train = config.train;
     let text = format!(
-        "{} {essence} {train:?} {bodies:?} {} {images:?}",
+        "{} {essence} {bodies:?} {} {images:?}",
         env!("CARGO_PKG_VERSION"),
         training.dataset.train_sha256
     );

@@ -24,6 +24,23 @@ pub struct Training {
     pub conditions: Vec<Condition>,
 }
 
+/// The number of training images of the scarcest of some classes, of a task that was asked for by `--task`.
+///
+/// # Errors
+/// If it is less than `least`; which class, and which there are.
+pub(crate) fn scarcest(dataset: &Dataset, classes: &[u8], least: usize) -> Result<usize, Error> {
+    let counts = classes.iter().map(|class| (dataset.indices_of(Split::Train, *class).len(), *class));
+    match counts.min() {
+        Some((count, class)) if count < least => {
+            let text =
+                format!("--task: class {class}: expected {least} training images or more, found {count}");
+            let there = dataset.classes(Split::Train);
+            Err(Error::input(text).hint(format!("{} has the classes {there:?}", dataset.name())))
+        }
+        scarcest => Ok(scarcest.map_or(0, |(count, _)| count)),
+    }
+}
+
 impl Training {
     /// The training images of a config.
     ///

@@ -154,7 +154,7 @@ fn published() -> Result<Collection, Error> {
     let tasks: Vec<String> = grouping.tasks().iter().map(|split| split.name()).collect();
     let entry = |robot: gallery::Published| Entry {
         id: robot.name,
-        task: tasks.first().cloned().unwrap_or_default(),
+        task: tasks.first().expect("the published robots perform a task").clone(),
         fitness: robot.fitness,
         voxels: robot.body.counts(),
         cell: Vec::new(),

@@ -1,30 +1,30 @@
 //! Names of the files in and beside a run's folder.
 
-/// Its name beside `run.json`.
+/// What `audit` found, beside `run.json`.
 pub const AUDIT_JSON: &str = "audit.json";
 
-/// Its name beside `eval.json`.
+/// What `capacity` found, beside `eval.json`.
 pub const CAPACITY_JSON: &str = "capacity.json";
 
-/// Its name beside `run.json`.
+/// What `eval` found on test images, beside `run.json`.
 pub const EVAL_JSON: &str = "eval.json";
 
-/// The name of one on validation images.
+/// What `eval` found on validation images.
 pub const EVAL_VALIDATION_JSON: &str = "eval-validation.json";
 
-/// Its name beside `run.json`.
+/// What `response` found, beside `run.json`.
 pub const RESPONSE_JSON: &str = "response.json";
 
 /// What a training keeps of its rollouts, beside `run.json`.
 pub const TRAINING_JSON: &str = "training.json";
 
-/// Its name beside `run.json`.
+/// The robots that were chosen on validation images, beside `run.json`.
 pub const VALIDATION_JSON: &str = "validation.json";
 
 /// What a run remembers where its images were in, beside `run.json`.
 pub const DATA_FOLDER: &str = "data-folder.json";
 
-/// Files a run writes into its folder.
+/// The archive with everything that made it.
 pub const RUN_JSON: &str = "run.json";
 
 /// The resolved config.

@@ -9,9 +9,10 @@
 use crate::base::Grid;
 use crate::base::random::{Purpose, Stream, stream};
 use crate::body::{Body, Material};
+use crate::genome::other_voxel;
 use crate::sim::{Physics, width};
 use crate::task::fitness::worth;
-use crate::task::response::{Design, Evidence, Example, Gait, Lesson, Moments};
+use crate::task::response::{CHOICES, Design, Evidence, Example, Gait, Lesson, Moments};
 use crate::task::teach::{Image, Rollouts};
 
 /// Images of the first look at a challenger; each next look takes twice as many. With fewer, good ones are dropped by chance;
@@ -42,7 +43,7 @@ const DRAWS: usize = 1000;
 
 /// A training image of a refinement.
 #[derive(Clone, Debug)]
-pub struct Shown {
+pub struct WeightedImage {
     /// What the voxels see.
     pub stimulus: Grid<f64>,
     /// The number of its condition.
@@ -53,13 +54,13 @@ pub struct Shown {
     pub weight: f64,
 }
 
-impl Shown {
+impl WeightedImage {
     /// Images of a training, for a robot whose first group walks to this side: 1 right, −1 left. Both groups weigh the same, however
     /// many images of each there are.
     pub fn all(images: &[&Image], side: f64) -> Vec<Self> {
         let of =
             |right: f64| images.iter().filter(|image| image.example.right == right).count().max(1) as f64;
-        let shown = |image: &&Image| Shown {
+        let shown = |image: &&Image| WeightedImage {
             stimulus: image.stimulus.clone(),
             condition: image.condition,
             right: side * image.example.right,
@@ -86,7 +87,7 @@ pub struct Challenge {
 
 /// A champion and what is known of it.
 pub struct Refinement<'a> {
-    images: Vec<Shown>,
+    images: Vec<WeightedImage>,
     physics: &'a Physics,
     min_muscles: usize,
     seed: u64,
@@ -106,7 +107,7 @@ impl<'a> Refinement<'a> {
     /// What the rollouts say.
     pub fn new<R: Rollouts>(
         body: Body,
-        images: Vec<Shown>,
+        images: Vec<WeightedImage>,
         (evidence, ridge): (Evidence, f64),
         (physics, min_muscles, seed): (&'a Physics, usize, u64),
         rollouts: &mut R,
@@ -152,7 +153,7 @@ impl<'a> Refinement<'a> {
         worths.sum::<f64>() / all
     }
 
-    fn worth(&self, image: &Shown, displacement: f64) -> f64 {
+    fn worth(&self, image: &WeightedImage, displacement: f64) -> f64 {
         image.weight * worth(image.right * displacement)
     }
 
@@ -171,22 +172,28 @@ impl<'a> Refinement<'a> {
         let mut random = self.random(Use::Order);
         let order = self.order(&mut random);
         let mut found: Vec<f64> = Vec::new();
-        let mut look = FIRST_LOOK;
+        // As in an archive, what is unstable has no fitness.
+        let (mut look, mut shown, mut is_stable) = (FIRST_LOOK, 0, true);
         while found.len() < order.len() && !self.is_behind(&order, &found) {
             let next = &order[found.len()..order.len().min(found.len() + look)];
             let stimuli: Vec<Grid<f64>> =
                 next.iter().map(|number| self.images[*number].stimulus.clone()).collect();
             let conditions: Vec<usize> = next.iter().map(|number| self.images[*number].condition).collect();
             let rolled = rollouts.roll(&challenger, &stimuli, &conditions)?;
-            found.extend(rolled.into_iter().map(|d| d.unwrap_or(0.0)));
+            shown += rolled.len();
+            let Some(walked) = rolled.into_iter().collect::<Option<Vec<f64>>>() else {
+                is_stable = false;
+                break;
+            };
+            found.extend(walked);
             look *= 2;
         }
-        self.rollouts += found.len();
+        self.rollouts += shown;
         if !other_gait {
             self.learn(&challenger, &order, &found);
         }
         let gain: f64 = order.iter().zip(&found).map(|(number, d)| self.gain(*number, *d)).sum();
-        let won = found.len() == order.len() && gain > 0.0;
+        let won = is_stable && found.len() == order.len() && gain > 0.0;
         if won {
             for (number, displacement) in order.iter().zip(&found) {
                 self.displacements[*number] = *displacement;
@@ -194,13 +201,7 @@ impl<'a> Refinement<'a> {
             self.body = challenger;
             self.evidence.fade(FADE);
         }
-        Ok(Challenge {
-            number: self.challenges,
-            other_gait,
-            shown: found.len(),
-            fitness: self.fitness(),
-            won,
-        })
+        Ok(Challenge { number: self.challenges, other_gait, shown, fitness: self.fitness(), won })
     }
 
     /// A body to challenge the champion with.
@@ -241,21 +242,18 @@ impl<'a> Refinement<'a> {
         let mut other: Design = design;
         let place = random.below(other.len());
         let others: Vec<Material> =
-            crate::task::response::CHOICES.into_iter().filter(|material| *material != other[place]).collect();
+            CHOICES.into_iter().filter(|material| *material != other[place]).collect();
         other[place] = others[random.below(others.len())];
         gait.built(&other)
     }
 
     /// The champion with one to three voxels of other materials.
     fn other_gait(&self, random: &mut Stream) -> Body {
-        let now = self.body.voxels();
         for _ in 0..DRAWS {
-            let mut voxels = now.clone();
+            let mut voxels = self.body.voxels().clone();
             for _ in 0..=random.below(MOST_VOXELS) {
-                let place = (random.below(self.body.height()), random.below(self.body.width()));
-                let step = 1 + random.below(Material::ALL.len() - 1);
-                let code = usize::from(voxels[place].code());
-                voxels[place] = Material::ALL[(code + step) % Material::ALL.len()];
+                let (place, material) = other_voxel(&voxels, random);
+                voxels[place] = material;
             }
             match Body::new(voxels) {
                 Ok(body) if body != self.body && body.is_valid(self.min_muscles) => return body,
@@ -376,7 +374,7 @@ mod tests {
             let walks = |stimulus: &Grid<f64>| {
                 let moved = body.voxels().iter().map(|((row, column), material)| {
                     let slope = 12.0 / (column + 1) as f64;
-                    let is_place = crate::task::response::CHOICES.contains(material);
+                    let is_place = CHOICES.contains(material);
                     let wide = width(*material, stimulus[(row, column)], &self.physics) - 1.0;
                     if is_place { slope * wide } else { 0.0 }
                 });
@@ -389,7 +387,7 @@ mod tests {
     const PLACES: usize = 12;
 
     /// Images whose bright pixels are those of even columns, mostly, if right is right; else those of odd ones.
-    fn images(count: usize) -> Vec<Shown> {
+    fn images(count: usize) -> Vec<WeightedImage> {
         let mut random = stream(1, Purpose::RandomImages, 0, 0);
         let image = |number: usize| {
             let right = if number.is_multiple_of(2) { 1.0 } else { -1.0 };
@@ -397,7 +395,7 @@ mod tests {
                 let likely = if column.is_multiple_of(2) == (right > 0.0) { 0.75 } else { 0.25 };
                 f64::from(u8::from(random.unit() < likely))
             });
-            Shown { stimulus, condition: 0, right, weight: 1.0 }
+            WeightedImage { stimulus, condition: 0, right, weight: 1.0 }
         };
         (0..count).map(image).collect()
     }
@@ -451,7 +449,7 @@ mod tests {
             Image { stimulus, example, condition: 0 }
         };
         let images = [image(1.0), image(-1.0), image(-1.0), image(-1.0)];
-        let shown = Shown::all(&images.iter().collect::<Vec<_>>(), -1.0);
+        let shown = WeightedImage::all(&images.iter().collect::<Vec<_>>(), -1.0);
         let weight = |right: f64| -> f64 {
             shown.iter().filter(|shown| shown.right == right).map(|shown| shown.weight).sum()
         };
@@ -472,8 +470,35 @@ mod tests {
         let Ok(challenge) = refinement.challenge(good.clone(), &mut rollouts);
         assert_eq!((challenge.won, challenge.shown), (true, 200));
         assert_eq!(*refinement.body(), good);
-        // A body with a muscle is another gait; one that is unstable everywhere gets nowhere.
+        // A body with a muscle is another gait.
         let Ok(challenge) = refinement.challenge("656565656563".parse().unwrap(), &mut rollouts);
         assert!(challenge.other_gait);
+    }
+
+    #[test]
+    fn a_challenger_that_is_unstable_under_an_image_loses_however_it_answers_the_others() {
+        /// Unstable under the last image of each look.
+        struct Shaky(Planted);
+        impl Rollouts for Shaky {
+            type Error = Infallible;
+            fn roll(
+                &mut self,
+                body: &Body,
+                stimuli: &[Grid<f64>],
+                conditions: &[usize],
+            ) -> Result<Vec<Option<f64>>, Infallible> {
+                let Ok(mut walked) = self.0.roll(body, stimuli, conditions);
+                *walked.last_mut().unwrap() = None;
+                Ok(walked)
+            }
+        }
+        let (mut rollouts, physics) = (planted(), Physics::default());
+        let (good, bad): (Body, Body) = ("656565656565".parse().unwrap(), "565656565656".parse().unwrap());
+        let evidence = (Evidence::new(PLACES), 1.0);
+        let Ok(mut refinement) =
+            Refinement::new(bad.clone(), images(200), evidence, (&physics, 0, 5), &mut rollouts);
+        let Ok(challenge) = refinement.challenge(good, &mut Shaky(rollouts));
+        assert_eq!((challenge.won, challenge.shown), (false, FIRST_LOOK));
+        assert_eq!(*refinement.body(), bad);
     }
 }

@@ -218,12 +218,6 @@ impl Evidence {
         self.vector *= factor;
     }
 
-    /// Adds other evidence.
-    pub fn join(&mut self, other: &Evidence) {
-        self.matrix += &other.matrix;
-        self.vector += &other.vector;
-    }
-
     /// The slopes with the least bias: by ridge regression with the smallest penalty.
     pub fn least_biased(&self) -> Fit {
         let factor = self.factor(RIDGES[0]);

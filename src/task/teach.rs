@@ -3,14 +3,14 @@
 //! The response says which design is best under the linear model. Where many places change at once the body is a little off
 //! the model, so the response is measured again around the design, under training images: in half of the rollouts some places
 //! are changed at random, an intervention as in the first response. Then the lesson is solved again. After a few such rounds
-//! the last designs are shown the same training images, and the best of them is taken.
+//! the last design is [refined](super::refine): the designs before it challenge it first.
 
 use crate::base::Grid;
 use crate::base::random::{Purpose, Stream, stream};
 use crate::body::{Body, Material};
 use crate::sim::Physics;
 use crate::task::fitness::worth;
-use crate::task::refine::{Challenge, Refinement, Shown};
+use crate::task::refine::{Challenge, Refinement, WeightedImage};
 use crate::task::response::{CHOICES, Design, Evidence, Example, Gait, Lesson, Moments, Response, dot};
 
 /// What rollouts under random images count beside those around the latest design. They are farther from it, but more, and each
@@ -25,7 +25,7 @@ const FADE: f64 = 0.7;
 /// ones tell less of the slopes.
 const CHANGED: f64 = 0.15;
 
-/// Designs that are compared at the end: that of the last solution, and those of the rounds before.
+/// Designs that are compared when refining begins: that of the last solution, and those of the rounds before.
 pub const FINALISTS: usize = 4;
 
 /// How a gait is taught.
@@ -259,7 +259,7 @@ impl<'a> Teacher<'a> {
         let mut random = self.random(Use::Finish, 0);
         let numbers = self.telling(self.plan.final_images, &mut random);
         let images: Vec<&Image> = numbers.iter().map(|number| &self.images[*number]).collect();
-        let shown = Shown::all(&images, self.side);
+        let shown = WeightedImage::all(&images, self.side);
         let body = self.gait.built(&self.design);
         let cell = |(row, column): &(usize, usize)| row * body.width() + column;
         let cells: Vec<usize> = self.gait.places().iter().map(cell).collect();
