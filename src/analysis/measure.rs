@@ -23,9 +23,9 @@ use crate::store::response::{
 use crate::store::robots::{Selection, Source};
 use crate::store::unwritten::Unwritten;
 use crate::store::whereabouts::{Whereabouts, load_dataset_of, see};
-use crate::task::condition::Condition;
 use crate::task::evaluation::fresh_rollouts;
 use crate::task::grouping::Grouping;
+use crate::task::perturbation::Condition;
 use crate::task::response::{Example, Gait, Shown};
 use crate::task::teachable::teachable;
 use std::path::{Path, PathBuf};
@@ -243,10 +243,7 @@ fn provenance(options: &Options) -> Result<Provenance, Error> {
 
 /// The conditions of `train`, as far as there are rollouts for them.
 fn conditions(config: &Config, rollouts: usize) -> Vec<Condition> {
-    let train = config.train;
-    let all = 2 * (u64::from(train.raised_starts) + 1);
-    let turns = usize::try_from(all).map_or(rollouts, |all| all.min(rollouts));
-    Condition::by_turns(std::iter::repeat_n(0, turns), train.raised_starts, train.without_limits)
+    config.train.perturbations.conditions().take(rollouts).collect()
 }
 
 /// Training images of a task.

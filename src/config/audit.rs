@@ -53,7 +53,7 @@ impl Criteria {
 
     /// Checks what a type cannot.
     pub(crate) fn check(&self) -> Result<(), Error> {
-        let Sizes { raised, time_step, share, pixels, least_sensors: _, seed } = &self.perturbations;
+        let Sizes { start, time_step, share, pixels, least_sensors: _, seed } = &self.perturbations;
         let shares = [self.least_answered, self.least_kept, self.least_distance, self.least_robust];
         let refuse = |key: &str, text: &str| Err(Error::input(format!("audit criteria: {text}")).of(key));
         if ![self.threshold, self.least_walk].iter().all(|walk| (0.0..1e9).contains(walk)) {
@@ -62,8 +62,8 @@ impl Criteria {
         if !shares.iter().all(|share| (0.0..=1.0).contains(share)) {
             return refuse("least_kept", "least_…: expected shares from 0 to 1");
         }
-        if raised.iter().any(|&rows| rows == 0 || rows > 100) {
-            return refuse("perturbations.raised", "perturbations.raised: expected 1 to 100 rows");
+        if start.iter().any(|&rows| rows == 0 || rows > 100) {
+            return refuse("perturbations.start", "perturbations.start: expected 1 to 100 rows");
         }
         if time_step.iter().any(|&by| !(2..=64).contains(&by)) {
             return refuse(

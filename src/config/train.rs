@@ -1,6 +1,7 @@
 //! [`TrainConfig`]: a config's section `[train]`.
 
 use crate::base::error::Error;
+use crate::task::perturbation::ByTurns;
 use serde::{Deserialize, Serialize};
 
 /// How gaits are taught by `morphcog train`: section `[train]`.
@@ -23,10 +24,8 @@ pub struct TrainConfig {
     pub final_images: usize,
     /// Bodies that challenge the best design, in sensors or in a few voxels of any material. Default 60; later ones win more seldom.
     pub challengers: usize,
-    /// Rows up to which starts are raised, by turns, so that designs do not depend on the first touch of the ground. Default 2.
-    pub raised_starts: u32,
-    /// Whether half of the images are shown to robots without length limits, so that designs do not exploit those. Default true.
-    pub without_limits: bool,
+    /// Under what images are shown by turns, so that designs do not depend on the first touch of the ground or exploit length limits.
+    pub perturbations: ByTurns,
 }
 
 impl Default for TrainConfig {
@@ -38,8 +37,7 @@ impl Default for TrainConfig {
             images: 120,
             final_images: 400,
             challengers: 60,
-            raised_starts: 2,
-            without_limits: true,
+            perturbations: ByTurns::default(),
         }
     }
 }

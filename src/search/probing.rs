@@ -4,7 +4,7 @@ use crate::base::Grid;
 use crate::base::random::{Purpose, stream};
 use crate::body::{Body, Material};
 use crate::sim::Physics;
-use crate::task::condition::Condition;
+use crate::task::perturbation::Condition;
 use crate::task::response::{Gait, Response, Shown, random_image};
 use std::ops::Range;
 
@@ -22,7 +22,7 @@ impl Probing {
         let mut once: Vec<Condition> = Vec::new();
         for condition in conditions {
             if !once.contains(condition) {
-                once.push(*condition);
+                once.push(condition.clone());
             }
         }
         Probing { conditions: once, seed }
@@ -53,7 +53,7 @@ impl Probing {
         let condition = |number: usize| number % self.conditions.len();
         let stimuli: Vec<Grid<f64>> = numbers.clone().map(image).collect();
         let conditions: Vec<Condition> =
-            numbers.clone().map(|number| self.conditions[condition(number)]).collect();
+            numbers.clone().map(|number| self.conditions[condition(number)].clone()).collect();
         let displacements = roll(&probe, &stimuli, &conditions)?;
         let design = vec![Material::SensorExpand; gait.places().len()];
         let shown =

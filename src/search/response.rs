@@ -4,8 +4,8 @@ use crate::base::Grid;
 use crate::base::random::{Purpose, stream};
 use crate::config::evaluation::LEAST_IMAGES;
 use crate::sim::Physics;
-use crate::task::condition::Condition;
 use crate::task::fitness::response_so_far;
+use crate::task::perturbation::{Condition, of_response};
 use crate::task::response::random_image;
 
 /// Which random images evolution shows: others than a training's, which are 0.
@@ -43,7 +43,12 @@ pub(crate) fn opposites(stimuli: &[Grid<f64>], physics: &Physics, seed: u64) -> 
 
 /// Under what each of so many images is shown: both of a pair under the same.
 pub(crate) fn conditions(images: usize) -> Vec<Condition> {
-    Condition::OF_RESPONSE.into_iter().flat_map(|condition| [condition; 2]).cycle().take(images).collect()
+    of_response()
+        .into_iter()
+        .flat_map(|condition| [condition.clone(), condition])
+        .cycle()
+        .take(images)
+        .collect()
 }
 
 /// Whether a body that is to beat a response is so far from it after the first half of its pairs, two of each condition at least,
@@ -63,7 +68,6 @@ mod tests {
     use crate::base::error::Error;
     use crate::config::Config;
     use crate::search::training::Training;
-    use crate::task::condition::Condition;
 
     /// Two classes of built-in digits, six images of each.
     const CONFIG: &str = "[task]\ngroups = [[0], [1]]\n[data]\ndataset = \"builtin\"\nimages_per_class = 6\n";
@@ -111,9 +115,12 @@ mod tests {
 
     #[test]
     fn every_second_pair_is_shown_from_a_raised_start_without_length_limits() {
-        let (ground, raised) = (Condition::default(), Condition { raised: 1, without_limits: true });
+        let [ground, raised] = of_response();
         let training = Training::load(&config(RESPONSE, &[]).unwrap(), None).unwrap();
-        assert_eq!(training.conditions[..6], [ground, ground, raised, raised, ground, ground]);
+        assert_eq!(
+            training.conditions[..6],
+            [&ground, &ground, &raised, &raised, &ground, &ground].map(Clone::clone)
+        );
         assert_eq!(training.conditions.len(), 12);
         let plain = Training::load(&config("", &[]).unwrap(), None).unwrap();
         assert!(plain.conditions.is_empty());

@@ -29,9 +29,9 @@ use crate::store::training::{Batch, FILE, File, Origin};
 use crate::store::validation::Validated;
 use crate::store::whereabouts;
 use crate::store::whereabouts::Whereabouts;
-use crate::task::condition::Condition;
 use crate::task::evaluation::fresh_rollouts;
 use crate::task::fitness::Fitness;
+use crate::task::perturbation::Condition;
 use crate::task::protocol::{Life, Protocol};
 use crate::task::refine::Challenge;
 use crate::task::response::{Example, Gait, Response};
@@ -123,8 +123,7 @@ pub fn train(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> R
     let config = with_images(config, &dataset)?;
     let mut training = Training::of(&config, &dataset)?;
     let classes = training.images.iter().map(|image| image.label);
-    training.conditions =
-        Condition::by_turns(classes, config.train.raised_starts, config.train.without_limits);
+    training.conditions = config.train.perturbations.of(classes);
     let origin = origin(&source, &dataset)?;
     held_out::check(&config, &dataset)?;
     let walkers = walkers(&source, &options.robots, config.seed)?;
@@ -354,7 +353,8 @@ impl Rollouts for Kept<'_, '_> {
     type Error = Error;
 
     fn roll(&mut self, body: &Body, stimuli: &[Grid<f64>], conditions: &[usize]) -> Result<Batch, Error> {
-        let conditions: Vec<Condition> = conditions.iter().map(|number| self.conditions[*number]).collect();
+        let conditions: Vec<Condition> =
+            conditions.iter().map(|number| self.conditions[*number].clone()).collect();
         self.log.rollouts(body, stimuli, &conditions, self.config)
     }
 }

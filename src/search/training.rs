@@ -7,7 +7,7 @@ use crate::data::dataset::{Dataset, DatasetError, Split};
 use crate::search::response;
 use crate::store::images::{DatasetRef, ImageRef, answers};
 use crate::store::whereabouts::{load_dataset, see};
-use crate::task::condition::Condition;
+use crate::task::perturbation::Condition;
 use crate::task::score::Answer;
 use std::path::Path;
 

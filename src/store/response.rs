@@ -4,7 +4,7 @@ use crate::base::error::Error;
 use crate::base::files::write_atomically;
 use crate::body::Body;
 use crate::store::images::DatasetRef;
-use crate::task::condition::Condition;
+use crate::task::perturbation::Condition;
 use crate::task::response::{Gait, Response};
 use crate::task::teachable::{Estimate, Teachable};
 use serde::{Deserialize, Serialize};

@@ -4,7 +4,7 @@ use crate::base::Grid;
 use crate::base::stop::{Stopped, check};
 use crate::body::Body;
 use crate::sim::{Physics, System, Unstable};
-use crate::task::condition::Condition;
+use crate::task::perturbation::{Condition, Kind, Perturbation};
 use crate::task::protocol::{Life, Protocol};
 use crate::task::rollout::{Rollout, fresh_life, same_to_sensors};
 use rayon::prelude::*;
@@ -88,7 +88,7 @@ pub struct Job<'a> {
 }
 
 /// Evaluates jobs, each on all images; results in the jobs' order, the same on any number of threads. Fresh lives are lived under the
-/// images' `conditions`; those that are missing are the default.
+/// images' `conditions`; those that are missing are the default. In sequential ones conditions have no meaning.
 ///
 /// All lives of all jobs are one list of work: first every robot's first image, then every second one, and so on, large
 /// bodies first so that no core waits long at the end. A life whose robot has dropped out by then is passed over. One
@@ -105,7 +105,7 @@ pub fn evaluate(
     savings: Savings,
     stop: &AtomicBool,
 ) -> Result<Vec<Evaluation>, Stopped> {
-    let setup = Setup { images, conditions, physics, protocol, stop };
+    let setup = &Setup::new(images, conditions, (physics, protocol), stop);
     let candidate = |job| check(stop).map(|()| Candidate::new(job, setup, savings));
     let candidates: Vec<Candidate> = jobs.iter().map(candidate).collect::<Result<_, Stopped>>()?;
     let mut work: Vec<(usize, &Candidate)> = candidates
@@ -113,7 +113,7 @@ pub fn evaluate(
         .flat_map(|candidate| (0..candidate.lives()).map(move |place| (place, candidate)))
         .collect();
     // Stable: equally large bodies stay in the jobs' order.
-    work.sort_by_key(|(place, candidate)| (*place, Reverse(candidate.systems.as_ever.point_count())));
+    work.sort_by_key(|(place, candidate)| (*place, Reverse(candidate.systems[0].point_count())));
     let next = AtomicUsize::new(0);
     let worker = |_| {
         while let Some((place, candidate)) = work.get(next.fetch_add(1, Ordering::Relaxed)) {
@@ -136,18 +136,18 @@ pub fn fresh_rollouts(
     body: &Body,
     images: &[Grid<f64>],
     conditions: &[Condition],
-    (physics, protocol): (&Physics, &Protocol),
+    setting: (&Physics, &Protocol),
     told: &(dyn Fn(u64) + Sync),
     stop: &AtomicBool,
 ) -> Result<(Vec<Result<f64, Unstable>>, usize), Stopped> {
-    let setup = Setup { images, conditions, physics, protocol, stop };
+    let setup = Setup::new(images, conditions, setting, stop);
     let systems = setup.systems(body);
     let same_as = setup.same_as(body);
     let mut shared = BTreeMap::<usize, u64>::new();
     same_as.iter().for_each(|&first| *shared.entry(first).or_default() += 1);
     let shared: Vec<(usize, u64)> = shared.into_iter().collect();
     let roll = |&(image, count): &(usize, u64)| {
-        let displacement = setup.fresh_life(&systems, image)?;
+        let displacement = setup.fresh_life(body, &systems, image)?;
         told(count);
         Ok((image, displacement))
     };
@@ -193,65 +193,103 @@ fn walked(known: Vec<Option<f64>>) -> Outcome {
 }
 
 /// What all jobs have in common.
-#[derive(Clone, Copy)]
 struct Setup<'a> {
     images: &'a [Grid<f64>],
-    conditions: &'a [Condition],
+    /// Every condition once, the default first.
+    conditions: Vec<Condition>,
+    /// For each image the number of its condition.
+    condition_of: Vec<usize>,
     physics: &'a Physics,
-    protocol: &'a Protocol,
+    /// Of each condition.
+    protocols: Vec<Protocol>,
     stop: &'a AtomicBool,
 }
 
-/// A body under the physics that the conditions ask for.
-struct Systems {
-    as_ever: Arc<System>,
-    /// If some condition asks for it.
-    without_limits: Option<Arc<System>>,
-}
-
-impl Setup<'_> {
-    fn systems(&self, body: &Body) -> Systems {
-        let system = |physics: Physics| Arc::new(System::new(body, physics));
-        let is_asked_for = self.conditions.iter().any(|condition| condition.without_limits);
-        Systems {
-            as_ever: system(self.physics.clone()),
-            without_limits: is_asked_for.then(|| system(self.physics.without_limits())),
-        }
+impl<'a> Setup<'a> {
+    fn new(
+        images: &'a [Grid<f64>],
+        conditions: &[Condition],
+        (physics, protocol): (&'a Physics, &Protocol),
+        stop: &'a AtomicBool,
+    ) -> Self {
+        let mut once = vec![Condition::new()];
+        let mut number = |condition: &Condition| {
+            once.iter().position(|other| other == condition).unwrap_or_else(|| {
+                once.push(condition.clone());
+                once.len() - 1
+            })
+        };
+        let condition_of =
+            (0..images.len()).map(|image| conditions.get(image).map_or(0, &mut number)).collect();
+        let under = |condition: &Condition| {
+            condition.iter().fold(protocol.clone(), |protocol, perturbation| perturbation.protocol(&protocol))
+        };
+        let protocols = once.iter().map(under).collect();
+        Setup { images, conditions: once, condition_of, physics, protocols, stop }
     }
 
-    fn condition(&self, image: usize) -> Condition {
-        self.conditions.get(image).copied().unwrap_or_default()
+    fn protocol(&self) -> &Protocol {
+        &self.protocols[0]
+    }
+
+    /// A body under the physics of each condition.
+    fn systems(&self, body: &Body) -> Vec<Arc<System>> {
+        let mut once: Vec<(Body, Physics, Arc<System>)> = Vec::new();
+        let system = |condition: &Condition| {
+            let body = condition.iter().fold(body.clone(), |body, perturbation| perturbation.body(&body));
+            let physics = self.physics.clone();
+            let physics =
+                condition.iter().fold(physics, |physics, perturbation| perturbation.physics(&physics));
+            if let Some((_, _, system)) = once.iter().find(|other| other.0 == body && other.1 == physics) {
+                return Arc::clone(system);
+            }
+            let system = Arc::new(System::new(&body, physics.clone()));
+            once.push((body, physics, Arc::clone(&system)));
+            system
+        };
+        self.conditions.iter().map(system).collect()
     }
 
     /// For each image the first that shows the body's sensors the same pixels under the same condition.
     fn same_as(&self, body: &Body) -> Vec<usize> {
         let mut first = HashMap::new();
         let same = same_to_sensors(body, &self.images.iter().collect::<Vec<_>>());
-        let of = |(image, same)| *first.entry((same, self.condition(image))).or_insert(image);
+        let of = |(image, same): (usize, usize)| {
+            let condition = self.condition_of[image];
+            // An inverted pixel is another one in each image.
+            let is_drawn = self.conditions[condition].iter().any(|change| change.kind == Kind::Pixel);
+            *first.entry((same, condition, is_drawn.then_some(image))).or_insert(image)
+        };
         same.into_iter().enumerate().map(of).collect()
     }
 
     /// A fresh life under an image and its condition.
-    fn fresh_life(&self, systems: &Systems, image: usize) -> Result<Result<f64, Unstable>, Stopped> {
-        let Condition { raised, without_limits } = self.condition(image);
-        let start_row = self.protocol.start_row.saturating_add(raised);
-        let protocol = Protocol { start_row, ..self.protocol.clone() };
-        let system = match &systems.without_limits {
-            Some(system) if without_limits => system,
-            _ => &systems.as_ever,
-        };
-        let displacement = fresh_life(system, &protocol, &self.images[image], self.stop)?;
+    fn fresh_life(
+        &self,
+        body: &Body,
+        systems: &[Arc<System>],
+        image: usize,
+    ) -> Result<Result<f64, Unstable>, Stopped> {
+        let number = self.condition_of[image];
+        let condition = &self.conditions[number];
+        let see = |stimulus: Grid<f64>, change: &Perturbation| change.stimulus(body, &stimulus, image as u64);
+        let stimulus = condition.iter().fold(self.images[image].clone(), see);
+        let displacement = fresh_life(&systems[number], &self.protocols[number], &stimulus, self.stop)?;
+        let undo = |d: f64, change: &Perturbation| change.undo(vec![d])[0];
+        let displacement = displacement.map(|d| condition.iter().fold(d, undo));
         // A body that needs a stop, as any material has one, is not refused for that.
-        Ok(if without_limits { displacement.or(Ok(0.0)) } else { displacement })
+        let is_excused = condition.iter().any(|change| !change.counts_if_unstable());
+        Ok(if is_excused { displacement.or(Ok(0.0)) } else { displacement })
     }
 }
 
 /// A job being done.
 struct Candidate<'a> {
     job: &'a Job<'a>,
-    setup: Setup<'a>,
+    setup: &'a Setup<'a>,
     early_stop: bool,
-    systems: Systems,
+    /// Of each condition.
+    systems: Vec<Arc<System>>,
     /// The images that need showing, in order.
     order: Vec<usize>,
     /// For each image its place in that order, or that of the image whose life it shares.
@@ -262,10 +300,10 @@ struct Candidate<'a> {
 }
 
 impl<'a> Candidate<'a> {
-    fn new(job: &'a Job<'a>, setup: Setup<'a>, savings: Savings) -> Self {
-        let Setup { images, protocol, .. } = setup;
+    fn new(job: &'a Job<'a>, setup: &'a Setup<'a>, savings: Savings) -> Self {
+        let images = setup.images;
         let all: Vec<usize> = (0..images.len()).collect();
-        let is_fresh = protocol.life == Life::Fresh;
+        let is_fresh = setup.protocol().life == Life::Fresh;
         let same_as = match is_fresh && savings.shared_lives {
             true => setup.same_as(job.body),
             false => all.clone(),
@@ -310,10 +348,12 @@ impl<'a> Candidate<'a> {
             return Ok(());
         }
         let mut lived = Lived { displacements: Vec::new(), unstable: None };
-        match self.setup.protocol.life {
-            Life::Fresh => lived.add(self.setup.fresh_life(&self.systems, self.order[place])?),
+        match self.setup.protocol().life {
+            Life::Fresh => {
+                lived.add(self.setup.fresh_life(self.job.body, &self.systems, self.order[place])?);
+            }
             Life::Sequential => {
-                let mut rollout = Rollout::new(&self.systems.as_ever, self.setup.protocol);
+                let mut rollout = Rollout::new(&self.systems[0], self.setup.protocol());
                 for image in self.setup.images {
                     lived.add(rollout.show_unless(image, self.setup.stop)?);
                     if lived.unstable.is_some() || self.outcome(&lived.displacements).is_some() {
@@ -391,6 +431,7 @@ mod tests {
     use crate::base::stop::NEVER;
     use crate::body::Material;
     use crate::sim::UnstableReason;
+    use crate::task::perturbation::{Setting, Sizes, condition};
     use std::collections::BTreeSet;
 
     /// A sensor that expands at both ends: under a bright image it is wider than `Physics::blow_up_extent` here allows.
@@ -536,8 +577,7 @@ mod tests {
         assert!(expected[1] != expected[3] && expected[0] != expected[4], "{expected:?}");
         for savings in all_savings() {
             let evaluated = |raised: &[u32]| {
-                let condition = |&raised: &u32| Condition { raised, ..Condition::default() };
-                let conditions: Vec<Condition> = raised.iter().map(condition).collect();
+                let conditions: Vec<Condition> = raised.iter().map(|rows| condition(*rows, false)).collect();
                 let job = Job { body: &body, order: Vec::new(), may_win: Box::new(|_| true), given_up: None };
                 evaluate(&[job], &images, &conditions, &physics, &protocol, savings, &NEVER)
                     .unwrap()
@@ -555,8 +595,7 @@ mod tests {
         let protocol = Protocol { life: Life::Fresh, control_steps: 30, ..Protocol::default() };
         let images = images(&WILD);
         let evaluated = |physics: &Physics, without_limits: &[bool]| {
-            let condition = |&without_limits: &bool| Condition { without_limits, ..Condition::default() };
-            let conditions: Vec<Condition> = without_limits.iter().map(condition).collect();
+            let conditions: Vec<Condition> = without_limits.iter().map(|off| condition(0, *off)).collect();
             let body = body();
             let may_win = Box::new(|_: &[Option<f64>]| true);
             let job = Job { body: &body, order: Vec::new(), may_win, given_up: None };
@@ -589,6 +628,30 @@ mod tests {
         let Outcome::Walked(walked) = evaluation.outcome else { panic!("{:?}", evaluation.outcome) };
         assert_eq!(walked[2], 0.0);
         assert_eq!(walked[1], expected(&tight, 1).unwrap());
+    }
+
+    #[test]
+    fn every_perturbation_of_an_audit_is_shown_as_a_condition_of_its_own() {
+        let (body, physics, images) = (body(), Physics::default(), images(&CALM));
+        let protocol = Protocol { life: Life::Fresh, control_steps: 30, ..Protocol::default() };
+        let sizes = Sizes { least_sensors: 1, ..Sizes::default() };
+        for perturbation in Perturbation::all(&sizes, &body, Life::Fresh) {
+            let setting = Setting {
+                body: body.clone(),
+                physics: physics.clone(),
+                protocol: protocol.clone(),
+                stimuli: images.clone(),
+            };
+            let changed = perturbation.apply(&setting);
+            let system = Arc::new(System::new(&changed.body, changed.physics));
+            let live = |stimulus| fresh_life(&system, &changed.protocol, stimulus, &NEVER).unwrap().unwrap();
+            let expected = perturbation.undo(changed.stimuli.iter().map(live).collect());
+            let conditions = vec![vec![perturbation]; images.len()];
+            let setting = (&physics, &protocol);
+            let (walked, _) = fresh_rollouts(&body, &images, &conditions, setting, &|_| (), &NEVER).unwrap();
+            let walked: Vec<f64> = walked.into_iter().map(Result::unwrap).collect();
+            assert_eq!(walked, expected, "{}", perturbation.name());
+        }
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! [`Fitness`]: how good a robot's answers to several images are together.
 
-use crate::task::condition::Condition;
 use crate::task::grouping::Group;
+use crate::task::perturbation::CONDITIONS_OF_RESPONSE;
 use serde::{Deserialize, Serialize};
 
 /// Margin at which an answer is as good as can be, for [`Fitness::MeanClipped`] \[voxel lengths\]. With less, a small change turns
@@ -29,7 +29,7 @@ pub enum Fitness {
     /// How strongly a gait responds to what its voxels see, whatever its task \[voxel lengths\]. Images are shown in pairs, an
     /// image and its opposite. Half the difference of the two displacements is what is linear in the widths of the voxels, half
     /// the sum is what is not, and where the body walks anyway. Fitness is the root of the mean square of the one, less the
-    /// variance of the other within [the conditions](Condition::OF_RESPONSE) that pairs are shown under by turns: so chance, which
+    /// variance of the other within [the conditions](crate::task::perturbation::of_response) that pairs are shown under by turns: so chance, which
     /// is in both, adds nothing on average. An eighth of the distance that the body walks anyway is subtracted: sensors have to
     /// make up for it. A run measures it on the body's [probe](crate::body::Body::probe), and multiplies it by the root of the
     /// number of the probe's sensors. Both ways to assign sides are worth the same.
@@ -102,7 +102,7 @@ pub fn response_so_far(displacements: impl Iterator<Item = Option<f64>>) -> Opti
     let pairs = known.chunks_exact(2);
     let (odd, even): (Vec<f64>, Vec<f64>) =
         pairs.map(|pair| ((pair[0] - pair[1]) / 2.0, (pair[0] + pair[1]) / 2.0)).unzip();
-    let conditions = Condition::OF_RESPONSE.len();
+    let conditions = CONDITIONS_OF_RESPONSE;
     let (mut squares, mut free) = (0.0, 0_usize);
     for turn in 0..conditions {
         let within = || even.iter().skip(turn).step_by(conditions);

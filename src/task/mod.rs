@@ -1,7 +1,6 @@
 //! What a robot is asked to do: stimuli, protocols, rollouts and their scores; how a gait responds, and how it is taught.
 
 pub mod baselines;
-pub mod condition;
 pub mod direction;
 pub mod evaluation;
 pub mod fitness;

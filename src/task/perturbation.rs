@@ -1,4 +1,6 @@
-//! [`Perturbation`]: changes that no honest walker should notice, for `morphcog audit`.
+//! [`Perturbation`]: a change of a simulation that should make no difference to a robot that walks by body and image.
+//! `morphcog audit` tests robots under many of them; `morphcog train` shows images under some, so that robots do not come to
+//! depend on what they change.
 //!
 //! To start at another column is none: the simulator is the same bits wherever on the ground a robot stands (but for
 //! pegs below the ground, which a robot can reach only by tunnelling). A raised start also changes the column.
@@ -75,12 +77,12 @@ impl Kind {
     }
 }
 
-/// How much is changed.
+/// How much an audit changes.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Sizes {
     /// Rows by which the start is raised, a life each. Default 1 and 2.
-    pub raised: Vec<u32>,
+    pub start: Vec<u32>,
     /// The time step is divided by these, a life each. Default 2 and 4.
     pub time_step: Vec<u32>,
     /// Share by which stiffness, friction and gravity are raised and lowered. Default 0.05.
@@ -95,14 +97,7 @@ pub struct Sizes {
 
 impl Default for Sizes {
     fn default() -> Self {
-        Sizes {
-            raised: vec![1, 2],
-            time_step: vec![2, 4],
-            share: 0.05,
-            pixels: 3,
-            least_sensors: 10,
-            seed: 1,
-        }
+        Sizes { start: vec![1, 2], time_step: vec![2, 4], share: 0.05, pixels: 3, least_sensors: 10, seed: 1 }
     }
 }
 
@@ -123,14 +118,77 @@ pub struct Setting {
 const HALF_AS_FAST: f64 = 0.5;
 const OUT_OF_REACH: f64 = 0.0;
 
+/// Under what the images of a training are shown by turns; keys of `train.perturbations`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct ByTurns {
+    /// Rows up to which the start is raised. Default 2.
+    pub start: u32,
+    /// Whether half of the images are shown without length limits. Default true.
+    pub length_limits: bool,
+}
+
+impl Default for ByTurns {
+    fn default() -> Self {
+        ByTurns { start: 2, length_limits: true }
+    }
+}
+
+/// The perturbations of one rollout; often none.
+pub type Condition = Vec<Perturbation>;
+
+impl ByTurns {
+    /// Every condition once: starts raised by no row up to the most, then the same again without length limits.
+    pub fn conditions(&self) -> impl Iterator<Item = Condition> {
+        let ByTurns { start, length_limits } = *self;
+        let one = move |without_limits: bool| (0..=start).map(move |rows| condition(rows, without_limits));
+        one(false).chain(length_limits.then(|| one(true)).into_iter().flatten())
+    }
+
+    /// Conditions of images of these classes: by turns within each class.
+    pub fn of(&self, classes: impl Iterator<Item = u8>) -> Vec<Condition> {
+        let starts = u64::from(self.start) + 1;
+        let mut turns = [0_u64; u8::MAX as usize + 1];
+        let condition = |class: u8| {
+            let turn = turns[usize::from(class)];
+            turns[usize::from(class)] += 1;
+            condition((turn % starts) as u32, self.length_limits && (turn / starts) % 2 == 1)
+        };
+        classes.map(condition).collect()
+    }
+}
+
+/// How many [`of_response`] there are.
+pub const CONDITIONS_OF_RESPONSE: usize = 2;
+
+/// Under what the response of gaits is measured while they evolve, by turns: the default; and raised by a row and without length
+/// limits, so that luck at the first touch of the ground, or at a limit, is no response.
+pub fn of_response() -> [Condition; CONDITIONS_OF_RESPONSE] {
+    [condition(0, false), condition(1, true)]
+}
+
+/// A start raised by so many rows, perhaps without length limits.
+pub(crate) fn condition(rows: u32, without_limits: bool) -> Condition {
+    let of = |kind, amount| Perturbation { kind, amount, seed: 0 };
+    let start = (rows > 0).then(|| of(Kind::Start, f64::from(rows)));
+    start.into_iter().chain(without_limits.then(|| of(Kind::LengthLimits, OUT_OF_REACH))).collect()
+}
+
 /// One change.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Perturbation {
     /// What is changed.
     pub kind: Kind,
     /// Rows, divisor of the time step, factor, speed, or number of the draw; unused elsewhere.
     amount: f64,
+    /// Seed of the draw; 0 where nothing is drawn.
+    #[serde(default, skip_serializing_if = "is_zero")]
     seed: u64,
+}
+
+fn is_zero(seed: &u64) -> bool {
+    *seed == 0
 }
 
 impl Perturbation {
@@ -138,7 +196,7 @@ impl Perturbation {
     pub fn all(sizes: &Sizes, body: &Body, life: Life) -> Vec<Self> {
         let sees = body.counts().sensor >= sizes.least_sensors;
         let amounts = |kind| match kind {
-            Kind::Start => sizes.raised.iter().map(|&rows| f64::from(rows)).collect(),
+            Kind::Start => sizes.start.iter().map(|&rows| f64::from(rows)).collect(),
             Kind::TimeStep => sizes.time_step.iter().map(|&by| f64::from(by)).collect(),
             Kind::Stiffness | Kind::Friction | Kind::Gravity => vec![1.0 - sizes.share, 1.0 + sizes.share],
             Kind::Order if life == Life::Fresh => Vec::new(),
@@ -148,7 +206,8 @@ impl Perturbation {
             Kind::Mirror | Kind::SelfContact | Kind::Order => vec![0.5],
         };
         let of = |kind| {
-            amounts(kind).into_iter().map(move |amount| Perturbation { kind, amount, seed: sizes.seed })
+            let seed = if kind == Kind::Pixel { sizes.seed } else { 0 };
+            amounts(kind).into_iter().map(move |amount| Perturbation { kind, amount, seed })
         };
         Kind::ALL.into_iter().flat_map(of).collect()
     }
@@ -180,33 +239,63 @@ impl Perturbation {
 
     /// The changed setting. Displacements under it are to be compared after [`Perturbation::undo`].
     pub fn apply(&self, setting: &Setting) -> Setting {
-        let mut changed = setting.clone();
-        let physics = &setting.physics;
+        let Setting { body, physics, protocol, stimuli } = setting;
+        let stimulus = |(image, stimulus)| self.stimulus(body, stimulus, image as u64);
+        let mut stimuli: Vec<Grid<f64>> = stimuli.iter().enumerate().map(stimulus).collect();
+        if self.kind == Kind::Order {
+            stimuli.reverse();
+        }
+        Setting {
+            body: self.body(body),
+            physics: self.physics(physics),
+            protocol: self.protocol(protocol),
+            stimuli,
+        }
+    }
+
+    /// The changed body.
+    pub fn body(&self, body: &Body) -> Body {
+        if self.kind == Kind::Mirror { body.mirrored() } else { body.clone() }
+    }
+
+    /// The changed constants of the simulator.
+    pub fn physics(&self, physics: &Physics) -> Physics {
+        match self.kind {
+            Kind::TimeStep => physics.refined(self.amount as u32),
+            Kind::LengthLimits if self.amount == OUT_OF_REACH => physics.without_limits(),
+            Kind::LengthLimits => physics.with_slower_limits(1.0 / self.amount),
+            Kind::SelfContact => {
+                Physics { self_contact_weight: physics.self_contact_weight * self.amount, ..physics.clone() }
+            }
+            Kind::Stiffness => physics.with_stiffness(self.amount),
+            Kind::Friction => Physics { friction: physics.friction * self.amount, ..physics.clone() },
+            Kind::Gravity => Physics { gravity: physics.gravity * self.amount, ..physics.clone() },
+            Kind::Start | Kind::Mirror | Kind::Order | Kind::Pixel => physics.clone(),
+        }
+    }
+
+    /// The changed way in which images are shown.
+    pub fn protocol(&self, protocol: &Protocol) -> Protocol {
         match self.kind {
             Kind::Start => {
                 let rows = self.amount as u32;
-                changed.protocol.start_row = setting.protocol.start_row.saturating_add(rows);
-                changed.protocol.start_column = setting.protocol.start_column - i64::from(rows);
-            }
-            Kind::Mirror => {
-                changed.body = setting.body.mirrored();
-                changed.stimuli = setting.stimuli.iter().map(Grid::mirrored).collect();
-            }
-            Kind::TimeStep => changed.physics = physics.refined(self.amount as u32),
-            Kind::LengthLimits if self.amount == OUT_OF_REACH => changed.physics = physics.without_limits(),
-            Kind::LengthLimits => changed.physics = physics.with_slower_limits(1.0 / self.amount),
-            Kind::SelfContact => changed.physics.self_contact_weight *= self.amount,
-            Kind::Order => changed.stimuli.reverse(),
-            Kind::Stiffness => changed.physics = physics.with_stiffness(self.amount),
-            Kind::Friction => changed.physics.friction *= self.amount,
-            Kind::Gravity => changed.physics.gravity *= self.amount,
-            Kind::Pixel => {
-                for (image, stimulus) in changed.stimuli.iter_mut().enumerate() {
-                    *stimulus = self.with_pixel_inverted(&setting.body, stimulus, image as u64);
+                Protocol {
+                    start_row: protocol.start_row.saturating_add(rows),
+                    start_column: protocol.start_column - i64::from(rows),
+                    ..protocol.clone()
                 }
             }
+            _ => protocol.clone(),
         }
-        changed
+    }
+
+    /// What the (unchanged) body sees of the image with this number.
+    pub fn stimulus(&self, body: &Body, stimulus: &Grid<f64>, image: u64) -> Grid<f64> {
+        match self.kind {
+            Kind::Mirror => stimulus.mirrored(),
+            Kind::Pixel => self.with_pixel_inverted(body, stimulus, image),
+            _ => stimulus.clone(),
+        }
     }
 
     /// Displacements as they would be in the unchanged setting: those of a mirror image are mirrored, and they stand in
@@ -301,6 +390,28 @@ mod tests {
         let blind = Setting { body: "33/44".parse().unwrap(), ..setting() };
         let pixel = Perturbation { kind: Kind::Pixel, amount: 1.0, seed: 1 };
         assert_eq!(pixel.apply(&blind), blind);
+    }
+
+    #[test]
+    fn starts_are_raised_and_limits_removed_by_turns_within_each_class() {
+        let conditions = |classes: &[u8], start: u32, length_limits: bool| {
+            ByTurns { start, length_limits }.of(classes.iter().copied())
+        };
+        let of = |turns: &[(u32, bool)]| -> Vec<Condition> {
+            turns.iter().map(|(rows, without)| condition(*rows, *without)).collect()
+        };
+        let (with, without) = (false, true);
+        let raised = [0, 0, 1, 1, 2, 2, 0, 0].map(|rows| (rows, with));
+        assert_eq!(conditions(&[0, 1, 0, 1, 0, 1, 0, 7], 2, false), of(&raised));
+        assert_eq!(conditions(&[0, 0], u32::MAX, true), of(&[(0, with), (1, with)]));
+        let limits = [with, with, without, without, with].map(|w| (0, w));
+        assert_eq!(conditions(&[4, 5, 4, 5, 4], 0, true), of(&limits));
+        let every = [(0, with), (1, with), (0, without), (1, without)];
+        assert_eq!(conditions(&[3; 4], 1, true), of(&every));
+        assert_eq!(ByTurns { start: 1, length_limits: true }.conditions().collect::<Vec<_>>(), of(&every));
+        assert_eq!(ByTurns { start: 2, length_limits: false }.conditions().count(), 3);
+        let json = serde_json::to_string(&condition(1, true)).unwrap();
+        assert_eq!(json, r#"[{"kind":"start","amount":1.0},{"kind":"length_limits","amount":0.0}]"#);
     }
 
     #[test]

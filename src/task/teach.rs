@@ -188,8 +188,8 @@ impl<'a> Teacher<'a> {
         let numbers = self.drawn(self.plan.images, &mut random);
         let draw = |(turn, number): (usize, &usize)| {
             let material = |material: &Material| {
-                // Half of the rollouts are of the design itself.
-                if turn % 2 == 1 && random.unit() < CHANGED {
+                // Half of the rollouts are of the design itself; the groups take turns, so as many of each.
+                if turn / 2 % 2 == 1 && random.unit() < CHANGED {
                     CHOICES[random.below(CHOICES.len())]
                 } else {
                     *material
