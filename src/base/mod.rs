@@ -1,4 +1,4 @@
-//! What every module stands on (random generators, hashes, files, numbers and lines as text).
+//! What every module stands on (random generators, hashes, files; numbers, lines and tables as text).
 
 pub mod clock;
 pub mod error;
@@ -9,6 +9,7 @@ pub mod observer;
 pub mod random;
 pub mod signals;
 pub mod statistics;
+pub mod table;
 pub mod text;
 pub mod threads;
 

@@ -212,7 +212,7 @@ fn curve_of(kind: Kind, points: Vec<Point>, accuracy: f64) -> Curve {
 }
 
 fn write(options: &Options, file: &CapacityFile) -> Result<(), Error> {
-    let csv = file.to_csv().map_err(|error| Error::other(error.to_string()))?;
+    let csv = file.to_csv();
     for (path, content) in
         [(&options.out, file.to_json().into_bytes()), (&options.out.with_extension("csv"), csv)]
     {

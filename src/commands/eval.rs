@@ -216,7 +216,7 @@ fn same_setting(first: &Source, other: &Source) -> Result<(), Error> {
 
 fn write(options: &Options, report: &EvalFile) -> Result<(), Error> {
     let csv_path = options.out.with_extension("csv");
-    let csv = report.to_csv().map_err(|error| Error::other(error.to_string()))?;
+    let csv = report.to_csv();
     for (path, content) in [(&options.out, report.to_json().into_bytes()), (&csv_path, csv)] {
         write_atomically(path, &content).map_err(|error| Error::writing(path, &error))?;
     }

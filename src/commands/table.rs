@@ -3,6 +3,7 @@
 use crate::analysis::published;
 use crate::base::error::Error;
 use crate::base::files::write_atomically;
+use crate::base::table;
 use crate::baseline::curve::Crossing;
 use crate::store::capacity::CapacityFile;
 use crate::store::eval::EvalFile;
@@ -92,45 +93,22 @@ pub(crate) fn write(folder: &Path, scale: f64, rows: &[Row]) -> Result<Vec<PathB
     let json = folder.join("reproduction.json");
     write_file(&json, format!("{about:#}\n").as_bytes())?;
     let csv = folder.join("reproduction.csv");
-    let failed = |error: csv::Error| Error::other(error.to_string());
-    let mut writer = csv::Writer::from_writer(Vec::new());
-    let header = [
-        "task",
-        "robots",
-        "physical",
-        "audited",
-        "accuracy",
-        "deviation",
-        "accuracy_low",
-        "accuracy_high",
-        "balanced_accuracy",
-        "larger_group",
-        "mlp",
-        "cnn",
-        "paper_accuracy",
-        "paper_mlp",
-        "paper_cnn",
-    ];
-    writer.write_record(header).map_err(failed)?;
-    for row in rows {
+    let about = ["task", "robots", "physical", "audited", "accuracy", "deviation"];
+    let shares = ["accuracy_low", "accuracy_high", "balanced_accuracy", "larger_group", "mlp", "cnn"];
+    let papers = ["paper_accuracy", "paper_mlp", "paper_cnn"];
+    let fields = rows.iter().map(|row| {
         let [low, high] = row.interval.map_or([None, None], |interval| interval.map(Some));
-        let text = |number: Option<f64>| number.map_or(String::new(), |number| number.to_string());
         let size = |size: Option<Crossing>| match size {
             Some(Crossing::At(size)) => size.to_string(),
             Some(below) => below.to_string(),
             None => String::new(),
         };
-        let accuracies = [row.accuracy, row.deviation, low, high, row.balanced_accuracy, row.larger_group];
-        let papers = [row.paper_accuracy, row.paper_mlp, row.paper_cnn];
-        let mut cells =
-            vec![row.task.clone(), row.robots.to_string(), row.physical.to_string(), row.audited.to_string()];
-        cells.extend(accuracies.map(text));
-        cells.extend([row.mlp, row.cnn].map(size));
-        cells.extend(papers.map(text));
-        writer.write_record(&cells).map_err(failed)?;
-    }
-    let text = writer.into_inner().map_err(|error| Error::other(error.to_string()))?;
-    write_file(&csv, &text)?;
+        let about = (&row.task, row.robots, row.physical, row.audited);
+        let shares = (row.accuracy, row.deviation, low, high, row.balanced_accuracy, row.larger_group);
+        let papers = (row.paper_accuracy, row.paper_mlp, row.paper_cnn);
+        (about, shares, [row.mlp, row.cnn].map(size), papers)
+    });
+    write_file(&csv, &table::csv(about.into_iter().chain(shares).chain(papers), fields))?;
     Ok(vec![json, csv])
 }
 

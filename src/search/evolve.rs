@@ -396,7 +396,7 @@ impl<'a> Run<'a> {
             Checkpoint { run: self.file(), totals: self.totals(), known_bodies: self.known.clone() };
         checkpoint::write(folder.path(), &checkpoint)?;
         let run = checkpoint.run;
-        let csv = run.to_csv().map_err(|error| Error::other(error.to_string()))?;
+        let csv = run.to_csv();
         for (name, content) in [(RUN_JSON, run.to_json().into_bytes()), (ELITES, csv)] {
             let path = folder.path().join(name);
             write_atomically(&path, &content).map_err(|error| Error::writing(&path, &error))?;

@@ -158,7 +158,7 @@ pub fn train(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> R
     let run = run_file(options, &config, &training, origin, walker, &taught)?;
     let seconds = began.elapsed().as_secs_f64();
     let totals = Totals { evaluations: 1, simulated: log.simulated as u64, seconds, ..Totals::default() };
-    let csv = run.to_csv().map_err(|error| Error::other(error.to_string()))?;
+    let csv = run.to_csv();
     let mut metrics = Metrics::open(folder.path(), 0)?;
     metrics.write(0, &run.stats, &totals)?;
     metrics.flush()?;

@@ -2,6 +2,7 @@
 
 use crate::base::error::Error;
 use crate::base::files::{read_text, write_atomically};
+use crate::base::table;
 use crate::config::audit::Criteria;
 use crate::config::reading;
 use crate::sim::Energy;
@@ -180,53 +181,32 @@ impl AuditFile {
     }
 
     /// `audit.csv`: a line per robot and life, the unchanged one first.
-    ///
-    /// # Errors
-    /// If it cannot be written to memory.
-    pub fn to_csv(&self) -> Result<Vec<u8>, csv::Error> {
+    pub fn to_csv(&self) -> Vec<u8> {
         let images = self.robots.iter().filter_map(|r| r.displacements.as_ref()).map(Vec::len).max();
         let images = images.unwrap_or(0);
-        let mut writer = csv::Writer::from_writer(Vec::new());
-        let mut header: Vec<String> = [
-            "id",
-            "task",
-            "verdict",
-            "reason",
-            "persisting",
-            "spread",
-            "drive_per_cycle",
-            "limits_per_cycle",
-        ]
-        .map(str::to_string)
-        .to_vec();
-        header.extend(["life", "kept", "distance", "persists"].map(str::to_string));
-        header.extend((0..images).map(|image| format!("displacement_{image}")));
-        writer.write_record(&header)?;
-        for robot in &self.robots {
-            let mut about = vec![robot.id.clone(), robot.task.clone(), robot.verdict.name().to_string()];
-            about.extend([robot.reason.clone(), robot.persisting.to_string(), robot.spread.to_string()]);
-            let energy = robot.energy_per_cycle;
-            about.extend([energy.drive, energy.limits].map(|e| e.to_string()));
-            let mut row = |life: [String; 4], displacements: &Option<Vec<f64>>| {
-                let walks = (0..images).map(|i| displacements.as_ref().and_then(|d| d.get(i)));
-                let walks = walks.map(|d| d.map_or(String::new(), f64::to_string));
-                writer.write_record(about.iter().cloned().chain(life).chain(walks))
+        let about = ["id", "task", "verdict", "reason", "persisting", "spread", "drive_per_cycle"];
+        let life = ["limits_per_cycle", "life", "kept", "distance", "persists"];
+        let columns = about.into_iter().chain(life).map(str::to_string);
+        let columns = columns.chain(table::numbered("displacement", images));
+        let rows = self.robots.iter().flat_map(|robot| {
+            let Energy { drive, limits } = robot.energy_per_cycle;
+            let verdict = (&robot.id, &robot.task, robot.verdict.name(), &robot.reason);
+            let about = (verdict, robot.persisting, robot.spread, drive, limits);
+            let row = move |name, compared: Option<(f64, f64, bool)>, displacements: &Option<Vec<f64>>| {
+                let (kept, distance, persists) = compared
+                    .map_or((None, None, None), |(kept, distance, persists)| {
+                        (Some(kept), Some(distance), Some(persists))
+                    });
+                let walks = table::padded(displacements.as_deref().unwrap_or_default(), images);
+                (about, name, kept, distance, persists, walks)
             };
-            row(
-                ["unchanged".to_string(), String::new(), String::new(), String::new()],
-                &robot.displacements,
-            )?;
-            for life in &robot.lives {
-                let about = [
-                    life.name.clone(),
-                    life.kept.to_string(),
-                    life.distance.to_string(),
-                    life.persists.to_string(),
-                ];
-                row(about, &life.displacements)?;
-            }
-        }
-        writer.into_inner().map_err(|error| csv::Error::from(error.into_error()))
+            let unchanged = row("unchanged", None, &robot.displacements);
+            let changed = robot.lives.iter().map(move |life| {
+                row(life.name.as_str(), Some((life.kept, life.distance, life.persists)), &life.displacements)
+            });
+            std::iter::once(unchanged).chain(changed)
+        });
+        table::csv(columns, rows)
     }
 
     /// Writes it, and its CSV beside it; the files written.
@@ -235,8 +215,7 @@ impl AuditFile {
     /// If they cannot be written.
     pub fn write(&self, path: &Path) -> Result<[PathBuf; 2], Error> {
         let csv_path = path.with_extension("csv");
-        let csv = self.to_csv().map_err(|error| Error::other(error.to_string()))?;
-        for (path, content) in [(path, self.to_json().into_bytes()), (&csv_path, csv)] {
+        for (path, content) in [(path, self.to_json().into_bytes()), (&csv_path, self.to_csv())] {
             write_atomically(path, &content).map_err(|error| Error::writing(path, &error))?;
         }
         Ok([path.to_path_buf(), csv_path])

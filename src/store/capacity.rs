@@ -2,6 +2,7 @@
 
 use crate::base::error::Error;
 use crate::base::files::read_text;
+use crate::base::table;
 use crate::baseline::curve::Crossing;
 use crate::config::reading;
 use crate::store::eval::EvalFile;
@@ -119,28 +120,19 @@ impl CapacityFile {
     }
 
     /// `capacity.csv`: a line per task, network and size.
-    ///
-    /// # Errors
-    /// If it cannot be written to memory.
-    pub fn to_csv(&self) -> Result<Vec<u8>, csv::Error> {
-        let mut writer = csv::Writer::from_writer(Vec::new());
+    pub fn to_csv(&self) -> Vec<u8> {
         let columns =
             ["task", "network", "size", "parameters", "mean", "standard_deviation", "fit", "robots"];
-        writer.write_record(columns)?;
-        for task in &self.tasks {
-            for curve in &task.curves {
-                for point in &curve.points {
-                    let fit = curve.value(point.size as f64).map_or(String::new(), |value| value.to_string());
-                    let mut row = vec![task.task.clone(), curve.network.clone()];
-                    row.extend([point.size, point.parameters].map(|count| count.to_string()));
-                    let deviation = point.standard_deviation.map_or(String::new(), |value| value.to_string());
-                    row.extend([point.mean.to_string(), deviation]);
-                    row.extend([fit, task.accuracy.to_string()]);
-                    writer.write_record(&row)?;
-                }
-            }
-        }
-        writer.into_inner().map_err(|error| csv::Error::from(error.into_error()))
+        let rows = self.tasks.iter().flat_map(|task| {
+            task.curves.iter().flat_map(move |curve| {
+                curve.points.iter().map(move |point| {
+                    let network = (&task.task, &curve.network, point.size, point.parameters);
+                    let fit = curve.value(point.size as f64);
+                    (network, point.mean, point.standard_deviation, fit, task.accuracy)
+                })
+            })
+        });
+        table::csv(columns, rows)
     }
 
     /// Its text.

@@ -3,6 +3,7 @@
 use crate::base::error::Error;
 use crate::base::files::read_text;
 use crate::base::statistics::{bootstrap, standard_deviation, wilson};
+use crate::base::table;
 use crate::config::reading;
 use crate::data::dataset;
 use crate::data::dataset::Dataset;
@@ -317,43 +318,23 @@ impl EvalFile {
     }
 
     /// `eval.csv`: a line per robot.
-    ///
-    /// # Errors
-    /// If it cannot be written to memory.
-    pub fn to_csv(&self) -> Result<Vec<u8>, csv::Error> {
+    pub fn to_csv(&self) -> Vec<u8> {
         let classes: Vec<u8> =
             self.robots.first().map_or(Vec::new(), |robot| robot.per_class.keys().copied().collect());
-        let mut writer = csv::Writer::from_writer(Vec::new());
-        let mut header: Vec<String> = [
-            "id",
-            "run_seed",
-            "task",
-            "objective",
-            "first_group_walks",
-            "right",
-            "images",
-            "accuracy",
-            "accuracy_low",
-            "accuracy_high",
-            "balanced_accuracy",
-        ]
-        .map(str::to_string)
-        .to_vec();
-        header.extend(classes.iter().map(|class| format!("accuracy_{class}")));
-        header.extend(["mean_distance", "not_moved", "unstable", "simulated"].map(str::to_string));
-        writer.write_record(&header)?;
-        for robot in &self.robots {
+        let about = ["id", "run_seed", "task", "objective", "first_group_walks", "right", "images"];
+        let shares = ["accuracy", "accuracy_low", "accuracy_high", "balanced_accuracy"];
+        let columns = about.into_iter().chain(shares).map(str::to_string);
+        let columns = columns.chain(classes.iter().map(|class| format!("accuracy_{class}")));
+        let columns =
+            columns.chain(["mean_distance", "not_moved", "unstable", "simulated"].map(str::to_string));
+        let rows = self.robots.iter().map(|robot| {
             let seed = self.runs.get(robot.run).map_or(self.run_seed, |run| run.seed);
-            let mut row = vec![robot.id.clone(), seed.to_string()];
-            row.extend([robot.task.clone(), robot.objective.to_string()]);
-            row.extend([robot.first_group_walks.clone(), robot.right.to_string(), robot.images.to_string()]);
-            let [low, high] = robot.interval;
-            row.extend([robot.accuracy, low, high, robot.balanced_accuracy].map(|v| v.to_string()));
-            row.extend(robot.per_class.values().map(f64::to_string));
-            row.extend([robot.mean_distance, robot.not_moved].map(|v| v.to_string()));
-            row.extend([robot.unstable, robot.simulated].map(|v| v.to_string()));
-            writer.write_record(&row)?;
-        }
-        writer.into_inner().map_err(|error| csv::Error::from(error.into_error()))
+            let about = (&robot.id, seed, &robot.task, robot.objective, &robot.first_group_walks);
+            let shares = (robot.accuracy, robot.interval, robot.balanced_accuracy);
+            let per_class: Vec<f64> = robot.per_class.values().copied().collect();
+            let simulated = (robot.mean_distance, robot.not_moved, robot.unstable, robot.simulated);
+            (about, robot.right, robot.images, shares, per_class, simulated)
+        });
+        table::csv(columns, rows)
     }
 }

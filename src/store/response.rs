@@ -2,6 +2,7 @@
 
 use crate::base::error::Error;
 use crate::base::files::write_atomically;
+use crate::base::table;
 use crate::body::Body;
 use crate::store::images::DatasetRef;
 use crate::task::perturbation::Condition;
@@ -209,21 +210,14 @@ impl ResponseFile {
     }
 
     /// `response.csv`: a line per robot and place.
-    ///
-    /// # Errors
-    /// If it cannot be written to memory.
-    pub fn to_csv(&self) -> Result<Vec<u8>, csv::Error> {
-        let mut writer = csv::Writer::from_writer(Vec::new());
-        writer.write_record(["id", "row", "column", "material", "slope", "error"])?;
-        for robot in &self.robots {
-            for Place { row, column, slope, error } in &robot.places {
-                let material = robot.body.voxels()[(*row, *column)].code().to_string();
-                let numbers =
-                    [row.to_string(), column.to_string(), material, slope.to_string(), error.to_string()];
-                writer.write_record(std::iter::once(robot.id.clone()).chain(numbers))?;
-            }
-        }
-        writer.into_inner().map_err(|error| csv::Error::from(error.into_error()))
+    pub fn to_csv(&self) -> Vec<u8> {
+        let rows = self.robots.iter().flat_map(|robot| {
+            robot.places.iter().map(|Place { row, column, slope, error }| {
+                let material = robot.body.voxels()[(*row, *column)].code();
+                (&robot.id, *row, *column, material, *slope, *error)
+            })
+        });
+        table::csv(["id", "row", "column", "material", "slope", "error"], rows)
     }
 
     /// Writes it, and its CSV beside it.
@@ -231,8 +225,8 @@ impl ResponseFile {
     /// # Errors
     /// If they cannot be written.
     pub fn write(&self, path: &Path) -> Result<(), Error> {
-        let csv = self.to_csv().map_err(|error| Error::other(error.to_string()))?;
-        for (path, content) in [(path, self.to_json().into_bytes()), (&path.with_extension("csv"), csv)] {
+        let files = [(path, self.to_json().into_bytes()), (&path.with_extension("csv"), self.to_csv())];
+        for (path, content) in files {
             write_atomically(path, &content).map_err(|error| Error::writing(path, &error))?;
         }
         Ok(())

@@ -4,6 +4,7 @@ use crate::base::error::Error;
 use crate::base::files::read_text;
 use crate::base::hash::sha256_hex;
 use crate::base::number;
+use crate::base::table;
 use crate::body::{Body, VoxelCounts};
 use crate::config::Config;
 use crate::genome::Genome;
@@ -273,36 +274,29 @@ impl RunFile {
 
     /// `elites.csv`: what pyribs' `ArchiveDataFrame` reads. `index`: cell; `objective`; `measures_i`: voxel counts (and
     /// task); `solution_i`: voxels row-major; then id, task, generation and displacements.
-    ///
-    /// # Errors
-    /// If it cannot be written to memory.
-    pub fn to_csv(&self) -> Result<Vec<u8>, csv::Error> {
+    pub fn to_csv(&self) -> Vec<u8> {
         let space = self.space();
         let voxels = self.config.body.height * self.config.body.width;
-        let numbered =
-            |name: &str, count: usize| (0..count).map(|i| format!("{name}_{i}")).collect::<Vec<_>>();
-        let mut header = vec!["index".to_string(), "objective".to_string()];
-        header.extend(numbered("measures", self.dimensions.bins.len()));
-        header.extend(numbered("solution", voxels));
-        header.extend(["id", "task", "generation"].map(str::to_string));
-        header.extend(numbered("displacement", self.training_images.len()));
-        let mut writer = csv::Writer::from_writer(Vec::new());
-        writer.write_record(&header)?;
-        for robot in &self.elites {
+        let images = self.training_images.len();
+        let columns = ["index", "objective"].map(str::to_string).into_iter();
+        let columns = columns
+            .chain(table::numbered("measures", self.dimensions.bins.len()))
+            .chain(table::numbered("solution", voxels))
+            .chain(["id", "task", "generation"].map(str::to_string))
+            .chain(table::numbered("displacement", images));
+        let rows = self.elites.iter().map(|robot| {
             let index =
                 space.index(&robot.cell).expect("elites are in cells of their archive: a file's are checked");
             let VoxelCounts { muscle, sensor, total } = robot.voxels;
-            let mut row = vec![index.to_string(), robot.objective.to_string()];
-            row.extend([muscle, sensor, total].map(|count| count.to_string()));
-            row.extend(robot.cell.get(3).map(usize::to_string));
-            row.extend(robot.body.voxels().cells().iter().map(|material| material.code().to_string()));
-            row.extend([robot.id.clone(), robot.task.clone(), robot.generation.to_string()]);
-            row.extend(robot.displacements.iter().map(f64::to_string));
+            let task = robot.cell.get(3).copied();
+            let measures: Vec<usize> = [muscle, sensor, total].into_iter().chain(task).collect();
+            let solution: Vec<u8> = robot.body.voxels().cells().iter().map(|voxel| voxel.code()).collect();
+            let about = (&robot.id, &robot.task, robot.generation);
             // Empty where it did not have to be shown an image.
-            row.resize(header.len(), String::new());
-            writer.write_record(&row)?;
-        }
-        writer.into_inner().map_err(|error| csv::Error::from(error.into_error()))
+            let displacements = table::padded(&robot.displacements, images);
+            (index, robot.objective, measures, solution, about, displacements)
+        });
+        table::csv(columns, rows)
     }
 }
 
