@@ -11,7 +11,7 @@
 //! are. (With g/n alone stiffness and viscosity would both fall with n, and a robot would be
 //! another at every time step.) The length limits remove a share s of an excess per substep; 1 − (1
 //! − s)^(1/n) removes as much in n of them. Drag, gravity, contacts and the floor are forces
-//! already, per time, and stay. Displacements converge as n grows (`docs/audit.md`).
+//! already, per time, and stay. Displacements converge as n grows (`docs/analysing.md`).
 
 use crate::physics::Physics;
 
