@@ -1,4 +1,4 @@
-//! Cost of what is larger than a substep: a life, a generation's lives, an evaluation, and a run's bookkeeping.
+//! Cost of what is larger than a substep: a rollout, a generation's rollouts, an evaluation, and a run's bookkeeping.
 
 mod processor;
 
@@ -17,12 +17,12 @@ use morphcog::store::folder::IfExists;
 use morphcog::store::metrics::Totals;
 use morphcog::store::run::RunFile;
 use morphcog::task::evaluation::{Job, Savings, evaluate};
-use morphcog::task::rollout::fresh_life;
+use morphcog::task::rollout::fresh_rollout;
 use processor::Processor;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-/// The paper's bodies and lives, on built-in digits.
+/// The paper's bodies and rollouts, on built-in digits.
 const OVERRIDES: [&str; 5] = [
     "data.dataset=builtin",
     "data.train_images=[0, 1]",
@@ -48,7 +48,7 @@ fn lives(criterion: &mut Criterion<Processor>) {
         let system = Arc::new(System::new(&specimen.body, config.physics.clone()));
         let stimulus = stimulus(0);
         group.bench_function(specimen.name, |bencher| {
-            bencher.iter(|| fresh_life(&system, &config.protocol, &stimulus, &NEVER));
+            bencher.iter(|| fresh_rollout(&system, &config.protocol, &stimulus, &NEVER));
         });
     }
 }

@@ -212,7 +212,7 @@ fn run_eval(args: EvalArgs, console: &Console) -> Result<(), Error> {
 fn run_replay(args: ReplayArgs, console: &Console) -> Result<(), Error> {
     let ReplayArgs { physical_only, images, dataset, data, format, out, open, .. } = args;
     let (width, every, fps, look) = (args.width, usize::from(args.every), args.fps, args.look);
-    // What is wrong with the file is to be known before the life is lived.
+    // What is wrong with the file is to be known before the simulation starts.
     let named = out.as_deref().map(|path| pictures::Wanted::named(path, &format)).transpose()?;
     let search = one_by_one::Options {
         robots: args.robot,

@@ -421,7 +421,7 @@ fn data_info_and_sheet_work_on_the_built_in_digits() {
 
 // ---- simulate ----
 
-/// A reference life as a scenario file, as it is, results and all.
+/// A reference rollout as a scenario file, as it is, results and all.
 fn scenario(sandbox: &Sandbox, name: &str) -> Reference {
     let text: serde_json::Value = golden(name);
     sandbox.write("scenario.json", serde_json::to_string(&text).unwrap());
@@ -1090,7 +1090,7 @@ fn a_reader_that_goes_away_is_no_error() {
             "{args}: {ended:?}"
         );
     }
-    // Nobody waits for the rest of a life that would take minutes.
+    // Nobody waits for the rest of a rollout that would take minutes.
     let forever = r#"{"body": [[3]], "control_steps": 1000000}"#;
     sandbox.write("forever.json", forever);
     let mut child = sandbox.start("simulate forever.json");

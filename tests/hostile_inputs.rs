@@ -41,7 +41,7 @@ use std::time::{Duration, Instant};
 
 /// No input may take longer: many times what the slowest takes on an idle machine.
 const LIMIT: Duration = Duration::from_secs(20);
-/// Lives may last as long as their file says; so long they are waited for, and then stopped.
+/// Rollouts may last as long as their file says; so long they are waited for, and then stopped.
 const PATIENCE: Duration = Duration::from_millis(500);
 /// Without a word from the user, so long all together.
 const SECONDS: f64 = 3.0;
@@ -236,7 +236,7 @@ fn scenario(world: &World, dice: &mut Dice, case: &mut Case) {
     case.input = world.json("scenario", dice);
     let path = world.sandbox.write("scenario.json", &case.input);
     let Some(scenario) = case.check(Scenario::read(&path), "scenario.json") else { return };
-    // As many rows as somebody reads who then goes.
+    // As many rows as a reader takes before it closes the pipe.
     let (mut rows, begin) = (0, Instant::now());
     let gone = || Error::unstable("scenario.json: nobody reads on".to_string());
     let row = |_| {

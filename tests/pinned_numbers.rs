@@ -95,7 +95,7 @@ fn the_golden_simulations_feel_the_least_change_of_every_constant_or_its_bits_ar
     let physics = Physics::default();
     let Value::Object(constants) = serde_json::to_value(&physics).unwrap() else { panic!("not by name") };
     let lives = references();
-    // Within so many control steps; beyond them, too, but that would take longer.
+    // Within this number of control steps.
     let steps = 100;
     let felt = |name: &str| {
         let changed = nudged(&constants, name);

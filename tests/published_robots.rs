@@ -14,7 +14,7 @@ use morphcog::sim::{Physics, System};
 use morphcog::store::eval::EvalFile;
 use morphcog::task::grouping::Group::{A, B};
 use morphcog::task::protocol::{Life, Protocol};
-use morphcog::task::rollout::{Rollout, fresh_life};
+use morphcog::task::rollout::{Rollout, fresh_rollout};
 use morphcog::task::score::two_group_fitness;
 use morphcog::task::stimulus::{Encoding, Reduction, StimulusParams, stimulus};
 use serde::Deserialize;
@@ -68,7 +68,7 @@ fn displacements(robot: &Published, stimuli: &[Grid<f64>], physics: &Physics) ->
         }
         "four_digit" => {
             let protocol = protocol(Life::Fresh, 250);
-            let life = |stimulus| fresh_life(&system, &protocol, stimulus, &NEVER).unwrap().unwrap();
+            let life = |stimulus| fresh_rollout(&system, &protocol, stimulus, &NEVER).unwrap().unwrap();
             stimuli.iter().map(life).collect()
         }
         other => panic!("no protocol for {other}"),

@@ -34,7 +34,7 @@ fn every_elite_can_be_played_and_nothing_is_loaded() {
         let id = format!("life-0-{}", elite.id);
         assert!(lives.contains(&id.as_str()) && page.contains(&format!("id=\"{id}\"")), "{id}");
     }
-    // What is packed is a life of that robot.
+    // What is packed is a rollout of that robot.
     let id = &run.elites[0].id;
     let packed = between(&page, &format!("id=\"life-0-{id}\">"), "</script>")[0];
     let bytes = base64::Engine::decode(&base64::engine::general_purpose::STANDARD, packed).unwrap();

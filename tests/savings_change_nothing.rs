@@ -58,7 +58,7 @@ fn check(config: &str, images: u64, effective: &[&str]) {
 
 #[test]
 fn two_groups() {
-    // Long enough a life for robots that walk both ways: only a success can end a life early.
+    // Long enough a rollout for robots that walk both ways: only a success can end a rollout early.
     let config = TINY
         .replace("generations = 12", "generations = 30")
         .replace("control_steps = 20", "control_steps = 50");

@@ -1,4 +1,4 @@
-//! `morphcog serve` over HTTP: what it answers, what it refuses, and that lives are the engine's and end when nobody
+//! `morphcog serve` over HTTP: what it answers, what it refuses, and that simulations are the engine's and end when nobody
 //! listens.
 
 // They end the server by signals.
@@ -188,7 +188,7 @@ fn what_is_wrong_is_refused_with_one_line_and_hurts_nothing() {
     );
     let image = json!({ "subject": robot, "shown": { "image": { "set": "builtin", "index": 99_999_999 } } });
     refused(&server.post("/api/lives", &image), 404, "99999999");
-    refused(&server.post("/api/lives/5", &json!({ "paused": true })), 404, "no life 5");
+    refused(&server.post("/api/lives/5", &json!({ "paused": true })), 404, "no simulation 5");
     refused(
         &server.post_text("/api/scenario", "{\"body\": [[3]], \"physics\": {\"substeps\": 9}}"),
         400,
@@ -196,7 +196,7 @@ fn what_is_wrong_is_refused_with_one_line_and_hurts_nothing() {
     );
     refused(&server.post_text("/api/scenario", "{\"body\": [[7]]}"), 400, "scenario:1: body");
 
-    // After all that it is well, and no life has begun.
+    // After all that it is well, and no simulation has begun.
     let status = json_of(&server.get("/api/status"));
     assert_eq!((&status["lives"], &status["begun"]), (&json!(0), &json!(0)));
     server.ended_by("INT");
@@ -357,7 +357,7 @@ fn lives_end_when_nobody_listens_and_only_so_many_run() {
     };
     let mut open: Vec<_> = (0..MAX_LIVES).map(|_| begin()).collect();
     wait_for(MAX_LIVES);
-    refused(&server.post("/api/lives", &request), 503, "lives are running");
+    refused(&server.post("/api/lives", &request), 503, "simulations are running");
     // One stands still when its tab closes.
     let (paused, events) = open.remove(0);
     server.post(&format!("/api/lives/{paused}"), &json!({ "paused": true }));
@@ -368,7 +368,7 @@ fn lives_end_when_nobody_listens_and_only_so_many_run() {
     open.clear();
     wait_for(0);
 
-    // A life that runs does not keep the server from ending; it is told.
+    // A simulation that runs does not keep the server from ending; it is told.
     let (_, events) = begin();
     server.ended_by("TERM");
     assert_eq!(events.last().map(|(name, _)| name), Some("end".to_string()));
@@ -378,7 +378,7 @@ fn lives_end_when_nobody_listens_and_only_so_many_run() {
 fn many_requests_at_once_are_all_answered() {
     let sandbox = Sandbox::new();
     let server = Server::start(&sandbox, "");
-    // Connections that say nothing, as browsers open them, are in nobody's way.
+    // Connections that send nothing, as browsers open them, block no others.
     let _idle: Vec<_> = (0..10).map(|_| server.connect()).collect();
     std::thread::scope(|scope| {
         for _ in 0..16 {

@@ -49,12 +49,12 @@ fn one() -> Vec<[f64; 2]> {
     (0..=12).map(|k| f64::from(k) / 12.0).map(|t| [16.0 - 4.0 * t, 5.0 + 18.0 * t]).collect()
 }
 
-/// Waits for the end of the life under the picture that was chosen last.
+/// Waits for the end of the simulation under the picture that was chosen last.
 fn at_end(tab: &mut Tab) {
     tab.wait("document.documentElement.dataset.state === 'over'");
 }
 
-/// What the robot says in the end of the life under a drawing.
+/// What the robot says in the end of the simulation under a drawing.
 fn answer(tab: &mut Tab, line: &[[f64; 2]]) -> (String, String) {
     draw(tab, line);
     at_end(tab);

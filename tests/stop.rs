@@ -13,7 +13,7 @@ use std::process::{Child, Command, ExitStatus};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-/// An image lasts a million control steps, the most there can be: a life of a minute or more.
+/// An image lasts a million control steps, the most there can be: a rollout of a minute or more.
 const LONG: &str = "--set protocol.control_steps=1000000";
 /// It takes some hundredths of a second; the rest is for machines that have other things to do.
 const SOON: Duration = Duration::from_secs(6);

@@ -48,7 +48,7 @@ impl Session {
         let (send, screen) = channel();
         std::thread::spawn(move || {
             let mut piece = [0; 4096];
-            // A terminal that nobody uses any more is an error to read from.
+            // Reading from a closed terminal is an error.
             while let Ok(count @ 1..) = (&*output).read(&mut piece) {
                 if send.send(piece[..count].to_vec()).is_err() {
                     break;

@@ -5,7 +5,7 @@ mod common;
 use common::program::{Sandbox, TINY, said, without_seconds};
 use morphcog::sim::InstructionSet;
 
-/// Configs that differ in what could depend on timing: kind of life, tasks, images per class.
+/// Configs that differ in what could depend on timing: kind of rollout, tasks, images per class.
 fn configs() -> Vec<(&'static str, String)> {
     let splits = TINY
         .replace("groups = [[0], [1]]", "splits = [0, 1, 2]\nsame_way_bin = true")

@@ -93,7 +93,7 @@ fn robots_are_compared_on_validation_images_without_a_look_at_the_test_images() 
     sandbox.run(&format!("{command} --images 60 --robots top:1")).ended(0, &[]);
     let report = EvalFile::read(&sandbox.path("run/eval-validation.json")).unwrap();
     assert_eq!(report.images, selected);
-    // Nor are those who are named after that; others are shown any.
+    // Nor are robots that are named afterwards; others may be shown any.
     let best = EvalFile::read(&sandbox.path("run/eval-validation.json")).unwrap().robots[0].id.clone();
     sandbox.run(&format!("{command} --images 60 --robots {best}")).ended(0, &[]);
     let report = EvalFile::read(&sandbox.path("run/eval-validation.json")).unwrap();

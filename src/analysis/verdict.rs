@@ -1,21 +1,21 @@
-//! [`Verdict`]: what an audit makes of a robot's perturbed lives, and by which [`Criteria`].
+//! [`Verdict`]: what an audit makes of a robot's perturbed rollouts, and by which [`Criteria`].
 
 use crate::base::number;
 use crate::config::audit::Criteria;
-use crate::store::audit::{PerturbedLife, Verdict};
+use crate::store::audit::{PerturbedRollout, Verdict};
 use crate::task::direction::{Assignment, Direction};
 use crate::task::fitness::Fitness;
 use crate::task::grouping::{Group, Split};
 use crate::task::perturbation::Kind;
 use crate::task::score::Answer;
 
-/// Balanced accuracy of who always walks the same way.
+/// Balanced accuracy of a robot that always walks the same way.
 const CHANCE: f64 = 0.5;
 
 /// How a robot is to walk, and how it does in its own simulator.
 pub(crate) struct Behaviour<'a> {
     criteria: &'a Criteria,
-    /// Displacements in the unchanged life.
+    /// Displacements in the unchanged rollout.
     plain: Vec<f64>,
     /// For each image whether its class is to walk right; none if it is in no group.
     rightward: Vec<Option<bool>>,
@@ -76,8 +76,8 @@ impl<'a> Behaviour<'a> {
         self.flaw.is_none()
     }
 
-    /// Compares a perturbed life with the unchanged one.
-    pub fn compare(&self, name: String, kind: Kind, displacements: Option<Vec<f64>>) -> PerturbedLife {
+    /// Compares a perturbed rollout with the unchanged one.
+    pub fn compare(&self, name: String, kind: Kind, displacements: Option<Vec<f64>>) -> PerturbedRollout {
         let along = |of: &[f64], image: usize| towards(self.rightward[image], of[image]);
         let (mut kept, mut distance) = (0.0, 0.0);
         if let Some(changed) = &displacements {
@@ -88,11 +88,11 @@ impl<'a> Behaviour<'a> {
             distance = if whole > 0.0 { sum(changed) / whole } else { 0.0 };
         }
         let persists = kept >= self.criteria.least_kept && distance >= self.criteria.least_distance;
-        PerturbedLife { name, kind, displacements, kept, distance, persists }
+        PerturbedRollout { name, kind, displacements, kept, distance, persists }
     }
 
     /// Verdict and reason.
-    pub fn judge(&self, lives: &[PerturbedLife]) -> (Verdict, String) {
+    pub fn judge(&self, lives: &[PerturbedRollout]) -> (Verdict, String) {
         if let Some(flaw) = &self.flaw {
             return (Verdict::NotAWalker, flaw.clone());
         }
@@ -107,7 +107,7 @@ impl<'a> Behaviour<'a> {
         };
         let (artefacts, mut broken) = (names(false), names(true));
         if artefacts.is_empty() && broken.is_empty() {
-            return (Verdict::Physical, format!("persists in all {} changed lives", lives.len()));
+            return (Verdict::Physical, format!("persists in all {} changed rollouts", lives.len()));
         }
         if is_robust && !artefacts.is_empty() {
             return (Verdict::Exploits, artefacts.join(", "));
@@ -116,9 +116,9 @@ impl<'a> Behaviour<'a> {
         (Verdict::Fragile, broken.join(", "))
     }
 
-    /// Root mean square difference of the perturbed lives' displacements from the unchanged ones, voxel lengths;
-    /// unstable lives have none.
-    pub fn spread(&self, lives: &[PerturbedLife]) -> f64 {
+    /// Root mean square difference of the perturbed rollouts' displacements from the unchanged ones, voxel lengths;
+    /// unstable rollouts have none.
+    pub fn spread(&self, lives: &[PerturbedRollout]) -> f64 {
         let stable = lives.iter().filter_map(|life| life.displacements.as_ref());
         let squares: Vec<f64> =
             stable.flat_map(|d| d.iter().zip(&self.plain).map(|(a, b)| (a - b) * (a - b))).collect();

@@ -15,7 +15,7 @@ pub enum ErrorKind {
     Usage,
     /// A file the user gave is missing, broken or of the wrong kind.
     Input,
-    /// A simulated life became unstable (`simulate` only).
+    /// A simulated rollout became unstable (`simulate` only).
     Unstable,
     /// Something is in the way: a run folder that exists, or is in use.
     Occupied,
@@ -85,7 +85,7 @@ impl Error {
         Error::new(ErrorKind::Other, message)
     }
 
-    /// An unstable life.
+    /// An unstable rollout.
     pub fn unstable(message: String) -> Self {
         Error::new(ErrorKind::Unstable, message)
     }

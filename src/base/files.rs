@@ -42,7 +42,7 @@ pub fn write_atomically(path: &Path, content: &[u8]) -> io::Result<()> {
     prefix.extend([name, OsStr::new(".")]);
     let mut builder = tempfile::Builder::new();
     // Opened here: with the permissions of any new file, not a temporary file's owner-only; and so that what the system says
-    // does not name a file that nobody asked for.
+    // does not name a file that the user did not ask for.
     let open = |name: &Path| File::options().write(true).create_new(true).open(name);
     let mut file = builder.prefix(&prefix).suffix(TEMPORARY[1]).make_in(folder, open)?;
     file.as_file_mut().write_all(content)?;

@@ -1,6 +1,6 @@
 //! Numbers for people: the one place where tables, labels and messages get theirs from.
 
-/// A number with so many decimals. What rounds to nothing has no sign: there is no −0.00.
+/// A number with a fixed number of decimals. What rounds to 0 has no sign: there is no −0.00.
 pub fn fixed(value: f64, decimals: usize) -> String {
     unsigned_zero(format!("{value:.decimals$}"))
 }

@@ -18,7 +18,7 @@ pub trait Observer: Sync {
     fn warning(&self, _text: &str) {}
 }
 
-/// Tells nobody.
+/// Ignores everything.
 impl Observer for () {}
 
 /// Work that is counted.

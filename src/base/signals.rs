@@ -11,14 +11,14 @@ use std::sync::{Arc, OnceLock};
 /// Exit code after a second SIGINT: the shell's for a process that SIGINT ended.
 const AT_ONCE: i32 = 130;
 
-/// Whether signals are nobody's: they then end the process.
+/// Whether no flag watches signals; they then end the process.
 static UNUSED: OnceLock<Arc<AtomicBool>> = OnceLock::new();
 
-/// A flag that SIGINT, SIGTERM and SIGUSR1 set as long as there is somebody who looks at it.
+/// A flag that SIGINT, SIGTERM and SIGUSR1 set as long as this exists.
 #[derive(Debug)]
 pub struct StopFlag {
     stop: Arc<AtomicBool>,
-    /// What there was before: signals of somebody else, or of nobody.
+    /// Whether another flag watched signals before.
     were_unused: bool,
 }
 

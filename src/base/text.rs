@@ -10,7 +10,7 @@ pub fn one_line(text: &str) -> String {
     shortened(text, MOST)
 }
 
-/// [`one_line`] of about so many characters at most.
+/// [`one_line`], cut to about this number of characters.
 pub fn shortened(text: &str, most: usize) -> String {
     let begin: String = text.chars().take(most + 1).map(written).collect();
     let is_whole = text.chars().nth(most).is_none();

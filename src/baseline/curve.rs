@@ -11,7 +11,7 @@ use std::fmt;
 pub enum Crossing {
     /// At this size. A number in JSON.
     At(f64),
-    /// It is above the value at the smallest size of all already. An object in JSON: nobody is to take the bound for the size.
+    /// It is above the value at the smallest size already. An object in JSON, so that the bound is not mistaken for the size.
     Below {
         /// That smallest size.
         below: f64,

@@ -16,7 +16,7 @@ impl Activation {
 }
 
 impl Pooling {
-    /// Rows and columns of pixels that become one, in a map of so many.
+    /// Rows and columns of pixels that become one, in a map of this side.
     fn window(self, (rows, columns): (usize, usize)) -> (usize, usize) {
         match self {
             Pooling::None => (1, 1),

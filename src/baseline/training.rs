@@ -46,7 +46,7 @@ impl Samples {
     }
 }
 
-/// Images judged at once: what networks make of so many stays in a core's nearest memory.
+/// Images judged at once \[images\]: activations of this many stay in a core's cache; with more, it is slower.
 const JUDGED_AT_ONCE: usize = 64;
 
 /// Why a training has no result.

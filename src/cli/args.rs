@@ -86,7 +86,7 @@ Examples:
   morphcog eval --archive runs/zero_one-seed*/run.json --robots random:10 --physical-only    the paper's test
   morphcog eval --robots gallery                       the robots published with the paper")]
     Eval(EvalArgs),
-    /// Tell robots that walk from robots that live off the simulator.
+    /// Check whether robots walk or exploit the simulator.
     #[command(after_help = audit::EXAMPLES)]
     Audit(AuditArgs),
     /// Find the networks that robots are worth.

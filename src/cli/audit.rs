@@ -63,7 +63,7 @@ pub(super) fn run(args: AuditArgs, console: &Console) -> Result<(), Error> {
     let (archives, chosen) = (&args.archives.archive, selected(args.robots.clone())?);
     let chosen = chosen.unwrap_or(Selection::All);
     let sources = sources(archives, &chosen)?;
-    // Whom to audit is known of all runs before the first life.
+    // Which robots to audit is known for all runs before the first rollout.
     let asked = match archives.is_empty() {
         true => vec![Some(chosen)],
         false => {

@@ -55,7 +55,7 @@ pub(super) fn run(args: ReportArgs, console: &Console) -> Result<(), Error> {
     let lives = args.lives.div_ceil(archives.len());
     let content = Content { gathered: &gathered, lives };
     let page = {
-        let counter = console.counter("living lives for the page:", content.count() as u64, "lives");
+        let counter = console.counter("simulating for the page:", content.count() as u64, "rollouts");
         content.page(&|lived| counter.update(lived))
     };
     let page = page?;

@@ -13,7 +13,7 @@ use crate::config::audit::Criteria;
 use crate::data::dataset::Split;
 use crate::search::training::Training;
 use crate::sim::{Energy, System};
-use crate::store::audit::{AuditFile, PerturbedLife, RobotAudit};
+use crate::store::audit::{AuditFile, PerturbedRollout, RobotAudit};
 use crate::store::folder::check_out;
 use crate::store::names::AUDIT_JSON;
 use crate::store::robots;
@@ -31,10 +31,10 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
-/// Robots whose lives are lived side by side; what is finished is saved after so many.
+/// Robots that are simulated side by side; finished ones are saved after this many.
 const BATCH: usize = 8;
 
-/// Most training images of a class that a robot is audited on: it lives them some twenty times.
+/// Most training images of a class that a robot is audited on: it sees each some twenty times.
 const IMAGES_PER_CLASS: usize = 16;
 
 /// Whose robots are audited.
@@ -225,7 +225,7 @@ fn training_of(run: &RunFile, path: &Path, whereabouts: &Whereabouts) -> Result<
         seen.map_err(|error| error.within("training_images").within(&path.display().to_string()))
     };
     let (dataset, stimuli) = (run.dataset.clone(), images.iter().map(see).collect::<Result<Vec<_>, Error>>());
-    // As in a test, every life is lived under the same conditions, however the robot was trained.
+    // As in a test, every rollout has the same conditions, however the robot was trained.
     let conditions = Vec::new();
     Ok(Training { dataset, images, stimuli: stimuli?, conditions })
 }
@@ -273,10 +273,10 @@ impl Trial {
             Some(behaviour.compare(perturbation.name(), perturbation.kind, walked))
         };
         let perturbations = self.perturbations(subject);
-        let lives: Vec<PerturbedLife> = match behaviour.is_walker() {
+        let lives: Vec<PerturbedRollout> = match behaviour.is_walker() {
             true => {
                 let lives: Option<Vec<_>> = perturbations.par_iter().map(life).collect();
-                let counts = |(life, perturbation): &(PerturbedLife, &Perturbation)| {
+                let counts = |(life, perturbation): &(PerturbedRollout, &Perturbation)| {
                     life.displacements.is_some() || perturbation.counts_if_unstable()
                 };
                 lives?.into_iter().zip(&perturbations).filter(counts).map(|(life, _)| life).collect()
@@ -304,7 +304,7 @@ impl Trial {
     }
 }
 
-/// Displacements of a life, and energies if they are to be `measured`; `None` if it is unstable.
+/// Displacements of a rollout, and energies if they are to be `measured`; `None` if it is unstable.
 fn live(setting: &Setting, measured: bool, stop: &AtomicBool) -> Result<Option<(Vec<f64>, Energy)>, Stopped> {
     let Setting { body, physics, protocol, stimuli } = setting;
     if measured {
@@ -331,7 +331,7 @@ mod tests {
     use crate::store::images::{DatasetRef, ImageRef};
     use crate::task::protocol::{Life, Protocol};
 
-    /// Two images, of classes 0 and 1, the first dark and the second bright, each in a fresh life of five cycles.
+    /// Two images, of classes 0 and 1, the first dark and the second bright, each in a fresh rollout of five cycles.
     fn trial(height: usize, width: usize, physics: Physics) -> Trial {
         let set = ["task={splits=[0,1],same_way_bin=true}", "protocol.control_steps=250"].map(str::to_string);
         let mut config = Config::parse(BUILT_IN[0].1, BUILT_IN[0].0, &set).unwrap();

@@ -70,11 +70,11 @@ pub fn specimens() -> Vec<Specimen> {
 
 /// Control steps of one repetition: one actuation cycle.
 const STEPS: u32 = 50;
-/// Control steps lived before measuring: the robot has landed and walks.
+/// Control steps before measuring: the robot has landed and walks.
 const WARM_UP: u32 = 50;
 
 /// Measures one body on one instruction set: the median of up to `repetitions` repetitions of fifty control steps of one
-/// life, fewer if they take longer than two seconds.
+/// rollout, fewer if they take longer than two seconds.
 pub fn measure(specimen: &Specimen, set: InstructionSet, repetitions: usize) -> Speed {
     let physics = Physics::default();
     let start = Start { column: 493, row: physics.ground_row };
@@ -85,7 +85,7 @@ pub fn measure(specimen: &Specimen, set: InstructionSet, repetitions: usize) -> 
     let mut live = |steps: u32| {
         let begin = thread_time();
         for _ in 0..steps {
-            // An unstable life starts again; that costs no more than a step.
+            // An unstable rollout starts again; that costs no more than a step.
             if world.step().is_err() {
                 world.reset();
             }

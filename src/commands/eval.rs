@@ -184,7 +184,7 @@ pub fn eval(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Re
     Ok(Finished { file: report, unwritten: unwritten.error() })
 }
 
-/// The name of the results beside a run.json if nobody says otherwise.
+/// The default name of the results beside a run.json.
 pub fn own_name(split: HeldOut) -> &'static str {
     match split {
         HeldOut::Test => EVAL_JSON,

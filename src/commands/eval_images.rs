@@ -125,7 +125,7 @@ fn labelled(list: &[(Grid<f64>, u8)]) -> Vec<Labelled<'_>> {
     list.iter().map(|(stimulus, class)| Labelled { stimulus, class: *class }).collect()
 }
 
-/// Validation images that robots of each run are chosen by, if they are, now or before: whoever is named may be one of the best
+/// Validation images that robots of each run are chosen by, now or before: a robot that is named may be one of the best
 /// of `validation.json`.
 fn chosen_by(
     config: &Config,

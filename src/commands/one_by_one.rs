@@ -70,7 +70,7 @@ pub fn named(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> R
     Ok(all)
 }
 
-/// The so many best of each task of a run on validation images.
+/// The best of each task of a run on validation images, this many.
 fn ranked<'a>(
     options: &Options,
     source: &'a Source,

@@ -1,4 +1,4 @@
-//! `morphcog replay`: record a robot's life, for the pictures.
+//! `morphcog replay`: record a robot's rollout, for the pictures.
 
 use crate::analysis::gallery;
 use crate::base::error::Error;
@@ -64,10 +64,10 @@ pub struct Options {
     pub dataset: Option<String>,
 }
 
-/// A robot's life, and where it is from.
+/// A robot's rollout, and where it is from.
 #[derive(Clone, Debug)]
 pub struct Replay {
-    /// The life.
+    /// The rollout.
     pub recording: Recording,
     /// What a page says about it: words and values.
     pub about: Vec<(String, String)>,
@@ -75,7 +75,7 @@ pub struct Replay {
     pub name: String,
 }
 
-/// A robot and what it is shown: a life before it is lived.
+/// A robot and what it is shown, before it is simulated.
 #[derive(Clone, Debug)]
 pub struct Subject {
     /// The robot.
@@ -84,7 +84,7 @@ pub struct Subject {
     pub images: Vec<(String, Grid<f64>)>,
 }
 
-/// Records a robot's life as its config's protocol has it.
+/// Records a robot's rollout as its config's protocol has it.
 ///
 /// # Errors
 /// What is wrong with robot, archive, images or data.
@@ -97,7 +97,7 @@ pub fn replay(options: &Options) -> Result<Replay, Error> {
         "Images".to_string(),
         format!("{}, {:?} encoding", config.data.dataset, config.stimulus.encoding).to_lowercase(),
     ));
-    let life = if fresh { "a fresh life for every image" } else { "one continuous life" };
+    let life = if fresh { "a fresh rollout for every image" } else { "one continuous rollout" };
     about.push((
         "Protocol".to_string(),
         format!("{life}, {} control steps each", config.protocol.control_steps),
@@ -105,7 +105,7 @@ pub fn replay(options: &Options) -> Result<Replay, Error> {
     Ok(Replay { recording, about, name })
 }
 
-/// Records a life.
+/// Records a rollout.
 pub fn record_subject(subject: &Subject) -> Recording {
     let Subject { found: Found { name, body, config, .. }, images } = subject;
     let fresh = config.protocol.life == Life::Fresh;
@@ -169,14 +169,14 @@ pub fn subject(options: &Options) -> Result<Subject, Error> {
     Ok(Subject { found, images })
 }
 
-/// Whether a life under so many images can be recorded: a recording holds every point at every moment.
+/// Whether a simulation under this number of images can be recorded: a recording holds every point at every moment.
 pub(crate) fn check_length(config: &Config, images: usize) -> Result<(), Error> {
     let points = (config.body.height + 1) * (config.body.width + 1);
     let most = MOST_PLACES / points / images.max(1);
     let steps = config.protocol.control_steps;
     match steps as usize > most {
         true => Err(Error::input(format!(
-            "protocol.control_steps = {steps}: expected at most {most} to record a life under {images} images"
+            "protocol.control_steps = {steps}: expected at most {most} to record a rollout under {images} images"
         ))
         .hint("show fewer images".to_string())),
         false => Ok(()),
@@ -193,7 +193,7 @@ fn some(images: &[ImageRef]) -> Vec<ImageRef> {
     some
 }
 
-/// A robot and how it lives.
+/// A robot and how it is simulated.
 #[derive(Clone, Debug)]
 pub struct Found {
     /// Its id, or its name in the gallery.

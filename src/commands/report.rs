@@ -18,7 +18,7 @@ use crate::task::recording::Recording;
 use crate::task::rollout::record;
 use std::path::{Path, PathBuf};
 
-/// Most images in the lives of a page: one of each class, if there are more.
+/// Most images in the rollouts of a page: one of each class, if there are more.
 const MOST_IMAGES: usize = 4;
 
 /// All that is known of a run.
@@ -149,7 +149,7 @@ fn images(run: &RunFile, path: &Path, whereabouts: &Whereabouts) -> Result<Vec<(
 }
 
 impl Dossier {
-    /// The life of a robot under the images.
+    /// The rollout of a robot under the images.
     pub fn record(&self, robot: &Robot) -> Recording {
         let config = &self.run.config;
         let fresh = config.protocol.life == Life::Fresh;

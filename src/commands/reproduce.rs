@@ -159,7 +159,7 @@ impl Job<'_> {
         Ok(Some(sources))
     }
 
-    /// Robots of each task, drawn at random one after the other and audited, until so many are found physical as are wanted
+    /// Robots of each task, drawn at random one after the other and audited, until enough are physical
     /// or there are no more. If they are too few, the first of those take part, too, that are not found to exploit the
     /// simulator: the paper, which sorted out by eye, kept such. With them, counts by task. `None` if stopped.
     fn chosen<'s>(&self, sources: &'s [Source]) -> Result<Option<Drawn<'s>>, Error> {

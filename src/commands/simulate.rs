@@ -20,7 +20,7 @@ use std::path::Path;
 pub struct Scenario {
     /// The body, rows of 0…6.
     pub body: Body,
-    /// One stimulus for the whole life: H × W in [0, 1].
+    /// One stimulus for the whole simulation: H × W in [0, 1].
     stimulus: Option<Grid<f64>>,
     /// Or several, each shown for `switch_every` control steps, again from the first after the last.
     #[serde(default, deserialize_with = "bounded")]
@@ -106,7 +106,7 @@ fn paper_column() -> i64 {
     493
 }
 
-/// Default length of a life: ten actuation cycles.
+/// Default length of a simulation: ten actuation cycles.
 const CONTROL_STEPS: u64 = 500;
 
 impl Scenario {
@@ -192,18 +192,18 @@ impl Scenario {
         &self.physics
     }
 
-    /// Control steps of the life.
+    /// Control steps of the simulation.
     pub fn control_steps(&self) -> u64 {
         let shown = self.switch_every.map(|every| every.saturating_mul(self.stimuli().len() as u64));
         self.control_steps.or(shown).unwrap_or(CONTROL_STEPS)
     }
 }
 
-/// Lives the scenario; `line` gets the CSV's lines: `step,com_x,com_y`, then the centre of mass \[world units\] before
+/// Simulations the scenario; `line` gets the CSV's lines: `step,com_x,com_y`, then the centre of mass \[world units\] before
 /// the first and after every control step.
 ///
 /// # Errors
-/// [`crate::base::error::ErrorKind::Unstable`] if the life ends early, and what `line` says.
+/// [`crate::base::error::ErrorKind::Unstable`] if the simulation ends early, and what `line` says.
 pub fn simulate(scenario: &Scenario, mut line: impl FnMut(String) -> Result<(), Error>) -> Result<(), Error> {
     line("step,com_x,com_y\n".to_string())?;
     let mut row = |step: u64, [x, y]: [f64; 2]| line(format!("{step},{},{}\n", digits17(x), digits17(y)));
@@ -228,7 +228,7 @@ pub fn simulate(scenario: &Scenario, mut line: impl FnMut(String) -> Result<(), 
             }
         }
         world.step().map_err(|unstable| {
-            // With resets the life's own clock starts again; what is reported counts the scenario's steps.
+            // With resets the simulation's own clock starts again; what is reported counts the scenario's steps.
             let unstable = crate::sim::Unstable { control_step: step, ..unstable };
             Error::unstable(unstable.to_string())
         })?;
@@ -237,7 +237,7 @@ pub fn simulate(scenario: &Scenario, mut line: impl FnMut(String) -> Result<(), 
     Ok(())
 }
 
-/// Writes the CSV of a scenario's file to a file, also of a life that ends unstable, up to its end.
+/// Writes the CSV of a scenario's file to a file, also of a simulation that ends unstable, up to its end.
 ///
 /// # Errors
 /// As [`Scenario::read`] and [`simulate`], and if the file cannot be written, or is the scenario's.

@@ -12,17 +12,17 @@ use std::path::Path;
 pub struct Criteria {
     /// A walk this far or shorter is no answer \[voxel lengths\]. Default 3, as in `eval`.
     pub threshold: f64,
-    /// In a changed life a walk the right way that is longer than this is an answer still \[voxel lengths\]: else whoever
-    /// walks just beyond the threshold would be called an exploiter for a hair's breadth. Default 1.5.
+    /// The same in a changed simulation \[voxel lengths\]. Lower than `threshold`, so that borderline walkers do not fail on a tiny
+    /// change. Default 1.5.
     pub least_walk: f64,
     /// A walker answers at least this share of its training images, right or wrong. Default 0.75.
     pub least_answered: f64,
-    /// A life persists if at least this share of the images answered right still is. Default 0.9.
+    /// A rollout persists if at least this share of the images answered right still is. Default 0.9.
     pub least_kept: f64,
     /// And if the walks under them, together, are at least this share of what they were. Default 0.5.
     pub least_distance: f64,
-    /// Who keeps at least this share of the lives in a changed world (stiffness, friction, gravity, pixels) is robust; if
-    /// another change breaks it all the same, it exploits what was changed, else it is fragile. Default 0.75.
+    /// A robot that keeps at least this share of the rollouts in a changed world (stiffness, friction, gravity, pixels) is robust; if
+    /// another change breaks it, it exploits what was changed; otherwise it is fragile. Default 0.75.
     pub least_robust: f64,
     /// Which changes, and how large.
     pub perturbations: Sizes,

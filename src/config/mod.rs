@@ -132,7 +132,7 @@ pub struct DataConfig {
     /// Folder of its files, if neither `--data` nor `MORPHCOG_DATA` says one, nor the run where they were. Default `data/<dataset>`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub dir: Option<PathBuf>,
-    /// Training images by index, in the order in which a sequential life sees them.
+    /// Training images by index, in the order in which a sequential rollout sees them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub train_images: Option<Vec<usize>>,
     /// Without `train_images`: this many of each class, drawn by the run's seed. Default 1.
@@ -173,9 +173,9 @@ pub struct ArchiveConfig {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct CheckpointConfig {
-    /// Every so many generations. Default 1000.
+    /// Generations between two checkpoints. Default 1000; larger values lose more at a power cut.
     pub generations: u64,
-    /// Every so many seconds. Default 60.
+    /// Seconds between two checkpoints. Default 60.
     pub seconds: f64,
 }
 

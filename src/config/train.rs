@@ -20,7 +20,7 @@ pub struct TrainConfig {
     /// Training images that a round shows. Default 120: with fewer, slopes are noisier, and the constant is off.
     pub images: usize,
     /// Training images under which designs and challengers are compared, half of them near the boundary. Default 400: with fewer,
-    /// challengers win by knowing those by heart.
+    /// challengers win by chance.
     pub final_images: usize,
     /// Bodies that challenge the best design, in sensors or in a few voxels of any material. Default 60; later ones win more seldom.
     pub challengers: usize,

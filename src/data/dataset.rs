@@ -125,7 +125,7 @@ impl Dataset {
         self.folder.as_deref()
     }
 
-    /// Name, folder, and who named that: for messages.
+    /// Name, folder, and what named that folder: for messages.
     pub fn place(&self) -> String {
         match &self.folder {
             Some(folder) => format!("{} in {} ({})", self.name, folder.display(), self.origin),

@@ -72,7 +72,7 @@ pub(crate) fn check(config: &Config, dataset: &Dataset) -> Result<(), Error> {
 
 /// `count` validation images of some runs of one experiment together, evenly divided between the classes, which take turns: so
 /// are the first of them. Of the same runs, in whichever order, they are always the same, and fewer of them the first of more. `asked` says
-/// where so many were asked for.
+/// where this number was asked for.
 ///
 /// # Errors
 /// If there are not enough images.

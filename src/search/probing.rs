@@ -65,7 +65,7 @@ impl Probing {
     }
 }
 
-/// The response that so many rollouts tell, unstable ones left out of `shown`; `None` if most are unstable, or too few stable.
+/// The response according to the stable rollouts `shown`, out of `rollouts`; `None` if most are unstable, or too few stable.
 pub fn response(shown: &[Shown], rollouts: usize) -> Option<Response> {
     if 2 * shown.len() > rollouts { Response::of(shown) } else { None }
 }

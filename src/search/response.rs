@@ -40,7 +40,7 @@ pub(crate) fn opposites(stimuli: &[Grid<f64>], physics: &Physics, seed: u64) -> 
     (0..half).flat_map(pair).collect()
 }
 
-/// Under what each of so many images is shown: both of a pair under the same.
+/// The condition of each image; both images of a pair have the same.
 pub(crate) fn conditions(images: usize) -> Vec<Condition> {
     of_response()
         .into_iter()

@@ -14,7 +14,7 @@ pub const THRESHOLD: f64 = 3.0;
 /// Actuation cycles per image in the paper's test.
 pub const CYCLES: u32 = 10;
 
-/// Control steps of so many actuation cycles.
+/// Control steps of this number of actuation cycles.
 pub(crate) fn control_steps(config: &Config, cycles: u32) -> u32 {
     cycles.saturating_mul(config.physics.cycle_steps)
 }
@@ -37,14 +37,14 @@ pub(crate) struct Walker<'a> {
 }
 
 impl Walker<'_> {
-    /// A validation begins: so many robots, the best of them on so many images; showings in all.
+    /// A validation begins: number of robots, of images for the best of them, and of simulations in all.
     pub fn validating(&self, robots: usize, images: usize, showings: u64) {
         let label = format!("validating {robots} robots on up to {images} images:");
         self.observer.begins(&Work::new(label, showings, "rollouts"));
     }
 
-    /// The displacement under each image (`None`: unstable), and the number of lives it took: images that show the sensors
-    /// the same pixels are one life. `None` if stopped before the end.
+    /// The displacement under each image (`None`: unstable), and the number of rollouts it took: images that show the sensors
+    /// the same pixels share a rollout. `None` if stopped before the end.
     pub fn lives(&self, robot: &Robot, stimuli: &[Grid<f64>]) -> Option<(Vec<Option<f64>>, usize)> {
         let Walker { config, stop, observer, done, .. } = self;
         let protocol =

@@ -16,7 +16,7 @@ use std::path::Path;
 pub struct Training {
     /// Where they come from.
     pub dataset: DatasetRef,
-    /// The images, in the order in which a sequential life sees them.
+    /// The images, in the order in which a sequential rollout sees them.
     pub images: Vec<ImageRef>,
     /// What the sensors see of each: H × W in [0, 1]. Where a response is measured, as many images of their pixels.
     pub stimuli: Vec<Grid<f64>>,

@@ -73,7 +73,7 @@ pub fn validate(
     ranked(&source, count, &dataset, &pool, stop, observer)
 }
 
-/// The same when a run ends, of the so many best that its config asks for, on data that are loaded already.
+/// The same when a run ends, for as many robots as its config asks for, on data that are loaded already.
 ///
 /// # Errors
 /// As of [`validate`].

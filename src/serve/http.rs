@@ -96,7 +96,7 @@ impl Response {
     /// Sends it; of an answer to HEAD the head only.
     ///
     /// # Errors
-    /// If nobody takes it.
+    /// If the reader has gone.
     pub fn send(&self, stream: &mut TcpStream, head_only: bool) -> io::Result<()> {
         let allow = self.allow.map_or(String::new(), |methods| format!("Allow: {methods}\r\n"));
         let length = format!("Content-Length: {}\r\n", self.body.len());
@@ -138,7 +138,7 @@ fn head(status: u16, content_type: &str, more: &str) -> String {
 /// Begins an answer that is a stream of server-sent events, which lasts until the connection is closed.
 ///
 /// # Errors
-/// If nobody takes it.
+/// If the reader has gone.
 pub fn begin_events(stream: &mut TcpStream) -> io::Result<()> {
     stream.set_nodelay(true)?;
     stream.write_all(head(200, "text/event-stream", "").as_bytes())

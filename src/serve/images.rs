@@ -94,7 +94,7 @@ impl ImageSets {
         found.ok_or_else(|| Refusal::Unknown(format!("there is no set of images {name:?}")))
     }
 
-    /// `count` images of a class, from the so manieth on.
+    /// `count` images of a class, starting at number `from`.
     ///
     /// # Errors
     /// If there is no such set.

@@ -1,4 +1,4 @@
-//! One life, simulated at the pace that is asked for, and told moment by moment.
+//! One simulation at the pace that is asked for, reported moment by moment.
 
 use crate::serve::judge::{Answer, answer};
 use crate::serve::lives::{Control, Slot};
@@ -11,24 +11,24 @@ use std::time::{Duration, Instant};
 
 /// Control steps in a second of a robot's own time.
 pub const STEPS_PER_SECOND: f64 = 50.0;
-/// Moments that are told together where nobody waits for each.
+/// Moments that are sent together when the simulation runs as fast as possible.
 const BATCH: u32 = 20;
 /// Time from one telling to the next in real time.
 const TICK: Duration = Duration::from_millis(40);
 /// What takes longer is told in parts.
 const MOST_AT_ONCE: Duration = Duration::from_millis(100);
-/// How often a life that stands still says that it is there; so it learns, too, that nobody listens any more.
+/// How often a paused simulation sends a sign of life; so it notices that the page was closed.
 const HEARTBEAT: Duration = Duration::from_millis(400);
-/// A life that cannot keep its pace does not try to make up for more than this.
+/// A simulation that cannot keep its pace does not try to make up for more than this.
 const MOST_BEHIND: f64 = 0.5;
 
-/// What is told of a life.
+/// What a simulation reports.
 pub enum Event<'a> {
     /// It begins, at rest.
     Begin {
         /// Its number.
         id: u64,
-        /// Who lives, and what is shown for how long.
+        /// The robot, and what is shown for how long.
         plan: &'a Plan,
         /// The voxels with their corners.
         voxels: Vec<VoxelCorners>,
@@ -44,9 +44,9 @@ pub enum Event<'a> {
         /// The image.
         seen: &'a Seen,
     },
-    /// It lived on.
+    /// It went on.
     Lived {
-        /// Control steps lived at the last of the moments.
+        /// Control steps simulated at the last of the moments.
         step: u32,
         /// The moments, one per control step.
         frames: &'a [Frame],
@@ -57,7 +57,7 @@ pub enum Event<'a> {
     Still,
     /// It has ended.
     End {
-        /// Control steps lived.
+        /// Control steps simulated.
         step: u32,
         /// What it has come to.
         answer: Answer,
@@ -70,7 +70,7 @@ pub enum Event<'a> {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Gone;
 
-/// Lives a life; `tell` is told what happens.
+/// Runs a simulation; `tell` gets what happens.
 ///
 /// # Errors
 /// [`Gone`] as soon as `tell` says so.
@@ -136,7 +136,7 @@ pub fn live(slot: &Slot, plan: &Plan, mut tell: impl FnMut(Event) -> Result<(), 
 struct Clock {
     pace: Pace,
     paused: bool,
-    /// The moment at which `first` control steps had been lived; none before the first look.
+    /// The moment at which `first` control steps had been simulated; none before the first look.
     begin: Option<(Instant, u32)>,
 }
 
@@ -153,7 +153,7 @@ impl Clock {
         }
     }
 
-    /// How many control steps are due after so many lived; none if it stands still.
+    /// Number of control steps that are due; none if it is paused.
     fn due(&mut self, step: u32) -> Option<u32> {
         let Pace::Times(times) = self.pace else {
             return (!self.paused).then_some(BATCH);

@@ -7,15 +7,15 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-/// Most lives at once.
+/// Most simulations at once.
 pub const MAX_LIVES: usize = 8;
 
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    // What is kept under the locks is whole after every statement, whoever panicked.
+    // What the locks guard is whole after every statement, even if a thread panicked.
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// What a life is to do now.
+/// What a simulation is to do now.
 #[derive(Debug, Default)]
 struct Wishes {
     pace: Option<Pace>,
@@ -23,9 +23,9 @@ struct Wishes {
     seen: Option<Seen>,
 }
 
-/// The way to a life that runs in another thread.
+/// The way to a simulation that runs in another thread.
 pub struct Control {
-    /// Who lives.
+    /// The robot.
     pub who: Who,
     wishes: Mutex<Wishes>,
     changed: Condvar,
@@ -33,7 +33,7 @@ pub struct Control {
     pub(crate) over: AtomicBool,
 }
 
-/// What has been asked of a life since it last looked.
+/// What has been asked of a simulation since it last looked.
 #[derive(Debug, Default)]
 pub(crate) struct News {
     pub pace: Option<Pace>,
@@ -94,13 +94,13 @@ struct Running {
     closed: bool,
 }
 
-/// The lives that run.
+/// The simulations that run.
 #[derive(Default)]
 pub struct Lives {
     running: Mutex<Running>,
 }
 
-/// A life's place among [`Lives`], free again when this goes.
+/// A simulation's place among [`Lives`], free again when this goes.
 pub struct Slot<'a> {
     lives: &'a Lives,
     /// Its number.
@@ -117,7 +117,7 @@ impl Lives {
     pub fn begin(&self, who: Who) -> Result<Slot<'_>, Refusal> {
         let mut running = lock(&self.running);
         if running.closed || running.lives.len() >= MAX_LIVES {
-            let text = format!("{MAX_LIVES} lives are running, the most at once; close a tab or wait");
+            let text = format!("{MAX_LIVES} simulations are running, the most at once; close a tab or wait");
             return Err(Refusal::Busy(text));
         }
         running.begun += 1;
@@ -132,13 +132,13 @@ impl Lives {
         Ok(Slot { lives: self, id, control })
     }
 
-    /// A life that runs.
+    /// A simulation that runs.
     ///
     /// # Errors
     /// If there is none of that number (any more).
     pub fn life(&self, id: u64) -> Result<Arc<Control>, Refusal> {
         let found = lock(&self.running).lives.get(&id).cloned();
-        found.ok_or_else(|| Refusal::Unknown(format!("there is no life {id}; perhaps it has ended")))
+        found.ok_or_else(|| Refusal::Unknown(format!("there is no simulation {id}; perhaps it has ended")))
     }
 
     /// How many run.

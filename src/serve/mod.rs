@@ -50,11 +50,11 @@ pub struct Service {
 pub struct Status {
     /// Version of the program.
     pub version: &'static str,
-    /// Lives running now.
+    /// Simulations running now.
     pub lives: usize,
-    /// Most lives at once.
+    /// Most simulations at once.
     pub max_lives: usize,
-    /// Lives begun so far.
+    /// Simulations begun so far.
     pub begun: u64,
 }
 
@@ -82,7 +82,7 @@ pub struct Loaded {
     pub body: Body,
     /// What it sees; none: all dark.
     pub stimulus: Option<crate::base::Grid<f64>>,
-    /// Length of the life, cut to what the page allows.
+    /// Length of the simulation, cut to what the page allows.
     pub control_steps: u64,
     /// What of it is not shown.
     pub note: Option<&'static str>,
@@ -149,7 +149,7 @@ impl Service {
         })
     }
 
-    /// What a request for a life means.
+    /// What a request for a simulation means.
     ///
     /// # Errors
     /// What is wrong with it.

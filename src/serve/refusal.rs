@@ -11,7 +11,7 @@ pub enum Refusal {
     /// It names what is not there.
     #[error("{0}")]
     Unknown(String),
-    /// As many lives as may run at once are running.
+    /// As many simulations as may run at once are running.
     #[error("{0}")]
     Busy(String),
 }

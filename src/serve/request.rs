@@ -1,4 +1,4 @@
-//! Requests for lives: from what the page sends to what is simulated, everything checked and bounded.
+//! Requests for simulations: from what the page sends to what is simulated, everything checked and bounded.
 
 use crate::base::Grid;
 use crate::body::Body;
@@ -11,7 +11,7 @@ use crate::task::protocol::Protocol;
 use crate::task::stimulus::{Encoding, Reduction, StimulusParams, stimulus};
 use serde::Deserialize;
 
-/// Most control steps in a life, images changed on the way included: a hundred actuation cycles.
+/// Most control steps in a simulation, images changed on the way included: a hundred actuation cycles.
 pub const MAX_STEPS: u32 = 5000;
 /// Largest side of a picture \[pixels\].
 pub const MAX_PICTURE: usize = 128;
@@ -44,11 +44,11 @@ pub struct Shown {
     stimulus: Option<Grid<f64>>,
 }
 
-/// A life to begin.
+/// A simulation to begin.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LifeRequest {
-    /// Who lives.
+    /// The robot.
     subject: Subject,
     /// What it sees.
     #[serde(default)]
@@ -59,7 +59,7 @@ pub struct LifeRequest {
     speed: Option<f64>,
 }
 
-/// What a body sees of an image, without a life.
+/// What a body sees of an image, without a simulation.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SeeRequest {
@@ -68,7 +68,7 @@ pub struct SeeRequest {
     shown: Shown,
 }
 
-/// A change of a life that goes on.
+/// A change of a simulation that goes on.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ChangeRequest {
@@ -80,7 +80,7 @@ pub struct ChangeRequest {
     pub paused: Option<bool>,
 }
 
-/// How fast a life goes.
+/// How fast a simulation goes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Pace {
     /// So many times real time.
@@ -105,7 +105,7 @@ impl Pace {
     }
 }
 
-/// Which body, with all that its life depends on.
+/// Which body, with all that its simulation depends on.
 #[derive(Clone, Debug)]
 pub struct Who {
     /// The body.
@@ -129,10 +129,10 @@ pub struct Seen {
     pub label: Option<u8>,
 }
 
-/// A life that can be begun.
+/// A simulation that can be begun.
 #[derive(Clone, Debug)]
 pub struct Plan {
-    /// Who lives.
+    /// The robot.
     pub who: Who,
     /// What it sees at first.
     pub seen: Seen,

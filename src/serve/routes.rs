@@ -13,7 +13,7 @@ use serde_json::json;
 pub enum Reply {
     /// It is answered as a whole.
     Whole(Response),
-    /// A life begins.
+    /// A simulation begins.
     Life(Box<Plan>),
 }
 
@@ -135,7 +135,7 @@ fn images(service: &Service, request: &Request) -> Result<Response, Refusal> {
 }
 
 fn change(service: &Service, id: &str, body: &[u8]) -> Result<Response, Refusal> {
-    let life = service.lives.life(number(id, "life")?)?;
+    let life = service.lives.life(number(id, "simulation")?)?;
     let ChangeRequest { shown, speed, paused } = request::read(body)?;
     let seen = shown.map(|shown| shown.seen(&life.who, &service.images)).transpose()?;
     life.change(speed.map(Pace::of).transpose()?, paused, seen);

@@ -15,7 +15,7 @@ use std::time::{Duration, Instant};
 
 /// Most connections at once; a browser needs about six.
 const MAX_CONNECTIONS: usize = 64;
-/// How long lives may take to end when the server ends.
+/// How long simulations may take to end when the server ends.
 const TO_END: Duration = Duration::from_secs(2);
 /// How often the server looks whether it is to end.
 const LOOK: Duration = Duration::from_millis(50);
@@ -50,7 +50,7 @@ impl Server {
         format!("http://{}/", self.address)
     }
 
-    /// Serves until `stop` is set; then ends all lives.
+    /// Serves until `stop` is set; then ends all simulations.
     pub fn run(self, stop: &AtomicBool) {
         let Server { listener, address, service } = self;
         let ended = Arc::new(AtomicBool::new(false));
@@ -118,13 +118,13 @@ fn connection(service: &Service, port: u16, stream: &mut TcpStream) {
             },
         },
     };
-    // Where nobody listens any more there is nobody left to tell.
+    // The page was closed: the error has no reader.
     if response.send(stream, head_only).is_ok() {
         http::close(stream);
     }
 }
 
-/// Lives a life over a connection; it ends when that does. What is to be answered if there is no place for it.
+/// Runs a simulation over a connection; it ends when that does. What is to be answered if there is no place for it.
 fn life(service: &Service, plan: &Plan, stream: &mut TcpStream) -> Option<Response> {
     let slot = match service.lives.begin(plan.who.clone()) {
         Ok(slot) => slot,
@@ -143,14 +143,14 @@ fn life(service: &Service, plan: &Plan, stream: &mut TcpStream) -> Option<Respon
     None
 }
 
-/// Ends a life when the other side closes its connection: a write would fail only after that, and in between the life would go on.
+/// Ends a simulation when the other side closes its connection: a write would fail only after that, and in between the simulation would go on.
 fn end_with(stream: &TcpStream, control: &Arc<Control>) -> io::Result<()> {
     let (stream, control) = (stream.try_clone()?, Arc::clone(control));
     stream.set_read_timeout(Some(LOOK))?;
     let watch = move || {
         while !control.is_over() {
             match stream.peek(&mut [0]) {
-                // Somebody who talks on.
+                // A client that keeps sending.
                 Ok(count) if count > 0 => std::thread::sleep(LOOK),
                 Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => {}
                 Err(error) if error.kind() == ErrorKind::Interrupted => {}

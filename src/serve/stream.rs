@@ -1,4 +1,4 @@
-//! A life as server-sent events: JSON, positions as 16-bit numbers in base64.
+//! A simulation as server-sent events: JSON, positions as 16-bit numbers in base64.
 //!
 //! As in the page of a replay: steps of 1/200 voxel length from an origin per moment, near the centre of mass.
 

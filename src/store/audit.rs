@@ -49,18 +49,18 @@ pub struct RobotAudit {
     pub task: String,
     /// The verdict.
     pub verdict: Verdict,
-    /// Why: of an exploiter, what it lives off.
+    /// Why: for `exploits`, what it exploits.
     pub reason: String,
-    /// Share of the perturbed lives in which its behaviour persists.
+    /// Share of the perturbed rollouts in which its behaviour persists.
     pub persisting: f64,
-    /// Root mean square difference of displacements from the unchanged life's, voxel lengths.
+    /// Root mean square difference of displacements from the unchanged rollout's, voxel lengths.
     pub spread: f64,
-    /// Energies put in per actuation cycle in the unchanged life \[mass·wu²/s²\].
+    /// Energies put in per actuation cycle in the unchanged rollout \[mass·wu²/s²\].
     pub energy_per_cycle: Energy,
-    /// Displacement under each training image in the unchanged life, voxel lengths; none if unstable.
+    /// Displacement under each training image in the unchanged rollout, voxel lengths; none if unstable.
     pub displacements: Option<Vec<f64>>,
-    /// The perturbed lives; none for one that is not a walker.
-    pub lives: Vec<PerturbedLife>,
+    /// The perturbed rollouts; none for one that is not a walker.
+    pub lives: Vec<PerturbedRollout>,
 }
 
 impl RobotAudit {
@@ -180,7 +180,7 @@ impl AuditFile {
         format!("{}\n{}\n]}}\n", head.strip_suffix("]}").unwrap_or(&head), lines.join(",\n"))
     }
 
-    /// `audit.csv`: a line per robot and life, the unchanged one first.
+    /// `audit.csv`: a line per robot and rollout, the unchanged one first.
     pub fn to_csv(&self) -> Vec<u8> {
         let images = self.robots.iter().filter_map(|r| r.displacements.as_ref()).map(Vec::len).max();
         let images = images.unwrap_or(0);
@@ -230,9 +230,9 @@ pub enum Verdict {
     Physical,
     /// Small changes of the world break it.
     Fragile,
-    /// The world may change, but not how it is computed or how images are shown: it lives off that.
+    /// It survives changes of the world, but not of how that is computed or how images are shown: it exploits those.
     Exploits,
-    /// It does not answer its training images to begin with, or no better than who always walks the same way.
+    /// It does not answer its training images, or no better than a robot that always walks the same way.
     NotAWalker,
 }
 
@@ -248,19 +248,19 @@ impl Verdict {
     }
 }
 
-/// A perturbed life.
+/// A perturbed rollout.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct PerturbedLife {
+pub struct PerturbedRollout {
     /// What was changed, and how much.
     pub name: String,
     /// What was changed.
     pub kind: Kind,
-    /// Displacement under each training image, voxel lengths (a mirrored life's mirrored back); none if unstable.
+    /// Displacement under each training image, voxel lengths (a mirrored rollout's mirrored back); none if unstable.
     pub displacements: Option<Vec<f64>>,
-    /// Share of the images answered right in the unchanged life under which it still walks the right way.
+    /// Share of the images answered right in the unchanged rollout under which it still walks the right way.
     pub kept: f64,
-    /// Walks under them, towards the right sides, as a share of the unchanged life's.
+    /// Walks under them, towards the right sides, as a share of the unchanged rollout's.
     pub distance: f64,
     /// Whether the behaviour persists.
     pub persists: bool,

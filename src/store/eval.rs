@@ -57,7 +57,7 @@ pub struct EvalFile {
     pub split: HeldOut,
     /// Seed of what was drawn.
     pub seed: u64,
-    /// Control steps per image, each a fresh life.
+    /// Control steps per image, each a fresh rollout.
     pub control_steps: u32,
     /// Displacements up to this counted as wrong \[voxel lengths\].
     pub threshold: f64,
@@ -130,13 +130,13 @@ pub struct RobotReport {
     pub balanced_accuracy: f64,
     /// Share answered right, by class.
     pub per_class: BTreeMap<u8, f64>,
-    /// Mean |displacement|, voxel lengths, of the stable lives.
+    /// Mean |displacement|, voxel lengths, of the stable rollouts.
     pub mean_distance: f64,
     /// Share of images under which it moved no farther than the threshold.
     pub not_moved: f64,
-    /// Images under which its life became unstable (counted as wrong).
+    /// Images under which its rollout became unstable (counted as wrong).
     pub unstable: usize,
-    /// Lives simulated.
+    /// Rollouts simulated.
     pub simulated: usize,
     /// How it did on the validation images, if it was selected on them.
     #[serde(default, skip_serializing_if = "Option::is_none")]

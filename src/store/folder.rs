@@ -30,7 +30,7 @@ pub enum IfExists {
     Overwrite,
 }
 
-/// A run's folder, in use by this process as long as the value lives.
+/// A run's folder, in use by this process as long as the value exists.
 #[derive(Debug)]
 pub struct RunFolder {
     path: PathBuf,
@@ -116,7 +116,7 @@ pub fn in_shell(path: &Path) -> String {
 
 /// Whether results can be written to a file, with a CSV beside it, and overwrite neither each other nor what lies beside the run or
 /// result file that they are of: files of the run, or what other commands found, each under the name of its command. `own` is
-/// the name of these results if nobody says otherwise.
+/// the default name of these results.
 ///
 /// # Errors
 /// If not.

@@ -9,7 +9,7 @@ use std::fs::File;
 use std::io::{BufWriter, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
-/// What a run has done so far. *Showings* are images shown to robots (fresh lives, or phases of sequential ones).
+/// What a run has done so far. *Showings* are images shown to robots (fresh rollouts, or phases of sequential ones).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Totals {

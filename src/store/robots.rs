@@ -45,11 +45,11 @@ pub struct Chosen<'a> {
 pub enum Selection {
     /// All of them, fittest first.
     All,
-    /// The so many fittest of each task.
+    /// The fittest of each task, this many.
     Top(usize),
     /// So many of each task, drawn at random.
     Random(usize),
-    /// The so many best of each run and task on validation images; only `eval` shows those.
+    /// The best of each run and task on validation images, this many; only `eval` shows those.
     Validated(usize),
     /// Those with these ids, or unique beginnings of ids; "best" is the first on validation images if the runs ranked their robots
     /// by those (validation.json), else the fittest.
@@ -326,7 +326,7 @@ pub(crate) fn physical<'a>(
     Ok(physical)
 }
 
-/// Of robots of a run, best on validation images first, the first so many of each task that are physical. What comes after them
+/// Of robots of a run, best on validation images first, the first of each task that are physical. What comes after them
 /// need not have been audited.
 ///
 /// # Errors

@@ -331,7 +331,7 @@ mod tests {
         run.elites.iter_mut().for_each(|robot| robot.id = robot.genome.id());
         let text = run.to_json();
         let read = |text: &str| RunFile::parse(text, "run.json").unwrap();
-        // As it is written, so it is known to whoever made it.
+        // The text is the file's, so its fingerprint is known without reading it again.
         assert_eq!(read(&text).fingerprint(), run.fingerprint());
         // What says the same in other bytes is another file, and its hash is the one that sha256sum says.
         for other in [text.replace("1.5", "1.50"), format!("{text}\n"), format!("\u{feff}{text}")] {

@@ -6,7 +6,7 @@ use crate::body::Body;
 use crate::sim::{Physics, System, Unstable};
 use crate::task::perturbation::{Condition, Kind, Perturbation};
 use crate::task::protocol::{Life, Protocol};
-use crate::task::rollout::{Rollout, fresh_life, same_to_sensors};
+use crate::task::rollout::{Rollout, fresh_rollout, same_to_sensors};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::cmp::Reverse;
@@ -23,7 +23,7 @@ pub struct Savings {
     pub known_bodies: bool,
     /// An offspring that can no longer beat the elite of any cell it may belong to is not simulated further.
     pub early_stop: bool,
-    /// Images that show a body's sensors the same pixels are one life.
+    /// Images that show a body's sensors the same pixels share a rollout.
     pub shared_lives: bool,
 }
 
@@ -38,7 +38,7 @@ impl Default for Savings {
 pub enum Outcome {
     /// The displacement under every image, in the images' order, voxel lengths.
     Walked(Vec<f64>),
-    /// A life became unstable: no fitness.
+    /// A rollout became unstable: no fitness.
     Unstable(Unstable),
     /// Stopped because it could not get into the archive any more, or was [given up](Job::given_up); with the displacement under
     /// every image, as far as known.
@@ -46,7 +46,7 @@ pub enum Outcome {
 }
 
 impl Outcome {
-    /// The displacement under every image, as far as known; `None` if a life became unstable.
+    /// The displacement under every image, as far as known; `None` if a rollout became unstable.
     pub fn known(&self) -> Option<Vec<Option<f64>>> {
         match self {
             Outcome::Walked(displacements) => Some(displacements.iter().copied().map(Some).collect()),
@@ -56,7 +56,7 @@ impl Outcome {
     }
 }
 
-/// An outcome and the simulation it took. A *showing* is one image shown to one robot: a fresh life, or one
+/// An outcome and the simulation it took. A *showing* is one image shown to one robot: a fresh rollout, or one
 /// phase of a sequential one.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Evaluation {
@@ -64,7 +64,7 @@ pub struct Evaluation {
     pub outcome: Outcome,
     /// Showings simulated.
     pub simulated: u64,
-    /// Showings that another image's life stood for.
+    /// Showings that another image's rollout stood for.
     pub shared: u64,
     /// Showings not needed after an early stop (or after an instability).
     pub stopped: u64,
@@ -77,21 +77,21 @@ pub type MayWin<'a> = dyn Fn(&[Option<f64>]) -> bool + Sync + Send + 'a;
 pub struct Job<'a> {
     /// The body.
     pub body: &'a Body,
-    /// In which order to show the images where that is free (fresh lives): those first under which it is likely to
+    /// In which order to show the images where that is free (fresh rollouts): those first under which it is likely to
     /// drop out. Images that are not in it come last, in their order.
     pub order: Vec<usize>,
     /// Whether it may still get into the archive, given some of its displacements; asked with early stopping only.
     pub may_win: Box<MayWin<'a>>,
     /// Whether it is given up, going by the images in some order up to the first whose displacement is not known, and no others: so
-    /// that it does not matter which are shown first, or are one life.
+    /// that it does not matter which are shown first, or share a rollout.
     pub given_up: Option<Box<MayWin<'a>>>,
 }
 
-/// Evaluates jobs, each on all images; results in the jobs' order, the same on any number of threads. Fresh lives are lived under the
+/// Evaluates jobs, each on all images; results in the jobs' order, the same on any number of threads. Fresh rollouts happen under the
 /// images' `conditions`; those that are missing are the default. In sequential ones conditions have no meaning.
 ///
-/// All lives of all jobs are one list of work: first every robot's first image, then every second one, and so on, large
-/// bodies first so that no core waits long at the end. A life whose robot has dropped out by then is passed over. One
+/// All rollouts of all jobs are one list of work: first every robot's first image, then every second one, and so on, large
+/// bodies first so that no core waits long at the end. A rollout whose robot has dropped out by then is passed over. One
 /// that was begun before that was known is simply not counted.
 ///
 /// # Errors
@@ -110,14 +110,14 @@ pub fn evaluate(
     let candidates: Vec<Candidate> = jobs.iter().map(candidate).collect::<Result<_, Stopped>>()?;
     let mut work: Vec<(usize, &Candidate)> = candidates
         .iter()
-        .flat_map(|candidate| (0..candidate.lives()).map(move |place| (place, candidate)))
+        .flat_map(|candidate| (0..candidate.rollouts()).map(move |place| (place, candidate)))
         .collect();
     // Stable: equally large bodies stay in the jobs' order.
     work.sort_by_key(|(place, candidate)| (*place, Reverse(candidate.systems[0].point_count())));
     let next = AtomicUsize::new(0);
     let worker = |_| {
         while let Some((place, candidate)) = work.get(next.fetch_add(1, Ordering::Relaxed)) {
-            candidate.live(*place)?;
+            candidate.simulate(*place)?;
         }
         Ok(())
     };
@@ -147,7 +147,7 @@ pub fn fresh_rollouts(
     same_as.iter().for_each(|&first| *shared.entry(first).or_default() += 1);
     let shared: Vec<(usize, u64)> = shared.into_iter().collect();
     let roll = |&(image, count): &(usize, u64)| {
-        let displacement = setup.fresh_life(body, &systems, image)?;
+        let displacement = setup.fresh_rollout(body, &systems, image)?;
         told(count);
         Ok((image, displacement))
     };
@@ -156,26 +156,26 @@ pub fn fresh_rollouts(
     Ok((same_as.iter().map(|first| rolled[first]).collect(), rolled.len()))
 }
 
-/// A life that was lived: one image's if fresh; if sequential all images', up to where the robot dropped out.
-struct Lived {
+/// A finished rollout: of one image if fresh; of all images if sequential, up to where the robot dropped out.
+struct Shown {
     /// Displacement under each image shown, voxel lengths; none for the one under which it became unstable.
     displacements: Vec<Option<f64>>,
     /// How it became unstable, if it did.
     unstable: Option<Unstable>,
 }
 
-impl Lived {
+impl Shown {
     fn add(&mut self, shown: Result<f64, Unstable>) {
         self.displacements.push(shown.ok());
         self.unstable = shown.err();
     }
 }
 
-/// What is known of a robot's lives.
+/// What is known of a robot's rollouts.
 #[derive(Default)]
-struct Lives {
+struct Progress {
     /// In the order in which they count, until they are counted.
-    lived: Vec<Option<Lived>>,
+    lived: Vec<Option<Shown>>,
     /// How many are.
     counted: usize,
     /// Of those, in the order of showing.
@@ -188,7 +188,7 @@ struct Lives {
 
 /// Walked, under all images.
 fn walked(known: Vec<Option<f64>>) -> Outcome {
-    let displacement = |known: Option<f64>| known.expect("no life was left out, and none was unstable");
+    let displacement = |known: Option<f64>| known.expect("no rollout was left out, and none was unstable");
     Outcome::Walked(known.into_iter().map(displacement).collect())
 }
 
@@ -263,8 +263,8 @@ impl<'a> Setup<'a> {
         same.into_iter().enumerate().map(of).collect()
     }
 
-    /// A fresh life under an image and its condition.
-    fn fresh_life(
+    /// A fresh rollout under an image and its condition.
+    fn fresh_rollout(
         &self,
         body: &Body,
         systems: &[Arc<System>],
@@ -274,7 +274,7 @@ impl<'a> Setup<'a> {
         let condition = &self.conditions[number];
         let see = |stimulus: Grid<f64>, change: &Perturbation| change.stimulus(body, &stimulus, image as u64);
         let stimulus = condition.iter().fold(self.images[image].clone(), see);
-        let displacement = fresh_life(&systems[number], &self.protocols[number], &stimulus, self.stop)?;
+        let displacement = fresh_rollout(&systems[number], &self.protocols[number], &stimulus, self.stop)?;
         let undo = |d: f64, change: &Perturbation| change.undo(vec![d])[0];
         let displacement = displacement.map(|d| condition.iter().fold(d, undo));
         // A body that needs a stop, as any material has one, is not refused for that.
@@ -292,9 +292,9 @@ struct Candidate<'a> {
     systems: Vec<Arc<System>>,
     /// The images that need showing, in order.
     order: Vec<usize>,
-    /// For each image its place in that order, or that of the image whose life it shares.
+    /// For each image its place in that order, or that of the image whose rollout it shares.
     places: Vec<usize>,
-    lives: Mutex<Lives>,
+    lives: Mutex<Progress>,
     /// Whether it is known how it ends.
     is_over: AtomicBool,
 }
@@ -328,29 +328,29 @@ impl<'a> Candidate<'a> {
             systems: setup.systems(job.body),
             order,
             places,
-            lives: Mutex::new(Lives { lived: (0..lives).map(|_| None).collect(), ..Lives::default() }),
+            lives: Mutex::new(Progress { lived: (0..lives).map(|_| None).collect(), ..Progress::default() }),
             is_over: AtomicBool::new(false),
         }
     }
 
-    fn lives(&self) -> usize {
+    fn rollouts(&self) -> usize {
         self.locked().lived.len()
     }
 
-    fn locked(&self) -> MutexGuard<'_, Lives> {
+    fn locked(&self) -> MutexGuard<'_, Progress> {
         // A thread that panicked leaves whole entries.
         self.lives.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Lives one life, unless the robot has dropped out.
-    fn live(&self, place: usize) -> Result<(), Stopped> {
+    /// Simulates one rollout, unless the robot has dropped out.
+    fn simulate(&self, place: usize) -> Result<(), Stopped> {
         if self.is_over.load(Ordering::Relaxed) {
             return Ok(());
         }
-        let mut lived = Lived { displacements: Vec::new(), unstable: None };
+        let mut lived = Shown { displacements: Vec::new(), unstable: None };
         match self.setup.protocol().life {
             Life::Fresh => {
-                lived.add(self.setup.fresh_life(self.job.body, &self.systems, self.order[place])?);
+                lived.add(self.setup.fresh_rollout(self.job.body, &self.systems, self.order[place])?);
             }
             Life::Sequential => {
                 let mut rollout = Rollout::new(&self.systems[0], self.setup.protocol());
@@ -385,11 +385,12 @@ impl<'a> Candidate<'a> {
         self.places.iter().map(|place| *displacements.get(*place)?).collect()
     }
 
-    /// Counts the lives that are known, in their order, whichever was done first: every one once, since each takes a look at
+    /// Counts the rollouts that are known, in their order, whichever was done first: every one once, since each takes a look at
     /// all images.
-    fn count(&self, lives: &mut Lives) {
-        let is_over =
-            |lives: &Lives| self.early_stop && lives.unstable.is_some() || lives.counted == lives.lived.len();
+    fn count(&self, lives: &mut Progress) {
+        let is_over = |lives: &Progress| {
+            self.early_stop && lives.unstable.is_some() || lives.counted == lives.lived.len()
+        };
         if lives.verdict.is_some() {
             return;
         }
@@ -418,7 +419,7 @@ impl<'a> Candidate<'a> {
     }
 
     fn evaluation(&self) -> Evaluation {
-        // All lives are done that the verdict needs; without images there is nothing to walk for.
+        // All rollouts are done that the verdict needs; without images there is nothing to walk for.
         let mut lives = self.locked();
         self.count(&mut lives);
         lives.verdict.take().unwrap_or_else(|| self.ended(Outcome::Walked(Vec::new()), 0))
@@ -534,7 +535,7 @@ mod tests {
 
     #[test]
     fn fresh_lives_follow_the_order_and_stop_when_nothing_can_be_won() {
-        // Image 3 is image 1's life, image 4 image 0's: with both known, nothing can be won any more.
+        // Image 3 shares image 1's rollout, image 4 image 0's: with both known, nothing can be won any more.
         let may_win = |known: &[Option<f64>]| {
             assert!(known[3].is_some() && known[1] == known[3], "image 3 comes first: {known:?}");
             known[0].is_none()
@@ -569,7 +570,7 @@ mod tests {
         let system = Arc::new(System::new(&body, physics.clone()));
         let live = |image: usize, rows: u32| {
             let raised = Protocol { start_row: protocol.start_row + rows, ..protocol.clone() };
-            fresh_life(&system, &raised, &images[image], &NEVER).unwrap().unwrap()
+            fresh_rollout(&system, &raised, &images[image], &NEVER).unwrap().unwrap()
         };
         // Images 1 and 3, and 0 and 4, show the sensors the same; of the last pair, the start is, too.
         let raised = [1, 0, 1, 2];
@@ -607,7 +608,7 @@ mod tests {
         let tight = Physics { limit_high: 1.02, limit_low: 0.98, ..physics() };
         let expected = |physics: &Physics, image: usize| {
             let system = Arc::new(System::new(&body(), physics.clone()));
-            fresh_life(&system, &protocol, &images[image], &NEVER).unwrap()
+            fresh_rollout(&system, &protocol, &images[image], &NEVER).unwrap()
         };
         let calm = Physics { blow_up_extent: 1.0, ..tight.clone() };
         let mixed = [true, false, false, true, true];
@@ -644,7 +645,8 @@ mod tests {
             };
             let changed = perturbation.apply(&setting);
             let system = Arc::new(System::new(&changed.body, changed.physics));
-            let live = |stimulus| fresh_life(&system, &changed.protocol, stimulus, &NEVER).unwrap().unwrap();
+            let live =
+                |stimulus| fresh_rollout(&system, &changed.protocol, stimulus, &NEVER).unwrap().unwrap();
             let expected = perturbation.undo(changed.stimuli.iter().map(live).collect());
             let conditions = vec![vec![perturbation]; images.len()];
             let setting = (&physics, &protocol);
@@ -670,7 +672,7 @@ mod tests {
     #[test]
     fn what_is_stopped_is_no_evaluation_and_ends_in_the_middle_of_a_life() {
         let (body, images) = (body(), images(&CALM));
-        // A life that lasts for minutes.
+        // A rollout that lasts for minutes.
         for life in [Life::Fresh, Life::Sequential] {
             let protocol = Protocol { life, control_steps: 10_000_000, ..Protocol::default() };
             let may_win = Box::new(|_: &[Option<f64>]| true);

@@ -27,7 +27,7 @@ pub enum Kind {
     LengthLimits,
     /// A contact of the robot with itself counts once instead of twice.
     SelfContact,
-    /// In a sequential life the images come in the reverse order: who turns round by the clock is found out.
+    /// In a sequential simulation the images come in reverse order: this finds robots that turn round by the clock.
     Order,
     /// Stiffness of all springs.
     Stiffness,
@@ -55,7 +55,7 @@ impl Kind {
     ];
 
     /// Whether it changes the world that is simulated. The others change only how that is computed, or how images are
-    /// shown: who does not survive those lives off something else than body and image.
+    /// shown: a robot that fails under those exploits something other than body and image.
     pub fn is_of_the_world(self) -> bool {
         self >= Kind::Stiffness
     }
@@ -81,15 +81,15 @@ impl Kind {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Sizes {
-    /// Rows by which the start is raised, a life each. Default 1 and 2.
+    /// Rows by which the start is raised, a rollout each. Default 1 and 2.
     pub start: Vec<u32>,
-    /// The time step is divided by these, a life each. Default 2 and 4.
+    /// The time step is divided by these, a rollout each. Default 2 and 4.
     pub time_step: Vec<u32>,
     /// Share by which stiffness, friction and gravity are raised and lowered. Default 0.05.
     pub share: f64,
-    /// Lives with a changed pixel in every image. Default 3.
+    /// Rollouts with a changed pixel in every image. Default 3.
     pub pixels: u32,
-    /// Only for robots with at least so many sensors: to fewer, one pixel is no noise but what they see. Default 10.
+    /// Fewest sensors of a robot whose pixels are changed: to fewer, one pixel is not noise. Default 10.
     pub least_sensors: usize,
     /// Seed of the pixels. Default 1.
     pub seed: u64,
@@ -101,7 +101,7 @@ impl Default for Sizes {
     }
 }
 
-/// A robot and how it lives.
+/// A robot and how it is simulated.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Setting {
     /// Its body.
@@ -167,7 +167,7 @@ pub fn of_response() -> [Condition; CONDITIONS_OF_RESPONSE] {
     [condition(0, false), condition(1, true)]
 }
 
-/// A start raised by so many rows, perhaps without length limits.
+/// A start raised by this number of rows, with or without length limits.
 pub(crate) fn condition(rows: u32, without_limits: bool) -> Condition {
     let of = |kind, amount| Perturbation { kind, amount, seed: 0 };
     let start = (rows > 0).then(|| of(Kind::Start, f64::from(rows)));
@@ -231,8 +231,8 @@ impl Perturbation {
         }
     }
 
-    /// Whether an unstable life speaks against the robot. Not without limits: a body that needs a stop, as any material
-    /// has one, does not live off it.
+    /// Whether instability counts against the robot. Not without limits: every material has a limit, and a body that needs one
+    /// does not exploit it.
     pub fn counts_if_unstable(&self) -> bool {
         (self.kind, self.amount) != (Kind::LengthLimits, OUT_OF_REACH)
     }
@@ -433,7 +433,7 @@ mod tests {
             };
             assert_eq!(perturbation.undo(vec![2.0, 3.0]), expected);
         }
-        // Fresh lives have no order.
+        // Fresh rollouts have no order.
         let fresh = super::tests::all(Life::Fresh);
         assert!(fresh.iter().all(|p| p.kind != Kind::Order) && fresh.len() + 1 == names.len());
     }

@@ -11,13 +11,13 @@ pub const MAX_STEPS: u32 = 1_000_000;
 /// Highest row of a start \[voxels\].
 pub const MAX_ROW: u32 = 2_000_000;
 
-/// Whether images share a life.
+/// Whether images share a rollout.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Life {
-    /// One life per image, from the initial state (the paper's text).
+    /// One rollout per image, from the initial state (the paper's text).
     Fresh,
-    /// One continuous life: each image in turn, without a reset (the published zero-one runs).
+    /// One continuous rollout: each image in turn, without a reset (the published zero-one runs).
     Sequential,
 }
 
@@ -25,7 +25,7 @@ pub enum Life {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Protocol {
-    /// Whether images share a life. Default fresh.
+    /// Whether images share a rollout. Default fresh.
     pub life: Life,
     /// Control steps an image is shown for. Default 500: ten actuation cycles.
     pub control_steps: u32,

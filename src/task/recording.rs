@@ -1,4 +1,4 @@
-//! [`Recording`]: a life kept frame by frame, for pictures.
+//! [`Recording`]: a rollout kept frame by frame, for pictures.
 
 use crate::base::Grid;
 use crate::body::Body;
@@ -37,7 +37,7 @@ pub struct VoxelCorners {
     pub corners: [usize; 4],
 }
 
-/// A life, one frame per control step (the first before the first step). With a reset between images
+/// A rollout, one frame per control step (the first before the first step). With a reset between images
 /// ("fresh" protocol) the robot jumps back at the first frame of a phase.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Recording {
@@ -45,7 +45,7 @@ pub struct Recording {
     pub robot: String,
     /// Its body.
     pub body: Body,
-    /// Its voxels with their corners, row-major; fixed for the life.
+    /// Its voxels with their corners, row-major; fixed for the rollout.
     pub voxels: Vec<VoxelCorners>,
     /// The phases in order, at least one; the first starts at frame 0.
     pub phases: Vec<Phase>,
@@ -53,6 +53,6 @@ pub struct Recording {
     pub frames: Vec<Frame>,
     /// Control steps per actuation cycle (50).
     pub cycle: usize,
-    /// Whether the life ended early as unstable.
+    /// Whether the rollout ended early as unstable.
     pub unstable: bool,
 }

@@ -2,7 +2,7 @@
 //!
 //! What a model says ends where a body is not linear. So at the end of a training the best design is *champion*: it is
 //! shown a few hundred training images, half of them random and half those that the model finds closest to the boundary; after
-//! some challengers it is shown others, so that none wins by knowing these by heart.
+//! some challengers it is shown others, so that none wins by chance on these.
 //! Challengers differ from it in some sensors, chosen by the slopes and by how the champion really answered, or in a few voxels
 //! of any material. A challenger is shown the same images, and dropped as soon as it falls behind (racing; Maron & Moore
 //! 1994). One that answers better becomes champion. Every challenger with the champion's gait tells more of the slopes.
@@ -443,7 +443,7 @@ mod tests {
         Planted { physics: Physics::default(), simulated: 0 }
     }
 
-    /// A champion of soft voxels, after so many challengers of its own; with the fitness after each.
+    /// A champion of soft voxels after a number of challengers of its own, with the fitness after each.
     fn refined(challengers: usize) -> (Body, Vec<f64>, usize) {
         let (mut rollouts, physics) = (planted(), Physics::default());
         let evidence = (Evidence::new(PLACES), 1.0);

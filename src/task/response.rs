@@ -139,7 +139,7 @@ pub struct Moments {
 }
 
 impl Moments {
-    /// Of no rollout, of a gait with so many places.
+    /// Of no rollout, for a gait with this number of places.
     pub fn new(places: usize) -> Self {
         Moments {
             count: 0.0,
@@ -193,7 +193,7 @@ pub struct Evidence {
 }
 
 impl Evidence {
-    /// Nothing, of a gait with so many places.
+    /// No evidence, for a gait with this number of places.
     pub fn new(places: usize) -> Self {
         Evidence { matrix: DMatrix::zeros(places, places), vector: DVector::zeros(places) }
     }

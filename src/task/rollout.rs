@@ -39,7 +39,7 @@ impl<'a> Rollout<'a> {
     /// control step.
     ///
     /// # Errors
-    /// [`Unstable`] if the life ends.
+    /// [`Unstable`] if the rollout ends.
     pub fn show(&mut self, stimulus: &Grid<f64>, mut watch: impl FnMut(&World)) -> Result<f64, Unstable> {
         self.look_at(stimulus);
         for _ in 0..self.protocol.control_steps {
@@ -49,10 +49,10 @@ impl<'a> Rollout<'a> {
         Ok(self.moved())
     }
 
-    /// The same, unless `stop` is set meanwhile; nobody watches.
+    /// The same without a watcher, unless `stop` is set meanwhile.
     ///
     /// # Errors
-    /// [`Stopped`] then; within, [`Unstable`] if the life ends.
+    /// [`Stopped`] then; within, [`Unstable`] if the rollout ends.
     pub fn show_unless(
         &mut self,
         stimulus: &Grid<f64>,
@@ -76,7 +76,7 @@ impl<'a> Rollout<'a> {
     /// One control step.
     ///
     /// # Errors
-    /// [`Unstable`] if the life ends in it.
+    /// [`Unstable`] if the rollout ends in it.
     pub fn step(&mut self) -> Result<(), Unstable> {
         self.world.step()
     }
@@ -84,7 +84,7 @@ impl<'a> Rollout<'a> {
     /// One control step, which ends soon when `stop` is set.
     ///
     /// # Errors
-    /// [`Stopped`] then; within, [`Unstable`] if the life ends in it.
+    /// [`Stopped`] then; within, [`Unstable`] if the rollout ends in it.
     pub fn step_unless(&mut self, stop: &AtomicBool) -> Result<Result<(), Unstable>, Stopped> {
         self.world.step_unless(stop)
     }
@@ -108,17 +108,17 @@ impl<'a> Rollout<'a> {
         self.world.voxels().map(corner).collect()
     }
 
-    /// Back to the initial state: a fresh life.
+    /// Back to the initial state: a fresh rollout.
     pub fn reset(&mut self) {
         self.world.reset();
     }
 }
 
-/// One fresh life under one image, unless `stop` is set meanwhile: its displacement in voxel lengths.
+/// One fresh rollout under one image, unless `stop` is set meanwhile: its displacement in voxel lengths.
 ///
 /// # Errors
-/// [`Stopped`] then; within, [`Unstable`] if the life ends early.
-pub fn fresh_life(
+/// [`Stopped`] then; within, [`Unstable`] if the rollout ends early.
+pub fn fresh_rollout(
     system: &Arc<System>,
     protocol: &Protocol,
     stimulus: &Grid<f64>,
@@ -127,11 +127,11 @@ pub fn fresh_life(
     Rollout::new(system, protocol).show_unless(stimulus, stop)
 }
 
-/// A robot shown images as the protocol has it, in fresh lives or one: its displacement under each in voxel lengths, and
+/// A robot shown images as the protocol has it, in fresh rollouts or one: its displacement under each in voxel lengths, and
 /// the energies that were put into it if they are to be `measured`. Unless `stop` is set meanwhile.
 ///
 /// # Errors
-/// [`Stopped`] then; within, [`Unstable`] if a life ends early.
+/// [`Stopped`] then; within, [`Unstable`] if a rollout ends early.
 pub fn walk(
     system: &Arc<System>,
     protocol: &Protocol,
@@ -156,7 +156,7 @@ pub fn walk(
     Ok(Ok((displacements, rollout.world.energy())))
 }
 
-/// For each stimulus the first one (its index) that shows the body's sensors the same pixels: those are one life.
+/// For each stimulus the first one (its index) that shows the body's sensors the same pixels: those share a rollout.
 pub fn same_to_sensors(body: &Body, stimuli: &[&Grid<f64>]) -> Vec<usize> {
     let sensors = || body.voxels().iter().filter(|(_, m)| m.is_sensor()).map(|(place, _)| place);
     let mut first = std::collections::HashMap::new();
@@ -166,7 +166,7 @@ pub fn same_to_sensors(body: &Body, stimuli: &[&Grid<f64>]) -> Vec<usize> {
     stimuli.iter().enumerate().map(|(i, stimulus)| *first.entry(seen(stimulus)).or_insert(i)).collect()
 }
 
-/// Records a robot's life frame by frame for pictures; images with their labels, one phase each. An unstable life
+/// Records a robot's rollout frame by frame for pictures; images with their labels, one phase each. An unstable rollout
 /// is recorded up to its end.
 pub fn record(
     robot: &str,
@@ -251,11 +251,11 @@ mod tests {
         let first = rollout.show(&image(1.0, 0.0), |world| way.push(world.centre_of_mass()[0])).unwrap();
         assert_eq!(way.len(), STEPS as usize);
         assert!((first - 10.0 * (way[STEPS as usize - 1] - start)).abs() < 1e-12 && first != 0.0);
-        // It lives on from there; after a reset, from the beginning.
+        // It goes on from there; after a reset, from the beginning.
         assert_ne!(rollout.show(&image(1.0, 0.0), |_| ()).unwrap(), first);
         rollout.reset();
         assert_eq!(rollout.show(&image(1.0, 0.0), |_| ()).unwrap(), first);
-        assert_eq!(fresh_life(&system, &protocol, &image(1.0, 0.0), &NEVER), Ok(Ok(first)));
+        assert_eq!(fresh_rollout(&system, &protocol, &image(1.0, 0.0), &NEVER), Ok(Ok(first)));
     }
 
     #[test]
@@ -266,9 +266,9 @@ mod tests {
         let blind: Body = "4113/4001/3301".parse().unwrap();
         assert_eq!(same_to_sensors(&blind, &views), [0; 5]);
         assert!(same_to_sensors(&blind, &[]).is_empty());
-        // Lives under images that are the same to the sensors are the same life.
+        // Images that are the same to the sensors give the same rollout.
         let (system, protocol) = (system(), protocol());
-        let live = |image| fresh_life(&system, &protocol, image, &NEVER).unwrap().unwrap();
+        let live = |image| fresh_rollout(&system, &protocol, image, &NEVER).unwrap().unwrap();
         assert_eq!(live(&images[1]), live(&images[3]));
         assert_ne!(live(&images[0]), live(&images[1]));
     }
@@ -278,7 +278,7 @@ mod tests {
         let (system, protocol) = (system(), protocol());
         let stop = AtomicBool::new(true);
         let image = image(1.0, 0.0);
-        assert_eq!(fresh_life(&system, &protocol, &image, &stop), Err(Stopped));
+        assert_eq!(fresh_rollout(&system, &protocol, &image, &stop), Err(Stopped));
         assert_eq!(walk(&system, &protocol, &[image], false, &stop), Err(Stopped));
     }
 
@@ -319,7 +319,7 @@ mod tests {
         assert_eq!(fresh.phases[1].first_frame, 1 + steps);
         assert_eq!(fresh.frames[1 + steps], fresh.frames[0]);
         assert_eq!(fresh.frames[..1 + steps], continuous.frames[..1 + steps]);
-        let alone = fresh_life(&system(), &protocol(), &image(1.0, 0.0), &NEVER);
+        let alone = fresh_rollout(&system(), &protocol(), &image(1.0, 0.0), &NEVER);
         assert_eq!(alone, Ok(Ok(fresh.phases[1].displacement)));
     }
 

@@ -28,8 +28,8 @@ const CHANGED: f64 = 0.15;
 /// Designs that are compared when refining begins: that of the last solution, and those of the rounds before.
 pub const FINALISTS: usize = 4;
 
-/// Challengers that are compared on the same images. With more, they win by knowing those by heart; with fewer, showing the
-/// champion others costs more.
+/// Challengers that are compared on the same images. With more, they win by chance on these; with fewer, showing the
+/// champion other images costs more.
 const CHALLENGERS_OF_A_SET: usize = 30;
 
 /// Of how many images the one that is closest to the boundary is shown. With more, images count that no gait tells apart; with
@@ -249,7 +249,7 @@ impl<'a> Teacher<'a> {
         Ok(round)
     }
 
-    /// Shows the last designs the same training images, and refines the best of them by so many challengers; `told` of each.
+    /// Shows the last designs the same training images, and refines the best of them by challengers; `told` hears of each.
     ///
     /// # Errors
     /// What the rollouts say.

@@ -42,7 +42,7 @@ struct Streams {
     err: Box<dyn Write + Send>,
     /// The reader of stdout has gone (`| head`), or it takes no more.
     closed: bool,
-    /// Results were lost for another reason than that nobody read on: a full disk.
+    /// Results were lost for another reason than a closed pipe: a full disk.
     lost: bool,
 }
 
@@ -80,7 +80,7 @@ impl Console {
         self.terminals[0] && self.colour
     }
 
-    /// Whether the reader of stdout has gone: nobody waits for further results.
+    /// Whether the reader of stdout has gone.
     pub fn is_closed(&self) -> bool {
         lock(&self.streams).closed
     }
@@ -221,7 +221,7 @@ impl Console {
     }
 
     pub(super) fn err(&self, text: &str) {
-        // Where stderr is gone there is nobody left to tell.
+        // Where stderr is closed, an error has no reader.
         let _ =
             self.aside(|streams| streams.err.write_all(text.as_bytes()).and_then(|()| streams.err.flush()));
     }

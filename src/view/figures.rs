@@ -26,7 +26,7 @@ pub enum Kind {
     Body,
     /// Its position over time.
     Spacetime,
-    /// Poses of its life.
+    /// Poses of its rollout.
     Snapshots,
     /// Fitness in the archive.
     Archive,
@@ -211,7 +211,7 @@ fn stem(archive: Option<&Path>, kind: Kind, robot: &str) -> PathBuf {
 fn of_robot(wanted: &Wanted, named: &Named) -> Result<Made, Error> {
     let Named { archive, robot } = named.clone();
     let options = Options { robot, archive, ..wanted.options.clone() };
-    // Of nobody's archive it is a published one, or of the newest run.
+    // Without an archive it is a published robot, or one of the newest run.
     let beside = match &options.archive {
         None if gallery::find(&options.robot)?.is_none() => Some(folder::newest_run()?),
         given => given.clone(),

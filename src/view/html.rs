@@ -52,7 +52,7 @@ pub fn page(
         format!("<tr><th scope=\"row\">{}</th><td>{}</td></tr>\n", escape(key), escape(value))
     });
     let warning = if recording.unstable {
-        "<p class=\"alarm\" role=\"alert\">This life ended early: the simulation became unstable.</p>"
+        "<p class=\"alarm\" role=\"alert\">The simulation became unstable and ended early.</p>"
     } else {
         ""
     };
@@ -86,7 +86,7 @@ pub(super) fn player(life: &str) -> String {
     )
 }
 
-/// A recording for [`player`], packed: gzip in base64. `most`: about so many bytes.
+/// A recording for [`player`], packed: gzip in base64. `most`: its largest size \[bytes\], about.
 ///
 /// # Errors
 /// [`PictureError::Encode`] if it cannot be packed.
@@ -98,7 +98,7 @@ pub(super) fn packed(walk: &Walk, most: usize) -> Result<String, PictureError> {
     Ok(BASE64.encode(packer.finish().map_err(failed)?))
 }
 
-/// The recording as the page's script reads it; `most`: bytes of positions, of which there are fewer for longer lives.
+/// The recording as the page's script reads it; `most`: bytes of positions, of which there are fewer for longer rollouts.
 fn life(walk: &Walk, most: usize) -> serde_json::Value {
     let recording = walk.recording();
     let points = recording.frames.iter().map(|f| f.points.len()).min().unwrap_or(0);

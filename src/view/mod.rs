@@ -1,4 +1,4 @@
-//! Pictures and the terminal. Recordings of lives become images, animations, pages and text here.
+//! Pictures and the terminal. Recordings of rollouts become images, animations, pages and text here.
 //!
 //! A [`Walk`] is a checked [`Recording`](crate::task::recording::Recording); a [`Stage`] decides what part of the
 //! world a picture shows; `scene` and `panel` make drawing primitives of one frame; `raster` paints them. On top of

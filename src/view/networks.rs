@@ -83,7 +83,7 @@ pub(super) fn papers_table<'a>(
     console.table(&headers, &rows.collect::<Vec<_>>());
 }
 
-/// What nobody measured, in a table.
+/// A value that was not measured, in a table.
 fn unknown() -> String {
     "–".to_string()
 }

@@ -115,7 +115,7 @@ impl Wanted {
     }
 }
 
-/// Where the pictures of a robot go if nobody says: beside its run.json; for a published robot, here.
+/// The default place of a robot's pictures: beside its run.json; for a published robot, the present folder.
 ///
 /// # Errors
 /// If there is no run.
@@ -176,7 +176,7 @@ pub fn make(console: &Console, replay: &Replay, wanted: &Wanted) -> Result<Vec<P
         ));
     }
     if recording.unstable {
-        console.warning("this life ended early: the simulation became unstable");
+        console.warning("the simulation became unstable and ended early");
     }
     made.iter().for_each(|path| console.line(&format!("wrote {}", path.display())));
     Ok(made)

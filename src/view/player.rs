@@ -51,7 +51,7 @@ impl Player {
         match key {
             Key::Pause => self.is_paused = !self.is_paused,
             Key::Quit => self.has_ended = true,
-            // Steps are whole, and who steps wants to look.
+            // A single step pauses.
             Key::Forward => (self.at, self.is_paused) = ((self.frame() + 1).min(self.last) as f64, true),
             Key::Back => (self.at, self.is_paused) = (self.frame().saturating_sub(1) as f64, true),
         }
@@ -163,7 +163,7 @@ impl<'c> Screen<'c> {
 impl Drop for Screen<'_> {
     fn drop(&mut self) {
         if self.has_keys {
-            // Where that fails the terminal is gone, and nobody is left to mind.
+            // Where that fails the terminal is gone.
             let _ = disable_raw_mode();
         }
         self.console.text("\r\x1b[0m\x1b[?25h");

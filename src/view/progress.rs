@@ -62,7 +62,7 @@ pub fn duration(seconds: f64) -> String {
 pub struct Pacer(Option<(f64, f64)>);
 
 impl Pacer {
-    /// Whether a line is due at so many seconds and such a share of the work done.
+    /// Whether a line is due, by seconds since the last one and by the share of the work done.
     pub fn is_due(&mut self, seconds: f64, share: f64) -> bool {
         let due = match self.0 {
             None => true,

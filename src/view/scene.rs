@@ -108,7 +108,7 @@ pub fn ruler(window: &Window, zero: f64, step: f64) -> impl Iterator<Item = f64>
 }
 
 /// The world at a frame, from back to front: sky, ground with its ruler, start marks, body, path of the centre of
-/// mass. The ruler's zero is the centre of mass at the start of the life.
+/// mass. The ruler's zero is the centre of mass at the start of the rollout.
 pub fn world(walk: &Walk, frame: usize, window: &Window) -> Vec<Primitive> {
     let mut out = ground(walk, frame, window);
     out.extend(body(walk, frame, window));
@@ -134,7 +134,7 @@ fn ground(walk: &Walk, frame: usize, window: &Window) -> Vec<Primitive> {
         }
     }
     out.push(Primitive::line([left, 0.0], [right, 0.0], 1.5, colour::GROUND_LINE));
-    // Where the life and (if it goes on) this phase began: dashes of five pixels, five apart.
+    // Where the rollout and (if it goes on) this phase began: dashes of five pixels, five apart.
     let phase = walk.centre(walk.phase(frame).first_frame)[0];
     for x in if phase == zero { vec![zero] } else { vec![zero, phase] } {
         let dash = 5.0 / scale;

@@ -126,7 +126,7 @@ fn reach(walk: &Walk) -> (f64, f64) {
     (all.left.max(low - size - 2.0).min(low), all.right.min(high + size + 2.0).max(high))
 }
 
-/// The centres' x, averaged twice over [`SMOOTHING`] frames on both sides, each life by itself, and never further than
+/// The centres' x, averaged twice over [`SMOOTHING`] frames on both sides, each rollout by itself, and never further than
 /// `most` voxel lengths from the centre: a body that is hurled away stays in view.
 fn followed(walk: &Walk, most: f64) -> Vec<f64> {
     let mut path: Vec<f64> = (0..walk.len()).map(|f| walk.centre(f)[0]).collect();

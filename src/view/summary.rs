@@ -66,7 +66,7 @@ pub fn evolution(console: &Console, finished: &Finished, out: &Path) {
     let showings = (totals.simulated + totals.saved()).max(1) as f64;
     let share = |count: u64| percent(count as f64 / showings);
     console.line(&format!(
-        "{} evaluations; of the images shown, simulated {} %, saved {} % (known bodies {} %, early stop {} %, shared lives {} %)",
+        "{} evaluations; of the images shown, simulated {} %, saved {} % (known bodies {} %, early stop {} %, shared rollouts {} %)",
         totals.evaluations,
         share(totals.simulated),
         share(totals.saved()),
@@ -136,7 +136,7 @@ pub fn evaluation(console: &Console, report: &EvalFile, capacity: Option<&Capaci
     let names: Vec<String> = classes.iter().map(|class| format!("% of {class}")).collect();
     let mut headers = vec!["robot", "task", "fitness", "accuracy %", "95 % interval", "balanced %"];
     headers.extend(names.iter().map(String::as_str));
-    headers.extend(["mean |d|", "not moved %", "unstable", "lives"]);
+    headers.extend(["mean |d|", "not moved %", "unstable", "rollouts"]);
     let validated = report.robots.iter().any(|robot| robot.validation.is_some());
     headers.extend(validated.then_some("validated %"));
     let rows = report.robots.iter().map(|robot| {

@@ -10,7 +10,7 @@ use std::ops::Range;
 const FAR: f64 = 1e9;
 
 /// A recording that can be drawn: it has frames, phases in order and corners that exist. Positions may still be
-/// anything (NaN in the last moments of an unstable life): voxels without finite corners are left out.
+/// anything (NaN in the last moments of an unstable rollout): voxels without finite corners are left out.
 #[derive(Clone, Debug)]
 pub struct Walk<'a> {
     recording: &'a Recording,
@@ -102,7 +102,7 @@ impl<'a> Walk<'a> {
         self.centre(frame)[0] - self.centre(self.phase(frame).first_frame)[0]
     }
 
-    /// The frames of the continuous life that a frame is part of, from the last reset up to the next.
+    /// The frames of the continuous rollout that a frame is part of, from the last reset up to the next.
     pub fn life(&self, frame: usize) -> Range<usize> {
         let phase = self.phase_index(frame);
         let resets = || self.fresh.iter().enumerate().filter(|(_, f)| **f).map(|(p, _)| p);

@@ -4,7 +4,7 @@
 //! The servo makes a spring of stiffness k and gain g pull towards its goal length with k·g·(d −
 //! goal) at the start of every substep: over many substeps that is a spring of stiffness k·g, and
 //! its energy is ½·k·g·(d − goal)². The length limits move points and leave their velocities alone,
-//! so what they change of that energy nobody pays for. They move both ends of a spring by as much,
+//! so they change that energy without work. They move both ends of a spring by as much,
 //! so that gravity's part of the change is 0 but for rounding.
 
 use crate::lattice::{FAMILIES, spring_index};

@@ -106,7 +106,7 @@ pub struct Physics {
 
     /// Top of the ground \[grid rows\]; the ground is one cell thick. (World)
     pub ground_row: u32,
-    /// Every so many columns a peg stands below the ground and covers the underside of a cell.
+    /// Columns from one peg below the ground to the next; a peg covers the underside of a cell.
     /// (World)
     pub peg_spacing: u32,
     /// Stiffness of the floor plane at y = 0 \[mass/s²\]. (World)

@@ -3,7 +3,7 @@
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// For work that nobody stops.
+/// For work that is never stopped.
 pub static NEVER: AtomicBool = AtomicBool::new(false);
 
 /// The work was stopped before its end: there is no result.

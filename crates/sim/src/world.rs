@@ -124,7 +124,7 @@ impl World {
     /// # Errors
     /// [`Unstable`] if the simulation ends in it; the state is then of no use.
     pub fn step(&mut self) -> Result<(), Unstable> {
-        self.step_unless(&NEVER).expect("nobody sets NEVER")
+        self.step_unless(&NEVER).expect("NEVER is never set")
     }
 
     /// One control step, which ends within a substep or two when `stop` is set.
@@ -146,7 +146,7 @@ impl World {
             Err(Ended::Stopped) => return Err(Stopped),
             Err(Ended::Unstable(reason)) => return Ok(Err(Unstable { control_step, reason })),
         }
-        // What a substep leaves behind is looked at by the next; here, at the end, by nobody else.
+        // What a substep leaves behind is looked at by the next; at the end of a control step, by no other.
         if !self.centre_of_mass().iter().all(|coordinate| coordinate.is_finite()) {
             return Ok(Err(Unstable { control_step, reason: UnstableReason::BlownUp }));
         }

@@ -1,4 +1,4 @@
-// The page: who is shown what, and what comes of it.
+// The page: which robot sees which picture, and what the simulation shows.
 
 import { $, element, get, post, tabs } from "./api.js";
 import { Editor } from "./editor.js";
@@ -26,7 +26,7 @@ const say = (error) => {
 
 const shownTo = () => (who?.own && editor.stimulus ? { stimulus: editor.stimulus } : picture.shown);
 
-// What the page is at, for whoever looks at it from outside: waiting for the hand to rest, living, over.
+// The page's state, for tests: waiting for the hand to rest, simulating, over.
 const mark = (state) => { document.documentElement.dataset.state = state; };
 
 const start = () => {
@@ -184,7 +184,7 @@ const status = async () => {
   try {
     const { lives, max_lives: most } = await get("/api/status");
     $("status").dataset.state = lives ? "alive" : "";
-    $("status").textContent = lives === 1 ? "1 life running" : `${lives} lives running`;
+    $("status").textContent = lives === 1 ? "1 simulation running" : `${lives} simulations running`;
     $("status").title = `at most ${most} at once`;
   } catch {
     $("status").dataset.state = "lost";

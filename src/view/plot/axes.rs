@@ -22,7 +22,7 @@ pub struct Axis {
 }
 
 impl Axis {
-    /// A range that holds all of low … high and ends on ticks, with about so many of them.
+    /// A range that holds all of low … high and ends on ticks, with about this number of them.
     pub fn nice(low: f64, high: f64, about: usize) -> Self {
         let Axis { from, to, step } = Axis::exact(low, high, about);
         // What ends on a tick but for rounding stays.
@@ -32,7 +32,7 @@ impl Axis {
         Axis { from: down, to: up, step }
     }
 
-    /// The range low … high, with about so many ticks in it.
+    /// The range low … high, with about this number of ticks in it.
     pub fn exact(low: f64, high: f64, about: usize) -> Self {
         let finite = |v: f64, other: f64| if v.is_finite() { v.clamp(-1e12, 1e12) } else { other };
         let (low, high) = (finite(low, 0.0), finite(high, 1.0));

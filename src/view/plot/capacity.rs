@@ -51,7 +51,7 @@ fn accuracies(panels: &[(&TaskCapacity, &Curve)]) -> Axis {
     Axis::nice(100.0 * low.max(0.0), 100.0 * high.min(1.0), 5)
 }
 
-/// A standard deviation below and above a point; the point itself if nobody knows it.
+/// A standard deviation below and above a point; the point itself if it is unknown.
 fn bar(point: &Point) -> [f64; 2] {
     let deviation = point.standard_deviation.unwrap_or(0.0);
     [point.mean - deviation, point.mean + deviation]

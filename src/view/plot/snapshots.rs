@@ -1,4 +1,4 @@
-//! The figure of a life: poses laid over each other.
+//! The figure of a rollout: poses laid over each other.
 
 use crate::task::recording::Recording;
 use crate::view::colour;
@@ -19,7 +19,7 @@ const LARGEST: f64 = 7.0;
 /// Opacity of the first pose.
 const FAINTEST: f64 = 0.22;
 
-/// Poses of a life every so many control steps (0: as suits the walk), earlier ones fainter; a panel per stimulus. `of`
+/// Poses of a simulation, `every` number of control steps (0: chosen by the walk), earlier ones fainter; a panel per stimulus. `of`
 /// says whose it is.
 ///
 /// # Errors
@@ -62,11 +62,7 @@ pub fn snapshots(recording: &Recording, every: usize, of: &str) -> Result<Figure
         panel(&mut canvas, &walk, phase, every, &plot);
     }
     let below = top + phases.div_ceil(columns) as f64 * (panel_height + GAP);
-    let note = if recording.unstable {
-        "the life ended early: unstable"
-    } else {
-        "x [voxel lengths] from the start"
-    };
+    let note = if recording.unstable { "ended early: unstable" } else { "x [voxel lengths] from the start" };
     canvas.text([width / 2.0, below + 2.0], note, Words::middle());
     Ok(Figure::new(&format!("Snapshots: {of}"), [width, below + 4.0 + MARGIN], canvas.finish()))
 }

@@ -27,7 +27,7 @@ const PER_STEP: f64 = 0.2;
 const HEIGHTS: [f64; 2] = [90.0, 210.0];
 
 /// x over time, which runs downwards: every row is the robot as seen from above at that time, darker where its voxels are
-/// compressed. A panel per life, dashed lines where the stimulus changes. `of` says whose it is.
+/// compressed. A panel per rollout, dashed lines where the stimulus changes. `of` says whose it is.
 ///
 /// # Errors
 /// [`PictureError::Recording`] if the recording cannot be drawn.
@@ -49,7 +49,7 @@ pub fn spacetime(recording: &Recording, of: &str) -> Result<Figure, PictureError
     let y = Axis::exact(0.0, longest as f64 / cycle, 5);
     let height = (PER_STEP * longest as f64).clamp(HEIGHTS[0], HEIGHTS[1]);
     let left = MARGIN + left_space(y.labels_width());
-    // One life has its stimuli beside it, several have them above.
+    // One rollout has its stimuli beside it, several have them above.
     let (beside, above) = if lives.len() == 1 { (STIMULUS + 8.0, 4.0) } else { (0.0, STIMULUS + 6.0) };
     let gap = 8.0;
     let wide = (width - MARGIN - 4.0 - left - beside - gap * (columns - 1) as f64) / columns as f64;
@@ -66,7 +66,7 @@ pub fn spacetime(recording: &Recording, of: &str) -> Result<Figure, PictureError
     Ok(Figure::new(&format!("Position over time: {of}"), [width, bottom + MARGIN - 4.0], canvas.finish()))
 }
 
-/// An axis that holds all lives, each counted from its start.
+/// An axis that holds all rollouts, each counted from its start.
 fn positions(walk: &Walk, lives: &[Range<usize>], columns: usize) -> Axis {
     let size = walk.recording().body.width() as f64 + 2.0;
     let reach = |life: &Range<usize>| {
@@ -80,7 +80,7 @@ fn positions(walk: &Walk, lives: &[Range<usize>], columns: usize) -> Axis {
     Axis::exact(low - 1.0, high + 1.0, if columns == 1 { 6 } else { 4 })
 }
 
-/// Where a moment of a life is in its panel, points from the top of the figure.
+/// Where a moment of a rollout is in its panel, points from the top of the figure.
 fn moment(plot: &Plot, cycles: f64) -> f64 {
     plot.at[1] + plot.y.share(cycles) * plot.size[1]
 }
@@ -179,7 +179,7 @@ fn stimuli(canvas: &mut Canvas, walk: &Walk, life: &Range<usize>, plot: &Plot, b
         }
         if beside {
             let at = [right + 6.0, y + 3.0];
-            // Short phases of a long life have room for the picture only, or for nothing.
+            // Short phases of a long rollout have room for the picture only, or for nothing.
             let room = moment(plot, walk.phase_frames(k).len() as f64 / cycle) - top;
             if room >= STIMULUS + 6.0 {
                 robot::stimulus(canvas, at, STIMULUS, &phase.stimulus);

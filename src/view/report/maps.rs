@@ -1,4 +1,4 @@
-//! The archive as buttons, and the lives they play.
+//! The archive as buttons, and the rollouts they play.
 
 use crate::commands::report::{Dossier, Gathered};
 use crate::qd::descriptor::{COUNT_BINS, DescriptorSpace, possible_cells};
@@ -12,12 +12,12 @@ use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// Bytes of all lives of a page together, before they are packed: packed, as text, they are about as many.
+/// Bytes of all rollouts of a page together, before they are packed: packed, as text, they are about as many.
 const MOST_BYTES: usize = 13_000_000;
 /// Most bytes of a single one.
 const MOST_OF_ONE: usize = 1_500_000;
 
-/// Lives, packed, by run and robot.
+/// Rollouts, packed, by run and robot.
 pub(super) struct Lives(BTreeMap<(usize, String), String>);
 
 /// The robots of a run that can be played: the fittest.
@@ -32,7 +32,7 @@ pub(super) fn played(dossier: &Dossier, most: usize) -> Vec<&Robot> {
 }
 
 impl Lives {
-    /// Lives them.
+    /// Rollouts them.
     pub fn live(
         gathered: &Gathered,
         most: usize,
@@ -57,7 +57,7 @@ impl Lives {
         jobs.par_iter().map(one).collect::<Result<BTreeMap<_, _>, _>>().map(Lives)
     }
 
-    /// Id of the element with a robot's life.
+    /// Id of the element with a robot's rollout.
     pub fn id(&self, run: usize, robot: &str) -> Option<String> {
         self.0.contains_key(&(run, robot.to_string())).then(|| format!("life-{run}-{robot}"))
     }

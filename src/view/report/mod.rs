@@ -23,15 +23,15 @@ pub struct Content<'a> {
 }
 
 impl Content<'_> {
-    /// Lives that have to be lived for it.
+    /// Rollouts that have to be simulated for it.
     pub fn count(&self) -> usize {
         self.gathered.runs.iter().map(|dossier| maps::played(dossier, self.lives).len()).sum()
     }
 
-    /// The page as text; `lived` is told the number of lives lived so far.
+    /// The page as text; `lived` gets the number of rollouts simulated so far.
     ///
     /// # Errors
-    /// If a life cannot be drawn.
+    /// If a rollout cannot be drawn.
     pub fn page(&self, lived: &(dyn Fn(u64) + Sync)) -> Result<String, PictureError> {
         let Gathered { runs, together } = self.gathered;
         let lives = Lives::live(self.gathered, self.lives, lived)?;

@@ -203,7 +203,7 @@ pub(super) fn audit(audit: &AuditFile) -> String {
         ]
     };
     let rows: Vec<Vec<String>> = walkers.iter().take(LISTED).map(row).collect();
-    let headers = ["robot", "task", "verdict", "persists in % of changed lives", "spread"];
+    let headers = ["robot", "task", "verdict", "persists in % of changed rollouts", "spread"];
     let listed = table(&headers, rows);
     out += &format!("<details><summary>Verdicts on the walkers</summary>\n{listed}</details>\n");
     out

@@ -55,8 +55,8 @@ pub(super) fn methods(dossier: &Dossier) -> String {
     let steps = config.protocol.control_steps;
     let cycles = number::fixed(f64::from(steps) / f64::from(config.physics.cycle_steps), 0);
     let life = match config.protocol.life {
-        Life::Fresh => "a life of its own from the initial state",
-        Life::Sequential => "one continuous life for all images",
+        Life::Fresh => "a rollout of its own from the initial state",
+        Life::Sequential => "one continuous rollout for all images",
     };
     let fitness = match run.fitness() {
         Fitness::Min => {
@@ -159,7 +159,7 @@ pub(super) fn commands(dossier: &Dossier) -> String {
     format!("<pre>{}</pre>\n", escape(&lines.join("\n")))
 }
 
-/// With what a capacity was found, as far as its file tells, where that is not what it is found with if nobody says otherwise.
+/// The settings of a capacity, as far as its file has them, where they are not the defaults.
 fn settings(file: &CapacityFile) -> String {
     let usual = CapacityConfig::default();
     let mut text = if file.patience_on == "test" { String::new() } else { " --clean".to_string() };

@@ -203,7 +203,7 @@ impl BroadPhase {
         }
     }
 
-    /// Whether so many distant surface voxels overlap that the simulation is unstable (physics.md,
+    /// Whether enough distant surface voxels overlap that the simulation is unstable (physics.md,
     /// "Instability").
     pub fn too_many_overlaps(&self, System { lattice, physics }: &System, state: &State) -> bool {
         let most = physics.unstable_ratio * lattice.surface.len() as f64;
