@@ -15,29 +15,30 @@ const OF_EVOLUTION: u64 = 1 << 32;
 /// with less, hopeless ones cost as much as good ones.
 const WORTH_GOING_ON: f64 = 0.5;
 
-/// As many images as there are training images, an even number, in pairs: an image and its opposite. Each pair belongs to two
-/// training images, which are of different classes where all classes have as many images. Pixels in which the two differ are bright
-/// or dark at random, and the other way round in the opposite. All others are bright, dark or at rest at random, and the same in
-/// both. So a pixel counts as often as it tells training images apart.
+/// As many images as there are training images, an even number, in pairs: one whose pixels are bright, dark or at rest at random, each
+/// independently of all others, and its opposite. Pixels that are the same in all training images stay so: what never changes
+/// says nothing.
 pub(crate) fn opposites(stimuli: &[Grid<f64>], physics: &Physics, seed: u64) -> Vec<Grid<f64>> {
-    let half = stimuli.len() / 2;
-    let pair = |number: usize| {
-        let (a, b) = (&stimuli[number], &stimuli[number + half]);
-        let mut random = stream(seed, Purpose::RandomImages, OF_EVOLUTION, number as u64);
-        let drawn = random_image(a.height(), a.width(), physics, &mut random);
-        let image = Grid::from_fn(a.height(), a.width(), |row, column| {
-            let pixel = drawn[(row, column)];
-            // What differs is never at rest.
-            let is_bright = f64::from(u8::from(random.unit() < 0.5));
-            if a[(row, column)] == b[(row, column)] { pixel } else { is_bright }
-        });
-        let opposite = Grid::from_fn(a.height(), a.width(), |row, column| {
-            let pixel = image[(row, column)];
-            if a[(row, column)] == b[(row, column)] { pixel } else { 1.0 - pixel }
-        });
-        [image, opposite]
+    let Some(first) = stimuli.first() else { return Vec::new() };
+    let changes = Grid::from_fn(first.height(), first.width(), |row, column| {
+        stimuli.iter().any(|other| other[(row, column)] != first[(row, column)])
+    });
+    let pair = |number: u64| {
+        let mut random = stream(seed, Purpose::RandomImages, OF_EVOLUTION, number);
+        let drawn = random_image(first.height(), first.width(), physics, &mut random);
+        [false, true].map(|is_opposite| {
+            Grid::from_fn(first.height(), first.width(), |row, column| {
+                let pixel = drawn[(row, column)];
+                match changes[(row, column)] {
+                    false => first[(row, column)],
+                    // What is at rest is so in both.
+                    true if is_opposite && (pixel == 0.0 || pixel == 1.0) => 1.0 - pixel,
+                    true => pixel,
+                }
+            })
+        })
     };
-    (0..half).flat_map(pair).collect()
+    (0..stimuli.len() as u64 / 2).flat_map(pair).collect()
 }
 
 /// The condition of each image; both images of a pair have the same.
@@ -79,27 +80,34 @@ mod tests {
     const RESPONSE: &str = "[evaluation]\nfitness = \"response\"\n";
 
     #[test]
-    fn images_are_pairs_of_opposites_where_two_training_images_differ_and_the_same_for_the_same_seed() {
+    fn images_are_pairs_of_opposites_where_training_images_differ_and_the_same_for_the_same_seed() {
         let images = |more: &str, seed: &str| {
             Training::load(&config(more, &[&format!("seed={seed}")]).unwrap(), None).unwrap()
         };
         let (plain, random) = (images("", "1"), images(RESPONSE, "1"));
         assert_eq!(random.images, plain.images);
         assert_eq!(random.stimuli.len(), 12);
-        let (mut bright, mut differing) = (0, 0);
-        for (number, pair) in random.stimuli.chunks(2).enumerate() {
-            assert_ne!(plain.images[number].label, plain.images[number + 6].label);
-            for (place, pixel) in pair[0].iter() {
-                let differs = plain.stimuli[number][place] != plain.stimuli[number + 6][place];
-                differing += usize::from(differs);
-                bright += usize::from(differs && *pixel == 1.0);
-                let opposite = pair[1][place];
-                assert_eq!(opposite, if differs { 1.0 - pixel } else { *pixel }, "{place:?}");
-                assert!(!differs || [0.0, 1.0].contains(pixel), "{place:?}: {pixel}");
+        let (mut seen, mut changing) = ([0, 0, 0], 0);
+        for (place, first) in plain.stimuli[0].iter() {
+            let changes = plain.stimuli.iter().any(|other| other[place] != *first);
+            changing += usize::from(changes);
+            for pair in random.stimuli.chunks(2) {
+                let (a, b) = (pair[0][place], pair[1][place]);
+                match changes {
+                    true if a == b => seen[2] += 1,
+                    true => {
+                        assert_eq!((a.max(b), a.min(b)), (1.0, 0.0), "{place:?}");
+                        seen[usize::from(a == 1.0)] += 1;
+                    }
+                    false => assert_eq!((a, b), (*first, *first), "{place:?}"),
+                }
             }
         }
-        let share = bright as f64 / differing as f64;
-        assert!(differing > 60 && (share - 0.5).abs() < 0.15, "{bright} of {differing}");
+        let all = 6.0 * changing as f64;
+        for (seen, expected) in seen.into_iter().zip([0.4, 0.4, 0.2]) {
+            assert!((f64::from(seen) / all - expected).abs() < 0.1, "{seen} of {all}: expected {expected}");
+        }
+        assert!(changing > 20);
         let opposites = |seed| opposites(&plain.stimuli, &Physics::default(), seed);
         assert_eq!(opposites(1), random.stimuli);
         assert_ne!(opposites(2), random.stimuli);
