@@ -1,4 +1,5 @@
-//! Cost of what is larger than a substep: a rollout, a generation's rollouts, an evaluation, and a run's bookkeeping.
+//! Cost of what is larger than a substep: a rollout, a generation's rollouts, an evaluation, and a
+//! run's bookkeeping.
 
 mod processor;
 

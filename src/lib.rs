@@ -1,13 +1,14 @@
 //! morphcog evolves soft robots whose bodies alone recognise images.
 //!
-//! A robot has no controller. Its muscle voxels oscillate, its sensor voxels swell or shrink with one pixel of an image
-//! each, and it is to walk left under some classes of images and right under the others. MAP-Elites evolves such
-//! bodies; the physics follows EvoGym's model.
+//! A robot has no controller. Its muscle voxels oscillate, its sensor voxels swell or shrink with
+//! one pixel of an image each, and it is to walk left under some classes of images and right under
+//! the others. MAP-Elites evolves such bodies; the physics follows EvoGym's model.
 //!
 //! # The layers
 //!
-//! A module uses only modules of lower layers. Below all of them is a crate of its own, the simulator: [`sim`] (`morphcog-sim`),
-//! the physics and nothing else. Begin there with [`sim::World`].
+//! A module uses only modules of lower layers. Below all of them is a crate of its own, the
+//! simulator: [`sim`] (`morphcog-sim`), the physics and nothing else. Begin there with
+//! [`sim::World`].
 //!
 //! | layer | module | what is in it | begin with |
 //! |---|---|---|---|

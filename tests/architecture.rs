@@ -1,9 +1,10 @@
-//! The house's plan (`src/lib.rs`) holds: what neither the compiler nor clippy (`clippy.toml`, `src/lib.rs`) can hold.
+//! The house's plan (`src/lib.rs`) holds: what neither the compiler nor clippy (`clippy.toml`,
+//! `src/lib.rs`) can hold.
 
 use std::path::{Path, PathBuf};
 
-/// Rooms with their floors. A room uses only rooms on lower floors. The simulator is a crate of its own, of which `base`
-/// and `body` pass on what does not simulate.
+/// Rooms with their floors. A room uses only rooms on lower floors. The simulator is a crate of its
+/// own, of which `base` and `body` pass on what does not simulate.
 const ROOMS: [(&str, u8); 15] = [
     ("base", 0),
     ("body", 1),

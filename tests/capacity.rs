@@ -1,4 +1,5 @@
-//! What robots are worth in networks: trained on the robots' images, kept, the same however it is stopped or spread.
+//! What robots are worth in networks: trained on the robots' images, kept, the same however it is
+//! stopped or spread.
 
 mod common;
 

@@ -292,7 +292,8 @@ fn a_wrong_set_is_refused_with_2_and_quotes_it() {
         said(command).ended(2, &["--set", words]);
         assert!(!sandbox.path("run").exists());
     }
-    // Well typed, but not what can be: the config's fault. What no file can hold is not taken for the same as anything else.
+    // Well typed, but not what can be: the config's fault. What no file can hold is not taken for
+    // the same as anything else.
     let table: toml::Table =
         toml::from_str(&TINY.replace("[data]\n", "[data]\nbuiltin = { seed = 77 }\n")).unwrap();
     let large = serde_json::to_string(&table).unwrap().replace(":77", ":9223372036854775808");

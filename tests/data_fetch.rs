@@ -1,5 +1,5 @@
-//! `morphcog data fetch` against a small HTTP server on this machine: what is not exactly the published file never gets
-//! to disk, and the next mirror is tried.
+//! `morphcog data fetch` against a small HTTP server on this machine: what is not exactly the
+//! published file never gets to disk, and the next mirror is tried.
 
 use morphcog::base::hash::sha256_hex;
 use morphcog::base::observer::{Observer, Work};

@@ -1,4 +1,5 @@
-//! A disk that is full when the work is done: what was found is shown all the same, and what to do is said.
+//! A disk that is full when the work is done: what was found is shown all the same, and what to do
+//! is said.
 #![cfg(unix)]
 
 mod common;
@@ -8,7 +9,8 @@ use common::program::{PROGRAM, SETTINGS, Said, Sandbox, files, said};
 use morphcog::store::run::Robot;
 use morphcog::task::response::Gait;
 
-/// Runs the program where no file may become larger than this number of blocks (of 512 or 1024 bytes): to it, a full disk.
+/// Runs the program where no file may become larger than this number of blocks (of 512 or 1024
+/// bytes): to it, a full disk.
 fn without_room(sandbox: &Sandbox, blocks: u32, args: &str) -> Said {
     let mut command = Command::new("sh");
     // Without a handler, the signal that comes with the error would end the program.
@@ -26,7 +28,8 @@ fn sandbox() -> Sandbox {
     sandbox
 }
 
-/// What a full disk must say in any case: which file, and what to do; no file that the user did not ask for.
+/// What a full disk must say in any case: which file, and what to do; no file that the user did not
+/// ask for.
 fn said_why(said: Said, file: &str) -> Said {
     let said = said.ended(1, &[&format!("error: {file}: cannot be written"), "hint:", "--out"]);
     assert!(!said.err.contains(".tmp") && !said.err.contains("tmp."), "{}", said.err);

@@ -1,5 +1,5 @@
-//! Hostile files and requests: whatever they hold, the program ends soon, says what is wrong in one harmless line that names
-//! the file, and never panics. By hand, for ten minutes:
+//! Hostile files and requests: whatever they hold, the program ends soon, says what is wrong in one
+//! harmless line that names the file, and never panics. By hand, for ten minutes:
 //!
 //! `MORPHCOG_HOSTILE_SECONDS=600 cargo test --release --test hostile_inputs -- --nocapture`
 //!
@@ -490,7 +490,8 @@ fn mutated_inputs_are_refused_or_used_and_nothing_else_ever_happens() {
     assert!(failures.is_empty(), "see {failures:#?}");
 }
 
-/// Runs a command on a file of the corpus: soon it ends, with words that do no harm and name the file if it is refused.
+/// Runs a command on a file of the corpus: soon it ends, with words that do no harm and name the
+/// file if it is refused.
 #[track_caller]
 fn put_to(sandbox: &Sandbox, args: &str, file: &str) -> Said {
     let mut command = sandbox.command(args.split_whitespace());

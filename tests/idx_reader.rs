@@ -1,4 +1,5 @@
-//! Our IDX reader against an independent one (the `mnist` crate), and against what is known of the real MNIST.
+//! Our IDX reader against an independent one (the `mnist` crate), and against what is known of the
+//! real MNIST.
 #![allow(clippy::disallowed_methods)]
 
 use morphcog::data::dataset::{Dataset, Split};

@@ -1,7 +1,8 @@
 //! Same numbers: no bit of a simulation or of a run changes unnoticed.
 //!
-//! Where one of these fails and the change is meant, the changelog says so under "Reproducibility-breaking", and
-//! the new hashes, which the failure shows, take the places of the old ones.
+//! Where one of these fails and the change is meant, the changelog says so under
+//! "Reproducibility-breaking", and the new hashes, which the failure shows, take the places of the
+//! old ones.
 
 mod common;
 
@@ -13,7 +14,8 @@ use rayon::prelude::*;
 use serde_json::{Map, Value};
 use std::fmt::Write;
 
-/// SHA-256 over the bits of x and y of all points before the first control step and after each, in little endian.
+/// SHA-256 over the bits of x and y of all points before the first control step and after each, in
+/// little endian.
 const SIMULATIONS: [(&str, &str); 21] = [
     ("bar_12x12_09", "4f30bdc53ddfc5b08c29d4233784a1a20bcd314b72d26e0fdb95229e24f26fd2"),
     ("bar_14x14_05", "39b53683f9d1fcb20c2cf8aca6643d087f54472fe659ce471ba32e8f22e67d9f"),
@@ -42,7 +44,8 @@ const SIMULATIONS: [(&str, &str); 21] = [
 const SEQUENTIAL_RUN: &str = "38e9052e5c9f95a3bd20ccd9b52f8b46c803f55a0e0a28dce0adb9538d2ce672";
 const GAITS_RUN: &str = "f61db093831825185d410574e416a76f618bd494abed790ff2daaffe90575267";
 
-/// The bits of all points before the first control step and after each, until the simulation becomes unstable.
+/// The bits of all points before the first control step and after each, until the simulation
+/// becomes unstable.
 fn bits(mut world: World) -> impl Iterator<Item = Vec<u8>> {
     let mut begun = false;
     std::iter::from_fn(move || {
@@ -79,7 +82,8 @@ const UNFELT: [(&str, u64); 8] = [
     ("unstable_ratio", 1f64.to_bits()),
 ];
 
-/// The physics with one of its constants a little greater: by 1 if it counts, or else by 1e-12 of itself.
+/// The physics with one of its constants a little greater: by 1 if it counts, or else by 1e-12 of
+/// itself.
 fn nudged(constants: &Map<String, Value>, name: &str) -> Physics {
     let mut changed = constants.clone();
     let value = &mut changed[name];

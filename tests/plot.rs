@@ -1,4 +1,5 @@
-//! `morphcog plot`: every kind of figure is made, well-formed, the same every time, and refuses what it cannot show.
+//! `morphcog plot`: every kind of figure is made, well-formed, the same every time, and refuses
+//! what it cannot show.
 
 mod common;
 

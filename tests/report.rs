@@ -66,7 +66,8 @@ fn what_lies_beside_the_run_is_in_it_and_several_runs_go_together() {
     sandbox
         .run("report runs/3 runs/3/run.json --lives 0")
         .ended(2, &["runs/3/run.json", "expected different runs"]);
-    // Networks that other robots are worth are not put beside this test; without a test they stand for themselves.
+    // Networks that other robots are worth are not put beside this test; without a test they stand
+    // for themselves.
     sandbox.run("eval -q --archive runs/3/run.json --images 20 --cycles 1 --robots top:2").ended(0, &[]);
     let capacity = |sandbox: &Sandbox| sandbox.read("runs/3/report.html").contains("Capacity");
     sandbox

@@ -1,4 +1,5 @@
-//! A report in a real browser: a click on a cell plays its robot, at every width, without complaints and from a file.
+//! A report in a real browser: a click on a cell plays its robot, at every width, without
+//! complaints and from a file.
 #![allow(clippy::disallowed_methods)]
 #![cfg(unix)]
 

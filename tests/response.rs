@@ -1,5 +1,5 @@
-//! `fitness = "response"`: the body's probe is measured under random images, the run is the same bits however it is run, and
-//! what reads a run reads this one.
+//! `fitness = "response"`: the body's probe is measured under random images, the run is the same
+//! bits however it is run, and what reads a run reads this one.
 #![allow(clippy::disallowed_methods)]
 
 mod common;
@@ -95,7 +95,8 @@ fn what_reads_a_run_reads_this_one() {
     let run = evolve(&sandbox, "run", "");
     let best = &run.best().unwrap().id;
     sandbox.run("eval -q -a run/run.json -n 20 --cycles 1 --robots top:1").ended(0, &[]);
-    // It rollouts its training images anew: those of the run are another body's, under other images.
+    // It rollouts its training images anew: those of the run are another body's, under other
+    // images.
     let audit = sandbox.run("audit -a run/run.json --set threshold=0").ended(0, &[]);
     assert!(!audit.err.contains("walks otherwise"), "{}", audit.err);
     sandbox.run(&format!("replay -a run/run.json --robot {best} -o replay.png")).ended(0, &[]);

@@ -1,4 +1,5 @@
-//! Stop anywhere: a run that was interrupted, however, and resumed ends with the same bytes as one that was not.
+//! Stop anywhere: a run that was interrupted, however, and resumed ends with the same bytes as one
+//! that was not.
 #![cfg(unix)]
 
 mod common;
@@ -380,7 +381,8 @@ fn a_second_sigint_ends_at_once_with_130_and_the_run_can_still_be_resumed() {
         let mut child = sandbox.start(&format!("{out} --json"));
         let mut events = BufReader::new(child.stdout.take().unwrap());
         wait_for_generation(&mut events, 2);
-        // Two of a kind that are both still pending are one. Between the two a run has little to do: it saves.
+        // Two of a kind that are both still pending are one. Between the two a run has little to
+        // do: it saves.
         let twice = format!("kill -s INT {0}; sleep 0.00{1}; kill -s INT {0}", child.id(), attempt % 5);
         Command::new("sh").args(["-c", &twice]).stderr(Stdio::null()).status().unwrap();
         events.read_to_string(&mut String::new()).unwrap();

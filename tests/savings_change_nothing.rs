@@ -1,4 +1,5 @@
-//! Lossless savings: the archive is the same with every combination of them on and off; with them, less is simulated.
+//! Lossless savings: the archive is the same with every combination of them on and off; with them,
+//! less is simulated.
 
 mod common;
 
@@ -26,7 +27,8 @@ fn totals(metrics: &str, images: u64) -> BTreeMap<String, u64> {
     last
 }
 
-/// Runs a config with all combinations of savings: same elites. `effective` savings must have saved something.
+/// Runs a config with all combinations of savings: same elites. `effective` savings must have saved
+/// something.
 fn check(config: &str, images: u64, effective: &[&str]) {
     let sandbox = Sandbox::new();
     sandbox.write("run.toml", config);

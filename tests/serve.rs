@@ -1,5 +1,5 @@
-//! `morphcog serve` over HTTP: what it answers, what it refuses, and that simulations are the engine's and end when nobody
-//! listens.
+//! `morphcog serve` over HTTP: what it answers, what it refuses, and that simulations are the
+//! engine's and end when nobody listens.
 
 // They end the server by signals.
 #![cfg(unix)]

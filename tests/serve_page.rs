@@ -1,4 +1,5 @@
-//! The page of `morphcog serve` in a real browser: what is drawn is walked, at every width, without complaints.
+//! The page of `morphcog serve` in a real browser: what is drawn is walked, at every width, without
+//! complaints.
 #![allow(clippy::disallowed_methods)]
 #![cfg(unix)]
 
@@ -12,7 +13,8 @@ use std::f64::consts::TAU;
 use std::io::Write;
 use std::time::{Duration, Instant};
 
-/// A browser if there is one; says so past the harness, which keeps the output of passing tests to itself, if not.
+/// A browser if there is one; says so past the harness, which keeps the output of passing tests to
+/// itself, if not.
 fn browser(sandbox: &Sandbox) -> Option<Browser> {
     let program = found();
     if program.is_none() {

@@ -1,4 +1,5 @@
-//! Whatever a command computes, it ends soon when it is to, and what would not end is refused before it begins.
+//! Whatever a command computes, it ends soon when it is to, and what would not end is refused
+//! before it begins.
 #![cfg(unix)]
 
 mod common;
@@ -161,7 +162,8 @@ fn a_run_stopped_at_any_moments_goes_on_to_the_same_bytes() {
         loop {
             let stop = AtomicBool::new(false);
             random = random.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-            // Long enough for some generations in the end, however slow the machine is at the moment.
+            // Long enough for some generations in the end, however slow the machine is at the
+            // moment.
             let patience = Duration::from_micros((random >> 33) % (20_000 + 3_000 * stops));
             let finished = std::thread::scope(|threads| {
                 threads.spawn(|| {
@@ -173,7 +175,8 @@ fn a_run_stopped_at_any_moments_goes_on_to_the_same_bytes() {
             match finished {
                 Ok(finished) if !finished.stopped => break,
                 Ok(_) => {}
-                // A program that another test starts has this process's files, and with them the lock of the run before, for a moment.
+                // A program that another test starts has this process's files, and with them the
+                // lock of the run before, for a moment.
                 Err(error) if error.kind == ErrorKind::Occupied => continue,
                 // Before there was anything to save.
                 Err(error) => assert_eq!(error.kind, ErrorKind::Stopped, "{error}"),

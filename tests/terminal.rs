@@ -1,4 +1,5 @@
-//! What a person at a terminal sees and types: films, keys, Ctrl-C, and the terminal as it was before.
+//! What a person at a terminal sees and types: films, keys, Ctrl-C, and the terminal as it was
+//! before.
 #![cfg(unix)]
 
 mod common;
@@ -25,8 +26,8 @@ struct Session {
 }
 
 impl Session {
-    /// Starts the program, under a shell that says at its end how the program ended and whether the terminal's settings are
-    /// those from before. Blanks separate arguments.
+    /// Starts the program, under a shell that says at its end how the program ended and whether the
+    /// terminal's settings are those from before. Blanks separate arguments.
     fn new(sandbox: &Sandbox, args: &str) -> Self {
         let (pty, place) = blocking::open().unwrap();
         pty.resize(Size::new(24, 80)).unwrap();
@@ -120,7 +121,8 @@ fn ctrl_c_ends_a_film_and_the_terminal_is_as_it_was() {
 fn ctrl_c_saves_a_run_that_shows_its_progress() {
     let sandbox = Sandbox::tiny();
     let mut run = Session::new(&sandbox, "evolve -c tiny.toml --generations 9999 -o run");
-    // A line that moves: it is written over again and again. How much time is left is known after the first generation.
+    // A line that moves: it is written over again and again. How much time is left is known after
+    // the first generation.
     run.shows("\r");
     run.shows("generation 0/9999");
     run.shows(" left");

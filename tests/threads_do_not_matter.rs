@@ -1,4 +1,5 @@
-//! Same bits: a run depends on config and seed only, not on the number of threads or the instruction set.
+//! Same bits: a run depends on config and seed only, not on the number of threads or the
+//! instruction set.
 
 mod common;
 

@@ -1,4 +1,5 @@
-//! Training of gaits: a run like any other, the same bits on any threads, exact after a stop, clear errors.
+//! Training of gaits: a run like any other, the same bits on any threads, exact after a stop, clear
+//! errors.
 
 mod common;
 

@@ -5,7 +5,8 @@ mod common;
 use common::program::{Sandbox, said};
 use std::path::Path;
 
-/// The commands of a page: lines of `console` blocks that begin with a prompt, without `morphcog` itself. Quotes hold blanks together.
+/// The commands of a page: lines of `console` blocks that begin with a prompt, without `morphcog`
+/// itself. Quotes hold blanks together.
 fn commands(page: &str) -> Vec<Vec<String>> {
     let text =
         std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("docs").join(page)).unwrap();

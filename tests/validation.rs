@@ -1,4 +1,5 @@
-//! Selection on validation images: from the training split, never trained on; the same every time; kept beside the run.
+//! Selection on validation images: from the training split, never trained on; the same every time;
+//! kept beside the run.
 
 mod common;
 
@@ -130,7 +131,8 @@ fn a_run_that_asks_for_it_chooses_robots_at_its_end() {
     sandbox.write("run.toml", format!("{TINY}{validation}"));
     let said = sandbox.run("evolve -c run.toml -o run").ended(0, &["validating"]);
     assert!(said.out.contains("best on validation"), "{}", said.out);
-    // What it found is what eval finds, and is not looked for again: eval asks for as many images as the config says.
+    // What it found is what eval finds, and is not looked for again: eval asks for as many images
+    // as the config says.
     let kept = sandbox.read("run/validation.json");
     let archive = "--archive run/run.json --robots best-validation:2 --images 20";
     let said = sandbox.run(&format!("eval {archive}")).ended(0, &[]);
@@ -271,7 +273,8 @@ fn the_best_robot_is_the_first_on_validation_images_where_the_run_ranked_them_el
     let run = sandbox.run_file("run");
     let fittest = run.best().unwrap();
     let first = run.elites.iter().find(|robot| robot.id != fittest.id && robot.task == fittest.task).unwrap();
-    // Robots of a tiny run are as good as each other on images they have not seen: so that it is not the fittest by chance.
+    // Robots of a tiny run are as good as each other on images they have not seen: so that it is
+    // not the fittest by chance.
     let mut ranking: serde_json::Value = serde_json::from_str(&sandbox.read("run/validation.json")).unwrap();
     ranking["robots"][0]["id"] = first.id.as_str().into();
     ranking["robots"][0]["task"] = first.task.as_str().into();

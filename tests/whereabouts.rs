@@ -1,4 +1,5 @@
-//! Whose images robots are shown: the run's own, wherever they lie, and others only if they are asked for by name.
+//! Whose images robots are shown: the run's own, wherever they lie, and others only if they are
+//! asked for by name.
 #![allow(clippy::disallowed_methods)]
 
 mod common;
@@ -8,7 +9,8 @@ use common::server::Server;
 use morphcog::store::eval::EvalFile;
 use std::fs::{remove_dir_all, rename};
 
-/// An IDX dataset of zeros and ones: noise with a bar, of the first ones upright; `seed` decides which noise.
+/// An IDX dataset of zeros and ones: noise with a bar, of the first ones upright; `seed` decides
+/// which noise.
 fn write_dataset(sandbox: &Sandbox, folder: &str, seed: u8) {
     const SIDE: usize = 10;
     let header = |sizes: &[u32]| {
@@ -64,7 +66,8 @@ fn a_run_remembers_where_its_images_were() {
     }
     let sets = Server::start(&sandbox, "--archive runs/one").get("/api/images").body;
     assert!(sets.contains("shapes"), "{sets}");
-    // It is of the run, so nothing is written over it, and a run that takes its place has none of it.
+    // It is of the run, so nothing is written over it, and a run that takes its place has none of
+    // it.
     sandbox.run("eval -a runs/one --images 8 -o runs/one/data-folder.json").ended(2, &["a file of a run"]);
     sandbox.run("evolve -q -c shapes.toml --set data.dataset=builtin -o runs/one --force").ended(0, &[]);
     assert!(!sandbox.path("runs/one/data-folder.json").exists());

@@ -74,7 +74,8 @@ pub fn config() -> Result<Config, Error> {
     Config::parse(text, CONFIG, &[])
 }
 
-/// Whether a selection, of no archive in particular, means published robots: the word for all of them, or their names.
+/// Whether a selection, of no archive in particular, means published robots: the word for all of
+/// them, or their names.
 ///
 /// # Errors
 /// As [`gallery`].
@@ -94,8 +95,8 @@ pub fn is_meant(selection: &Selection) -> Result<bool, Error> {
     }
 }
 
-/// The published robots as a run, for a test. Their genomes were not published: each has the empty one, and none of their
-/// displacements but the fitness.
+/// The published robots as a run, for a test. Their genomes were not published: each has the empty
+/// one, and none of their displacements but the fitness.
 ///
 /// Those data need not be there if images of another `dataset` are to be shown.
 ///

@@ -7,7 +7,8 @@ pub struct PaperRow {
     pub task: &'static str,
     /// Mean accuracy of ten robots on held-out images \[%\] (section "Generalization test").
     pub accuracy: f64,
-    /// Hidden neurons of the network they are worth; none: no match (section "Morphological cognition capacity").
+    /// Hidden neurons of the network they are worth; none: no match (section "Morphological
+    /// cognition capacity").
     pub mlp: Option<f64>,
     /// Kernels of the convolutional one.
     pub cnn: Option<f64>,

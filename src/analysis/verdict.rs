@@ -26,7 +26,8 @@ pub(crate) struct Behaviour<'a> {
 }
 
 impl<'a> Behaviour<'a> {
-    /// Of a robot that performs a task, judged by some fitness, and answers these classes with these displacements.
+    /// Of a robot that performs a task, judged by some fitness, and answers these classes with
+    /// these displacements.
     pub fn new(
         criteria: &'a Criteria,
         (split, fitness): (&Split, Fitness),
@@ -42,7 +43,8 @@ impl<'a> Behaviour<'a> {
         let asked: Vec<usize> = (0..plain.len()).filter(|&image| rightward[image].is_some()).collect();
         let is_right = |&image: &usize| towards(rightward[image], plain[image]) > criteria.threshold;
         let answered: Vec<usize> = asked.iter().copied().filter(is_right).collect();
-        // Who is wrong on many is a walker all the same, if it walks: how much it knows is for a test to say.
+        // Who is wrong on many is a walker all the same, if it walks: how much it knows is for a
+        // test to say.
         let walks = |&&image: &&usize| Direction::of(plain[image], criteria.threshold).is_some();
         let walked = asked.iter().filter(walks).count();
         let groups = [Group::A, Group::B].into_iter().filter(|&group| !split.classes(group).is_empty());
@@ -116,8 +118,8 @@ impl<'a> Behaviour<'a> {
         (Verdict::Fragile, broken.join(", "))
     }
 
-    /// Root mean square difference of the perturbed rollouts' displacements from the unchanged ones, voxel lengths;
-    /// unstable rollouts have none.
+    /// Root mean square difference of the perturbed rollouts' displacements from the unchanged
+    /// ones, voxel lengths; unstable rollouts have none.
     pub fn spread(&self, lives: &[PerturbedRollout]) -> f64 {
         let stable = lives.iter().filter_map(|life| life.displacements.as_ref());
         let squares: Vec<f64> =

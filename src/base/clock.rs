@@ -2,7 +2,8 @@
 
 use std::time::Duration;
 
-/// What [`thread_time`] tells: "processor", or "wall" where the system does not tell a thread's processor time.
+/// What [`thread_time`] tells: "processor", or "wall" where the system does not tell a thread's
+/// processor time.
 pub const CLOCK: &str = if IS_KNOWN { "processor" } else { "wall" };
 
 #[cfg(all(
@@ -55,8 +56,8 @@ mod system {
 
 use system::IS_KNOWN;
 
-/// Processor time of the calling thread so far; where the system does not tell it, wall-clock time since the first call. Only
-/// differences mean anything.
+/// Processor time of the calling thread so far; where the system does not tell it, wall-clock time
+/// since the first call. Only differences mean anything.
 pub fn thread_time() -> Duration {
     system::now()
 }

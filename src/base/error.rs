@@ -46,7 +46,8 @@ pub struct Error {
     pub message: String,
     /// What to do about it.
     pub hint: Option<String>,
-    /// The key that it is about, if it is about one of a config: its path in dots, items of lists by their number from 1.
+    /// The key that it is about, if it is about one of a config: its path in dots, items of lists
+    /// by their number from 1.
     pub key: Option<String>,
 }
 
@@ -135,7 +136,8 @@ impl Error {
     }
 }
 
-/// Whether there is no room: on the disk, in the user's quota, or in a file of the size that the system allows.
+/// Whether there is no room: on the disk, in the user's quota, or in a file of the size that the
+/// system allows.
 pub fn is_full(error: &io::Error) -> bool {
     use io::ErrorKind::{FileTooLarge, QuotaExceeded, StorageFull};
     matches!(error.kind(), StorageFull | QuotaExceeded | FileTooLarge)

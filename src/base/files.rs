@@ -24,8 +24,9 @@ pub fn read_text(path: &Path) -> io::Result<String> {
     }
 }
 
-/// Writes a file as a whole or not at all: to a temporary name in the same folder, synced, then renamed. Of a
-/// symbolic link, the file it leads to; what is no ordinary file (`/dev/stdout`, a pipe) is written to as it is.
+/// Writes a file as a whole or not at all: to a temporary name in the same folder, synced, then
+/// renamed. Of a symbolic link, the file it leads to; what is no ordinary file (`/dev/stdout`, a
+/// pipe) is written to as it is.
 ///
 /// # Errors
 /// What the system says, as when the folder does not exist; the file is then as it was.
@@ -41,8 +42,8 @@ pub fn write_atomically(path: &Path, content: &[u8]) -> io::Result<()> {
     let name = path.file_name().filter(|name| name.len() <= 200).unwrap_or_default();
     prefix.extend([name, OsStr::new(".")]);
     let mut builder = tempfile::Builder::new();
-    // Opened here: with the permissions of any new file, not a temporary file's owner-only; and so that what the system says
-    // does not name a file that the user did not ask for.
+    // Opened here: with the permissions of any new file, not a temporary file's owner-only; and so
+    // that what the system says does not name a file that the user did not ask for.
     let open = |name: &Path| File::options().write(true).create_new(true).open(name);
     let mut file = builder.prefix(&prefix).suffix(TEMPORARY[1]).make_in(folder, open)?;
     file.as_file_mut().write_all(content)?;
@@ -70,8 +71,8 @@ fn folder_of(path: &Path) -> &Path {
     path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
-/// Removes what writing the files of these names left half-written in a folder when the process was killed. Only for who
-/// alone writes those files.
+/// Removes what writing the files of these names left half-written in a folder when the process was
+/// killed. Only for who alone writes those files.
 ///
 /// # Errors
 /// What the system says.

@@ -1,4 +1,5 @@
-//! What every module stands on (random generators, hashes, files; numbers, lines and tables as text).
+//! What every module stands on (random generators, hashes, files; numbers, lines and tables as
+//! text).
 
 pub mod clock;
 pub mod error;

@@ -1,8 +1,9 @@
 //! The only maker of random generators, and the only way random bits become numbers.
 //!
-//! Every use of chance has a stream of its own, named by (seed, purpose, generation, child), so that no result
-//! depends on which thread asked first or on where a run was interrupted. Numbers are made from the bits
-//! here, not by a library's distributions: their values then never change with a library's version.
+//! Every use of chance has a stream of its own, named by (seed, purpose, generation, child), so
+//! that no result depends on which thread asked first or on where a run was interrupted. Numbers
+//! are made from the bits here, not by a library's distributions: their values then never change
+//! with a library's version.
 
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64;
@@ -45,7 +46,8 @@ pub struct Stream(Pcg64);
 
 /// The stream for `purpose` in a run with `seed`; `generation` and `child` tell its uses apart.
 pub fn stream(seed: u64, purpose: Purpose, generation: u64, child: u64) -> Stream {
-    // SplitMix64 (Steele et al. 2014) over the four words: neighbouring names give unrelated PCG states.
+    // SplitMix64 (Steele et al. 2014) over the four words: neighbouring names give unrelated PCG
+    // states.
     let mut state = 0u64;
     let mut bytes = [0; 32];
     let words = [seed, purpose as u64, generation, child];
@@ -113,7 +115,8 @@ mod tests {
 
     #[test]
     fn values_are_stable_across_versions() {
-        // Pinned: a change here changes every result of every seed (CHANGELOG: Reproducibility-breaking).
+        // Pinned: a change here changes every result of every seed (CHANGELOG:
+        // Reproducibility-breaking).
         let mut s = stream(1, Purpose::Mutation, 2, 3);
         let drawn = (s.0.next_u64(), s.below(1000), s.unit().to_bits(), s.normal().to_bits());
         assert_eq!(drawn, PINNED);

@@ -1,5 +1,5 @@
-//! Signals: the first one asks a command that has something to save to stop and save; where there is nothing, or when that is
-//! done, a signal ends the process, as is usual.
+//! Signals: the first one asks a command that has something to save to stop and save; where there
+//! is nothing, or when that is done, a signal ends the process, as is usual.
 
 use crate::base::error::Error;
 use signal_hook::consts::{SIGINT, SIGTERM};
@@ -37,8 +37,8 @@ impl Drop for StopFlag {
     }
 }
 
-/// A flag that SIGINT, SIGTERM and SIGUSR1 set; a second SIGINT ends the process at once. When it goes, signals end the process
-/// again.
+/// A flag that SIGINT, SIGTERM and SIGUSR1 set; a second SIGINT ends the process at once. When it
+/// goes, signals end the process again.
 ///
 /// # Errors
 /// If the system does not let signals be handled.
@@ -58,7 +58,8 @@ pub fn stop_flag() -> Result<StopFlag, Error> {
         }
     };
     let stop = Arc::new(AtomicBool::new(false));
-    // In this order: the first SIGINT finds its flag unset and sets it, the second one finds it set.
+    // In this order: the first SIGINT finds its flag unset and sets it, the second one finds it
+    // set.
     let interrupted = Arc::new(AtomicBool::new(false));
     flag::register_conditional_shutdown(SIGINT, AT_ONCE, Arc::clone(&interrupted)).map_err(failed)?;
     flag::register(SIGINT, interrupted).map_err(failed)?;

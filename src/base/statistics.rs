@@ -27,8 +27,8 @@ pub fn standard_deviation(values: &[f64]) -> Option<f64> {
     (values.len() > 1).then(|| (squares / (n - 1.0)).sqrt())
 }
 
-/// 95 % interval of the mean: percentiles of the means of resamples (Efron 1979), the same every time. None of fewer
-/// than two values.
+/// 95 % interval of the mean: percentiles of the means of resamples (Efron 1979), the same every
+/// time. None of fewer than two values.
 pub fn bootstrap(values: &[f64]) -> Option<[f64; 2]> {
     const RESAMPLES: usize = 10_000;
     if values.len() < 2 {

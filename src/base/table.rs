@@ -2,7 +2,8 @@
 
 use serde::Serialize;
 
-/// The text of a table. A row's fields come in the columns' order; a list in a row stands for as many columns.
+/// The text of a table. A row's fields come in the columns' order; a list in a row stands for as
+/// many columns.
 ///
 /// # Panics
 /// If rows have not as many fields as there are columns.

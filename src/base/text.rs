@@ -3,9 +3,10 @@
 /// Most characters of a message: more than any of ours has.
 const MOST: usize = 1500;
 
-/// A text as one line of printable characters: a control character, a line break or what turns the direction of writing is
-/// written as `\u{…}` (or `\n`, `\r`, `\t`), so that a file, or a file's name, can neither command the terminal nor forge a
-/// line. Of what is very long, beginning and end stay.
+/// A text as one line of printable characters: a control character, a line break or what turns the
+/// direction of writing is written as `\u{…}` (or `\n`, `\r`, `\t`), so that a file, or a file's
+/// name, can neither command the terminal nor forge a line. Of what is very long, beginning and end
+/// stay.
 pub fn one_line(text: &str) -> String {
     shortened(text, MOST)
 }
@@ -38,7 +39,8 @@ fn written(c: char) -> String {
 pub fn is_unseen(c: char) -> bool {
     c.is_control()
         || matches!(c,
-            // Marks and overrides of the direction, separators of lines, tags, and what has no width.
+            // Marks and overrides of the direction, separators of lines, tags, and what has no
+            // width.
             '\u{61c}' | '\u{180e}' | '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}'
             | '\u{2060}'..='\u{206f}' | '\u{feff}' | '\u{fff9}'..='\u{fffb}' | '\u{e0000}'..='\u{e007f}')
 }

@@ -11,7 +11,8 @@ use std::fmt;
 pub enum Crossing {
     /// At this size. A number in JSON.
     At(f64),
-    /// It is above the value at the smallest size already. An object in JSON, so that the bound is not mistaken for the size.
+    /// It is above the value at the smallest size already. An object in JSON, so that the bound is
+    /// not mistaken for the size.
     Below {
         /// That smallest size.
         below: f64,
@@ -27,7 +28,8 @@ impl fmt::Display for Crossing {
     }
 }
 
-/// c0, c1, c2 of the least-squares parabola c0 + c1·x + c2·x² through points; `None` of fewer than three different x.
+/// c0, c1, c2 of the least-squares parabola c0 + c1·x + c2·x² through points; `None` of fewer than
+/// three different x.
 pub fn parabola(points: &[(f64, f64)]) -> Option<[f64; 3]> {
     let mut xs: Vec<f64> = points.iter().map(|point| point.0).collect();
     xs.sort_by(f64::total_cmp);
@@ -46,8 +48,8 @@ pub fn parabola(points: &[(f64, f64)]) -> Option<[f64; 3]> {
     Some([solution[0], solution[1] / scale, solution[2] / (scale * scale)])
 }
 
-/// The smallest x in [from, to] at which a parabola reaches a value: where it is at or above it first. `None` if it
-/// never is.
+/// The smallest x in [from, to] at which a parabola reaches a value: where it is at or above it
+/// first. `None` if it never is.
 pub fn first_crossing([c0, c1, c2]: [f64; 3], value: f64, (from, to): (f64, f64)) -> Option<Crossing> {
     let at = |x: f64| c0 + x * (c1 + x * c2);
     if at(from) > value {
@@ -64,7 +66,8 @@ pub fn first_crossing([c0, c1, c2]: [f64; 3], value: f64, (from, to): (f64, f64)
         if discriminant < 0.0 {
             return None;
         }
-        // The stable form: no difference of nearly equal numbers (Press et al., Numerical Recipes, 5.6).
+        // The stable form: no difference of nearly equal numbers (Press et al., Numerical Recipes,
+        // 5.6).
         let q = -0.5 * (c1 + discriminant.sqrt().copysign(c1));
         [Some(q / c2), (q != 0.0).then(|| c / q)]
     };

@@ -1,4 +1,5 @@
-//! Networks that robots are compared with (paper, "Morphological cognition capacity"), trained on a library.
+//! Networks that robots are compared with (paper, "Morphological cognition capacity"), trained on a
+//! library.
 
 pub mod curve;
 #[cfg(feature = "networks")]

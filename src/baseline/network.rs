@@ -52,7 +52,8 @@ impl Shape {
         }
     }
 
-    /// Places of that on an image, by rows and columns: one, of all of the image, for a hidden layer.
+    /// Places of that on an image, by rows and columns: one, of all of the image, for a hidden
+    /// layer.
     fn places(&self) -> (usize, usize) {
         (self.image.0 + 1 - self.field().0, self.image.1 + 1 - self.field().1)
     }
@@ -78,8 +79,9 @@ impl Shape {
         rows * columns * self.size
     }
 
-    /// Images as [`Network::forward`] takes them: what the units see at every place, places of a pooling window × images ×
-    /// windows × inputs. A convolution is then a product of matrices, and made of fixed images only once.
+    /// Images as [`Network::forward`] takes them: what the units see at every place, places of a
+    /// pooling window × images × windows × inputs. A convolution is then a product of matrices, and
+    /// made of fixed images only once.
     ///
     /// # Errors
     /// If an image is not of the shape's size.
@@ -117,7 +119,8 @@ impl Shape {
 /// A network with two outputs.
 pub struct Network {
     shape: Shape,
-    /// Weights of the hidden layer (inputs × size), the biases in the last row; weights and biases of the outputs.
+    /// Weights of the hidden layer (inputs × size), the biases in the last row; weights and biases
+    /// of the outputs.
     parameters: [Var; 3],
 }
 
@@ -125,7 +128,8 @@ pub struct Network {
 const OUTPUTS: usize = 2;
 
 impl Network {
-    /// With random parameters: uniform within ±1/√(inputs of a unit), as PyTorch starts such layers.
+    /// With random parameters: uniform within ±1/√(inputs of a unit), as PyTorch starts such
+    /// layers.
     ///
     /// # Errors
     /// If the library has no memory for them.

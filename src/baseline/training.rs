@@ -46,7 +46,8 @@ impl Samples {
     }
 }
 
-/// Images judged at once \[images\]: activations of this many stay in a core's cache; with more, it is slower.
+/// Images judged at once \[images\]: activations of this many stay in a core's cache; with more, it
+/// is slower.
 const JUDGED_AT_ONCE: usize = 64;
 
 /// Why a training has no result.
@@ -84,8 +85,9 @@ fn judge(
     Ok((accuracy, if watch == Watch::Accuracy { accuracy } else { -loss }))
 }
 
-/// Trains a network of a size on `training`, waits for improvement on `waiting`, and tests it on `test`: samples for
-/// networks of one kind. Unless `stop` is set meanwhile, which is looked at between batches.
+/// Trains a network of a size on `training`, waits for improvement on `waiting`, and tests it on
+/// `test`: samples for networks of one kind. Unless `stop` is set meanwhile, which is looked at
+/// between batches.
 ///
 /// # Errors
 /// If it was stopped; if the images do not go with each other or with the kernels.

@@ -24,8 +24,9 @@ use std::path::PathBuf;
 
 /// Evolve soft robots whose bodies alone recognise images.
 ///
-/// Voxels that oscillate, voxels that swell or shrink with one pixel and passive voxels are put together by evolution so
-/// that the robot walks one way when it sees a zero and the other way when it sees a one: no neurons, no controller.
+/// Voxels that oscillate, voxels that swell or shrink with one pixel and passive voxels are put
+/// together by evolution so that the robot walks one way when it sees a zero and the other way when
+/// it sees a one: no neurons, no controller.
 #[derive(Debug, Parser)]
 #[command(name = "morphcog", version, after_help = EXAMPLES, max_term_width = 100)]
 pub struct Cli {
@@ -34,7 +35,8 @@ pub struct Cli {
     /// Results, warnings and errors only.
     #[arg(short, long, global = true, conflicts_with = "json")]
     pub(super) quiet: bool,
-    /// For programs: one JSON object per line on stdout (but for what config, simulate, completions and man print).
+    /// For programs: one JSON object per line on stdout (but for what config, simulate, completions
+    /// and man print).
     #[arg(long, global = true)]
     pub(super) json: bool,
 }
@@ -161,14 +163,16 @@ Examples:
         after_help = "Examples:\n  morphcog man > morphcog.1 && man ./morphcog.1\n  morphcog man --out ~/.local/share/man/man1"
     )]
     Man {
-        /// Folder for the pages of all commands (default: the page of morphcog itself, to standard output).
+        /// Folder for the pages of all commands (default: the page of morphcog itself, to standard
+        /// output).
         #[arg(short, long, value_name = "DIR")]
         out: Option<PathBuf>,
     },
     /// How fast this machine simulates.
     ///
-    /// Measured is the processor time of one thread, which other work on the machine leaves nearly as it is. Where the
-    /// system does not tell it (Windows), it is wall-clock time, and the output says so.
+    /// Measured is the processor time of one thread, which other work on the machine leaves nearly
+    /// as it is. Where the system does not tell it (Windows), it is wall-clock time, and the output
+    /// says so.
     #[command(after_help = "Examples:\n  morphcog bench\n  morphcog bench --all")]
     Bench {
         /// Every instruction set of this machine, not only the one in use.
@@ -217,8 +221,8 @@ pub(super) struct EvalArgs {
     /// Images in all, evenly divided between the classes.
     #[arg(short = 'n', long, default_value_t = 1000, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pub(super) images: u32,
-    /// Which images: test, or validation (of the training split, neither trained on nor chosen from), to compare robots by
-    /// and leave the test images unseen.
+    /// Which images: test, or validation (of the training split, neither trained on nor chosen
+    /// from), to compare robots by and leave the test images unseen.
     #[arg(long, default_value_t = HeldOut::Test, value_name = "SPLIT")]
     pub(super) split: HeldOut,
     #[arg(short, long, visible_aliases = ["robot", "select"], default_value = "top:10", help = ROBOTS)]
@@ -244,7 +248,8 @@ pub(super) struct EvalArgs {
     /// Folder with the images.
     #[arg(long, value_name = "DIR")]
     pub(super) data: Option<PathBuf>,
-    /// Result file; a CSV goes beside it (default: eval.json, or eval-validation.json, beside run.json, or above several).
+    /// Result file; a CSV goes beside it (default: eval.json, or eval-validation.json, beside
+    /// run.json, or above several).
     #[arg(short, long, value_name = "FILE")]
     pub(super) out: Option<PathBuf>,
     /// Threads (default: one per core).
@@ -277,13 +282,15 @@ pub(super) struct ReplayArgs {
     /// What to make, separated by commas (default: gif,html).
     #[arg(short, long, value_delimiter = ',')]
     pub(super) format: Vec<Format>,
-    /// File; its ending (.gif, .html, .png) says the format (default: replay-<robot> beside run.json).
+    /// File; its ending (.gif, .html, .png) says the format (default: replay-<robot> beside
+    /// run.json).
     #[arg(short, long, value_name = "FILE")]
     pub(super) out: Option<PathBuf>,
     /// Width of GIF and PNG in pixels.
     #[arg(long, default_value_t = 480)]
     pub(super) width: u32,
-    /// Control steps from one frame of the GIF to the next: 1 is the robot's own time, more is faster and a smaller file.
+    /// Control steps from one frame of the GIF to the next: 1 is the robot's own time, more is
+    /// faster and a smaller file.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=500))]
     pub(super) every: u16,
     /// Frames of the GIF per second: 25 with --every 2 is the robot's own time in half the frames.

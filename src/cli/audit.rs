@@ -42,14 +42,15 @@ pub(super) struct AuditArgs {
     /// How to judge: a TOML file (or JSON); keys that are not in it have their defaults.
     #[arg(long, value_name = "FILE")]
     criteria: Option<PathBuf>,
-    /// Change a criterion, as in threshold=2 or perturbations.time_step=[2,4]; without a value, it has its default again; may be
-    /// given several times.
+    /// Change a criterion, as in threshold=2 or perturbations.time_step=[2,4]; without a value, it
+    /// has its default again; may be given several times.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
     /// Folder with the images.
     #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,
-    /// Result file; a CSV goes beside it (default: audit.json beside run.json, where --physical-only looks).
+    /// Result file; a CSV goes beside it (default: audit.json beside run.json, where
+    /// --physical-only looks).
     #[arg(short, long, value_name = "FILE")]
     out: Option<PathBuf>,
     /// Threads (default: one per core).

@@ -1,4 +1,5 @@
-//! What commands have in common that take archives, or robots of them: one rule, and the same words of help.
+//! What commands have in common that take archives, or robots of them: one rule, and the same words
+//! of help.
 
 use crate::base::error::Error;
 use crate::base::signals;
@@ -16,7 +17,8 @@ use std::path::PathBuf;
 /// Archives, of a command that takes several.
 #[derive(Debug, Args)]
 pub(super) struct Archives {
-    /// A run.json, or its folder; several may follow, and the option may be repeated (default: the newest under runs/).
+    /// A run.json, or its folder; several may follow, and the option may be repeated (default: the
+    /// newest under runs/).
     #[arg(short, long, value_name = "FILE", value_parser = run_json(), num_args = 1..)]
     pub(super) archive: Vec<PathBuf>,
 }
@@ -46,7 +48,8 @@ pub(super) fn selected(mut given: Vec<Selection>) -> Result<Option<Selection>, E
 
 /// The robots of a selection, for a command that looks at them one by one.
 pub(super) fn one_by_one(search: &one_by_one::Options, console: &Console) -> Result<Vec<Named>, Error> {
-    // Only a search on validation images is stopped in an orderly way: signals end all else at once.
+    // Only a search on validation images is stopped in an orderly way: signals end all else at
+    // once.
     let observer = Reporter::new(console);
     match search.robots.validated() {
         Some(_) => one_by_one::named(search, &*signals::stop_flag()?, &observer),

@@ -59,7 +59,8 @@ pub(super) struct PlotArgs {
     /// Control steps between the poses of snapshots (default: as suits the walk).
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..))]
     every: Option<u32>,
-    /// File; its ending (.svg, .png) says the format (default: both, plot-<kind>[-<robot>] beside run.json).
+    /// File; its ending (.svg, .png) says the format (default: both, plot-<kind>[-<robot>] beside
+    /// run.json).
     #[arg(short, long, value_name = "FILE")]
     out: Option<PathBuf>,
     /// Pixels of PNG per inch.

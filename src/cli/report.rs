@@ -27,8 +27,8 @@ pub(super) struct ReportArgs {
     /// The same without the option's name, as command lines of before have it.
     #[arg(value_parser = run_json(), hide = true)]
     runs: Vec<PathBuf>,
-    /// Robots that can be watched, the fittest of each run; the more, the fewer frames each has (the page stays below
-    /// 20 MB).
+    /// Robots that can be watched, the fittest of each run; the more, the fewer frames each has
+    /// (the page stays below 20 MB).
     #[arg(long, default_value_t = 100)]
     lives: usize,
     /// Folder with the images.

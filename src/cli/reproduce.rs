@@ -25,11 +25,12 @@ pub(super) struct ReproduceArgs {
     /// What belongs to it (TOML or JSON), or paper.toml, which is built in.
     #[arg(default_value = PAPER_TOML.0)]
     plan: String,
-    /// More than 0, up to 1: generations are multiplied by it, test images and trainings by its square root.
+    /// More than 0, up to 1: generations are multiplied by it, test images and trainings by its
+    /// square root.
     #[arg(long, default_value_t = 1.0)]
     scale: f64,
-    /// Change a key, as in seeds=[1,2] or experiment.1.config=mine.toml (experiments are counted from 1); without a value, it has
-    /// its default again; may be given several times.
+    /// Change a key, as in seeds=[1,2] or experiment.1.config=mine.toml (experiments are counted
+    /// from 1); without a value, it has its default again; may be given several times.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
     /// Folder for everything.

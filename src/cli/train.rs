@@ -47,7 +47,8 @@ pub(super) struct TrainArgs {
     /// Seed of all chance (default: that of the archive's run).
     #[arg(long, value_parser = clap::value_parser!(u64).range(..=config::MAX_NUMBER))]
     seed: Option<u64>,
-    /// Change a key, as in train.rounds=10 or data.dataset=fashion-mnist; may be given several times.
+    /// Change a key, as in train.rounds=10 or data.dataset=fashion-mnist; may be given several
+    /// times.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
     /// Folder with the images.

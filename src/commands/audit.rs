@@ -95,8 +95,8 @@ struct Trial {
     criteria: Criteria,
 }
 
-/// Audits robots. What an earlier audit of the same robots by the same criteria found is kept and not done again; the
-/// file is the same bytes however often it was stopped.
+/// Audits robots. What an earlier audit of the same robots by the same criteria found is kept and
+/// not done again; the file is the same bytes however often it was stopped.
 ///
 /// # Errors
 /// What is wrong with archive, data, selection or criteria.
@@ -156,7 +156,8 @@ pub fn audit(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> R
 
 type Opened = (Config, Fitness, Training, Vec<Subject>, Vec<String>, AuditFile);
 
-/// Config, fitness, images, the robots asked for, the ids of all there are in order, and an empty file.
+/// Config, fitness, images, the robots asked for, the ids of all there are in order, and an empty
+/// file.
 fn open(options: &Options) -> Result<Opened, Error> {
     let data = options.data.as_deref();
     match &options.source {
@@ -189,7 +190,8 @@ fn open(options: &Options) -> Result<Opened, Error> {
             check_out(&options.out, path, AUDIT_JSON)?;
             let whereabouts = Whereabouts::given(data).and_of(path);
             let training = training_of(run, path, &whereabouts)?;
-            // A training may have shown images otherwise than the protocol says, which is what is judged.
+            // A training may have shown images otherwise than the protocol says, which is what is
+            // judged.
             let is_known = run.follows_protocol() && training.images == run.training_images;
             let subject = |robot: &Robot| Subject {
                 id: robot.id.clone(),
@@ -210,7 +212,8 @@ fn open(options: &Options) -> Result<Opened, Error> {
     }
 }
 
-/// The images a run's robots were evolved on, of each class the first few. Of other data, verdicts would mean nothing.
+/// The images a run's robots were evolved on, of each class the first few. Of other data, verdicts
+/// would mean nothing.
 fn training_of(run: &RunFile, path: &Path, whereabouts: &Whereabouts) -> Result<Training, Error> {
     let dataset = load_dataset_of(Some(&run.dataset), &run.config, whereabouts, &[Split::Train])?;
     let mut taken = [0; 256];
@@ -331,7 +334,8 @@ mod tests {
     use crate::store::images::{DatasetRef, ImageRef};
     use crate::task::protocol::{Life, Protocol};
 
-    /// Two images, of classes 0 and 1, the first dark and the second bright, each in a fresh rollout of five cycles.
+    /// Two images, of classes 0 and 1, the first dark and the second bright, each in a fresh
+    /// rollout of five cycles.
     fn trial(height: usize, width: usize, physics: Physics) -> Trial {
         let set = ["task={splits=[0,1],same_way_bin=true}", "protocol.control_steps=250"].map(str::to_string);
         let mut config = Config::parse(BUILT_IN[0].1, BUILT_IN[0].0, &set).unwrap();
@@ -355,7 +359,8 @@ mod tests {
         trial.robot(&subject, &AtomicBool::new(false), &AtomicU64::new(0), &()).unwrap()
     }
 
-    /// Muscles of one phase above, of the other below, a soft front and a rigid foot: it walks to the right.
+    /// Muscles of one phase above, of the other below, a soft front and a rigid foot: it walks to
+    /// the right.
     const WALKER: &str = "444422/444422/333311/330011";
 
     #[test]

@@ -25,8 +25,8 @@ pub struct Speed {
     pub voxels: usize,
     /// Instruction set.
     pub instruction_set: &'static str,
-    /// What measured it: "processor", the processor time of the thread, which what else the machine does leaves as it is; or
-    /// "wall", where the system does not tell that.
+    /// What measured it: "processor", the processor time of the thread, which what else the machine
+    /// does leaves as it is; or "wall", where the system does not tell that.
     pub clock: &'static str,
     /// Microseconds per substep, median of the repetitions.
     pub microseconds: f64,
@@ -37,8 +37,8 @@ pub struct Speed {
 /// Material by row and column.
 type Pattern = dyn Fn(usize, usize) -> Material;
 
-/// Bodies of every kind that differ in cost. Their voxels are a fixed pattern, so that figures of different machines and
-/// versions can be compared.
+/// Bodies of every kind that differ in cost. Their voxels are a fixed pattern, so that figures of
+/// different machines and versions can be compared.
 pub fn specimens() -> Vec<Specimen> {
     use Material::{Empty, MuscleAntiphase, MuscleInPhase, Rigid, SensorExpand, SensorShrink, Soft};
     let active = |r: usize, c: usize| match (r / 2 + c / 3) % 4 {
@@ -73,8 +73,8 @@ const STEPS: u32 = 50;
 /// Control steps before measuring: the robot has landed and walks.
 const WARM_UP: u32 = 50;
 
-/// Measures one body on one instruction set: the median of up to `repetitions` repetitions of fifty control steps of one
-/// rollout, fewer if they take longer than two seconds.
+/// Measures one body on one instruction set: the median of up to `repetitions` repetitions of fifty
+/// control steps of one rollout, fewer if they take longer than two seconds.
 pub fn measure(specimen: &Specimen, set: InstructionSet, repetitions: usize) -> Speed {
     let physics = Physics::default();
     let start = Start { column: 493, row: physics.ground_row };
@@ -135,7 +135,8 @@ mod tests {
         let rigid = list[3].body.voxels().cells().iter().filter(|m| **m == Material::Rigid).count();
         assert_eq!(rigid, 131);
         let points = |i: usize| System::new(&list[i].body, Physics::default()).point_count();
-        // 24 gaps, none of which takes a whole vertex away; at each of 12 corner contacts one point more.
+        // 24 gaps, none of which takes a whole vertex away; at each of 12 corner contacts one point
+        // more.
         assert!(points(4) > points(0), "{} {}", points(4), points(0));
     }
 

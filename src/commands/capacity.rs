@@ -1,4 +1,5 @@
-//! `morphcog capacity`: the networks that the robots are worth (paper, "Morphological cognition capacity").
+//! `morphcog capacity`: the networks that the robots are worth (paper, "Morphological cognition
+//! capacity").
 
 use crate::analysis::gallery;
 use crate::base::error::{Error, ErrorKind};
@@ -53,7 +54,8 @@ pub struct Finished {
     pub unwritten: Option<Error>,
 }
 
-/// Finds the capacity of evaluated robots. What was trained before is kept beside the results and not trained again.
+/// Finds the capacity of evaluated robots. What was trained before is kept beside the results and
+/// not trained again.
 ///
 /// # Errors
 /// What is wrong with the evaluation, the data or the settings.

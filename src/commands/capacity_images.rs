@@ -138,7 +138,8 @@ impl Task {
     /// The training of this number; the runs take turns in lending their images.
     ///
     /// # Errors
-    /// Of kind [`ErrorKind::Stopped`](crate::base::error::ErrorKind::Stopped) if `stop` is set meanwhile; if networks cannot be trained.
+    /// Of kind [`ErrorKind::Stopped`](crate::base::error::ErrorKind::Stopped) if `stop` is set
+    /// meanwhile; if networks cannot be trained.
     pub fn train(
         &self,
         size: usize,

@@ -27,7 +27,8 @@ use std::sync::atomic::{AtomicBool, AtomicU64};
 /// What to evaluate, and on what.
 #[derive(Clone, Debug)]
 pub struct Options {
-    /// The run.json, or those of several runs that differ in their seeds only; none: the published robots.
+    /// The run.json, or those of several runs that differ in their seeds only; none: the published
+    /// robots.
     pub archives: Vec<PathBuf>,
     /// Which of its robots.
     pub robots: Selection,
@@ -62,7 +63,8 @@ pub struct Finished {
     pub unwritten: Option<Error>,
 }
 
-/// Evaluates robots; results are written after every robot, so that stopping keeps what is finished.
+/// Evaluates robots; results are written after every robot, so that stopping keeps what is
+/// finished.
 ///
 /// # Errors
 /// What is wrong with archive, data or selection.
@@ -143,7 +145,8 @@ pub fn eval(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Re
         None => (robots, Vec::new()),
         Some(count) => {
             let wanted = validation::Wanted { count, images: validated, threshold: options.threshold };
-            // Which images are for validation is known by their indices, in the run's own data only.
+            // Which images are for validation is known by their indices, in the run's own data
+            // only.
             let others = other.map(|_| own(&[Split::Train])).transpose()?;
             let Some(best) = validation::chosen(
                 &sources,
@@ -192,7 +195,8 @@ pub fn own_name(split: HeldOut) -> &'static str {
     }
 }
 
-/// Whether robots of two runs can be tested together: what they are shown, and where they live, is the same.
+/// Whether robots of two runs can be tested together: what they are shown, and where they live, is
+/// the same.
 fn same_setting(first: &Source, other: &Source) -> Result<(), Error> {
     let (a, b) = (&first.run.config, &other.run.config);
     let of_data = |config: &Config| (config.data.dataset.clone(), config.data.builtin.clone());

@@ -31,7 +31,8 @@ pub(crate) struct HeldOutImages<'a> {
 }
 
 impl<'a> HeldOutImages<'a> {
-    /// As many as asked for, evenly divided between the classes; the first classes get what is left over.
+    /// As many as asked for, evenly divided between the classes; the first classes get what is left
+    /// over.
     ///
     /// # Errors
     /// If there are not enough images, or not one of each class is asked for.
@@ -125,8 +126,8 @@ fn labelled(list: &[(Grid<f64>, u8)]) -> Vec<Labelled<'_>> {
     list.iter().map(|(stimulus, class)| Labelled { stimulus, class: *class }).collect()
 }
 
-/// Validation images that robots of each run are chosen by, now or before: a robot that is named may be one of the best
-/// of `validation.json`.
+/// Validation images that robots of each run are chosen by, now or before: a robot that is named
+/// may be one of the best of `validation.json`.
 fn chosen_by(
     config: &Config,
     sources: &[Source],

@@ -1,4 +1,5 @@
-//! Robots for commands that look at them one by one (`replay`, `plot`): which they are, and of which archives.
+//! Robots for commands that look at them one by one (`replay`, `plot`): which they are, and of
+//! which archives.
 
 use crate::analysis::gallery;
 use crate::base::error::Error;
@@ -16,13 +17,15 @@ use std::sync::atomic::AtomicBool;
 pub struct Options {
     /// Which of them.
     pub robots: Selection,
-    /// The archives, which are one crowd; none: the published robots if those are named, else the newest run.
+    /// The archives, which are one crowd; none: the published robots if those are named, else the
+    /// newest run.
     pub archives: Vec<PathBuf>,
     /// Whether only robots will do that an audit found physical.
     pub physical_only: bool,
     /// Seed of what is drawn.
     pub seed: u64,
-    /// Where the data are, if the command line says; only a selection on validation images needs them.
+    /// Where the data are, if the command line says; only a selection on validation images needs
+    /// them.
     pub data: Option<PathBuf>,
 }
 

@@ -120,7 +120,8 @@ impl Plan {
         Ok(experiments)
     }
 
-    /// The plan at a scale: generations are multiplied by it, test images and trainings by its square root.
+    /// The plan at a scale: generations are multiplied by it, test images and trainings by its
+    /// square root.
     #[must_use]
     pub(crate) fn at(&self, scale: f64) -> Self {
         let part = |count: usize, least: usize| {

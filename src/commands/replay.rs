@@ -169,7 +169,8 @@ pub fn subject(options: &Options) -> Result<Subject, Error> {
     Ok(Subject { found, images })
 }
 
-/// Whether a simulation under this number of images can be recorded: a recording holds every point at every moment.
+/// Whether a simulation under this number of images can be recorded: a recording holds every point
+/// at every moment.
 pub(crate) fn check_length(config: &Config, images: usize) -> Result<(), Error> {
     let points = (config.body.height + 1) * (config.body.width + 1);
     let most = MOST_PLACES / points / images.max(1);

@@ -87,7 +87,8 @@ pub struct Gathered {
     pub together: Findings,
 }
 
-/// Reads runs and what lies beside them; `warn` is told what cannot be read. Without `with_lives` no images are needed.
+/// Reads runs and what lies beside them; `warn` is told what cannot be read. Without `with_lives`
+/// no images are needed.
 ///
 /// # Errors
 /// What is wrong with a run, or with its images.
@@ -162,8 +163,8 @@ impl Dossier {
         Some((last.seconds, last.evaluations))
     }
 
-    /// Robots that differ most from each other: the fittest, then in turn the one whose body is farthest from all before
-    /// (in voxels that differ), among those fitter than 0.
+    /// Robots that differ most from each other: the fittest, then in turn the one whose body is
+    /// farthest from all before (in voxels that differ), among those fitter than 0.
     pub fn most_different(&self, count: usize) -> Vec<&Robot> {
         let able = || self.run.elites.iter().filter(|robot| robot.objective > 0.0);
         let mut chosen: Vec<&Robot> =

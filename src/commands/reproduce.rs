@@ -159,9 +159,10 @@ impl Job<'_> {
         Ok(Some(sources))
     }
 
-    /// Robots of each task, drawn at random one after the other and audited, until enough are physical
-    /// or there are no more. If they are too few, the first of those take part, too, that are not found to exploit the
-    /// simulator: the paper, which sorted out by eye, kept such. With them, counts by task. `None` if stopped.
+    /// Robots of each task, drawn at random one after the other and audited, until enough are
+    /// physical or there are no more. If they are too few, the first of those take part, too, that
+    /// are not found to exploit the simulator: the paper, which sorted out by eye, kept such. With
+    /// them, counts by task. `None` if stopped.
     fn chosen<'s>(&self, sources: &'s [Source]) -> Result<Option<Drawn<'s>>, Error> {
         let all = Selection::All.of(sources, 0)?;
         let grouping = sources[0].run.config.grouping()?;

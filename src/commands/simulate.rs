@@ -13,8 +13,8 @@ use serde::{Deserialize, Deserializer};
 use std::fmt;
 use std::path::Path;
 
-/// A body, what it sees, and for how long. The keys of a reference trajectory are understood too; its results are
-/// passed over.
+/// A body, what it sees, and for how long. The keys of a reference trajectory are understood too;
+/// its results are passed over.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Scenario {
@@ -22,7 +22,8 @@ pub struct Scenario {
     pub body: Body,
     /// One stimulus for the whole simulation: H × W in [0, 1].
     stimulus: Option<Grid<f64>>,
-    /// Or several, each shown for `switch_every` control steps, again from the first after the last.
+    /// Or several, each shown for `switch_every` control steps, again from the first after the
+    /// last.
     #[serde(default, deserialize_with = "bounded")]
     stimuli: Option<Vec<Grid<f64>>>,
     switch_every: Option<u64>,
@@ -69,7 +70,8 @@ fn bounded<'de, D: Deserializer<'de>>(reader: D) -> Result<Option<Vec<Grid<f64>>
         fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<Self::Value, A::Error> {
             let (mut stimuli, mut bytes) = (Vec::new(), 0);
             while let Some(stimulus) = list.next_element::<Grid<f64>>()? {
-                // The pixels and their allocation, and the place in the list, which grows by doubling.
+                // The pixels and their allocation, and the place in the list, which grows by
+                // doubling.
                 bytes += stimulus.area() * size_of::<f64>() + 16 + 2 * size_of::<Grid<f64>>();
                 if bytes > MOST_STIMULI {
                     let (count, pixels) = (stimuli.len(), stimulus.area());
@@ -199,8 +201,8 @@ impl Scenario {
     }
 }
 
-/// Simulations the scenario; `line` gets the CSV's lines: `step,com_x,com_y`, then the centre of mass \[world units\] before
-/// the first and after every control step.
+/// Simulations the scenario; `line` gets the CSV's lines: `step,com_x,com_y`, then the centre of
+/// mass \[world units\] before the first and after every control step.
 ///
 /// # Errors
 /// [`crate::base::error::ErrorKind::Unstable`] if the simulation ends early, and what `line` says.
@@ -228,7 +230,8 @@ pub fn simulate(scenario: &Scenario, mut line: impl FnMut(String) -> Result<(), 
             }
         }
         world.step().map_err(|unstable| {
-            // With resets the simulation's own clock starts again; what is reported counts the scenario's steps.
+            // With resets the simulation's own clock starts again; what is reported counts the
+            // scenario's steps.
             let unstable = crate::sim::Unstable { control_step: step, ..unstable };
             Error::unstable(unstable.to_string())
         })?;
@@ -237,7 +240,8 @@ pub fn simulate(scenario: &Scenario, mut line: impl FnMut(String) -> Result<(), 
     Ok(())
 }
 
-/// Writes the CSV of a scenario's file to a file, also of a simulation that ends unstable, up to its end.
+/// Writes the CSV of a scenario's file to a file, also of a simulation that ends unstable, up to
+/// its end.
 ///
 /// # Errors
 /// As [`Scenario::read`] and [`simulate`], and if the file cannot be written, or is the scenario's.
@@ -305,7 +309,8 @@ mod tests {
 
     #[test]
     fn stimuli_are_bounded_by_the_memory_that_they_need() {
-        // As a file of 240 MB: forty million of them took 3.7 GB. Refused while it is read: this one has no end.
+        // As a file of 240 MB: forty million of them took 3.7 GB. Refused while it is read: this
+        // one has no end.
         let many = 2_000_000;
         let text = format!("{{\"body\": [[3]], \"switch_every\": 1, \"stimuli\": [{}", "[[1]],".repeat(many));
         let error = Scenario::parse(&text, "scenario.json").unwrap_err().message;

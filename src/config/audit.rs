@@ -12,17 +12,20 @@ use std::path::Path;
 pub struct Criteria {
     /// A walk this far or shorter is no answer \[voxel lengths\]. Default 3, as in `eval`.
     pub threshold: f64,
-    /// The same in a changed simulation \[voxel lengths\]. Lower than `threshold`, so that borderline walkers do not fail on a tiny
-    /// change. Default 1.5.
+    /// The same in a changed simulation \[voxel lengths\]. Lower than `threshold`, so that
+    /// borderline walkers do not fail on a tiny change. Default 1.5.
     pub least_walk: f64,
     /// A walker answers at least this share of its training images, right or wrong. Default 0.75.
     pub least_answered: f64,
-    /// A rollout persists if at least this share of the images answered right still is. Default 0.9.
+    /// A rollout persists if at least this share of the images answered right still is. Default
+    /// 0.9.
     pub least_kept: f64,
-    /// And if the walks under them, together, are at least this share of what they were. Default 0.5.
+    /// And if the walks under them, together, are at least this share of what they were. Default
+    /// 0.5.
     pub least_distance: f64,
-    /// A robot that keeps at least this share of the rollouts in a changed world (stiffness, friction, gravity, pixels) is robust; if
-    /// another change breaks it, it exploits what was changed; otherwise it is fragile. Default 0.75.
+    /// A robot that keeps at least this share of the rollouts in a changed world (stiffness,
+    /// friction, gravity, pixels) is robust; if another change breaks it, it exploits what was
+    /// changed; otherwise it is fragile. Default 0.75.
     pub least_robust: f64,
     /// Which changes, and how large.
     pub perturbations: Sizes,
@@ -43,7 +46,8 @@ impl Default for Criteria {
 }
 
 impl Criteria {
-    /// Reads criteria from TOML (or JSON, if the name ends so); keys that are not there have their defaults.
+    /// Reads criteria from TOML (or JSON, if the name ends so); keys that are not there have their
+    /// defaults.
     ///
     /// # Errors
     /// What is wrong, with file, line and key.

@@ -25,7 +25,8 @@ pub struct CapacityConfig {
     pub step: usize,
     /// Trainings from scratch per size.
     pub trainings: usize,
-    /// Whether training waits for an improvement on images of the training split, not, as in the paper, on the test images.
+    /// Whether training waits for an improvement on images of the training split, not, as in the
+    /// paper, on the test images.
     pub clean: bool,
     /// So many such images, evenly divided between the classes.
     pub waiting_images: usize,

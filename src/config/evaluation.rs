@@ -1,4 +1,5 @@
-//! [`EvaluationConfig`]: a config's section `[evaluation]`, and what goes with `fitness = "response"`.
+//! [`EvaluationConfig`]: a config's section `[evaluation]`, and what goes with `fitness =
+//! "response"`.
 
 use crate::base::error::Error;
 use crate::body::{Body, key};
@@ -30,8 +31,8 @@ impl Config {
         self.evaluation.fitness == Fitness::Response
     }
 
-    /// What stands for a body among those that were evaluated: itself, or what a response is measured with, so that a
-    /// gait is evaluated once, whatever its sensors are.
+    /// What stands for a body among those that were evaluated: itself, or what a response is
+    /// measured with, so that a gait is evaluated once, whatever its sensors are.
     pub(crate) fn known_key(&self, body: &Body) -> [u8; 16] {
         match self.measures_response() {
             true => key(&body.probe()),
@@ -39,10 +40,11 @@ impl Config {
         }
     }
 
-    /// By what the fitness of a body is multiplied: 1, or, if it is a response, the square root of the number of its
-    /// soft voxels and sensors, up to a third of its grid. Of two gaits that respond as strongly, the one with more places can
-    /// be taught more: together they can move it by at most so much (Cauchy's inequality), and by that only if all respond
-    /// alike. More than a third leave too little that walks.
+    /// By what the fitness of a body is multiplied: 1, or, if it is a response, the square root of
+    /// the number of its soft voxels and sensors, up to a third of its grid. Of two gaits that
+    /// respond as strongly, the one with more places can be taught more: together they can move it
+    /// by at most so much (Cauchy's inequality), and by that only if all respond alike. More than a
+    /// third leave too little that walks.
     pub(crate) fn worth_of_places(&self, body: &Body) -> f64 {
         match self.measures_response() {
             true => {

@@ -86,7 +86,8 @@ pub struct Config {
     /// How robots are evaluated. Left out of files where it is the default.
     #[serde(default, skip_serializing_if = "EvaluationConfig::is_default")]
     pub evaluation: EvaluationConfig,
-    /// How robots are chosen on images that they were not trained on. Left out of files where it is the default.
+    /// How robots are chosen on images that they were not trained on. Left out of files where it is
+    /// the default.
     #[serde(default, skip_serializing_if = "ValidationConfig::is_default")]
     pub validation: ValidationConfig,
     /// How gaits are taught by `morphcog train`. Left out of files where it is the default.
@@ -129,7 +130,8 @@ impl Default for BodyConfig {
 pub struct DataConfig {
     /// "mnist", "fashion-mnist", "builtin", or a name of one's own.
     pub dataset: String,
-    /// Folder of its files, if neither `--data` nor `MORPHCOG_DATA` says one, nor the run where they were. Default `data/<dataset>`.
+    /// Folder of its files, if neither `--data` nor `MORPHCOG_DATA` says one, nor the run where
+    /// they were. Default `data/<dataset>`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub dir: Option<PathBuf>,
     /// Training images by index, in the order in which a sequential rollout sees them.
@@ -144,7 +146,8 @@ pub struct DataConfig {
 }
 
 impl DataConfig {
-    /// The same with another dataset, in which its folder and its images mean nothing; its own changes nothing.
+    /// The same with another dataset, in which its folder and its images mean nothing; its own
+    /// changes nothing.
     #[must_use]
     pub(crate) fn of(&self, dataset: &str) -> Self {
         if dataset == self.dataset {
@@ -162,9 +165,11 @@ fn one_image() -> usize {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct ArchiveConfig {
-    /// Fitness that counts as nothing in the QD score \[voxel lengths\]; a smaller one counts less than nothing. Default 0.
+    /// Fitness that counts as nothing in the QD score \[voxel lengths\]; a smaller one counts less
+    /// than nothing. Default 0.
     pub qd_offset: f64,
-    /// Elites of each task that stay in the archive after each generation, the fittest. Default: all. Few make a search greedy.
+    /// Elites of each task that stay in the archive after each generation, the fittest. Default:
+    /// all. Few make a search greedy.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub keep: Option<usize>,
 }
@@ -203,8 +208,9 @@ fn too_large(place: &str, value: &serde_json::Value) -> Option<(String, u64)> {
 }
 
 impl Config {
-    /// Reads a config: a file (JSON if its name ends in `.json`, else TOML) or, if there is none, the built-in config of
-    /// that name; then sets `overrides` (`key=value`, keys as `map_elites.parents`).
+    /// Reads a config: a file (JSON if its name ends in `.json`, else TOML) or, if there is none,
+    /// the built-in config of that name; then sets `overrides` (`key=value`, keys as
+    /// `map_elites.parents`).
     ///
     /// # Errors
     /// What is wrong, with file, line and key.
@@ -250,7 +256,8 @@ impl Config {
         toml::to_string_pretty(self).expect("every field is a number, text, list or table, which TOML has")
     }
 
-    /// What the results of a generation depend on: without how many there are, and what changes no result.
+    /// What the results of a generation depend on: without how many there are, and what changes no
+    /// result.
     pub(crate) fn essence(&self) -> Config {
         Config {
             generations: 1,

@@ -2,7 +2,8 @@
 
 use serde::de::{Deserialize, Deserializer, Error};
 
-/// Two of a kind, for `deserialize_with`. An array's own reader leaves a third to the format, and TOML's passes it over.
+/// Two of a kind, for `deserialize_with`. An array's own reader leaves a third to the format, and
+/// TOML's passes it over.
 ///
 /// # Errors
 /// Of a list that is shorter or longer, or what is wrong with an item.

@@ -85,8 +85,8 @@ pub(crate) fn read_versioned<T: DeserializeOwned>(
     read_json(text, name)
 }
 
-/// Reads settings, a JSON file if its name ends in `.json`, else TOML; keys that are not in it have their defaults.
-/// Then sets `overrides` (`key=value`), and checks what types cannot.
+/// Reads settings, a JSON file if its name ends in `.json`, else TOML; keys that are not in it have
+/// their defaults. Then sets `overrides` (`key=value`), and checks what types cannot.
 pub(crate) fn load<T: Serialize + DeserializeOwned + Default>(
     path: Option<&Path>,
     overrides: &[String],
@@ -138,8 +138,8 @@ fn line_at(text: &str, span: Option<std::ops::Range<usize>>) -> Option<usize> {
     Some(text.get(..span?.start)?.matches('\n').count() + 1)
 }
 
-/// An error with where in a file its key stands, or the innermost table around it that the text has: the file and, in TOML, the
-/// line.
+/// An error with where in a file its key stands, or the innermost table around it that the text
+/// has: the file and, in TOML, the line.
 pub(crate) fn placed(error: Error, text: &str, format: Format, name: &str) -> Error {
     let line = error.key.as_deref().filter(|_| format == Format::Toml).and_then(|key| line_of(text, key));
     let place = line.map_or(name.to_string(), |line| format!("{name}:{line}"));
@@ -162,8 +162,8 @@ fn line_of(text: &str, key: &str) -> Option<usize> {
     line_at(text, Some(value.span()))
 }
 
-/// Settings with `overrides` set, checked. What is wrong is said of the override that causes it; `in_file` puts the place in
-/// the file to an error that would be there without any.
+/// Settings with `overrides` set, checked. What is wrong is said of the override that causes it;
+/// `in_file` puts the place in the file to an error that would be there without any.
 pub(crate) fn changed<T: Serialize + DeserializeOwned>(
     settings: T,
     overrides: &[String],
@@ -196,7 +196,8 @@ pub(crate) fn changed<T: Serialize + DeserializeOwned>(
         Err(error) if error.key.as_deref() == Some(SET) => return Err(error),
         Err(error) => error,
     };
-    // Those without which it would not be; of these the one that sets the key it is about, else the last.
+    // Those without which it would not be; of these the one that sets the key it is about, else the
+    // last.
     let is_cause = |place: &usize| {
         let others: Vec<&String> = [&all[..*place], &all[place + 1..]].concat();
         attempt(&others).err().is_none_or(|other| other.message != error.message)
@@ -223,8 +224,9 @@ fn sets(assignment: &str, key: &str) -> bool {
     is_within(set, key) || is_within(key, set)
 }
 
-/// Changes one key: `map_elites.parents=10`, or `task.groups.2=[1]` for the second of a list; without a value, `keep=`, it has
-/// its default again. What follows the sign is read as TOML, and as plain text if it is none.
+/// Changes one key: `map_elites.parents=10`, or `task.groups.2=[1]` for the second of a list;
+/// without a value, `keep=`, it has its default again. What follows the sign is read as TOML, and
+/// as plain text if it is none.
 fn set<T: DeserializeOwned>(root: &mut toml::Value, assignment: &str) -> Result<(), String> {
     let Some((key, text)) = assignment.split_once('=') else {
         return Err("expected key=value, as in --set map_elites.parents=10".to_string());
@@ -287,7 +289,8 @@ fn is_number(part: &str) -> bool {
     !part.is_empty() && part.bytes().all(|byte| byte.is_ascii_digit())
 }
 
-/// Whether settings have a key, which may be at its default and left out: if not, its reader says so.
+/// Whether settings have a key, which may be at its default and left out: if not, its reader says
+/// so.
 fn is_known<T: DeserializeOwned>(root: &toml::Value, key: &str) -> Result<(), String> {
     let mut root = root.clone();
     let mut place = &mut root;

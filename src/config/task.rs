@@ -12,10 +12,12 @@ pub struct TaskConfig {
     /// One task: two groups of classes that are to walk opposite ways.
     #[serde(skip_serializing_if = "Option::is_none", deserialize_with = "pair::read_some")]
     pub groups: Option<[Vec<u8>; 2]>,
-    /// All ways to split these classes in two groups; the task a robot performs is a dimension of the archive.
+    /// All ways to split these classes in two groups; the task a robot performs is a dimension of
+    /// the archive.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub splits: Option<Vec<u8>>,
-    /// With `splits`: one more bin for robots that walk the same way for all classes, as in the published code.
+    /// With `splits`: one more bin for robots that walk the same way for all classes, as in the
+    /// published code.
     pub same_way_bin: bool,
 }
 

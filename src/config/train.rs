@@ -8,23 +8,27 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct TrainConfig {
-    /// Training images of each class that the model sees; only a few of them are shown to robots. Default 2000, or three
-    /// quarters of the images of the scarcest class if that is less: more make designs general, and cost little.
+    /// Training images of each class that the model sees; only a few of them are shown to robots.
+    /// Default 2000, or three quarters of the images of the scarcest class if that is less: more
+    /// make designs general, and cost little.
     pub images_per_class: usize,
-    /// Rollouts under random images that measure a gait's response. Default 300: with fewer than two for each soft voxel and
-    /// sensor the slopes are mostly noise.
+    /// Rollouts under random images that measure a gait's response. Default 300: with fewer than
+    /// two for each soft voxel and sensor the slopes are mostly noise.
     pub random_images: usize,
-    /// Rounds in which the response is measured around the latest design, and the lesson is solved again. Default 6: more seldom
-    /// help.
+    /// Rounds in which the response is measured around the latest design, and the lesson is solved
+    /// again. Default 6: more seldom help.
     pub rounds: usize,
-    /// Training images that a round shows. Default 120: with fewer, slopes are noisier, and the constant is off.
+    /// Training images that a round shows. Default 120: with fewer, slopes are noisier, and the
+    /// constant is off.
     pub images: usize,
-    /// Training images under which designs and challengers are compared, half of them near the boundary. Default 400: with fewer,
-    /// challengers win by chance.
+    /// Training images under which designs and challengers are compared, half of them near the
+    /// boundary. Default 400: with fewer, challengers win by chance.
     pub final_images: usize,
-    /// Bodies that challenge the best design, in sensors or in a few voxels of any material. Default 60; later ones win more seldom.
+    /// Bodies that challenge the best design, in sensors or in a few voxels of any material.
+    /// Default 60; later ones win more seldom.
     pub challengers: usize,
-    /// Under what images are shown by turns, so that designs do not depend on the first touch of the ground or exploit length limits.
+    /// Under what images are shown by turns, so that designs do not depend on the first touch of
+    /// the ground or exploit length limits.
     pub perturbations: ByTurns,
 }
 

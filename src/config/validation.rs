@@ -11,7 +11,8 @@ pub const LEAST: usize = 40;
 pub struct ValidationConfig {
     /// Images in all, evenly divided between the classes; none of them is trained on. Default 400.
     pub images: usize,
-    /// Robots of each task that are chosen by them at the run's end. Default 0: nothing is done then.
+    /// Robots of each task that are chosen by them at the run's end. Default 0: nothing is done
+    /// then.
     pub best: usize,
 }
 

@@ -1,5 +1,5 @@
-//! Built-in digits: handwriting-like images that the program draws itself, so that everything works without a
-//! download. Any number of them, each a pure function of (seed, split, class, number).
+//! Built-in digits: handwriting-like images that the program draws itself, so that everything works
+//! without a download. Any number of them, each a pure function of (seed, split, class, number).
 
 use crate::base::Grid;
 use crate::base::hash::sha256_hex;
@@ -8,8 +8,8 @@ use crate::data::info::Split;
 use crate::data::pen;
 use serde::{Deserialize, Serialize};
 
-/// Which built-in digits there are. In each split the classes take turns: index i shows `classes[i % k]`, so that
-/// indices 0, 1, …, k − 1 are one image of each class.
+/// Which built-in digits there are. In each split the classes take turns: index i shows `classes[i
+/// % k]`, so that indices 0, 1, …, k − 1 are one image of each class.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct BuiltinDigits {
@@ -54,7 +54,8 @@ impl BuiltinDigits {
     /// Number of rows and of columns of every image.
     pub const SIDE: usize = pen::SIDE;
 
-    /// Whether the classes are different digits, there is at least one, and not too many images of each.
+    /// Whether the classes are different digits, there is at least one, and not too many images of
+    /// each.
     ///
     /// # Errors
     /// [`BuiltinError`] if not.
@@ -123,7 +124,8 @@ mod tests {
 
     #[test]
     fn drawings_are_stable_across_versions() {
-        // Pinned: if this changes, so do all results on built-in digits; raise pen::DRAWING and say so in the CHANGELOG.
+        // Pinned: if this changes, so do all results on built-in digits; raise pen::DRAWING and say
+        // so in the CHANGELOG.
         let digits = BuiltinDigits::default();
         let mut bytes = Vec::new();
         for index in 0..200 {

@@ -33,7 +33,8 @@ pub struct UnknownDataset {
     pub name: String,
 }
 
-/// Name, size and SHA-256 of the four files of a dataset: training images and labels, test images and labels.
+/// Name, size and SHA-256 of the four files of a dataset: training images and labels, test images
+/// and labels.
 type Published = [(&'static str, u64, &'static str); 4];
 
 const MNIST: Published = [
@@ -55,7 +56,8 @@ const MNIST: Published = [
     ("t10k-labels-idx1-ubyte.gz", 4_542, "f7ae60f92e00ec6debd23a6088c31dbd2371eca3ffa0defaefb259924204aec6"),
 ];
 
-/// SHA-256 of the content of MNIST's training and test split (see [`SplitInfo::fingerprint`]): it is known however it is packed.
+/// SHA-256 of the content of MNIST's training and test split (see [`SplitInfo::fingerprint`]): it
+/// is known however it is packed.
 pub const MNIST_CONTENT: [&str; 2] = [
     "c5097fdd51cfdbe7695fd9df3612695696864b5c424f58d843ffdc5d335e9914",
     "18489308deedfe2f7bd3a11e599a597126f161d991b1ffcffb71642aa76f7f62",
@@ -113,8 +115,8 @@ impl Catalogue {
     }
 }
 
-/// The dataset that a split is known to be of, whatever it is called where it was found: MNIST by its content, Fashion-MNIST by its
-/// files as published.
+/// The dataset that a split is known to be of, whatever it is called where it was found: MNIST by
+/// its content, Fashion-MNIST by its files as published.
 pub fn known_as(split: &SplitInfo) -> Option<&'static str> {
     let are_published = |published: &Published| {
         let is_one = |file: &FileInfo| published.iter().any(|(_, _, sha256)| *sha256 == file.sha256);

@@ -82,12 +82,14 @@ enum Images {
 }
 
 impl Dataset {
-    /// Loads the wanted splits of a dataset: "builtin" (the default [`BuiltinDigits`]), "mnist", "fashion-mnist", or any
-    /// other name for IDX files of one's own. The files are looked for in the first of the `given` places (see
-    /// [`files::places`]) or, if none is given, in `data/<name>`; files of splits that are not wanted may be missing.
+    /// Loads the wanted splits of a dataset: "builtin" (the default [`BuiltinDigits`]), "mnist",
+    /// "fashion-mnist", or any other name for IDX files of one's own. The files are looked for in
+    /// the first of the `given` places (see [`files::places`]) or, if none is given, in
+    /// `data/<name>`; files of splits that are not wanted may be missing.
     ///
     /// # Errors
-    /// [`DatasetError::Files`] naming the file, where it was looked for, what was expected and what to do.
+    /// [`DatasetError::Files`] naming the file, where it was looked for, what was expected and what
+    /// to do.
     pub fn load(name: &str, given: &[Place], wanted: &[Split]) -> Result<Self, DatasetError> {
         if name == BUILTIN {
             return Dataset::builtin(BuiltinDigits::default(), wanted);
@@ -199,8 +201,9 @@ impl Dataset {
         DatasetInfo { name, source, origin, splits }
     }
 
-    /// Draws `per_class` different images of each class by seed: first those of `classes[0]`, then those of
-    /// `classes[1]`, …; their indices. What is drawn of one class does not depend on the other classes asked for.
+    /// Draws `per_class` different images of each class by seed: first those of `classes[0]`, then
+    /// those of `classes[1]`, …; their indices. What is drawn of one class does not depend on the
+    /// other classes asked for.
     ///
     /// # Errors
     /// [`DatasetError::NotLoaded`], or [`DatasetError::TooFew`] if a class has fewer images.

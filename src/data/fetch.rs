@@ -1,4 +1,5 @@
-//! `morphcog data fetch`: downloads the files of a dataset and lets none in that is not the published one.
+//! `morphcog data fetch`: downloads the files of a dataset and lets none in that is not the
+//! published one.
 
 use crate::base::files::write_atomically;
 use crate::base::hash::sha256_hex;
@@ -122,11 +123,13 @@ pub struct Fetched {
     pub outcome: Outcome,
 }
 
-/// Brings all files of a dataset to disk. Each is checked against its published size and SHA-256 before anything is
-/// written, and then written atomically; files that are there and right are kept.
+/// Brings all files of a dataset to disk. Each is checked against its published size and SHA-256
+/// before anything is written, and then written atomically; files that are there and right are
+/// kept.
 ///
 /// # Errors
-/// [`FetchError`]. If any file that is there differs from the published one (and `force` is off), nothing is done.
+/// [`FetchError`]. If any file that is there differs from the published one (and `force` is off),
+/// nothing is done.
 pub fn fetch(
     catalogue: &Catalogue,
     options: &FetchOptions,
@@ -175,7 +178,8 @@ fn is_there(file: &Path, remote: &RemoteFile) -> Result<bool, FetchError> {
     }
 }
 
-/// The client. Limits are for a slow line, not for patience: a mirror that is dead is given up in 15 s.
+/// The client. Limits are for a slow line, not for patience: a mirror that is dead is given up in
+/// 15 s.
 fn agent() -> Agent {
     let seconds = |s| Some(Duration::from_secs(s));
     Agent::config_builder()
@@ -184,7 +188,8 @@ fn agent() -> Agent {
         .timeout_recv_response(seconds(30))
         .timeout_per_read(seconds(30))
         .timeout_recv_body(seconds(1800))
-        // The files are gzip files; a server must not pack them once more, nor the client unpack them.
+        // The files are gzip files; a server must not pack them once more, nor the client unpack
+        // them.
         .accept_encoding("identity")
         .user_agent(concat!("morphcog/", env!("CARGO_PKG_VERSION")))
         .build()

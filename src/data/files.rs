@@ -19,7 +19,8 @@ pub const FETCHABLE: [&str; 2] = ["mnist", "fashion-mnist"];
 pub struct Place {
     /// Who says so, as the user knows it: "--data", "MORPHCOG_DATA", `[data] dir`.
     pub origin: String,
-    /// The folder. If it has a subfolder with the dataset's name, that is used, so one folder can hold several datasets.
+    /// The folder. If it has a subfolder with the dataset's name, that is used, so one folder can
+    /// hold several datasets.
     pub path: PathBuf,
 }
 
@@ -29,10 +30,11 @@ impl fmt::Display for Place {
     }
 }
 
-/// The places that were given, in order of precedence: the option `--data`, the environment variable `MORPHCOG_DATA`
-/// (its value, empty counts as not set), and the config's `[data] dir`.
+/// The places that were given, in order of precedence: the option `--data`, the environment
+/// variable `MORPHCOG_DATA` (its value, empty counts as not set), and the config's `[data] dir`.
 ///
-/// The first one is used and has to work: silently reading other data than the user named would be worse than an error.
+/// The first one is used and has to work: silently reading other data than the user named would be
+/// worse than an error.
 pub fn places(option: Option<&Path>, environment: Option<OsString>, config: Option<&Path>) -> Vec<Place> {
     let environment = environment.filter(|value| !value.is_empty()).map(PathBuf::from);
     [
@@ -45,12 +47,14 @@ pub fn places(option: Option<&Path>, environment: Option<OsString>, config: Opti
     .collect()
 }
 
-/// Where a dataset is looked for if no place is given, and where it is downloaded to: `data/<name>`.
+/// Where a dataset is looked for if no place is given, and where it is downloaded to:
+/// `data/<name>`.
 pub fn default_folder(name: &str) -> PathBuf {
     Path::new("data").join(name)
 }
 
-/// Why a dataset's files cannot be used. Every message says which file, where, what was expected and what to do.
+/// Why a dataset's files cannot be used. Every message says which file, where, what was expected
+/// and what to do.
 #[derive(Debug, thiserror::Error)]
 pub enum FilesError {
     /// A name that cannot be a folder's name.
@@ -154,7 +158,8 @@ pub fn check_name(name: &str) -> Result<(), FilesError> {
     }
 }
 
-/// The place that is used: the first given one, or else the default; its path is the folder with the files.
+/// The place that is used: the first given one, or else the default; its path is the folder with
+/// the files.
 pub(crate) fn choose(name: &str, given: &[Place]) -> Result<Place, FilesError> {
     check_name(name)?;
     Ok(match given.first() {
@@ -210,8 +215,9 @@ fn standard_names(split: Split, content: &str) -> Vec<String> {
     stems.iter().flat_map(spelled).collect()
 }
 
-/// The file of a split's images or labels: one of a standard name, or else the only one whose name ends in one
-/// (EMNIST's `emnist-digits-train-images-idx3-ubyte.gz`). The gzipped one of two that differ in .gz only.
+/// The file of a split's images or labels: one of a standard name, or else the only one whose name
+/// ends in one (EMNIST's `emnist-digits-train-images-idx3-ubyte.gz`). The gzipped one of two that
+/// differ in .gz only.
 fn find(name: &str, place: &Place, split: Split, content: &'static str) -> Result<PathBuf, FilesError> {
     let (dataset, searched) = (name.to_string(), Box::new(place.clone()));
     let present = match file_names(&place.path) {
@@ -274,7 +280,8 @@ mod tests {
     use crate::data::dataset::{Dataset, DatasetError};
     use std::fs;
 
-    /// Writes images and labels under the given names; every pixel of image i is i, label i is 10 − i.
+    /// Writes images and labels under the given names; every pixel of image i is i, label i is 10 −
+    /// i.
     fn write(folder: &Path, images: &str, labels: &str, count: u8) {
         let pixels: Vec<u8> = (0..count).flat_map(|i| [i; 6]).collect();
         let values: Vec<u8> = (0..count).map(|i| 10 - i).collect();

@@ -1,9 +1,11 @@
-//! The IDX format (<http://yann.lecun.com/exdb/mnist/>): how MNIST and its look-alikes store images and labels.
+//! The IDX format (<http://yann.lecun.com/exdb/mnist/>): how MNIST and its look-alikes store images
+//! and labels.
 //!
-//! A file is a magic number (two zero bytes, the type of the numbers, how many dimensions), the length of every
-//! dimension as a big-endian 32-bit number, and the numbers themselves in row-major order. Here the numbers
-//! are unsigned bytes; images have three dimensions (count, rows, columns), labels one. Counts and sizes are
-//! taken from the header, and the file must hold exactly what its header announces.
+//! A file is a magic number (two zero bytes, the type of the numbers, how many dimensions), the
+//! length of every dimension as a big-endian 32-bit number, and the numbers themselves in row-major
+//! order. Here the numbers are unsigned bytes; images have three dimensions (count, rows, columns),
+//! labels one. Counts and sizes are taken from the header, and the file must hold exactly what its
+//! header announces.
 
 use crate::base::Grid;
 use crate::base::hash::sha256_hex;
@@ -12,8 +14,8 @@ use std::fs::File;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
-/// More than this in one file (as stored or unpacked, bytes) is refused: it is not a set of images but a
-/// broken header or the wrong file. (MNIST: 47 MB; the whole of EMNIST: 0.6 GB.)
+/// More than this in one file (as stored or unpacked, bytes) is refused: it is not a set of images
+/// but a broken header or the wrong file. (MNIST: 47 MB; the whole of EMNIST: 0.6 GB.)
 pub const MAX_BYTES: u64 = 1 << 30;
 
 /// Type code of unsigned bytes in a magic number.
@@ -28,7 +30,8 @@ pub struct IdxImages {
     pub height: usize,
     /// Columns per image, at least 1.
     pub width: usize,
-    /// All pixels (0 … 255), image after image, row-major from the top left: count × height × width of them.
+    /// All pixels (0 … 255), image after image, row-major from the top left: count × height × width
+    /// of them.
     pub pixels: Vec<u8>,
 }
 
@@ -100,7 +103,8 @@ pub enum IdxError {
         /// The first four bytes (after unpacking).
         found: [u8; 4],
     },
-    /// An IDX file of unsigned bytes, but of another shape (labels where images were expected, say).
+    /// An IDX file of unsigned bytes, but of another shape (labels where images were expected,
+    /// say).
     #[error(
         "{}: wrong number of dimensions: expected {expected} ({what}), found {found}; \
          are the image and the label file mixed up?",
@@ -192,7 +196,8 @@ pub fn read_images(file: &Path) -> Result<IdxFile<IdxImages>, IdxError> {
     Ok(with_origin(&stored, IdxImages { count, height, width, pixels }))
 }
 
-/// Reads an IDX1 file of unsigned bytes, raw or gzipped (told apart by content, not by name): one label per image.
+/// Reads an IDX1 file of unsigned bytes, raw or gzipped (told apart by content, not by name): one
+/// label per image.
 ///
 /// # Errors
 /// [`IdxError`] if the file cannot be read or is anything but exactly such a file.
@@ -202,7 +207,8 @@ pub fn read_labels(file: &Path) -> Result<IdxFile<Vec<u8>>, IdxError> {
     Ok(with_origin(&stored, labels))
 }
 
-/// The header of an IDX file of unsigned bytes with these sizes: magic number and big-endian lengths.
+/// The header of an IDX file of unsigned bytes with these sizes: magic number and big-endian
+/// lengths.
 pub fn header(sizes: &[u32]) -> Vec<u8> {
     let mut bytes = vec![0, 0, UNSIGNED_BYTE, sizes.len() as u8];
     bytes.extend(sizes.iter().flat_map(|size| size.to_be_bytes()));
@@ -280,7 +286,8 @@ fn decode<const N: usize>(
 
 #[cfg(test)]
 mod tests {
-    //! Contract of the IDX reader on broken files; `tests/idx_reader.rs` compares it with another reader.
+    //! Contract of the IDX reader on broken files; `tests/idx_reader.rs` compares it with another
+    //! reader.
 
     use super::*;
     use flate2::{Compression, write::GzEncoder};

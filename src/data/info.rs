@@ -1,4 +1,5 @@
-//! What is recorded about a dataset, so that a result can be traced to the very images it came from.
+//! What is recorded about a dataset, so that a result can be traced to the very images it came
+//! from.
 
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -26,8 +27,8 @@ pub struct SplitInfo {
     pub height: usize,
     /// Columns per image.
     pub width: usize,
-    /// SHA-256 of the content; for files: of the unpacked image file followed by the unpacked label file (the same
-    /// whether they are gzipped or not), for built-in digits: of their parameters.
+    /// SHA-256 of the content; for files: of the unpacked image file followed by the unpacked label
+    /// file (the same whether they are gzipped or not), for built-in digits: of their parameters.
     pub fingerprint: String,
     /// Number of images of every class that occurs.
     pub per_class: BTreeMap<u8, usize>,

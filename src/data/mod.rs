@@ -1,4 +1,5 @@
-//! Images: the IDX reader, where datasets lie and where they come from, the digits that the program draws.
+//! Images: the IDX reader, where datasets lie and where they come from, the digits that the program
+//! draws.
 
 pub mod builtin;
 pub mod catalogue;

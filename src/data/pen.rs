@@ -1,7 +1,7 @@
 //! The pen that writes the built-in digits: variation of the strokes, and anti-aliased drawing.
 //!
-//! As in MNIST, the ink is scaled to a box of about 20 × 20 pixels and put in the middle of 28 × 28. Everything
-//! here ends up in stimuli, so transcendental functions come from `libm` alone.
+//! As in MNIST, the ink is scaled to a box of about 20 × 20 pixels and put in the middle of 28 ×
+//! 28. Everything here ends up in stimuli, so transcendental functions come from `libm` alone.
 
 use crate::base::Grid;
 use crate::base::random::Stream;
@@ -67,7 +67,8 @@ fn displaced(stroke: &[Place], chance: &mut Stream) -> Vec<Place> {
     stroke.iter().map(moved).collect()
 }
 
-/// A smooth line through the places (a Catmull–Rom spline), interrupted in its direction at the turns.
+/// A smooth line through the places (a Catmull–Rom spline), interrupted in its direction at the
+/// turns.
 fn line(places: &[Place]) -> Vec<Point> {
     let points: Vec<Point> = places
         .iter()
@@ -135,7 +136,8 @@ fn tilt(lines: &mut [Vec<Point>], digit: u8, chance: &mut Stream) {
     }
 }
 
-/// Scales the lines to the ink box and puts them about the middle of the image; from here on in pixels.
+/// Scales the lines to the ink box and puts them about the middle of the image; from here on in
+/// pixels.
 fn fit(lines: &mut [Vec<Point>], radius: f64, chance: &mut Stream) {
     let mut low = [f64::INFINITY; 2];
     let mut high = [f64::NEG_INFINITY; 2];
@@ -179,7 +181,8 @@ fn ink(lines: &[Vec<Point>], radius: f64, chance: &mut Stream) -> Grid<u8> {
     cover.map(|&c| (255.0 * c).round() as u8)
 }
 
-/// Draws one straight piece: how much of a pixel is covered follows from its middle's distance to the piece.
+/// Draws one straight piece: how much of a pixel is covered follows from its middle's distance to
+/// the piece.
 fn segment(cover: &mut Grid<f64>, from: Point, to: Point, radius: f64) {
     let reach = radius + 1.0;
     let range = |axis: usize| {

@@ -28,15 +28,16 @@ pub struct Edge {
 
 /// A compositional pattern-producing network (Stanley 2007; paper, section "Genome").
 ///
-/// Nodes are numbered 0–3 inputs (x, y, distance, bias), 4–10 outputs (materials 0–6), 11… hidden, without gaps.
-/// In files:
+/// Nodes are numbered 0–3 inputs (x, y, distance, bias), 4–10 outputs (materials 0–6), 11… hidden,
+/// without gaps. In files:
 ///
 /// ```json
 /// {"version": 1, "outputs": ["squash", …7], "hidden": ["sin", …], "edges": [[from, to, weight], …]}
 /// ```
 ///
-/// `outputs` and `hidden` are the nodes' functions in the order of their numbers (squash is for outputs only);
-/// edges lead out of inputs and hidden nodes into outputs and hidden nodes, no two between the same nodes, no cycle.
+/// `outputs` and `hidden` are the nodes' functions in the order of their numbers (squash is for
+/// outputs only); edges lead out of inputs and hidden nodes into outputs and hidden nodes, no two
+/// between the same nodes, no cycle.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "CppnFile", into = "CppnFile")]
 pub struct Cppn {
@@ -105,8 +106,8 @@ impl Cppn {
         order
     }
 
-    /// The content in bytes, the same for equal networks and only for them: numbers little-endian, weights as
-    /// their bits. What ids are made of, so it must not change within a version.
+    /// The content in bytes, the same for equal networks and only for them: numbers little-endian,
+    /// weights as their bits. What ids are made of, so it must not change within a version.
     pub fn canonical_bytes(&self) -> Vec<u8> {
         let mut bytes = VERSION.to_le_bytes().to_vec();
         bytes.extend(self.outputs.iter().map(|f| *f as u8));
@@ -170,7 +171,8 @@ impl Cppn {
         self.retain_hidden(|node| fed[node] && useful[node]);
     }
 
-    /// Removes the hidden nodes not to be kept, with their edges; those behind them move up in number.
+    /// Removes the hidden nodes not to be kept, with their edges; those behind them move up in
+    /// number.
     pub(super) fn retain_hidden(&mut self, keep: impl Fn(usize) -> bool) {
         let kept = |node: usize| node < FIRST_HIDDEN || keep(node);
         let mut next = 0..;

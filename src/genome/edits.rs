@@ -5,9 +5,10 @@ use crate::body::{Body, MAX_SIDE, Material};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// Voxels that are not what a genome's network says: a direct encoding on top of the indirect one, for the last touches that
-/// no change of a network makes alone (HybrID of Clune, Beckmann, Pennock & Ofria, ECAL 2009). In files a list of
-/// `[row, column, material]`. Those outside a body's grid have no effect.
+/// Voxels that are not what a genome's network says: a direct encoding on top of the indirect one,
+/// for the last touches that no change of a network makes alone (HybrID of Clune, Beckmann, Pennock
+/// & Ofria, ECAL 2009). In files a list of `[row, column, material]`. Those outside a body's grid
+/// have no effect.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(try_from = "Vec<(usize, usize, Material)>", into = "Vec<(usize, usize, Material)>")]
 pub struct Edits(BTreeMap<(usize, usize), Material>);

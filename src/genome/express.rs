@@ -6,12 +6,13 @@ use crate::body::{Body, BodyError, MAX_SIDE, Material};
 use crate::genome::cppn::{Cppn, INPUTS, OUTPUTS};
 
 impl Cppn {
-    /// The body of `height` × `width` voxels the network describes: in each cell, the material whose output is
-    /// largest; the first wins a tie.
+    /// The body of `height` × `width` voxels the network describes: in each cell, the material
+    /// whose output is largest; the first wins a tie.
     ///
-    /// x goes from −1 (left column) to 1 (right), y from −1 (top row) to 1 (bottom); both are 0 where there is
-    /// only one column or row. The distance to the centre, √(x² + y²), is rescaled linearly so that its smallest
-    /// and largest value on the grid are −1 and 1 (0 if it is the same everywhere). The bias is 1.
+    /// x goes from −1 (left column) to 1 (right), y from −1 (top row) to 1 (bottom); both are 0
+    /// where there is only one column or row. The distance to the centre, √(x² + y²), is rescaled
+    /// linearly so that its smallest and largest value on the grid are −1 and 1 (0 if it is the
+    /// same everywhere). The bias is 1.
     ///
     /// # Errors
     /// [`BodyError`] if there is no cell, or more than [`MAX_SIDE`] rows or columns.

@@ -2,7 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-/// The function of a node, applied to the weighted sum s of its predecessors (paper, section "Genome").
+/// The function of a node, applied to the weighted sum s of its predecessors (paper, section
+/// "Genome").
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 #[repr(u8)]
@@ -25,8 +26,8 @@ pub enum Function {
     NegSqrt = 7,
 }
 
-/// Largest size of a node's value. Chains of squares would overflow to infinities, whose differences are not
-/// numbers; no sum of values this large does.
+/// Largest size of a node's value. Chains of squares would overflow to infinities, whose
+/// differences are not numbers; no sum of values this large does.
 const LIMIT: f64 = 1e100;
 
 impl Function {
@@ -47,7 +48,8 @@ impl Function {
         &Self::ALL[1..]
     }
 
-    /// Replaces every sum by the function's value, at most 10¹⁰⁰ in size; what is not a number becomes 0.
+    /// Replaces every sum by the function's value, at most 10¹⁰⁰ in size; what is not a number
+    /// becomes 0.
     pub fn apply(self, sums: &mut [f64]) {
         match self {
             Function::Squash => each(sums, |s| 2.0 / (1.0 + libm::exp(-s)) - 1.0),

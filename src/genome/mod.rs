@@ -21,8 +21,8 @@ use serde::{Deserialize, Serialize};
 use std::sync::atomic::AtomicBool;
 pub use voxels::other_voxel;
 
-/// What evolution varies: a network that describes a body, and single voxels in which the body differs from that. In files
-/// `{"cppn": …, "edits": …}`, see [`Cppn`] and [`Edits`].
+/// What evolution varies: a network that describes a body, and single voxels in which the body
+/// differs from that. In files `{"cppn": …, "edits": …}`, see [`Cppn`] and [`Edits`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Genome {
@@ -42,8 +42,8 @@ pub struct BodySpec {
     pub min_muscles: usize,
 }
 
-/// Most mutations in a row without a valid body. (On 14 × 14 voxels a random individual needs some 25 from
-/// nothing, seldom above 150; an offspring two or three.)
+/// Most mutations in a row without a valid body. (On 14 × 14 voxels a random individual needs some
+/// 25 from nothing, seldom above 150; an offspring two or three.)
 pub const MAX_MUTATIONS: usize = 100_000;
 
 /// Mutations between two looks at whether to stop.
@@ -118,14 +118,16 @@ impl Genome {
         Ok(Genome { cppn: self.cppn.clone(), edits })
     }
 
-    /// A short id, the same for the same genome: the first ten hexadecimal digits of its content's hash.
+    /// A short id, the same for the same genome: the first ten hexadecimal digits of its content's
+    /// hash.
     pub fn id(&self) -> String {
         let content = [self.cppn.canonical_bytes(), self.edits.canonical_bytes()].concat();
         hash::sha256_hex(&content)[..10].to_string()
     }
 
-    /// A copy with one mutation, and more of them until its body is valid; with that body. Of some, as many as
-    /// [`MutationParams::voxel_mutations`] says, one voxel is mutated and not the network, or a few of them.
+    /// A copy with one mutation, and more of them until its body is valid; with that body. Of some,
+    /// as many as [`MutationParams::voxel_mutations`] says, one voxel is mutated and not the
+    /// network, or a few of them.
     ///
     /// # Errors
     /// [`GenomeError`] if the size is not a body's or [`MAX_MUTATIONS`] give no valid body.
@@ -149,7 +151,8 @@ impl Genome {
         rng: &mut Stream,
         stop: &AtomicBool,
     ) -> Result<(Genome, Body), GenomeError> {
-        // Without voxel mutations nothing is drawn, and runs are what they were before there were any.
+        // Without voxel mutations nothing is drawn, and runs are what they were before there were
+        // any.
         if params.voxel_mutations == 0.0 || rng.unit() >= params.voxel_mutations {
             return self.with_mutated_network(spec, params, rng, stop);
         }
@@ -172,7 +175,8 @@ impl Genome {
         let mutations = if min_muscles > height.saturating_mul(width) { 0 } else { MAX_MUTATIONS };
         let mut genome = self.clone();
         for number in 1..=mutations {
-            // What is quick is done all the same: a run that is stopped as it begins has its folder.
+            // What is quick is done all the same: a run that is stopped as it begins has its
+            // folder.
             if number % MUTATIONS_AT_ONCE == 0 {
                 check(stop)?;
             }

@@ -10,8 +10,8 @@ use crate::genome::params::MutationParams;
 pub enum Mutation {
     /// A hidden node with a random function splits an edge: weight in as the edge's, weight out 1.
     AddNode,
-    /// A hidden node goes; each predecessor is joined to each successor by the product of the two weights,
-    /// where there is no edge between them yet.
+    /// A hidden node goes; each predecessor is joined to each successor by the product of the two
+    /// weights, where there is no edge between them yet.
     RemoveNode,
     /// An edge that closes no cycle, its weight plus or minus [`MutationParams::new_edge_weight`].
     AddEdge,
@@ -23,8 +23,8 @@ pub enum Mutation {
     ChangeWeight,
 }
 
-/// Pairs of nodes drawn for a new edge before none is taken to be possible. Uniform among the possible ones, and
-/// cheap however large the network.
+/// Pairs of nodes drawn for a new edge before none is taken to be possible. Uniform among the
+/// possible ones, and cheap however large the network.
 const EDGE_DRAWS: usize = 100;
 
 impl Mutation {
@@ -91,7 +91,8 @@ fn remove_node(cppn: &mut Cppn, params: &MutationParams, rng: &mut Stream) -> Op
     let out: Vec<_> = cppn.edges().iter().copied().filter(|e| e.from == node).collect();
     for i in &into {
         for o in &out {
-            // Products of weights within a limit of 1 stay within it; others must not grow without bound.
+            // Products of weights within a limit of 1 stay within it; others must not grow without
+            // bound.
             cppn.connect(i.from, o.to, clip(i.weight * o.weight, params));
         }
     }

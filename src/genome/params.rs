@@ -15,12 +15,12 @@ pub struct MutationParams {
     /// Size of the weight of an added edge; its sign is random. Default 0.1.
     #[serde(deserialize_with = "size")]
     pub new_edge_weight: f64,
-    /// Share of offspring of which one voxel is mutated instead of the network ([`Edits`](crate::genome::Edits)). Default 0, as in
-    /// the paper; then left out of files.
+    /// Share of offspring of which one voxel is mutated instead of the network
+    /// ([`Edits`](crate::genome::Edits)). Default 0, as in the paper; then left out of files.
     #[serde(deserialize_with = "share", skip_serializing_if = "is_zero")]
     pub voxel_mutations: f64,
-    /// Most voxels of an offspring that change: one, two, four and so on, doubled up to this, of as many offspring each.
-    /// Default 1; then left out of files.
+    /// Most voxels of an offspring that change: one, two, four and so on, doubled up to this, of as
+    /// many offspring each. Default 1; then left out of files.
     #[serde(deserialize_with = "changes", skip_serializing_if = "is_one")]
     pub voxel_changes: u16,
 }

@@ -8,7 +8,8 @@ use crate::genome::{BodySpec, Edits, Genome, GenomeError, MAX_MUTATIONS, Mutatio
 use std::sync::atomic::AtomicBool;
 
 impl Genome {
-    /// A copy with as many voxels changed as is drawn ([`MutationParams::voxel_changes`]), with its body.
+    /// A copy with as many voxels changed as is drawn ([`MutationParams::voxel_changes`]), with its
+    /// body.
     pub(super) fn with_voxels_changed(
         &self,
         described: &Body,
@@ -35,7 +36,8 @@ pub fn other_voxel(voxels: &Grid<Material>, rng: &mut Stream) -> ((usize, usize)
     (place, Material::ALL[(usize::from(voxels[place].code()) + step) % Material::ALL.len()])
 }
 
-/// Edits of what a network describes, with one more voxel of another material, drawn anew until their body is valid; with that.
+/// Edits of what a network describes, with one more voxel of another material, drawn anew until
+/// their body is valid; with that.
 fn one_voxel_changed(
     edits: &Edits,
     described: &Body,

@@ -14,7 +14,8 @@ pub struct Elite<S> {
     pub solution: S,
 }
 
-/// At most one [`Elite`] per cell (Mouret & Clune 2015). In files a list of elites in the order of their cells.
+/// At most one [`Elite`] per cell (Mouret & Clune 2015). In files a list of elites in the order of
+/// their cells.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(try_from = "Vec<Elite<S>>", bound(deserialize = "S: Deserialize<'de>"))]
 pub struct Archive<S> {
@@ -51,7 +52,8 @@ pub enum ArchiveError {
     Occupied(usize),
 }
 
-/// Figures of an archive: pyribs' `ArchiveStats`, of an archive that has the possible cells and no others.
+/// Figures of an archive: pyribs' `ArchiveStats`, of an archive that has the possible cells and no
+/// others.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ArchiveStats {
     /// Number of elites.
@@ -90,7 +92,8 @@ impl<S> Archive<S> {
         Ok(old.map_or(Insertion::New, |old| Insertion::Improved { old }))
     }
 
-    /// Takes out all but the `count` fittest of each kind; of equally fit ones those in the first cells stay.
+    /// Takes out all but the `count` fittest of each kind; of equally fit ones those in the first
+    /// cells stay.
     pub fn retain_fittest<K: Ord>(&mut self, count: usize, kind: impl Fn(&S) -> K) {
         let mut ranked: Vec<(f64, usize)> = self.elites().map(|e| (e.objective, e.cell)).collect();
         // Stable: elites come in the order of their cells.
@@ -106,7 +109,8 @@ impl<S> Archive<S> {
         }
     }
 
-    /// Objective of the `count`-th fittest elite (from 1) among those that are `of` a kind; none if there are fewer.
+    /// Objective of the `count`-th fittest elite (from 1) among those that are `of` a kind; none if
+    /// there are fewer.
     pub fn nth_fittest(&self, count: usize, of: impl Fn(&S) -> bool) -> Option<f64> {
         let mut objectives: Vec<f64> =
             self.elites().filter(|e| of(&e.solution)).map(|e| e.objective).collect();
@@ -144,8 +148,8 @@ impl<S> Archive<S> {
         self.elites().reduce(|best, e| if e.objective > best.objective { e } else { best })
     }
 
-    /// Figures of the archive, of `possible` cells that can be filled; `qd_offset` is what pyribs calls
-    /// `qd_score_offset`.
+    /// Figures of the archive, of `possible` cells that can be filled; `qd_offset` is what pyribs
+    /// calls `qd_score_offset`.
     pub fn stats(&self, possible: usize, qd_offset: f64) -> ArchiveStats {
         let (num_elites, cells) = (self.len(), possible.max(1) as f64);
         // (`sum` of nothing would be −0.)

@@ -1,7 +1,7 @@
 //! [`DescriptorSpace`]: the cells of an archive; and the paper's space of three voxel counts.
 
-/// A box of cells with named dimensions. A cell is known by its coordinates (one bin per dimension) or by its
-/// index, the last dimension running fastest.
+/// A box of cells with named dimensions. A cell is known by its coordinates (one bin per dimension)
+/// or by its index, the last dimension running fastest.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct DescriptorSpace {
     dimensions: Vec<(String, usize)>,
@@ -13,8 +13,8 @@ impl DescriptorSpace {
         DescriptorSpace { dimensions }
     }
 
-    /// The paper's space (section "MAP-Elites"): muscle, sensor and total voxels in seven bins each, and with
-    /// more than one task, the task.
+    /// The paper's space (section "MAP-Elites"): muscle, sensor and total voxels in seven bins
+    /// each, and with more than one task, the task.
     pub fn voxel_counts(tasks: usize) -> Self {
         let counts = ["muscle", "sensor", "total"].map(|name| (name.to_string(), COUNT_BINS));
         let task = (tasks > 1).then(|| ("task".to_string(), tasks));
@@ -68,15 +68,16 @@ fn bin_width(area: usize) -> usize {
     (area / COUNT_BINS).max(1)
 }
 
-/// The bin of a count of cells of a grid with `area` cells: min(count div (area div 7), 6), the width of a bin
-/// being at least 1.
+/// The bin of a count of cells of a grid with `area` cells: min(count div (area div 7), 6), the
+/// width of a bin being at least 1.
 pub fn count_bin(count: usize, area: usize) -> usize {
     (count / bin_width(area)).min(COUNT_BINS - 1)
 }
 
-/// The cells of [`DescriptorSpace::voxel_counts`] that a connected body on a grid of `area` cells with at least
-/// `min_muscles` muscles can have, as ascending indices: muscle + sensor ≤ total ≤ area, total ≥ 1. For
-/// 14 × 14 voxels they are 90 of 343 ("archive of size 90"), times the number of tasks.
+/// The cells of [`DescriptorSpace::voxel_counts`] that a connected body on a grid of `area` cells
+/// with at least `min_muscles` muscles can have, as ascending indices: muscle + sensor ≤ total ≤
+/// area, total ≥ 1. For 14 × 14 voxels they are 90 of 343 ("archive of size 90"), times the number
+/// of tasks.
 pub fn possible_cells(area: usize, min_muscles: usize, tasks: usize) -> Vec<usize> {
     let space = DescriptorSpace::voxel_counts(tasks);
     let width = bin_width(area);

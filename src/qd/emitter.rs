@@ -35,8 +35,8 @@ pub struct Proposal {
     pub parent: Option<usize>,
 }
 
-/// How solutions are made. All chance must come from streams of (generation, child) and the run's seed, so that
-/// solutions may be made in any order and on any thread.
+/// How solutions are made. All chance must come from streams of (generation, child) and the run's
+/// seed, so that solutions may be made in any order and on any thread.
 pub trait Variation<S> {
     /// Why a solution could not be made.
     type Error;
@@ -55,8 +55,9 @@ pub trait Variation<S> {
 }
 
 impl EmitterParams {
-    /// What `generation` consists of: offspring of different elites drawn uniformly, then newcomers. While the
-    /// archive is empty (in the first generation, and after it if no individual was stable): random individuals.
+    /// What `generation` consists of: offspring of different elites drawn uniformly, then
+    /// newcomers. While the archive is empty (in the first generation, and after it if no
+    /// individual was stable): random individuals.
     pub fn ask<S>(&self, archive: &Archive<S>, seed: u64, generation: u64) -> Vec<Proposal> {
         let cells: Vec<usize> = archive.elites().map(|e| e.cell).collect();
         let mut rng = stream(seed, Purpose::Parents, generation, 0);

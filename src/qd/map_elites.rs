@@ -5,9 +5,9 @@ use crate::qd::emitter::{EmitterParams, Proposal, Variation};
 
 /// MAP-Elites (Mouret & Clune 2015; paper, section "MAP-Elites").
 ///
-/// A generation is [`ask`](MapElites::ask)ed for, its solutions are [`make`](MapElites::make)d and evaluated in
-/// any order and on any threads, and [`tell`](MapElites::tell) puts them into the archive in their children's
-/// order: nothing depends on which was first.
+/// A generation is [`ask`](MapElites::ask)ed for, its solutions are [`make`](MapElites::make)d and
+/// evaluated in any order and on any threads, and [`tell`](MapElites::tell) puts them into the
+/// archive in their children's order: nothing depends on which was first.
 #[derive(Clone, Debug)]
 pub struct MapElites<S> {
     seed: u64,
@@ -61,8 +61,8 @@ impl<S> MapElites<S> {
         }
     }
 
-    /// Puts the solutions of a generation into the archive, in the order of their children, and says what
-    /// became of each. Solutions without fitness (unstable rollouts) are not told.
+    /// Puts the solutions of a generation into the archive, in the order of their children, and
+    /// says what became of each. Solutions without fitness (unstable rollouts) are not told.
     ///
     /// # Errors
     /// [`ArchiveError`] if a fitness is not finite; what was told before it is in the archive.

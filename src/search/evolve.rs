@@ -53,16 +53,20 @@ pub struct Finished {
     pub run: RunFile,
     /// Counts of the whole run.
     pub totals: Totals,
-    /// The best robots of each task on validation images, best first; none if the config asks for none, or it was stopped.
+    /// The best robots of each task on validation images, best first; none if the config asks for
+    /// none, or it was stopped.
     pub validated: Vec<Validated>,
-    /// Whether a signal stopped it before its end: its last generation, and the choice of robots after that.
+    /// Whether a signal stopped it before its end: its last generation, and the choice of robots
+    /// after that.
     pub stopped: bool,
-    /// Why its end is not, or not as a whole, in its files, if so; it goes on from its last checkpoint.
+    /// Why its end is not, or not as a whole, in its files, if so; it goes on from its last
+    /// checkpoint.
     pub unwritten: Option<Error>,
 }
 
 impl Finished {
-    /// Id of the best robot: the first on validation images if some were chosen by them, else the fittest.
+    /// Id of the best robot: the first on validation images if some were chosen by them, else the
+    /// fittest.
     pub fn best(&self) -> Option<&str> {
         let better = |a: &Validated, b: &Validated| a.balanced_accuracy > b.balanced_accuracy;
         let first =
@@ -71,8 +75,9 @@ impl Finished {
     }
 }
 
-/// Runs a config, or goes on with a run, and at its end chooses robots on validation images if the config says so. When `stop`
-/// is set, a generation under way is dropped: the run is saved as it was before.
+/// Runs a config, or goes on with a run, and at its end chooses robots on validation images if the
+/// config says so. When `stop` is set, a generation under way is dropped: the run is saved as it
+/// was before.
 ///
 /// # Errors
 /// What is wrong with config, data or folder; nothing that was there is lost.
@@ -99,7 +104,8 @@ pub fn evolve(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> 
         true => resume::saved(&folder, config, &training, |text| observer.warning(&text))?,
         false => None,
     };
-    // A config that says the same stays as it is, with its comments: it may be what this run was asked for with.
+    // A config that says the same stays as it is, with its comments: it may be what this run was
+    // asked for with.
     let there = Config::load(&folder.path().join(CONFIG).to_string_lossy(), &[]);
     if there.ok().as_ref() != Some(config) {
         let path = folder.path().join(CONFIG);
@@ -186,7 +192,8 @@ impl<'a> Run<'a> {
         })
     }
 
-    /// Generation after generation: ask, score, tell. A generation that is stopped leaves the run as it was before.
+    /// Generation after generation: ask, score, tell. A generation that is stopped leaves the run
+    /// as it was before.
     fn evolve(
         &mut self,
         mutations: &Mutations,
@@ -252,7 +259,8 @@ impl<'a> Run<'a> {
         Ok(())
     }
 
-    /// Those children whose bodies are to be evaluated; and the keys of bodies that are known only from now on.
+    /// Those children whose bodies are to be evaluated; and the keys of bodies that are known only
+    /// from now on.
     fn unknown(&mut self, children: Vec<Child>) -> (Vec<Child>, Vec<[u8; 16]>) {
         let config = &self.options.config;
         // A gait whose response is known would fill the archive with its sensors.
@@ -356,8 +364,9 @@ impl<'a> Run<'a> {
         is_in.then_some(Evaluated { child, cell, objective, solution })
     }
 
-    /// By task the fitness of the last elite that `archive.keep` keeps; `None` while it keeps all, or there are fewer. It never
-    /// decreases, so what did not exceed it, or lost its cell, never can: early stop and known bodies stay lossless.
+    /// By task the fitness of the last elite that `archive.keep` keeps; `None` while it keeps all,
+    /// or there are fewer. It never decreases, so what did not exceed it, or lost its cell, never
+    /// can: early stop and known bodies stay lossless.
     fn floors(&self) -> Vec<Option<f64>> {
         let keep = self.options.config.archive.keep;
         let last = |name: String| self.search.archive().nth_fittest(keep?, |robot| robot.task == name);

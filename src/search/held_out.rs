@@ -1,5 +1,6 @@
-//! Images that robots are not trained on: those of the test split, and validation images. The latter are those of the training
-//! split that a run neither is trained on nor chooses its training images among, drawn by its seed.
+//! Images that robots are not trained on: those of the test split, and validation images. The
+//! latter are those of the training split that a run neither is trained on nor chooses its training
+//! images among, drawn by its seed.
 
 use crate::base::error::Error;
 use crate::base::random::{Purpose, stream};
@@ -31,7 +32,8 @@ fn left(config: &Config, seen: &BTreeSet<usize>, dataset: &Dataset) -> Vec<Vec<I
     config.classes().iter().map(of_class).collect()
 }
 
-/// How many are to be taken of each class, for `count` in all; `asked` says where that many were asked for, `or` what else to do.
+/// How many are to be taken of each class, for `count` in all; `asked` says where that many were
+/// asked for, `or` what else to do.
 ///
 /// # Errors
 /// If a class has not as many.
@@ -56,7 +58,8 @@ fn per_class(
     }
 }
 
-/// Whether a run that is to choose robots when it ends will have images for that: to be known before it begins.
+/// Whether a run that is to choose robots when it ends will have images for that: to be known
+/// before it begins.
 ///
 /// # Errors
 /// If of a class there are not enough.
@@ -70,9 +73,10 @@ pub(crate) fn check(config: &Config, dataset: &Dataset) -> Result<(), Error> {
     per_class(config, &left(config, &seen, dataset), "validation.images =", images, or).map(|_| ())
 }
 
-/// `count` validation images of some runs of one experiment together, evenly divided between the classes, which take turns: so
-/// are the first of them. Of the same runs, in whichever order, they are always the same, and fewer of them the first of more. `asked` says
-/// where this number was asked for.
+/// `count` validation images of some runs of one experiment together, evenly divided between the
+/// classes, which take turns: so are the first of them. Of the same runs, in whichever order, they
+/// are always the same, and fewer of them the first of more. `asked` says where this number was
+/// asked for.
 ///
 /// # Errors
 /// If there are not enough images.

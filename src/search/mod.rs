@@ -1,4 +1,5 @@
-//! The evolution of bodies and the training of gaits: ask, score, tell; resume; choice on validation images.
+//! The evolution of bodies and the training of gaits: ask, score, tell; resume; choice on
+//! validation images.
 
 pub mod evolve;
 pub mod held_out;

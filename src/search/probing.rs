@@ -8,7 +8,8 @@ use crate::task::perturbation::Condition;
 use crate::task::response::{Gait, Response, Shown, random_image};
 use std::ops::Range;
 
-/// Random images, numbered from 0, and the conditions under which a gait's probe is shown them by turns.
+/// Random images, numbered from 0, and the conditions under which a gait's probe is shown them by
+/// turns.
 #[derive(Clone, Debug)]
 pub struct Probing {
     /// Every condition once.
@@ -33,8 +34,9 @@ impl Probing {
         &self.conditions
     }
 
-    /// Shows a gait's probe the random images with these numbers: what became of each, unstable rollouts left out. `roll`
-    /// simulates: displacements of a body under images and conditions, `None` where unstable.
+    /// Shows a gait's probe the random images with these numbers: what became of each, unstable
+    /// rollouts left out. `roll` simulates: displacements of a body under images and conditions,
+    /// `None` where unstable.
     ///
     /// # Errors
     /// Those of `roll`.
@@ -65,7 +67,8 @@ impl Probing {
     }
 }
 
-/// The response according to the stable rollouts `shown`, out of `rollouts`; `None` if most are unstable, or too few stable.
+/// The response according to the stable rollouts `shown`, out of `rollouts`; `None` if most are
+/// unstable, or too few stable.
 pub fn response(shown: &[Shown], rollouts: usize) -> Option<Response> {
     if 2 * shown.len() > rollouts { Response::of(shown) } else { None }
 }

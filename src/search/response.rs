@@ -1,4 +1,5 @@
-//! Runs with `fitness = "response"`: what their images are, what a gait is worth, and which configs there can be.
+//! Runs with `fitness = "response"`: what their images are, what a gait is worth, and which configs
+//! there can be.
 
 use crate::base::Grid;
 use crate::base::random::{Purpose, stream};
@@ -11,13 +12,13 @@ use crate::task::response::random_image;
 /// Which random images evolution shows: others than a training's, which are 0.
 const OF_EVOLUTION: u64 = 1 << 32;
 
-/// Share of what is to be beaten that a body must show after the first pairs to be shown the others. With more, chance decides;
-/// with less, hopeless ones cost as much as good ones.
+/// Share of what is to be beaten that a body must show after the first pairs to be shown the
+/// others. With more, chance decides; with less, hopeless ones cost as much as good ones.
 const WORTH_GOING_ON: f64 = 0.5;
 
-/// As many images as there are training images, an even number, in pairs: one whose pixels are bright, dark or at rest at random, each
-/// independently of all others, and its opposite. Pixels that are the same in all training images stay so: what never changes
-/// says nothing.
+/// As many images as there are training images, an even number, in pairs: one whose pixels are
+/// bright, dark or at rest at random, each independently of all others, and its opposite. Pixels
+/// that are the same in all training images stay so: what never changes says nothing.
 pub(crate) fn opposites(stimuli: &[Grid<f64>], physics: &Physics, seed: u64) -> Vec<Grid<f64>> {
     let Some(first) = stimuli.first() else { return Vec::new() };
     let changes = Grid::from_fn(first.height(), first.width(), |row, column| {
@@ -51,8 +52,8 @@ pub(crate) fn conditions(images: usize) -> Vec<Condition> {
         .collect()
 }
 
-/// Whether a body that is to beat a response is so far from it after the first half of its pairs, two of each condition at least,
-/// that the rest is not worth simulating.
+/// Whether a body that is to beat a response is so far from it after the first half of its pairs,
+/// two of each condition at least, that the rest is not worth simulating.
 pub(crate) fn is_left_behind(known: &[Option<f64>], to_beat: f64) -> bool {
     // Two images a pair; as many pairs of each condition as of the other.
     let first = (known.len() / 8 * 4).max(LEAST_IMAGES).min(known.len());

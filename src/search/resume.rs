@@ -1,4 +1,5 @@
-//! Going on with a saved run: only from its own checkpoint, under the same config, on the same images.
+//! Going on with a saved run: only from its own checkpoint, under the same config, on the same
+//! images.
 
 use crate::base::error::Error;
 use crate::config::Config;
@@ -11,11 +12,12 @@ use std::collections::BTreeMap;
 
 const ANEW: &str = "start the run anew with --force";
 
-/// What to go on from; `None` if there is no run in the folder yet. A broken newest checkpoint is passed over, and said
-/// with `warn`.
+/// What to go on from; `None` if there is no run in the folder yet. A broken newest checkpoint is
+/// passed over, and said with `warn`.
 ///
 /// # Errors
-/// If there are only broken checkpoints, or none beside a `run.json`, or the run is another one; nothing is changed.
+/// If there are only broken checkpoints, or none beside a `run.json`, or the run is another one;
+/// nothing is changed.
 pub(crate) fn saved(
     folder: &RunFolder,
     config: &Config,
@@ -44,7 +46,8 @@ pub(crate) fn saved(
     }
 }
 
-/// Whether a saved run can be gone on with under a config: all that its results depend on must be the same.
+/// Whether a saved run can be gone on with under a config: all that its results depend on must be
+/// the same.
 fn compatible(saved: &Checkpoint, config: &Config, training: &Training) -> Result<(), Error> {
     let hint = || format!("resume with the config it was started with, or {ANEW}");
     let (theirs, ours) = (&saved.run.program_version, env!("CARGO_PKG_VERSION"));

@@ -37,14 +37,16 @@ pub(crate) struct Walker<'a> {
 }
 
 impl Walker<'_> {
-    /// A validation begins: number of robots, of images for the best of them, and of simulations in all.
+    /// A validation begins: number of robots, of images for the best of them, and of simulations in
+    /// all.
     pub fn validating(&self, robots: usize, images: usize, showings: u64) {
         let label = format!("validating {robots} robots on up to {images} images:");
         self.observer.begins(&Work::new(label, showings, "rollouts"));
     }
 
-    /// The displacement under each image (`None`: unstable), and the number of rollouts it took: images that show the sensors
-    /// the same pixels share a rollout. `None` if stopped before the end.
+    /// The displacement under each image (`None`: unstable), and the number of rollouts it took:
+    /// images that show the sensors the same pixels share a rollout. `None` if stopped before the
+    /// end.
     pub fn lives(&self, robot: &Robot, stimuli: &[Grid<f64>]) -> Option<(Vec<Option<f64>>, usize)> {
         let Walker { config, stop, observer, done, .. } = self;
         let protocol =

@@ -1,7 +1,8 @@
 //! `morphcog train`: the gaits of an archive are taught to tell two groups of images apart.
 //!
-//! [`teach`](crate::task::teach) says how. Everything that is simulated is kept in `training.json` beside `run.json`; a
-//! training that goes on takes from there what was simulated before, so that it ends with the same bits.
+//! [`teach`](crate::task::teach) says how. Everything that is simulated is kept in `training.json`
+//! beside `run.json`; a training that goes on takes from there what was simulated before, so that
+//! it ends with the same bits.
 
 use crate::base::error::Error;
 use crate::base::files::{read_text, write_atomically};

@@ -18,13 +18,15 @@ pub struct Training {
     pub dataset: DatasetRef,
     /// The images, in the order in which a sequential rollout sees them.
     pub images: Vec<ImageRef>,
-    /// What the sensors see of each: H × W in [0, 1]. Where a response is measured, as many images of their pixels.
+    /// What the sensors see of each: H × W in [0, 1]. Where a response is measured, as many images
+    /// of their pixels.
     pub stimuli: Vec<Grid<f64>>,
     /// Under what each is shown, in a fresh rollout; the default where one is missing.
     pub conditions: Vec<Condition>,
 }
 
-/// The number of training images of the scarcest of some classes, of a task that was asked for by `--task`.
+/// The number of training images of the scarcest of some classes, of a task that was asked for by
+/// `--task`.
 ///
 /// # Errors
 /// If it is less than `least`; which class, and which there are.
@@ -45,7 +47,8 @@ impl Training {
     /// The training images of a config.
     ///
     /// # Errors
-    /// If the data are missing or broken, or an image is of a class that is not in the task, or a class has no image.
+    /// If the data are missing or broken, or an image is of a class that is not in the task, or a
+    /// class has no image.
     pub fn load(config: &Config, data: Option<&Path>) -> Result<Self, Error> {
         Training::of(config, &load_dataset(config, data, &[Split::Train])?)
     }
@@ -111,7 +114,8 @@ impl Training {
         self.images.iter().map(image).collect::<Vec<_>>().join(", ")
     }
 
-    /// The answers that displacements under the images are, in their order; those that are missing are still to come.
+    /// The answers that displacements under the images are, in their order; those that are missing
+    /// are still to come.
     pub fn answers(&self, displacements: impl IntoIterator<Item = Option<f64>>) -> Vec<Answer> {
         answers(&self.images, displacements)
     }

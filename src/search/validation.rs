@@ -1,7 +1,8 @@
 //! Choosing robots by their answers to images that are neither training nor test images.
 //!
-//! [`held_out`](crate::search::held_out) says which images. Robots are screened in rounds: all on a tenth of them, the better third
-//! of each task on three tenths, the better tenth on all. Results are kept beside the run.
+//! [`held_out`](crate::search::held_out) says which images. Robots are screened in rounds: all on a
+//! tenth of them, the better third of each task on three tenths, the better tenth on all. Results
+//! are kept beside the run.
 
 use crate::base::error::Error;
 use crate::base::files::write_atomically;
@@ -54,8 +55,8 @@ pub struct Options {
     pub threads: Option<usize>,
 }
 
-/// Chooses the best robots of a run on the images of its section `[validation]`, as `eval` does it, and keeps them beside
-/// the run; `None` if stopped.
+/// Chooses the best robots of a run on the images of its section `[validation]`, as `eval` does it,
+/// and keeps them beside the run; `None` if stopped.
 ///
 /// # Errors
 /// What is wrong with run or data, or that there are not enough images.
@@ -73,7 +74,8 @@ pub fn validate(
     ranked(&source, count, &dataset, &pool, stop, observer)
 }
 
-/// The same when a run ends, for as many robots as its config asks for, on data that are loaded already.
+/// The same when a run ends, for as many robots as its config asks for, on data that are loaded
+/// already.
 ///
 /// # Errors
 /// As of [`validate`].
@@ -108,8 +110,8 @@ fn ranked(
     Ok(best.map(|best| best.into_iter().map(|(_, validated)| validated).collect()))
 }
 
-/// The best of each run and task among some robots, or the best physical ones if the selection says so, with how they did;
-/// `None` if stopped.
+/// The best of each run and task among some robots, or the best physical ones if the selection says
+/// so, with how they did; `None` if stopped.
 ///
 /// # Errors
 /// As of [`best`] and [`first_physical`].
@@ -126,7 +128,8 @@ pub(crate) fn chosen<'a>(
     for (number, source) in sources.iter().enumerate() {
         let own = robots.iter().filter(|chosen| chosen.source == number).map(|chosen| chosen.robot).collect();
         let is_physical = matches!(selection, Selection::Physical(_));
-        // Among those that are known at the run's end, in any case, since some will not be physical.
+        // Among those that are known at the run's end, in any case, since some will not be
+        // physical.
         let count =
             if is_physical { wanted.count.max(source.run.config.validation.best) } else { wanted.count };
         let searched = Wanted { count, ..*wanted };
@@ -139,7 +142,8 @@ pub(crate) fn chosen<'a>(
     Ok(Some(all))
 }
 
-/// The best of each task among some robots of a run, best first, with how they did; `None` if stopped.
+/// The best of each task among some robots of a run, best first, with how they did; `None` if
+/// stopped.
 ///
 /// # Errors
 /// If there are not enough images, or the result cannot be kept.
@@ -211,8 +215,8 @@ fn key(
     )
 }
 
-/// Robots and images of each round, for some robots of a task of which `count` are wanted; of each class, which take turns, an image
-/// or more.
+/// Robots and images of each round, for some robots of a task of which `count` are wanted; of each
+/// class, which take turns, an image or more.
 fn rounds(robots: usize, count: usize, (images, classes): (usize, usize)) -> [(usize, usize); 3] {
     ROUNDS.map(|(of_images, of_robots)| {
         let kept = ((robots as f64 * of_robots).ceil() as usize).max(count).min(robots);

@@ -93,7 +93,8 @@ pub struct Catalogue {
 }
 
 impl Catalogue {
-    /// Reads the archives, and the audits beside them; an audit that cannot be used is told in a note.
+    /// Reads the archives, and the audits beside them; an audit that cannot be used is told in a
+    /// note.
     ///
     /// # Errors
     /// What is wrong with an archive.

@@ -1,4 +1,5 @@
-//! As much of HTTP/1.1 as a page on this machine needs: one request per connection, every size and time bounded.
+//! As much of HTTP/1.1 as a page on this machine needs: one request per connection, every size and
+//! time bounded.
 
 use crate::base::text::one_line;
 use serde::Serialize;
@@ -36,7 +37,8 @@ impl Request {
     /// A header's value; none if it is not there.
     ///
     /// # Errors
-    /// If it is there more than once: of several, one could say what is allowed, another what is meant.
+    /// If it is there more than once: of several, one could say what is allowed, another what is
+    /// meant.
     pub fn header(&self, name: &str) -> Result<Option<&str>, Response> {
         let mut found = self.headers.iter().filter(|(own, _)| own == name);
         let first = found.next().map(|(_, value)| value.as_str());
@@ -110,7 +112,8 @@ impl Response {
     }
 }
 
-/// The head of an answer. The page may load nothing but what this server has, and be shown in no other page.
+/// The head of an answer. The page may load nothing but what this server has, and be shown in no
+/// other page.
 fn head(status: u16, content_type: &str, more: &str) -> String {
     let reason = match status {
         200 => "OK",
@@ -135,7 +138,8 @@ fn head(status: u16, content_type: &str, more: &str) -> String {
     )
 }
 
-/// Begins an answer that is a stream of server-sent events, which lasts until the connection is closed.
+/// Begins an answer that is a stream of server-sent events, which lasts until the connection is
+/// closed.
 ///
 /// # Errors
 /// If the reader has gone.

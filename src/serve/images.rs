@@ -1,4 +1,5 @@
-//! [`ImageSets`]: test images to show: the built-in digits always, datasets of the archives where they are found.
+//! [`ImageSets`]: test images to show: the built-in digits always, datasets of the archives where
+//! they are found.
 
 use crate::base::Grid;
 use crate::base::error::Error;

@@ -28,7 +28,8 @@ pub struct Answer {
 }
 
 impl Judge {
-    /// Of a task and the way its first group is to walk; none where every class is to walk the same way.
+    /// Of a task and the way its first group is to walk; none where every class is to walk the same
+    /// way.
     pub fn of(split: &Split, assignment: Assignment) -> Option<Self> {
         if split.is_same_way() {
             return None;

@@ -1,5 +1,5 @@
-//! `morphcog serve`: what the page asks for, answered with the real engine. Knows nothing of HTTP: that is
-//! [`server`]'s.
+//! `morphcog serve`: what the page asks for, answered with the real engine. Knows nothing of HTTP:
+//! that is [`server`]'s.
 
 pub mod assets;
 pub mod catalogue;
@@ -89,8 +89,8 @@ pub struct Loaded {
 }
 
 impl Service {
-    /// Reads the archives and finds the images; what could not be found without being asked for by name is told in
-    /// the notes.
+    /// Reads the archives and finds the images; what could not be found without being asked for by
+    /// name is told in the notes.
     ///
     /// # Errors
     /// What is wrong with an archive.

@@ -1,4 +1,5 @@
-//! Requests for simulations: from what the page sends to what is simulated, everything checked and bounded.
+//! Requests for simulations: from what the page sends to what is simulated, everything checked and
+//! bounded.
 
 use crate::base::Grid;
 use crate::body::Body;
@@ -11,7 +12,8 @@ use crate::task::protocol::Protocol;
 use crate::task::stimulus::{Encoding, Reduction, StimulusParams, stimulus};
 use serde::Deserialize;
 
-/// Most control steps in a simulation, images changed on the way included: a hundred actuation cycles.
+/// Most control steps in a simulation, images changed on the way included: a hundred actuation
+/// cycles.
 pub const MAX_STEPS: u32 = 5000;
 /// Largest side of a picture \[pixels\].
 pub const MAX_PICTURE: usize = 128;

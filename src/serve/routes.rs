@@ -82,7 +82,8 @@ pub fn refused(refusal: Refusal) -> Response {
     Response::refusal(status, &refusal.to_string())
 }
 
-/// Refuses other sites that let a name of theirs point here (DNS rebinding), and requests that other sites' pages send.
+/// Refuses other sites that let a name of theirs point here (DNS rebinding), and requests that
+/// other sites' pages send.
 fn no_stranger(port: u16, request: &Request) -> Result<(), Response> {
     let names = ["127.0.0.1", "localhost"];
     let mut own = names.map(|name| format!("{name}:{port}")).to_vec();

@@ -124,7 +124,8 @@ fn connection(service: &Service, port: u16, stream: &mut TcpStream) {
     }
 }
 
-/// Runs a simulation over a connection; it ends when that does. What is to be answered if there is no place for it.
+/// Runs a simulation over a connection; it ends when that does. What is to be answered if there is
+/// no place for it.
 fn life(service: &Service, plan: &Plan, stream: &mut TcpStream) -> Option<Response> {
     let slot = match service.lives.begin(plan.who.clone()) {
         Ok(slot) => slot,
@@ -143,7 +144,8 @@ fn life(service: &Service, plan: &Plan, stream: &mut TcpStream) -> Option<Respon
     None
 }
 
-/// Ends a simulation when the other side closes its connection: a write would fail only after that, and in between the simulation would go on.
+/// Ends a simulation when the other side closes its connection: a write would fail only after that,
+/// and in between the simulation would go on.
 fn end_with(stream: &TcpStream, control: &Arc<Control>) -> io::Result<()> {
     let (stream, control) = (stream.try_clone()?, Arc::clone(control));
     stream.set_read_timeout(Some(LOOK))?;

@@ -1,6 +1,7 @@
 //! A simulation as server-sent events: JSON, positions as 16-bit numbers in base64.
 //!
-//! As in the page of a replay: steps of 1/200 voxel length from an origin per moment, near the centre of mass.
+//! As in the page of a replay: steps of 1/200 voxel length from an origin per moment, near the
+//! centre of mass.
 
 use crate::body::Material;
 use crate::serve::judge::THRESHOLD;
@@ -61,7 +62,8 @@ fn looks(step: u32, until: u32, seen: &Seen) -> Value {
     json!({ "step": step, "until": until, "label": seen.label, "stimulus": seen.stimulus })
 }
 
-/// Moments: per moment the origin [x, y], two 64-bit floats, then two 16-bit numbers per point; little-endian.
+/// Moments: per moment the origin [x, y], two 64-bit floats, then two 16-bit numbers per point;
+/// little-endian.
 fn positions(frames: &[Frame]) -> String {
     let mut bytes = Vec::new();
     for frame in frames {

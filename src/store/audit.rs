@@ -57,7 +57,8 @@ pub struct RobotAudit {
     pub spread: f64,
     /// Energies put in per actuation cycle in the unchanged rollout \[mass·wu²/s²\].
     pub energy_per_cycle: Energy,
-    /// Displacement under each training image in the unchanged rollout, voxel lengths; none if unstable.
+    /// Displacement under each training image in the unchanged rollout, voxel lengths; none if
+    /// unstable.
     pub displacements: Option<Vec<f64>>,
     /// The perturbed rollouts; none for one that is not a walker.
     pub lives: Vec<PerturbedRollout>,
@@ -151,7 +152,8 @@ impl AuditFile {
         Err(Error::input(text).hint("morphcog audit --archive … makes one beside the run".to_string()))
     }
 
-    /// Adds what a file of verdicts on the same run, by the same criteria and version, says of other robots.
+    /// Adds what a file of verdicts on the same run, by the same criteria and version, says of
+    /// other robots.
     pub(crate) fn add_known(&mut self, path: &Path) {
         let Ok(known) = AuditFile::read(path) else { return };
         let head = |file: &AuditFile| AuditFile { robots: Vec::new(), ..file.clone() };
@@ -230,9 +232,11 @@ pub enum Verdict {
     Physical,
     /// Small changes of the world break it.
     Fragile,
-    /// It survives changes of the world, but not of how that is computed or how images are shown: it exploits those.
+    /// It survives changes of the world, but not of how that is computed or how images are shown:
+    /// it exploits those.
     Exploits,
-    /// It does not answer its training images, or no better than a robot that always walks the same way.
+    /// It does not answer its training images, or no better than a robot that always walks the same
+    /// way.
     NotAWalker,
 }
 
@@ -256,9 +260,11 @@ pub struct PerturbedRollout {
     pub name: String,
     /// What was changed.
     pub kind: Kind,
-    /// Displacement under each training image, voxel lengths (a mirrored rollout's mirrored back); none if unstable.
+    /// Displacement under each training image, voxel lengths (a mirrored rollout's mirrored back);
+    /// none if unstable.
     pub displacements: Option<Vec<f64>>,
-    /// Share of the images answered right in the unchanged rollout under which it still walks the right way.
+    /// Share of the images answered right in the unchanged rollout under which it still walks the
+    /// right way.
     pub kept: f64,
     /// Walks under them, towards the right sides, as a share of the unchanged rollout's.
     pub distance: f64,

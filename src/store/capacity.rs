@@ -73,8 +73,8 @@ pub struct Curve {
     pub points: Vec<Point>,
     /// c0, c1, c2 of accuracy ≈ c0 + c1·size + c2·size², least squares through the points.
     pub fit: Option<[f64; 3]>,
-    /// The smallest size at which the fit reaches the robots' accuracy, or that it is above it from the smallest network on;
-    /// none if it never reaches it.
+    /// The smallest size at which the fit reaches the robots' accuracy, or that it is above it from
+    /// the smallest network on; none if it never reaches it.
     pub capacity: Option<Crossing>,
 }
 
@@ -102,7 +102,8 @@ impl CapacityFile {
         reading::read_versioned(&text, &path.display().to_string(), FORMAT, FORMAT_VERSION)
     }
 
-    /// The analysis beside an `eval.json`, if there is one of just the robots and images that the evaluation is of.
+    /// The analysis beside an `eval.json`, if there is one of just the robots and images that the
+    /// evaluation is of.
     pub fn of(report: &EvalFile, eval: &Path) -> Option<Self> {
         let found = Self::read(&eval.with_file_name(CAPACITY_JSON)).ok()?;
         found.is_of(report).then_some(found)

@@ -1,4 +1,5 @@
-//! Checkpoints: everything a run needs to go on, written so that one good checkpoint always survives.
+//! Checkpoints: everything a run needs to go on, written so that one good checkpoint always
+//! survives.
 
 use crate::base::error::Error;
 use crate::base::files::{sync_folder, write_atomically};
@@ -86,7 +87,8 @@ pub fn write(folder: &Path, checkpoint: &Checkpoint) -> Result<(), Error> {
     };
     let text = serde_json::to_string(checkpoint).map_err(|error| Error::other(error.to_string()))?;
     let text = format!("{}\n{text}\n", sha256_hex(text.as_bytes()));
-    // Only a good newest becomes the previous one: a broken one must not push the last good one out.
+    // Only a good newest becomes the previous one: a broken one must not push the last good one
+    // out.
     if let Ok(Some(_)) = content(&newest) {
         std::fs::rename(&newest, &previous).map_err(failed(&previous))?;
         sync_folder(folder).map_err(failed(folder))?;
@@ -94,8 +96,8 @@ pub fn write(folder: &Path, checkpoint: &Checkpoint) -> Result<(), Error> {
     write_atomically(&newest, text.as_bytes()).map_err(failed(&newest))
 }
 
-/// Reads the newest good checkpoint; `None` if there never was one. A broken newest one is passed over, and said
-/// with `warn`.
+/// Reads the newest good checkpoint; `None` if there never was one. A broken newest one is passed
+/// over, and said with `warn`.
 ///
 /// # Errors
 /// If there are only broken ones.
@@ -118,7 +120,8 @@ pub fn read(folder: &Path, mut warn: impl FnMut(String)) -> Result<Option<Checkp
     }
 }
 
-/// Puts the checkpoint before into the place of a broken newest one, which would push it out when the next is written.
+/// Puts the checkpoint before into the place of a broken newest one, which would push it out when
+/// the next is written.
 ///
 /// # Errors
 /// If it cannot be renamed.

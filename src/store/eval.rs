@@ -99,7 +99,8 @@ pub struct Mean {
     /// Standard deviation of the accuracy over the robots; none of a single one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub standard_deviation: Option<f64>,
-    /// 95 % bootstrap interval of the mean accuracy (percentiles of 10,000 resamples of the robots).
+    /// 95 % bootstrap interval of the mean accuracy (percentiles of 10,000 resamples of the
+    /// robots).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub interval: Option<[f64; 2]>,
 }
@@ -116,7 +117,8 @@ pub struct RobotReport {
     pub task: String,
     /// Its fitness on the training images, voxel lengths.
     pub objective: f64,
-    /// Which way the classes before the task's bar are to walk: "left" or "right", as on the training images.
+    /// Which way the classes before the task's bar are to walk: "left" or "right", as on the
+    /// training images.
     pub first_group_walks: String,
     /// Images answered right.
     pub right: usize,
@@ -267,8 +269,8 @@ impl EvalFile {
         self.means = means.collect();
     }
 
-    /// How the robots were selected, for people; if they were trained on another dataset, or a signal came before the last of them,
-    /// that, too.
+    /// How the robots were selected, for people; if they were trained on another dataset, or a
+    /// signal came before the last of them, that, too.
     pub fn selection(&self) -> String {
         let stopped = if self.stopped { "; stopped before the last of them" } else { "" };
         let trained =

@@ -42,7 +42,8 @@ impl RunFolder {
     /// Makes the folder if there is none, and takes it into use.
     ///
     /// # Errors
-    /// If another process uses it, or it holds a run and `if_exists` says to refuse, or it cannot be written.
+    /// If another process uses it, or it holds a run and `if_exists` says to refuse, or it cannot
+    /// be written.
     pub fn open(path: &Path, if_exists: IfExists) -> Result<Self, Error> {
         std::fs::create_dir_all(path).map_err(|error| Error::writing(path, &error))?;
         let holds_run = RunFolder::files().iter().any(|name| path.join(name).exists());
@@ -114,9 +115,9 @@ pub fn in_shell(path: &Path) -> String {
     }
 }
 
-/// Whether results can be written to a file, with a CSV beside it, and overwrite neither each other nor what lies beside the run or
-/// result file that they are of: files of the run, or what other commands found, each under the name of its command. `own` is
-/// the default name of these results.
+/// Whether results can be written to a file, with a CSV beside it, and overwrite neither each other
+/// nor what lies beside the run or result file that they are of: files of the run, or what other
+/// commands found, each under the name of its command. `own` is the default name of these results.
 ///
 /// # Errors
 /// If not.
@@ -157,7 +158,8 @@ fn is_of_run(path: &Path) -> bool {
     holds_run(path) && RunFolder::files().iter().any(|file| path.file_name() == Some(file.as_ref()))
 }
 
-/// Whether a file can be written, and is none of a run: to be known before what goes into it is made.
+/// Whether a file can be written, and is none of a run: to be known before what goes into it is
+/// made.
 ///
 /// # Errors
 /// Why not.

@@ -1,4 +1,5 @@
-//! Which images a run was made with and robots are shown: by their places in a dataset, and as robots see them.
+//! Which images a run was made with and robots are shown: by their places in a dataset, and as
+//! robots see them.
 
 use crate::task::score::Answer;
 use serde::{Deserialize, Serialize};
@@ -58,7 +59,8 @@ impl FromStr for HeldOut {
     }
 }
 
-/// The answers that displacements under images are, in their order; those that are missing are still to come.
+/// The answers that displacements under images are, in their order; those that are missing are
+/// still to come.
 pub(crate) fn answers(
     images: &[ImageRef],
     displacements: impl IntoIterator<Item = Option<f64>>,

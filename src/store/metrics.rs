@@ -9,7 +9,8 @@ use std::fs::File;
 use std::io::{BufWriter, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
-/// What a run has done so far. *Showings* are images shown to robots (fresh rollouts, or phases of sequential ones).
+/// What a run has done so far. *Showings* are images shown to robots (fresh rollouts, or phases of
+/// sequential ones).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Totals {
@@ -55,7 +56,8 @@ pub struct Metrics {
 }
 
 impl Metrics {
-    /// Opens it to go on after `generations` lines; later ones, from before an interruption, are dropped.
+    /// Opens it to go on after `generations` lines; later ones, from before an interruption, are
+    /// dropped.
     ///
     /// # Errors
     /// If it cannot be read or written.

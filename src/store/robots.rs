@@ -51,8 +51,8 @@ pub enum Selection {
     Random(usize),
     /// The best of each run and task on validation images, this many; only `eval` shows those.
     Validated(usize),
-    /// Those with these ids, or unique beginnings of ids; "best" is the first on validation images if the runs ranked their robots
-    /// by those (validation.json), else the fittest.
+    /// Those with these ids, or unique beginnings of ids; "best" is the first on validation images
+    /// if the runs ranked their robots by those (validation.json), else the fittest.
     Ids(Vec<String>),
     /// These, by the place of their run and by id, and how they were come by.
     Drawn {
@@ -89,7 +89,8 @@ impl FromStr for Selection {
 }
 
 impl Selection {
-    /// The same among the robots only that the audits beside the runs found physical, if `only` says so.
+    /// The same among the robots only that the audits beside the runs found physical, if `only`
+    /// says so.
     #[must_use]
     pub fn physical(self, only: bool) -> Self {
         if only { Selection::Physical(Box::new(self)) } else { self }
@@ -128,11 +129,12 @@ impl Selection {
         }
     }
 
-    /// The robots; where no order is given: task by task, the fittest first. `seed` is for the random ones. For a
-    /// validation: all that are to be looked at.
+    /// The robots; where no order is given: task by task, the fittest first. `seed` is for the
+    /// random ones. For a validation: all that are to be looked at.
     ///
     /// # Errors
-    /// If there is no robot, or no single one, of an id; if only physical ones are asked for, and they are not known.
+    /// If there is no robot, or no single one, of an id; if only physical ones are asked for, and
+    /// they are not known.
     pub fn of<'a>(&self, sources: &'a [Source], seed: u64) -> Result<Vec<Chosen<'a>>, Error> {
         let robots = |(source, from): (usize, &'a Source)| {
             from.run.elites.iter().map(move |robot| Chosen { source, robot })
@@ -147,8 +149,9 @@ impl Selection {
         self.among(fittest, sources, seed)
     }
 
-    /// The same robots of several runs, each run's by their ids, so that runs can be looked at one after the other: `None` for
-    /// a run of which there are none. Who is best on validation images is told run by run as it is.
+    /// The same robots of several runs, each run's by their ids, so that runs can be looked at one
+    /// after the other: `None` for a run of which there are none. Who is best on validation images
+    /// is told run by run as it is.
     ///
     /// # Errors
     /// As [`Selection::of`].
@@ -207,7 +210,8 @@ impl Selection {
                 let found: Result<Vec<_>, Error> = robots.iter().map(find).collect();
                 Ok(found?.into_iter().flatten().collect())
             }
-            // The first in a ranking can be told without the last; it is asked when they are ranked.
+            // The first in a ranking can be told without the last; it is asked when they are
+            // ranked.
             Selection::Physical(of) if of.validated().is_some() && !all_audited(&fittest, sources)? => {
                 Ok(fittest)
             }
@@ -216,8 +220,8 @@ impl Selection {
     }
 }
 
-/// The best of some robots, given fittest first: the first on validation images if all runs ranked their robots by those, and
-/// ranked one of these; else the fittest.
+/// The best of some robots, given fittest first: the first on validation images if all runs ranked
+/// their robots by those, and ranked one of these; else the fittest.
 fn best<'a>(fittest: &[Chosen<'a>], sources: &'a [Source]) -> Option<Chosen<'a>> {
     let rankings: Option<Vec<Vec<Validated>>> = sources.iter().map(ranking).collect();
     let mut first: Option<(Chosen, f64)> = None;
@@ -235,8 +239,8 @@ fn best<'a>(fittest: &[Chosen<'a>], sources: &'a [Source]) -> Option<Chosen<'a>>
     first.map(|(chosen, _)| chosen).or(fittest.first().copied())
 }
 
-/// The robot of an id, or of the unique beginning of one. Of several runs that have it all, as when they started from one
-/// archive, from each.
+/// The robot of an id, or of the unique beginning of one. Of several runs that have it all, as when
+/// they started from one archive, from each.
 pub(crate) fn by_id<'a>(robots: &[Chosen<'a>], id: &str) -> Result<Vec<Chosen<'a>>, Error> {
     let lower = id.to_ascii_lowercase();
     let found: Vec<Chosen> = robots
@@ -293,7 +297,8 @@ pub(crate) fn physical<'a>(
             named.extend(by_id(&fittest, id)?);
         }
     }
-    // Who names robots needs to know of those only; of a part of an archive nothing can be drawn fairly.
+    // Who names robots needs to know of those only; of a part of an archive nothing can be drawn
+    // fairly.
     let is_named = matches!(selection, Selection::Ids(ids) if !ids.iter().any(|id| id == BEST));
     for chosen in if is_named { &named } else { &fittest } {
         if found(chosen).is_none() {
@@ -326,8 +331,8 @@ pub(crate) fn physical<'a>(
     Ok(physical)
 }
 
-/// Of robots of a run, best on validation images first, the first of each task that are physical. What comes after them
-/// need not have been audited.
+/// Of robots of a run, best on validation images first, the first of each task that are physical.
+/// What comes after them need not have been audited.
 ///
 /// # Errors
 /// If one that comes before them has not been, or none of a task is physical.

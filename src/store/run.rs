@@ -1,4 +1,5 @@
-//! `run.json`: a run's archive with everything that made it; the file that `eval` and `replay` read.
+//! `run.json`: a run's archive with everything that made it; the file that `eval` and `replay`
+//! read.
 
 use crate::base::error::Error;
 use crate::base::files::read_text;
@@ -121,7 +122,8 @@ pub struct RunFile {
     pub stats: ArchiveStats,
     /// The elites, in the order of their cells.
     pub elites: Vec<Robot>,
-    /// SHA-256 of the bytes of the file that it was read from; none of a run that was not read from its file.
+    /// SHA-256 of the bytes of the file that it was read from; none of a run that was not read from
+    /// its file.
     #[serde(skip)]
     pub read_sha256: Option<String>,
 }
@@ -214,7 +216,8 @@ impl RunFile {
         format!("{}{unit}", number::fixed(objective, 2))
     }
 
-    /// Whether both are of one run, however far it had got: the same config and seed make the same robots.
+    /// Whether both are of one run, however far it had got: the same config and seed make the same
+    /// robots.
     fn is_one_with(&self, other: &RunFile) -> bool {
         let essence = |run: &RunFile| (run.config.essence(), run.dataset.clone());
         self.fingerprint() == other.fingerprint() || essence(self) == essence(other)
@@ -231,8 +234,8 @@ impl RunFile {
         answers(&self.training_images, robot.displacements.iter().copied().map(Some))
     }
 
-    /// Whether its displacements are those of its bodies under the training images as the config's protocol has them: not
-    /// of probes, nor from raised starts or without length limits.
+    /// Whether its displacements are those of its bodies under the training images as the config's
+    /// protocol has them: not of probes, nor from raised starts or without length limits.
     pub fn follows_protocol(&self) -> bool {
         !self.config.measures_response() && self.origin.is_none()
     }
@@ -267,13 +270,15 @@ impl RunFile {
         format!("{head}\n{}\n]}}\n", lines.join(",\n"))
     }
 
-    /// What identifies it: SHA-256 of the bytes of its file, or of those that would be written, in hexadecimal digits.
+    /// What identifies it: SHA-256 of the bytes of its file, or of those that would be written, in
+    /// hexadecimal digits.
     pub fn fingerprint(&self) -> String {
         self.read_sha256.clone().unwrap_or_else(|| sha256_hex(self.to_json().as_bytes()))
     }
 
-    /// `elites.csv`: what pyribs' `ArchiveDataFrame` reads. `index`: cell; `objective`; `measures_i`: voxel counts (and
-    /// task); `solution_i`: voxels row-major; then id, task, generation and displacements.
+    /// `elites.csv`: what pyribs' `ArchiveDataFrame` reads. `index`: cell; `objective`;
+    /// `measures_i`: voxel counts (and task); `solution_i`: voxels row-major; then id, task,
+    /// generation and displacements.
     pub fn to_csv(&self) -> Vec<u8> {
         let space = self.space();
         let voxels = self.config.body.height * self.config.body.width;
@@ -333,7 +338,8 @@ mod tests {
         let read = |text: &str| RunFile::parse(text, "run.json").unwrap();
         // The text is the file's, so its fingerprint is known without reading it again.
         assert_eq!(read(&text).fingerprint(), run.fingerprint());
-        // What says the same in other bytes is another file, and its hash is the one that sha256sum says.
+        // What says the same in other bytes is another file, and its hash is the one that sha256sum
+        // says.
         for other in [text.replace("1.5", "1.50"), format!("{text}\n"), format!("\u{feff}{text}")] {
             assert_ne!(other, text);
             assert_eq!(read(&other).to_json(), text);

@@ -7,7 +7,8 @@ use crate::qd::Archive;
 use crate::store::images::{DatasetRef, ImageRef};
 use crate::store::run::{Dimensions, FORMAT, FORMAT_VERSION, Robot, RunFile};
 
-/// A run of the quick-start config with robots of these ids and objectives, each in a cell of its own.
+/// A run of the quick-start config with robots of these ids and objectives, each in a cell of its
+/// own.
 pub fn run(robots: &[(&str, f64)]) -> RunFile {
     let config = Config::parse(BUILT_IN[0].1, BUILT_IN[0].0, &[]).unwrap();
     let image = |label| ImageRef { index: usize::from(label), label };

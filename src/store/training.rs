@@ -1,4 +1,5 @@
-//! `training.json`: every rollout of a training, so that it goes on where it was stopped; and which run its gaits are from.
+//! `training.json`: every rollout of a training, so that it goes on where it was stopped; and which
+//! run its gaits are from.
 
 use serde::{Deserialize, Serialize};
 
@@ -15,7 +16,8 @@ pub struct Origin {
     pub generations: u64,
     /// SHA-256 of its file.
     pub sha256: String,
-    /// Indices of the images that its robots were ever trained on, if they are of the same data: not for validation.
+    /// Indices of the images that its robots were ever trained on, if they are of the same data:
+    /// not for validation.
     pub trained_on: Vec<usize>,
 }
 

@@ -22,13 +22,14 @@ pub(crate) struct Trainings {
 struct Content {
     format: String,
     format_version: u32,
-    /// By what was trained on what (a hash) and by size: accuracy and parameters of each training, in order.
+    /// By what was trained on what (a hash) and by size: accuracy and parameters of each training,
+    /// in order.
     trainings: BTreeMap<String, BTreeMap<usize, Vec<(f64, usize)>>>,
 }
 
 impl Trainings {
-    /// Those beside a result file: `capacity.trainings.json` beside `capacity.json`. None if there are none, or they cannot
-    /// be read: then all is trained again.
+    /// Those beside a result file: `capacity.trainings.json` beside `capacity.json`. None if there
+    /// are none, or they cannot be read: then all is trained again.
     pub fn read(results: &Path) -> Self {
         let path = results.with_extension("trainings.json");
         let text = read_text(&path).unwrap_or_default();

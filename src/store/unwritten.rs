@@ -1,5 +1,5 @@
-//! `Unwritten`: results that could not be written. The work goes on all the same: they can still be shown, and perhaps be
-//! written later.
+//! `Unwritten`: results that could not be written. The work goes on all the same: they can still be
+//! shown, and perhaps be written later.
 
 use crate::base::error::Error;
 

@@ -48,13 +48,15 @@ impl ValidationFile {
     }
 }
 
-/// The best robots of a run on validation images, as far as they are known for the run as it is; `None` if none are.
+/// The best robots of a run on validation images, as far as they are known for the run as it is;
+/// `None` if none are.
 pub(crate) fn ranking(source: &Source) -> Option<Vec<Validated>> {
     let file = ValidationFile::read(&source.path.with_file_name(VALIDATION_JSON))?;
     (file.run_sha256 == source.run.fingerprint() && !file.robots.is_empty()).then_some(file.robots)
 }
 
-/// How many images the robots in the `validation.json` beside a run were chosen by; `None` without such a file.
+/// How many images the robots in the `validation.json` beside a run were chosen by; `None` without
+/// such a file.
 pub(crate) fn shown(source: &Source) -> Option<usize> {
     ValidationFile::read(&source.path.with_file_name(VALIDATION_JSON))?
         .robots

@@ -1,4 +1,5 @@
-//! [`Whereabouts`]: where images are looked for. A run remembers where its own were, in a file beside its `run.json`.
+//! [`Whereabouts`]: where images are looked for. A run remembers where its own were, in a file
+//! beside its `run.json`.
 
 use crate::base::Grid;
 use crate::base::error::Error;
@@ -24,12 +25,14 @@ struct DataFolder {
     format_version: u32,
     /// Name of the dataset.
     dataset: String,
-    /// The folder with its files; if it is not absolute, as someone may write it: from the run's folder on.
+    /// The folder with its files; if it is not absolute, as someone may write it: from the run's
+    /// folder on.
     folder: PathBuf,
 }
 
-/// Where images are looked for, in this order: in the folder that the command line says, in that of `MORPHCOG_DATA`, in the one that a
-/// run remembers (if it is still there), in the config's `[data] dir`, or else in `data/<name>`.
+/// Where images are looked for, in this order: in the folder that the command line says, in that of
+/// `MORPHCOG_DATA`, in the one that a run remembers (if it is still there), in the config's `[data]
+/// dir`, or else in `data/<name>`.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Whereabouts {
     /// The folder that the command line says.
@@ -86,7 +89,8 @@ impl Whereabouts {
         })
     }
 
-    /// The first remembered folder with a dataset of this name that is still there; and the first that is not.
+    /// The first remembered folder with a dataset of this name that is still there; and the first
+    /// that is not.
     fn remembered(&self, dataset: &str) -> Result<(Option<Place>, Option<Place>), Error> {
         let mut gone = None;
         for path in self.remembered.iter().filter(|path| path.exists()) {
@@ -139,8 +143,8 @@ pub fn load_dataset(config: &Config, data: Option<&Path>, wanted: &[Split]) -> R
     Whereabouts::given(data).load(&config.data, wanted)
 }
 
-/// Loads the dataset that a run was made with; any, if none is said. Where only other splits are wanted, it is known by its training
-/// images if these are there.
+/// Loads the dataset that a run was made with; any, if none is said. Where only other splits are
+/// wanted, it is known by its training images if these are there.
 ///
 /// # Errors
 /// As [`load_dataset`]; or that it is another one: images of the same index would be others.

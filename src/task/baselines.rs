@@ -31,8 +31,8 @@ pub fn larger_group(split: &Split, images: &[Labelled]) -> f64 {
     a.max(images.len() - a) as f64 / images.len().max(1) as f64
 }
 
-/// The pixel and threshold that tell the groups of some images apart best (the first in reading order wins a tie);
-/// `None` without images.
+/// The pixel and threshold that tell the groups of some images apart best (the first in reading
+/// order wins a tie); `None` without images.
 pub fn best_pixel(split: &Split, images: &[Labelled]) -> Option<PixelRule> {
     let first = images.first()?.stimulus;
     let total_a = images.iter().filter(|image| split.group(image.class) == Some(Group::A)).count();
@@ -43,7 +43,8 @@ pub fn best_pixel(split: &Split, images: &[Labelled]) -> Option<PixelRule> {
             let mut sorted: Vec<(f64, bool)> =
                 images.iter().map(|i| (value(i), split.group(i.class) == Some(Group::A))).collect();
             sorted.sort_by(|x, y| x.0.total_cmp(&y.0));
-            // Below a threshold after i images: right if A is the answer below, B above; or the other way round.
+            // Below a threshold after i images: right if A is the answer below, B above; or the
+            // other way round.
             let mut a_below = 0;
             for (i, (level, is_a)) in sorted.iter().enumerate() {
                 a_below += usize::from(*is_a);
@@ -76,7 +77,8 @@ impl PixelRule {
     }
 }
 
-/// Accuracy of answering with the group of the nearest training image (Euclidean distance; the first wins a tie).
+/// Accuracy of answering with the group of the nearest training image (Euclidean distance; the
+/// first wins a tie).
 pub fn nearest_training_image(split: &Split, training: &[Labelled], images: &[Labelled]) -> f64 {
     let distance = |a: &Grid<f64>, b: &Grid<f64>| {
         a.cells().iter().zip(b.cells()).map(|(x, y)| (x - y) * (x - y)).sum::<f64>()

@@ -1,5 +1,5 @@
-//! [`Direction`] and [`Assignment`]: which way a robot walks, and which way it should (paper, section
-//! "Generalization test").
+//! [`Direction`] and [`Assignment`]: which way a robot walks, and which way it should (paper,
+//! section "Generalization test").
 
 use crate::task::fitness::Fitness;
 use crate::task::grouping::{Group, Split};
@@ -15,14 +15,16 @@ pub enum Direction {
 }
 
 impl Direction {
-    /// Where a displacement leads; `None` if it is not larger than `threshold` (paper: 3 voxel lengths).
+    /// Where a displacement leads; `None` if it is not larger than `threshold` (paper: 3 voxel
+    /// lengths).
     pub fn of(displacement: f64, threshold: f64) -> Option<Self> {
         let direction = if displacement > 0.0 { Direction::Right } else { Direction::Left };
         (displacement.abs() > threshold).then_some(direction)
     }
 }
 
-/// Which way group A is to walk; group B is to walk the other. Fixed by the training answers before any test.
+/// Which way group A is to walk; group B is to walk the other. Fixed by the training answers before
+/// any test.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Assignment {
     /// The way of group A.
@@ -30,7 +32,8 @@ pub struct Assignment {
 }
 
 impl Assignment {
-    /// The assignment under which a robot's training answers are fitter (A left if it makes no difference).
+    /// The assignment under which a robot's training answers are fitter (A left if it makes no
+    /// difference).
     pub fn from_training(split: &Split, fitness: Fitness, answers: &[Answer]) -> Self {
         let (a_right, a_left) = fitness.of_assignments(of_split(split, answers));
         Assignment { a: if a_right > a_left { Direction::Right } else { Direction::Left } }
@@ -53,7 +56,8 @@ impl Assignment {
         }
     }
 
-    /// Whether a displacement is the right answer to an image of a group: farther than `threshold`, the right way.
+    /// Whether a displacement is the right answer to an image of a group: farther than `threshold`,
+    /// the right way.
     pub fn is_right(self, group: Group, displacement: f64, threshold: f64) -> bool {
         Direction::of(displacement, threshold) == Some(self.expected(group))
     }

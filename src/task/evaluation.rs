@@ -1,4 +1,5 @@
-//! Evaluation of many robots at once, in parallel over robots and images, and what can be saved without loss.
+//! Evaluation of many robots at once, in parallel over robots and images, and what can be saved
+//! without loss.
 
 use crate::base::Grid;
 use crate::base::stop::{Stopped, check};
@@ -18,10 +19,11 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Savings {
-    /// A body already evaluated in this run is not simulated again: it would be exactly as fit, and only the
-    /// strictly fitter get in.
+    /// A body already evaluated in this run is not simulated again: it would be exactly as fit, and
+    /// only the strictly fitter get in.
     pub known_bodies: bool,
-    /// An offspring that can no longer beat the elite of any cell it may belong to is not simulated further.
+    /// An offspring that can no longer beat the elite of any cell it may belong to is not simulated
+    /// further.
     pub early_stop: bool,
     /// Images that show a body's sensors the same pixels share a rollout.
     pub shared_lives: bool,
@@ -40,8 +42,8 @@ pub enum Outcome {
     Walked(Vec<f64>),
     /// A rollout became unstable: no fitness.
     Unstable(Unstable),
-    /// Stopped because it could not get into the archive any more, or was [given up](Job::given_up); with the displacement under
-    /// every image, as far as known.
+    /// Stopped because it could not get into the archive any more, or was [given
+    /// up](Job::given_up); with the displacement under every image, as far as known.
     Stopped(Vec<Option<f64>>),
 }
 
@@ -56,8 +58,8 @@ impl Outcome {
     }
 }
 
-/// An outcome and the simulation it took. A *showing* is one image shown to one robot: a fresh rollout, or one
-/// phase of a sequential one.
+/// An outcome and the simulation it took. A *showing* is one image shown to one robot: a fresh
+/// rollout, or one phase of a sequential one.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Evaluation {
     /// How it ended.
@@ -77,22 +79,26 @@ pub type MayWin<'a> = dyn Fn(&[Option<f64>]) -> bool + Sync + Send + 'a;
 pub struct Job<'a> {
     /// The body.
     pub body: &'a Body,
-    /// In which order to show the images where that is free (fresh rollouts): those first under which it is likely to
-    /// drop out. Images that are not in it come last, in their order.
+    /// In which order to show the images where that is free (fresh rollouts): those first under
+    /// which it is likely to drop out. Images that are not in it come last, in their order.
     pub order: Vec<usize>,
-    /// Whether it may still get into the archive, given some of its displacements; asked with early stopping only.
+    /// Whether it may still get into the archive, given some of its displacements; asked with early
+    /// stopping only.
     pub may_win: Box<MayWin<'a>>,
-    /// Whether it is given up, going by the images in some order up to the first whose displacement is not known, and no others: so
-    /// that it does not matter which are shown first, or share a rollout.
+    /// Whether it is given up, going by the images in some order up to the first whose displacement
+    /// is not known, and no others: so that it does not matter which are shown first, or share a
+    /// rollout.
     pub given_up: Option<Box<MayWin<'a>>>,
 }
 
-/// Evaluates jobs, each on all images; results in the jobs' order, the same on any number of threads. Fresh rollouts happen under the
-/// images' `conditions`; those that are missing are the default. In sequential ones conditions have no meaning.
+/// Evaluates jobs, each on all images; results in the jobs' order, the same on any number of
+/// threads. Fresh rollouts happen under the images' `conditions`; those that are missing are the
+/// default. In sequential ones conditions have no meaning.
 ///
-/// All rollouts of all jobs are one list of work: first every robot's first image, then every second one, and so on, large
-/// bodies first so that no core waits long at the end. A rollout whose robot has dropped out by then is passed over. One
-/// that was begun before that was known is simply not counted.
+/// All rollouts of all jobs are one list of work: first every robot's first image, then every
+/// second one, and so on, large bodies first so that no core waits long at the end. A rollout whose
+/// robot has dropped out by then is passed over. One that was begun before that was known is simply
+/// not counted.
 ///
 /// # Errors
 /// [`Stopped`] if `stop` was set before all was known.
@@ -126,9 +132,10 @@ pub fn evaluate(
     Ok(candidates.iter().map(Candidate::evaluation).collect())
 }
 
-/// Fresh rollouts of a body, one under each image and its condition (the default where one is missing): displacements in voxel
-/// lengths, in the images' order. Images that show its sensors the same pixels under the same condition are one rollout. With how many
-/// were simulated; `told` is told after each for how many images it stands.
+/// Fresh rollouts of a body, one under each image and its condition (the default where one is
+/// missing): displacements in voxel lengths, in the images' order. Images that show its sensors the
+/// same pixels under the same condition are one rollout. With how many were simulated; `told` is
+/// told after each for how many images it stands.
 ///
 /// # Errors
 /// [`Stopped`] if `stop` was set meanwhile; within, [`Unstable`] for a rollout that ended early.
@@ -156,9 +163,11 @@ pub fn fresh_rollouts(
     Ok((same_as.iter().map(|first| rolled[first]).collect(), rolled.len()))
 }
 
-/// A finished rollout: of one image if fresh; of all images if sequential, up to where the robot dropped out.
+/// A finished rollout: of one image if fresh; of all images if sequential, up to where the robot
+/// dropped out.
 struct Shown {
-    /// Displacement under each image shown, voxel lengths; none for the one under which it became unstable.
+    /// Displacement under each image shown, voxel lengths; none for the one under which it became
+    /// unstable.
     displacements: Vec<Option<f64>>,
     /// How it became unstable, if it did.
     unstable: Option<Unstable>,
@@ -250,7 +259,8 @@ impl<'a> Setup<'a> {
         self.conditions.iter().map(system).collect()
     }
 
-    /// For each image the first that shows the body's sensors the same pixels under the same condition.
+    /// For each image the first that shows the body's sensors the same pixels under the same
+    /// condition.
     fn same_as(&self, body: &Body) -> Vec<usize> {
         let mut first = HashMap::new();
         let same = same_to_sensors(body, &self.images.iter().collect::<Vec<_>>());
@@ -371,7 +381,8 @@ impl<'a> Candidate<'a> {
         Ok(())
     }
 
-    /// How it ends for a robot with these displacements, in the order of showing, whatever the rest may be; `None` if that matters.
+    /// How it ends for a robot with these displacements, in the order of showing, whatever the rest
+    /// may be; `None` if that matters.
     fn outcome(&self, displacements: &[Option<f64>]) -> Option<Outcome> {
         let Job { may_win, given_up, .. } = self.job;
         let known = self.known(displacements);
@@ -385,8 +396,8 @@ impl<'a> Candidate<'a> {
         self.places.iter().map(|place| *displacements.get(*place)?).collect()
     }
 
-    /// Counts the rollouts that are known, in their order, whichever was done first: every one once, since each takes a look at
-    /// all images.
+    /// Counts the rollouts that are known, in their order, whichever was done first: every one
+    /// once, since each takes a look at all images.
     fn count(&self, lives: &mut Progress) {
         let is_over = |lives: &Progress| {
             self.early_stop && lives.unstable.is_some() || lives.counted == lives.lived.len()
@@ -419,7 +430,8 @@ impl<'a> Candidate<'a> {
     }
 
     fn evaluation(&self) -> Evaluation {
-        // All rollouts are done that the verdict needs; without images there is nothing to walk for.
+        // All rollouts are done that the verdict needs; without images there is nothing to walk
+        // for.
         let mut lives = self.locked();
         self.count(&mut lives);
         lives.verdict.take().unwrap_or_else(|| self.ended(Outcome::Walked(Vec::new()), 0))
@@ -435,7 +447,8 @@ mod tests {
     use crate::task::perturbation::{Setting, Sizes, condition};
     use std::collections::BTreeSet;
 
-    /// A sensor that expands at both ends: under a bright image it is wider than `Physics::blow_up_extent` here allows.
+    /// A sensor that expands at both ends: under a bright image it is wider than
+    /// `Physics::blow_up_extent` here allows.
     fn body() -> Body {
         let row = [Material::SensorExpand, Material::Soft, Material::SensorExpand];
         Body::new(Grid::from_fn(1, 3, |_, column| row[column])).unwrap()
@@ -481,7 +494,8 @@ mod tests {
         rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap()
     }
 
-    /// Orders to show images in: none, a first one, all, and some with images that are there twice or not at all.
+    /// Orders to show images in: none, a first one, all, and some with images that are there twice
+    /// or not at all.
     const ORDERS: [&[usize]; 4] = [&[], &[3], &[4, 2, 0, 1, 3], &[7, 2, 2, 4]];
 
     fn all_savings() -> impl Iterator<Item = Savings> {
@@ -535,7 +549,8 @@ mod tests {
 
     #[test]
     fn fresh_lives_follow_the_order_and_stop_when_nothing_can_be_won() {
-        // Image 3 shares image 1's rollout, image 4 image 0's: with both known, nothing can be won any more.
+        // Image 3 shares image 1's rollout, image 4 image 0's: with both known, nothing can be won
+        // any more.
         let may_win = |known: &[Option<f64>]| {
             assert!(known[3].is_some() && known[1] == known[3], "image 3 comes first: {known:?}");
             known[0].is_none()
@@ -572,7 +587,8 @@ mod tests {
             let raised = Protocol { start_row: protocol.start_row + rows, ..protocol.clone() };
             fresh_rollout(&system, &raised, &images[image], &NEVER).unwrap().unwrap()
         };
-        // Images 1 and 3, and 0 and 4, show the sensors the same; of the last pair, the start is, too.
+        // Images 1 and 3, and 0 and 4, show the sensors the same; of the last pair, the start is,
+        // too.
         let raised = [1, 0, 1, 2];
         let expected = [live(0, 1), live(1, 0), live(2, 1), live(3, 2), live(4, 0)];
         assert!(expected[1] != expected[3] && expected[0] != expected[4], "{expected:?}");
@@ -623,7 +639,8 @@ mod tests {
         assert!(alone[1] != alone[3] && alone[2] != alone[4], "{alone:?}");
         assert_eq!((evaluation.outcome, evaluation.simulated), (Outcome::Walked(alone), 5));
 
-        // Without them it grows wider than it may: that is no reason to refuse it, but no way either.
+        // Without them it grows wider than it may: that is no reason to refuse it, but no way
+        // either.
         assert!(expected(&tight, 2).is_ok() && expected(&tight.without_limits(), 2).is_err());
         let evaluation = evaluated(&tight, &[false, false, true, false, false]);
         let Outcome::Walked(walked) = evaluation.outcome else { panic!("{:?}", evaluation.outcome) };

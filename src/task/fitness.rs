@@ -4,35 +4,39 @@ use crate::task::grouping::Group;
 use crate::task::perturbation::CONDITIONS_OF_RESPONSE;
 use serde::{Deserialize, Serialize};
 
-/// Margin at which an answer is as good as can be, for [`Fitness::MeanClipped`] \[voxel lengths\]. With less, a small change turns
-/// many answers; with more, bodies that walk far count more than bodies that are right.
+/// Margin at which an answer is as good as can be, for [`Fitness::MeanClipped`] \[voxel lengths\].
+/// With less, a small change turns many answers; with more, bodies that walk far count more than
+/// bodies that are right.
 pub const ENOUGH: f64 = 10.0;
 
 /// More than rounding can make of a sum over images.
 const SLACK: f64 = 1e-9;
 
-/// How answers to several images become one number. An answer's *margin* is its displacement towards the right side, in
-/// voxel lengths, negative on the wrong one; of the two ways to assign sides to groups the fitter counts.
+/// How answers to several images become one number. An answer's *margin* is its displacement
+/// towards the right side, in voxel lengths, negative on the wrong one; of the two ways to assign
+/// sides to groups the fitter counts.
 ///
-/// Where images are averaged, both groups weigh the same, however many images they have: with one class
-/// against three, a robot that always walks the way of the three would else be right on three quarters, and the fittest
-/// for long.
+/// Where images are averaged, both groups weigh the same, however many images they have: with one
+/// class against three, a robot that always walks the way of the three would else be right on three
+/// quarters, and the fittest for long.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Fitness {
-    /// The smallest margin \[voxel lengths\]: the paper's. With many images one wrong answer makes standing still
-    /// the best that is in reach.
+    /// The smallest margin \[voxel lengths\]: the paper's. With many images one wrong answer makes
+    /// standing still the best that is in reach.
     #[default]
     Min,
     /// The mean of the margins, each divided by ten voxel lengths and clipped to −1 … 1.
     MeanClipped,
-    /// How strongly a gait responds to what its voxels see, whatever its task \[voxel lengths\]. Images are shown in pairs, an
-    /// image and its opposite. Half the difference of the two displacements is what is linear in the widths of the voxels, half
-    /// the sum is what is not, and where the body walks anyway. Fitness is the root of the mean square of the one, less the
-    /// variance of the other within [the conditions](crate::task::perturbation::of_response) that pairs are shown under by turns: so chance, which
-    /// is in both, adds nothing on average. An eighth of the distance that the body walks anyway is subtracted: sensors have to
-    /// make up for it. A run measures it on the body's [probe](crate::body::Body::probe), and multiplies it by the root of the
-    /// number of the probe's sensors. Both ways to assign sides are worth the same.
+    /// How strongly a gait responds to what its voxels see, whatever its task \[voxel lengths\].
+    /// Images are shown in pairs, an image and its opposite. Half the difference of the two
+    /// displacements is what is linear in the widths of the voxels, half the sum is what is not,
+    /// and where the body walks anyway. Fitness is the root of the mean square of the one, less the
+    /// variance of the other within [the conditions](crate::task::perturbation::of_response) that
+    /// pairs are shown under by turns: so chance, which is in both, adds nothing on average. An
+    /// eighth of the distance that the body walks anyway is subtracted: sensors have to make up for
+    /// it. A run measures it on the body's [probe](crate::body::Body::probe), and multiplies it by
+    /// the root of the number of the probe's sensors. Both ways to assign sides are worth the same.
     Response,
 }
 
@@ -50,8 +54,9 @@ impl Fitness {
 pub(super) type Assignments = (f64, f64);
 
 impl Fitness {
-    /// Fitness under both assignments, of answers by group and displacement in the images' order; if some are still to
-    /// come (`None`), upper bounds of it. Infinite without any image; not a number if an answer is none.
+    /// Fitness under both assignments, of answers by group and displacement in the images' order;
+    /// if some are still to come (`None`), upper bounds of it. Infinite without any image; not a
+    /// number if an answer is none.
     pub(super) fn of_assignments(
         self,
         answers: impl Iterator<Item = (Group, Option<f64>)> + Clone,
@@ -92,11 +97,12 @@ pub fn worth(margin: f64) -> f64 {
     (margin / ENOUGH).clamp(-1.0, 1.0)
 }
 
-/// What a voxel length that the body walks anyway costs. With more, still bodies win at first; with less, so do those that walk one
-/// way and that no sensors could turn.
+/// What a voxel length that the body walks anyway costs. With more, still bodies win at first; with
+/// less, so do those that walk one way and that no sensors could turn.
 const OFFSET_COST: f64 = 0.125;
 
-/// The response of the pairs of displacements that are known so far; `None` if they are fewer than two in every condition.
+/// The response of the pairs of displacements that are known so far; `None` if they are fewer than
+/// two in every condition.
 pub fn response_so_far(displacements: impl Iterator<Item = Option<f64>>) -> Option<f64> {
     let known: Vec<f64> = displacements.map_while(|displacement| displacement).collect();
     let pairs = known.chunks_exact(2);
@@ -119,7 +125,8 @@ pub fn response_so_far(displacements: impl Iterator<Item = Option<f64>>) -> Opti
     (free > 0).then(|| linear.signum() * linear.abs().sqrt() - OFFSET_COST * anyway)
 }
 
-/// The response of all pairs. Infinite while a displacement is to come, since it may be any, and without any.
+/// The response of all pairs. Infinite while a displacement is to come, since it may be any, and
+/// without any.
 fn response(displacements: impl Iterator<Item = Option<f64>> + Clone) -> f64 {
     let mut all = displacements.clone().peekable();
     if all.peek().is_none() || all.any(|displacement| displacement.is_none()) {
@@ -128,15 +135,16 @@ fn response(displacements: impl Iterator<Item = Option<f64>> + Clone) -> f64 {
     response_so_far(displacements).unwrap_or(0.0)
 }
 
-/// By number of the group: displacements towards the right side if group A is to walk right; if it is to walk left, the
-/// negatives of those.
+/// By number of the group: displacements towards the right side if group A is to walk right; if it
+/// is to walk left, the negatives of those.
 pub(super) fn margins(
     answers: impl Iterator<Item = (Group, Option<f64>)> + Clone,
 ) -> impl Iterator<Item = (usize, Option<f64>)> + Clone {
     answers.map(|(group, d)| if group == Group::A { (0, d) } else { (1, d.map(|d| -d)) })
 }
 
-/// How many images each group has, and what one of them weighs: exactly 1 where both have as many, or one has none.
+/// How many images each group has, and what one of them weighs: exactly 1 where both have as many,
+/// or one has none.
 pub(super) fn weights(margins: impl Iterator<Item = (usize, Option<f64>)>) -> ([usize; 2], [f64; 2]) {
     let mut images = [0; 2];
     margins.for_each(|(group, _)| images[group] += 1);
@@ -183,10 +191,12 @@ mod tests {
                 d.iter().zip([A, B, B].iter().cycle()).map(|(&d, &g)| (g, d)).collect();
             fitness(Fitness::Response, &answers)
         };
-        // Half differences 3, 2, −1, −2; half sums 0 and 0, and 10 and 10, which is 5 voxel lengths on average.
+        // Half differences 3, 2, −1, −2; half sums 0 and 0, and 10 and 10, which is 5 voxel lengths
+        // on average.
         let pairs = [3.0, -3.0, 12.0, 8.0, -1.0, 1.0, 8.0, 12.0];
         assert_eq!(response(&pairs), 4.5_f64.sqrt() - 5.0 / 8.0);
-        // Which way the robot walks does not matter; how far it walks anyway costs; what the conditions differ by adds nothing.
+        // Which way the robot walks does not matter; how far it walks anyway costs; what the
+        // conditions differ by adds nothing.
         assert_eq!(response(&pairs.map(|d| -d)), 4.5_f64.sqrt() - 5.0 / 8.0);
         assert_eq!(response(&[3.0, -3.0, 2.0, -2.0, -1.0, 1.0, -2.0, 2.0]), 4.5_f64.sqrt());
         assert_eq!(response(&[13.0, 7.0, -8.0, -12.0, 9.0, 11.0, -12.0, -8.0]), 4.5_f64.sqrt());

@@ -1,5 +1,5 @@
-//! [`Grouping`]: which tasks there are: how classes are divided into a group that walks one way and one that
-//! walks the other.
+//! [`Grouping`]: which tasks there are: how classes are divided into a group that walks one way and
+//! one that walks the other.
 
 use crate::task::fitness::Fitness;
 
@@ -33,7 +33,8 @@ impl Split {
         [Group::A, Group::B].into_iter().find(|g| self.classes(*g).contains(&class))
     }
 
-    /// Whether every class is in one group: no recognition task, but the bin of robots that always walk one way.
+    /// Whether every class is in one group: no recognition task, but the bin of robots that always
+    /// walk one way.
     pub fn is_same_way(&self) -> bool {
         self.b.is_empty()
     }
@@ -48,8 +49,9 @@ impl Split {
     }
 }
 
-/// The tasks of a run: one division of classes into two groups, or all there are. With more than one, the task a
-/// robot performs is a dimension of the archive (paper, sections "Fitness" and "MAP-Elites").
+/// The tasks of a run: one division of classes into two groups, or all there are. With more than
+/// one, the task a robot performs is a dimension of the archive (paper, sections "Fitness" and
+/// "MAP-Elites").
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Grouping {
     tasks: Vec<Split>,
@@ -87,9 +89,10 @@ impl Grouping {
         Ok(Grouping { tasks, fitness: Fitness::Min })
     }
 
-    /// All ways to split the classes in two non-empty groups, 2^(k−1) − 1 for k classes: small first groups come
-    /// first, equally large ones in the order of the classes. (For 0, 1, 2, 3: 0|123, 1|023, 2|013, 3|012, 01|23,
-    /// 02|13, 03|12.) With `same_way_bin`, "all the same way" is one task more, the last.
+    /// All ways to split the classes in two non-empty groups, 2^(k−1) − 1 for k classes: small
+    /// first groups come first, equally large ones in the order of the classes. (For 0, 1, 2, 3:
+    /// 0|123, 1|023, 2|013, 3|012, 01|23, 02|13, 03|12.) With `same_way_bin`, "all the same way" is
+    /// one task more, the last.
     ///
     /// # Errors
     /// [`GroupingError`] if a class occurs twice or there are not 2 to [`MAX_CLASSES`] classes.

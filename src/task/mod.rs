@@ -1,4 +1,5 @@
-//! What a robot is asked to do: stimuli, protocols, rollouts and their scores; how a gait responds, and how it is taught.
+//! What a robot is asked to do: stimuli, protocols, rollouts and their scores; how a gait responds,
+//! and how it is taught.
 
 pub mod baselines;
 pub mod direction;

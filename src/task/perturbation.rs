@@ -1,9 +1,10 @@
-//! [`Perturbation`]: a change of a simulation that should make no difference to a robot that walks by body and image.
-//! `morphcog audit` tests robots under many of them; `morphcog train` shows images under some, so that robots do not come to
-//! depend on what they change.
+//! [`Perturbation`]: a change of a simulation that should make no difference to a robot that walks
+//! by body and image. `morphcog audit` tests robots under many of them; `morphcog train` shows
+//! images under some, so that robots do not come to depend on what they change.
 //!
-//! To start at another column is none: the simulator is the same bits wherever on the ground a robot stands (but for
-//! pegs below the ground, which a robot can reach only by tunnelling). A raised start also changes the column.
+//! To start at another column is none: the simulator is the same bits wherever on the ground a
+//! robot stands (but for pegs below the ground, which a robot can reach only by tunnelling). A
+//! raised start also changes the column.
 
 use crate::base::random::{Purpose, stream};
 use crate::base::{Grid, number};
@@ -16,18 +17,21 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Kind {
-    /// The robot starts above the ground, and so touches it first in another way; at another column, too.
+    /// The robot starts above the ground, and so touches it first in another way; at another
+    /// column, too.
     Start,
-    /// Robot and images are mirrored: ties, and whatever goes from left to right, are decided the other way round.
+    /// Robot and images are mirrored: ties, and whatever goes from left to right, are decided the
+    /// other way round.
     Mirror,
     /// The same material at a shorter time step ([`Physics::refined`]).
     TimeStep,
-    /// The length limits remove an excess half as fast; or they are beyond every goal, so that no spring is held at a
-    /// limit against its goal, and given energy there, any more.
+    /// The length limits remove an excess half as fast; or they are beyond every goal, so that no
+    /// spring is held at a limit against its goal, and given energy there, any more.
     LengthLimits,
     /// A contact of the robot with itself counts once instead of twice.
     SelfContact,
-    /// In a sequential simulation the images come in reverse order: this finds robots that turn round by the clock.
+    /// In a sequential simulation the images come in reverse order: this finds robots that turn
+    /// round by the clock.
     Order,
     /// Stiffness of all springs.
     Stiffness,
@@ -54,8 +58,9 @@ impl Kind {
         Kind::Pixel,
     ];
 
-    /// Whether it changes the world that is simulated. The others change only how that is computed, or how images are
-    /// shown: a robot that fails under those exploits something other than body and image.
+    /// Whether it changes the world that is simulated. The others change only how that is computed,
+    /// or how images are shown: a robot that fails under those exploits something other than body
+    /// and image.
     pub fn is_of_the_world(self) -> bool {
         self >= Kind::Stiffness
     }
@@ -89,7 +94,8 @@ pub struct Sizes {
     pub share: f64,
     /// Rollouts with a changed pixel in every image. Default 3.
     pub pixels: u32,
-    /// Fewest sensors of a robot whose pixels are changed: to fewer, one pixel is not noise. Default 10.
+    /// Fewest sensors of a robot whose pixels are changed: to fewer, one pixel is not noise.
+    /// Default 10.
     pub least_sensors: usize,
     /// Seed of the pixels. Default 1.
     pub seed: u64,
@@ -138,7 +144,8 @@ impl Default for ByTurns {
 pub type Condition = Vec<Perturbation>;
 
 impl ByTurns {
-    /// Every condition once: starts raised by no row up to the most, then the same again without length limits.
+    /// Every condition once: starts raised by no row up to the most, then the same again without
+    /// length limits.
     pub fn conditions(&self) -> impl Iterator<Item = Condition> {
         let ByTurns { start, length_limits } = *self;
         let one = move |without_limits: bool| (0..=start).map(move |rows| condition(rows, without_limits));
@@ -161,8 +168,9 @@ impl ByTurns {
 /// How many [`of_response`] there are.
 pub const CONDITIONS_OF_RESPONSE: usize = 2;
 
-/// Under what the response of gaits is measured while they evolve, by turns: the default; and raised by a row and without length
-/// limits, so that luck at the first touch of the ground, or at a limit, is no response.
+/// Under what the response of gaits is measured while they evolve, by turns: the default; and
+/// raised by a row and without length limits, so that luck at the first touch of the ground, or at
+/// a limit, is no response.
 pub fn of_response() -> [Condition; CONDITIONS_OF_RESPONSE] {
     [condition(0, false), condition(1, true)]
 }
@@ -192,7 +200,8 @@ fn is_zero(seed: &u64) -> bool {
 }
 
 impl Perturbation {
-    /// All changes of these sizes that mean something to a body under a protocol, in the order of a report.
+    /// All changes of these sizes that mean something to a body under a protocol, in the order of a
+    /// report.
     pub fn all(sizes: &Sizes, body: &Body, life: Life) -> Vec<Self> {
         let sees = body.counts().sensor >= sizes.least_sensors;
         let amounts = |kind| match kind {
@@ -231,8 +240,8 @@ impl Perturbation {
         }
     }
 
-    /// Whether instability counts against the robot. Not without limits: every material has a limit, and a body that needs one
-    /// does not exploit it.
+    /// Whether instability counts against the robot. Not without limits: every material has a
+    /// limit, and a body that needs one does not exploit it.
     pub fn counts_if_unstable(&self) -> bool {
         (self.kind, self.amount) != (Kind::LengthLimits, OUT_OF_REACH)
     }
@@ -298,8 +307,8 @@ impl Perturbation {
         }
     }
 
-    /// Displacements as they would be in the unchanged setting: those of a mirror image are mirrored, and they stand in
-    /// the unchanged order.
+    /// Displacements as they would be in the unchanged setting: those of a mirror image are
+    /// mirrored, and they stand in the unchanged order.
     pub fn undo(&self, mut displacements: Vec<f64>) -> Vec<f64> {
         match self.kind {
             Kind::Mirror => displacements.iter_mut().for_each(|d| *d = -*d),

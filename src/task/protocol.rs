@@ -5,7 +5,8 @@ use serde::{Deserialize, Serialize};
 /// Farthest start column either way \[voxels\]: world coordinates stay exact to far below a voxel.
 pub const MAX_COLUMN: i64 = 1_000_000;
 
-/// Most control steps that an image, or a scenario, lasts: twenty thousand actuation cycles of the paper's.
+/// Most control steps that an image, or a scenario, lasts: twenty thousand actuation cycles of the
+/// paper's.
 pub const MAX_STEPS: u32 = 1_000_000;
 
 /// Highest row of a start \[voxels\].
@@ -31,8 +32,8 @@ pub struct Protocol {
     pub control_steps: u32,
     /// Grid row of the body's bottom row at the start \[voxels\]. Default 2: on the ground.
     pub start_row: u32,
-    /// Grid column of its left edge \[voxels\]. Default 493, the paper's; only the pegs below the ground tell columns
-    /// apart.
+    /// Grid column of its left edge \[voxels\]. Default 493, the paper's; only the pegs below the
+    /// ground tell columns apart.
     pub start_column: i64,
 }
 

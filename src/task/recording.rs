@@ -12,12 +12,13 @@ pub struct Phase {
     pub stimulus: Grid<f64>,
     /// What the image is, for people: "0 (train 1)".
     pub label: String,
-    /// Signed x displacement of the centre of mass over the phase, voxel lengths (right is positive).
+    /// Signed x displacement of the centre of mass over the phase, voxel lengths (right is
+    /// positive).
     pub displacement: f64,
 }
 
-/// One moment: all points of the robot, in voxel lengths; x from the left edge of its starting box, y from the
-/// ground's surface up.
+/// One moment: all points of the robot, in voxel lengths; x from the left edge of its starting box,
+/// y from the ground's surface up.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Frame {
     /// Position [x, y] of every point.
@@ -37,8 +38,8 @@ pub struct VoxelCorners {
     pub corners: [usize; 4],
 }
 
-/// A rollout, one frame per control step (the first before the first step). With a reset between images
-/// ("fresh" protocol) the robot jumps back at the first frame of a phase.
+/// A rollout, one frame per control step (the first before the first step). With a reset between
+/// images ("fresh" protocol) the robot jumps back at the first frame of a phase.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Recording {
     /// The robot's id or name.

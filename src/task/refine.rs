@@ -1,11 +1,13 @@
 //! Refining a taught robot: a hill climb over whole bodies on real rollouts.
 //!
-//! What a model says ends where a body is not linear. So at the end of a training the best design is *champion*: it is
-//! shown a few hundred training images, half of them random and half those that the model finds closest to the boundary; after
-//! some challengers it is shown others, so that none wins by chance on these.
-//! Challengers differ from it in some sensors, chosen by the slopes and by how the champion really answered, or in a few voxels
-//! of any material. A challenger is shown the same images, and dropped as soon as it falls behind (racing; Maron & Moore
-//! 1994). One that answers better becomes champion. Every challenger with the champion's gait tells more of the slopes.
+//! What a model says ends where a body is not linear. So at the end of a training the best design
+//! is *champion*: it is shown a few hundred training images, half of them random and half those
+//! that the model finds closest to the boundary; after some challengers it is shown others, so that
+//! none wins by chance on these. Challengers differ from it in some sensors, chosen by the slopes
+//! and by how the champion really answered, or in a few voxels of any material. A challenger is
+//! shown the same images, and dropped as soon as it falls behind (racing; Maron & Moore 1994). One
+//! that answers better becomes champion. Every challenger with the champion's gait tells more of
+//! the slopes.
 
 use crate::base::Grid;
 use crate::base::random::{Purpose, Stream, stream};
@@ -16,16 +18,16 @@ use crate::task::fitness::worth;
 use crate::task::response::{CHOICES, Design, Evidence, Example, Gait, Lesson, Moments};
 use crate::task::teach::{Image, Rollouts};
 
-/// Images of the first look at a challenger; each next look takes twice as many. With fewer, good ones are dropped by chance;
-/// with more, bad ones cost more.
+/// Images of the first look at a challenger; each next look takes twice as many. With fewer, good
+/// ones are dropped by chance; with more, bad ones cost more.
 const FIRST_LOOK: usize = 24;
 
-/// By how many standard errors what is to come may be better than what was seen. Larger values drop later: with 2, three in four
-/// challengers of a hard task (3|012) are shown all 400 images.
+/// By how many standard errors what is to come may be better than what was seen. Larger values drop
+/// later: with 2, three in four challengers of a hard task (3|012) are shown all 400 images.
 const ERRORS: f64 = 1.0;
 
-/// What few images may hide of the spread of gains. Without it, a challenger whose first answers are all the champion's is taken
-/// for its twin.
+/// What few images may hide of the spread of gains. Without it, a challenger whose first answers
+/// are all the champion's is taken for its twin.
 const DOUBT: f64 = 0.05;
 
 /// Share of challengers that differ in voxels of any material; the others differ in sensors.
@@ -57,8 +59,8 @@ pub struct WeightedImage {
 }
 
 impl WeightedImage {
-    /// Images of a training, for a robot whose first group walks to this side: 1 right, −1 left. Both groups weigh the same, however
-    /// many images of each there are.
+    /// Images of a training, for a robot whose first group walks to this side: 1 right, −1 left.
+    /// Both groups weigh the same, however many images of each there are.
     pub fn all(images: &[&Image], side: f64) -> Vec<Self> {
         let of =
             |right: f64| images.iter().filter(|image| image.example.right == right).count().max(1) as f64;
@@ -95,7 +97,8 @@ pub struct Refinement<'a> {
     seed: u64,
     body: Body,
     displacements: Vec<f64>,
-    /// What is known of the slopes of all cells of the grid, row-major; of a cell that is no place nothing is.
+    /// What is known of the slopes of all cells of the grid, row-major; of a cell that is no place
+    /// nothing is.
     evidence: Evidence,
     ridge: f64,
     challenges: usize,
@@ -103,7 +106,8 @@ pub struct Refinement<'a> {
 }
 
 impl<'a> Refinement<'a> {
-    /// Shows a body all images: the first champion. `evidence` is of all cells of its grid, row-major.
+    /// Shows a body all images: the first champion. `evidence` is of all cells of its grid,
+    /// row-major.
     ///
     /// # Errors
     /// What the rollouts say.
@@ -150,8 +154,8 @@ impl<'a> Refinement<'a> {
         Ok(())
     }
 
-    /// How far the champion would walk under images of these conditions, going by the slopes and by its answers so far
-    /// \[voxel lengths\].
+    /// How far the champion would walk under images of these conditions, going by the slopes and by
+    /// its answers so far \[voxel lengths\].
     pub fn expected<'b>(&self, images: impl IntoIterator<Item = &'b Grid<f64>>) -> Vec<f64> {
         let slopes = self.evidence.slopes_alone(self.ridge);
         let moved = |stimulus: &Grid<f64>| -> f64 {
@@ -316,7 +320,8 @@ impl<'a> Refinement<'a> {
         self.worth(image, displacement) - self.worth(image, self.displacements[number])
     }
 
-    /// Whether a challenger that goes on as it began, or somewhat better, will not beat the champion.
+    /// Whether a challenger that goes on as it began, or somewhat better, will not beat the
+    /// champion.
     fn is_behind(&self, order: &[usize], found: &[f64]) -> bool {
         let mean_weight =
             self.images.iter().map(|image| image.weight).sum::<f64>() / self.images.len() as f64;
@@ -353,8 +358,8 @@ impl<'a> Refinement<'a> {
         bound <= 0.0
     }
 
-    /// What a challenger with the champion's gait tells of the slopes: on each image by how much it is wider, and by how much farther
-    /// it walks.
+    /// What a challenger with the champion's gait tells of the slopes: on each image by how much it
+    /// is wider, and by how much farther it walks.
     fn learn(&mut self, challenger: &Body, order: &[usize], found: &[f64]) {
         let cells = self.body.height() * self.body.width();
         let mut set = Moments::new(cells);
@@ -395,7 +400,8 @@ mod tests {
     use super::*;
     use std::convert::Infallible;
 
-    /// Bodies of one row that walk by the widths of their soft voxels and sensors; the first of them is worth most.
+    /// Bodies of one row that walk by the widths of their soft voxels and sensors; the first of
+    /// them is worth most.
     struct Planted {
         physics: Physics,
         simulated: usize,
@@ -425,7 +431,8 @@ mod tests {
 
     const PLACES: usize = 12;
 
-    /// Images whose bright pixels are those of even columns, mostly, if right is right; else those of odd ones.
+    /// Images whose bright pixels are those of even columns, mostly, if right is right; else those
+    /// of odd ones.
     fn images(count: usize) -> Vec<WeightedImage> {
         let mut random = stream(1, Purpose::RandomImages, 0, 0);
         let image = |number: usize| {
@@ -443,7 +450,8 @@ mod tests {
         Planted { physics: Physics::default(), simulated: 0 }
     }
 
-    /// A champion of soft voxels after a number of challengers of its own, with the fitness after each.
+    /// A champion of soft voxels after a number of challengers of its own, with the fitness after
+    /// each.
     fn refined(challengers: usize) -> (Body, Vec<f64>, usize) {
         let (mut rollouts, physics) = (planted(), Physics::default());
         let evidence = (Evidence::new(PLACES), 1.0);
@@ -473,7 +481,8 @@ mod tests {
         assert!(course[0].abs() < 1e-9 && course[60] > 0.45, "{course:?}");
         // Most challengers are dropped before they have seen all images.
         assert!(rollouts < 200 * 61 * 2 / 3, "{rollouts}");
-        // The place that moves it most is an expanding sensor, since its pixel is bright where right is right.
+        // The place that moves it most is an expanding sensor, since its pixel is bright where
+        // right is right.
         assert_eq!(body.voxels()[(0, 0)], Material::SensorExpand);
         assert_eq!(refined(60), (body, course, rollouts), "the same seed refines the same");
     }

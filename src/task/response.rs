@@ -1,10 +1,12 @@
-//! The response of a gait: how far a body is moved by each voxel that is a little wider, and which sensors that calls for.
+//! The response of a gait: how far a body is moved by each voxel that is a little wider, and which
+//! sensors that calls for.
 //!
-//! A body that walks is moved by the width of its passive voxels nearly in proportion, d ≈ c + Σ Jᵢ wᵢ. Shown images whose
-//! pixels are drawn independently of each other, a body whose soft voxels and sensors have all become expanding sensors
-//! tells its *slopes* J by linear regression: an intervention on every voxel by itself. (Natural images only tell what
-//! goes together.) The slopes belong to the gait, so they serve every task: for two groups of images, [`Lesson`] finds
-//! the material at each place that makes the mean margin largest under that model.
+//! A body that walks is moved by the width of its passive voxels nearly in proportion, d ≈ c + Σ Jᵢ
+//! wᵢ. Shown images whose pixels are drawn independently of each other, a body whose soft voxels
+//! and sensors have all become expanding sensors tells its *slopes* J by linear regression: an
+//! intervention on every voxel by itself. (Natural images only tell what goes together.) The slopes
+//! belong to the gait, so they serve every task: for two groups of images, [`Lesson`] finds the
+//! material at each place that makes the mean margin largest under that model.
 
 use crate::base::Grid;
 use crate::base::random::Stream;
@@ -20,8 +22,8 @@ pub const CHOICES: [Material; 3] = [Material::Soft, Material::SensorExpand, Mate
 /// Larger ones shrink the slopes; smaller ones fit noise where there are few rollouts.
 const RIDGES: [f64; 7] = [0.25, 1.0, 2.0, 4.0, 8.0, 16.0, 64.0];
 
-/// Probability that a place is wide in a random image, and that it is narrow. A design has about as many of either: larger values
-/// say nothing of soft voxels, smaller ones tell less of the slopes.
+/// Probability that a place is wide in a random image, and that it is narrow. A design has about as
+/// many of either: larger values say nothing of soft voxels, smaller ones tell less of the slopes.
 const EXTREME: f64 = 0.4;
 
 /// Folds of the cross-validation. More cost time and change little.
@@ -33,7 +35,8 @@ const LEAST_GAIN: f64 = 1e-9;
 /// Most sweeps over all places; a search ends sooner when a sweep changes nothing.
 const SWEEPS: usize = 12;
 
-/// Random designs that a search from many starts from. More cost as much each, and seldom end better.
+/// Random designs that a search from many starts from. More cost as much each, and seldom end
+/// better.
 const STARTS: usize = 6;
 
 /// A body as something that walks: what its soft voxels and sensors are made of is left open.
@@ -112,8 +115,9 @@ fn resting(physics: &Physics) -> f64 {
     if wide > narrow { ((rest - narrow) / (wide - narrow)).clamp(0.0, 1.0) } else { 0.0 }
 }
 
-/// An image under which each place of a probe is, independently of all others, as wide as can be (with probability 0.4), as
-/// narrow as can be (0.4), or at rest (0.2): as if each were a sensor of either kind or a soft voxel.
+/// An image under which each place of a probe is, independently of all others, as wide as can be
+/// (with probability 0.4), as narrow as can be (0.4), or at rest (0.2): as if each were a sensor of
+/// either kind or a soft voxel.
 pub fn random_image(height: usize, width: usize, physics: &Physics, random: &mut Stream) -> Grid<f64> {
     let rest = resting(physics);
     Grid::from_fn(height, width, |_, _| {
@@ -184,8 +188,8 @@ impl Moments {
     }
 }
 
-/// What is known of slopes: sums over sets of rollouts, each set about its own means, so that sets may differ in their
-/// intercepts.
+/// What is known of slopes: sums over sets of rollouts, each set about its own means, so that sets
+/// may differ in their intercepts.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Evidence {
     matrix: DMatrix<f64>,
@@ -224,7 +228,8 @@ impl Evidence {
         Fit { slopes: factor.solve(&self.vector).as_slice().to_vec(), factor }
     }
 
-    /// The slopes by ridge regression, and by what factor the noise of a rollout is in each (its standard error).
+    /// The slopes by ridge regression, and by what factor the noise of a rollout is in each (its
+    /// standard error).
     ///
     /// # Panics
     /// If `ridge` is not above 0.
@@ -286,12 +291,13 @@ impl Fit {
 /// What rollouts under random images tell of a gait.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Response {
-    /// By how much a place that is wider by one rest width moves the body to the right \[voxel lengths\], in the
-    /// places' order.
+    /// By how much a place that is wider by one rest width moves the body to the right \[voxel
+    /// lengths\], in the places' order.
     pub slopes: Vec<f64>,
     /// Their standard errors, what the penalty shrinks included \[voxel lengths\].
     pub errors: Vec<f64>,
-    /// The displacement of a body whose places all had no width, the mean over conditions \[voxel lengths\].
+    /// The displacement of a body whose places all had no width, the mean over conditions \[voxel
+    /// lengths\].
     pub intercept: f64,
     /// The same under each condition; none of one without rollouts.
     pub intercepts: Vec<Option<f64>>,
@@ -321,7 +327,8 @@ pub struct Shown {
 }
 
 impl Response {
-    /// Fits slopes; the penalty is the one that predicts left-out rollouts best. `None` of fewer than two rollouts a fold.
+    /// Fits slopes; the penalty is the one that predicts left-out rollouts best. `None` of fewer
+    /// than two rollouts a fold.
     pub fn of(rollouts: &[Shown]) -> Option<Self> {
         let places = rollouts.first()?.widths.len();
         if rollouts.len() < 2 * FOLDS {
@@ -418,7 +425,8 @@ pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
 pub struct Example {
     /// For each place the target width that each of [`CHOICES`] has under it \[rest widths\].
     pub choices: Vec<[f64; 3]>,
-    /// How far the body with the lesson's first design walks, measured or predicted \[voxel lengths\].
+    /// How far the body with the lesson's first design walks, measured or predicted \[voxel
+    /// lengths\].
     pub displacement: f64,
     /// 1 if walking right is the right answer, −1 if left.
     pub right: f64,
@@ -453,7 +461,8 @@ fn choice(material: Material) -> usize {
     CHOICES.iter().position(|other| *other == material).expect("a design has materials of CHOICES only")
 }
 
-/// What a gait is to learn: examples, the first design, and the slopes that say how far another one would walk.
+/// What a gait is to learn: examples, the first design, and the slopes that say how far another one
+/// would walk.
 pub struct Lesson {
     /// By place, by choice, by example: width \[rest widths\].
     widths: Vec<[Vec<f64>; 3]>,
@@ -494,7 +503,8 @@ impl Lesson {
         self.objective = self.margins.iter().zip(&self.weights).map(worth).sum();
     }
 
-    /// The weighted mean [worth](crate::task::fitness::worth) of the margins: from −1 to 1, the best.
+    /// The weighted mean [worth](crate::task::fitness::worth) of the margins: from −1 to 1, the
+    /// best.
     pub fn objective(&self) -> f64 {
         self.objective
     }
@@ -525,8 +535,8 @@ impl Lesson {
         (self.design[place], self.objective) = (choice, objective);
     }
 
-    /// Climbs until no change of one place helps: first with no answer too bad to count, so that a body which walks far to one
-    /// side under every image is led back; then as answers are worth.
+    /// Climbs until no change of one place helps: first with no answer too bad to count, so that a
+    /// body which walks far to one side under every image is led back; then as answers are worth.
     pub fn solve(&mut self, random: &mut Stream) {
         for floor in [f64::NEG_INFINITY, WORST] {
             self.floor = floor;
@@ -553,7 +563,8 @@ impl Lesson {
         (self.objective, self.margins, self.design) = best;
     }
 
-    /// Changes some of these places, each time the one that helps most, until as many are changed or none helps.
+    /// Changes some of these places, each time the one that helps most, until as many are changed
+    /// or none helps.
     pub fn best_changes(&mut self, places: &[usize], most: usize) {
         for _ in 0..most {
             let all = places.iter().flat_map(|place| (0..CHOICES.len()).map(move |choice| (*place, choice)));

@@ -34,9 +34,9 @@ impl<'a> Rollout<'a> {
         self.world.system().physics()
     }
 
-    /// Shows an image for the protocol's control steps and goes on living from the present state; the displacement
-    /// of the centre of mass along x meanwhile, in voxel lengths, right positive. `watch` is called after every
-    /// control step.
+    /// Shows an image for the protocol's control steps and goes on living from the present state;
+    /// the displacement of the centre of mass along x meanwhile, in voxel lengths, right positive.
+    /// `watch` is called after every control step.
     ///
     /// # Errors
     /// [`Unstable`] if the rollout ends.
@@ -89,7 +89,8 @@ impl<'a> Rollout<'a> {
         self.world.step_unless(stop)
     }
 
-    /// Displacement of the centre of mass along x since the present image is shown, in voxel lengths, right positive.
+    /// Displacement of the centre of mass along x since the present image is shown, in voxel
+    /// lengths, right positive.
     pub fn moved(&self) -> f64 {
         voxel_lengths(self.world.centre_of_mass()[0] - self.begin, self.physics())
     }
@@ -114,7 +115,8 @@ impl<'a> Rollout<'a> {
     }
 }
 
-/// One fresh rollout under one image, unless `stop` is set meanwhile: its displacement in voxel lengths.
+/// One fresh rollout under one image, unless `stop` is set meanwhile: its displacement in voxel
+/// lengths.
 ///
 /// # Errors
 /// [`Stopped`] then; within, [`Unstable`] if the rollout ends early.
@@ -127,8 +129,9 @@ pub fn fresh_rollout(
     Rollout::new(system, protocol).show_unless(stimulus, stop)
 }
 
-/// A robot shown images as the protocol has it, in fresh rollouts or one: its displacement under each in voxel lengths, and
-/// the energies that were put into it if they are to be `measured`. Unless `stop` is set meanwhile.
+/// A robot shown images as the protocol has it, in fresh rollouts or one: its displacement under
+/// each in voxel lengths, and the energies that were put into it if they are to be `measured`.
+/// Unless `stop` is set meanwhile.
 ///
 /// # Errors
 /// [`Stopped`] then; within, [`Unstable`] if a rollout ends early.
@@ -156,7 +159,8 @@ pub fn walk(
     Ok(Ok((displacements, rollout.world.energy())))
 }
 
-/// For each stimulus the first one (its index) that shows the body's sensors the same pixels: those share a rollout.
+/// For each stimulus the first one (its index) that shows the body's sensors the same pixels: those
+/// share a rollout.
 pub fn same_to_sensors(body: &Body, stimuli: &[&Grid<f64>]) -> Vec<usize> {
     let sensors = || body.voxels().iter().filter(|(_, m)| m.is_sensor()).map(|(place, _)| place);
     let mut first = std::collections::HashMap::new();
@@ -166,8 +170,8 @@ pub fn same_to_sensors(body: &Body, stimuli: &[&Grid<f64>]) -> Vec<usize> {
     stimuli.iter().enumerate().map(|(i, stimulus)| *first.entry(seen(stimulus)).or_insert(i)).collect()
 }
 
-/// Records a robot's rollout frame by frame for pictures; images with their labels, one phase each. An unstable rollout
-/// is recorded up to its end.
+/// Records a robot's rollout frame by frame for pictures; images with their labels, one phase each.
+/// An unstable rollout is recorded up to its end.
 pub fn record(
     robot: &str,
     body: &Body,

@@ -1,4 +1,5 @@
-//! From an image to what a body's sensors feel: reduction to the body's grid, then encoding (paper, "Task").
+//! From an image to what a body's sensors feel: reduction to the body's grid, then encoding (paper,
+//! "Task").
 
 use crate::base::Grid;
 use serde::{Deserialize, Serialize};
@@ -7,12 +8,12 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Reduction {
-    /// Every s-th row and column (0, s, 2s, …), as in the paper, where s = 2 takes 28 × 28 to 14 × 14.
-    /// Rows and columns each have their own s; the body's sides must divide the image's.
+    /// Every s-th row and column (0, s, 2s, …), as in the paper, where s = 2 takes 28 × 28 to 14 ×
+    /// 14. Rows and columns each have their own s; the body's sides must divide the image's.
     #[default]
     Stride,
-    /// Each voxel gets the mean of the raw pixel values under it, pixels cut by its edges counting by the
-    /// area they share with it; for bodies of any size. The mean is encoded, not the pixels.
+    /// Each voxel gets the mean of the raw pixel values under it, pixels cut by its edges counting
+    /// by the area they share with it; for bodies of any size. The mean is encoded, not the pixels.
     Area,
 }
 
@@ -86,10 +87,12 @@ pub enum StimulusError {
     Level(f64),
 }
 
-/// The stimulus of an image for a body of height × width voxels: one value in [0, 1] per voxel place, row 0 on top.
+/// The stimulus of an image for a body of height × width voxels: one value in [0, 1] per voxel
+/// place, row 0 on top.
 ///
 /// # Errors
-/// [`StimulusError`] if the body's size does not go with the reduction, or a threshold is out of range.
+/// [`StimulusError`] if the body's size does not go with the reduction, or a threshold is out of
+/// range.
 pub fn stimulus(
     image: &Grid<u8>,
     height: usize,
@@ -120,8 +123,9 @@ fn strided(image: &Grid<u8>, height: usize, width: usize) -> Result<Grid<f64>, S
     Ok(Grid::from_fn(height, width, |r, c| f64::from(image[(r * rows, c * columns)])))
 }
 
-/// Area-weighted means, 0 … 255. In units of 1/height of a pixel, a voxel is `image.height()` tall and a pixel
-/// `height`: all overlaps are whole numbers, and one division per voxel is the only rounding.
+/// Area-weighted means, 0 … 255. In units of 1/height of a pixel, a voxel is `image.height()` tall
+/// and a pixel `height`: all overlaps are whole numbers, and one division per voxel is the only
+/// rounding.
 fn averaged(image: &Grid<u8>, height: usize, width: usize) -> Grid<f64> {
     let overlap = |voxel: usize, voxel_side: usize, pixel: usize, pixel_side: usize| {
         let end = ((voxel + 1) * voxel_side).min((pixel + 1) * pixel_side);
@@ -194,7 +198,8 @@ mod tests {
             stimulus(&quarter, 1, 1, &params(Area, Intensity)).unwrap().cells(),
             [256.0 / 4.0 / 255.0]
         );
-        // The mean is encoded, not the pixels: 64/255 is above 0.25, though only one pixel of four is.
+        // The mean is encoded, not the pixels: 64/255 is above 0.25, though only one pixel of four
+        // is.
         let above = |level| {
             let params = StimulusParams { level, ..params(Area, Threshold) };
             stimulus(&quarter, 1, 1, &params).unwrap()[(0, 0)]

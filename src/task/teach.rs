@@ -1,9 +1,10 @@
 //! Teaching a gait: from its response to a design that tells images apart.
 //!
-//! The response says which design is best under the linear model. Where many places change at once the body is a little off
-//! the model, so the response is measured again around the design, under training images: in half of the rollouts some places
-//! are changed at random, an intervention as in the first response. Then the lesson is solved again. After a few such rounds
-//! the last design is [refined](super::refine): the designs before it challenge it first.
+//! The response says which design is best under the linear model. Where many places change at once
+//! the body is a little off the model, so the response is measured again around the design, under
+//! training images: in half of the rollouts some places are changed at random, an intervention as
+//! in the first response. Then the lesson is solved again. After a few such rounds the last design
+//! is [refined](super::refine): the designs before it challenge it first.
 
 use crate::base::Grid;
 use crate::base::random::{Purpose, Stream, stream};
@@ -13,27 +14,28 @@ use crate::task::fitness::worth;
 use crate::task::refine::{Challenge, Refinement, WeightedImage};
 use crate::task::response::{CHOICES, Design, Evidence, Example, Gait, Lesson, Moments, Response, dot};
 
-/// What rollouts under random images count beside those around the latest design. They are farther from it, but more, and each
-/// tells more of the slopes.
+/// What rollouts under random images count beside those around the latest design. They are farther
+/// from it, but more, and each tells more of the slopes.
 const RANDOM_WEIGHT: f64 = 0.3;
 
-/// What the rollouts of a round count in each round after it. With less, slopes are noise; with more, they are those of designs
-/// that were left.
+/// What the rollouts of a round count in each round after it. With less, slopes are noise; with
+/// more, they are those of designs that were left.
 const FADE: f64 = 0.7;
 
-/// Probability that a place is drawn anew in a rollout around a design. Larger values leave the design's surroundings; smaller
-/// ones tell less of the slopes.
+/// Probability that a place is drawn anew in a rollout around a design. Larger values leave the
+/// design's surroundings; smaller ones tell less of the slopes.
 const CHANGED: f64 = 0.15;
 
-/// Designs that are compared when refining begins: that of the last solution, and those of the rounds before.
+/// Designs that are compared when refining begins: that of the last solution, and those of the
+/// rounds before.
 pub const FINALISTS: usize = 4;
 
-/// Challengers that are compared on the same images. With more, they win by chance on these; with fewer, showing the
-/// champion other images costs more.
+/// Challengers that are compared on the same images. With more, they win by chance on these; with
+/// fewer, showing the champion other images costs more.
 const CHALLENGERS_OF_A_SET: usize = 30;
 
-/// Of how many images the one that is closest to the boundary is shown. With more, images count that no gait tells apart; with
-/// fewer, most are answered right by every design of an easy task.
+/// Of how many images the one that is closest to the boundary is shown. With more, images count
+/// that no gait tells apart; with fewer, most are answered right by every design of an easy task.
 const NEAREST_OF: usize = 8;
 
 /// How a gait is taught.
@@ -73,7 +75,8 @@ pub struct Round {
     pub predicted: f64,
     /// Mean worth of its answers to the images of the round.
     pub measured: f64,
-    /// By how far displacements were to the right of what the model said, on average \[voxel lengths\].
+    /// By how far displacements were to the right of what the model said, on average \[voxel
+    /// lengths\].
     pub off: f64,
     /// Places that the next design has otherwise.
     pub changed: usize,
@@ -102,7 +105,8 @@ pub struct Taught {
 pub trait Rollouts {
     /// Why there are none: stopped, or a file that cannot be written.
     type Error;
-    /// The displacements of a body under stimuli and conditions \[voxel lengths\]; `None` where it is unstable.
+    /// The displacements of a body under stimuli and conditions \[voxel lengths\]; `None` where it
+    /// is unstable.
     ///
     /// # Errors
     /// If it was stopped.
@@ -196,7 +200,8 @@ impl<'a> Teacher<'a> {
         let numbers = self.drawn(self.plan.images, &mut random);
         let draw = |(turn, number): (usize, &usize)| {
             let material = |material: &Material| {
-                // Half of the rollouts are of the design itself; the groups take turns, so as many of each.
+                // Half of the rollouts are of the design itself; the groups take turns, so as many
+                // of each.
                 if turn / 2 % 2 == 1 && random.unit() < CHANGED {
                     CHOICES[random.below(CHOICES.len())]
                 } else {
@@ -249,7 +254,8 @@ impl<'a> Teacher<'a> {
         Ok(round)
     }
 
-    /// Shows the last designs the same training images, and refines the best of them by challengers; `told` hears of each.
+    /// Shows the last designs the same training images, and refines the best of them by
+    /// challengers; `told` hears of each.
     ///
     /// # Errors
     /// What the rollouts say.
@@ -309,8 +315,9 @@ impl<'a> Teacher<'a> {
         })
     }
 
-    /// Training images to compare bodies on, by their numbers, and as they are shown: of both groups as many as far as they go. Half
-    /// are random; half are those of several times as many that are `expected` to be closest to the boundary.
+    /// Training images to compare bodies on, by their numbers, and as they are shown: of both
+    /// groups as many as far as they go. Half are random; half are those of several times as many
+    /// that are `expected` to be closest to the boundary.
     fn telling(
         &self,
         draw: usize,
@@ -358,8 +365,8 @@ impl<'a> Teacher<'a> {
         numbers.iter().map(|number| self.images[*number].condition).collect()
     }
 
-    /// Mean worth of displacements under training images, by their numbers; both groups weigh the same, however many images
-    /// of each there are.
+    /// Mean worth of displacements under training images, by their numbers; both groups weigh the
+    /// same, however many images of each there are.
     fn mean_worth(&self, answers: impl Iterator<Item = (usize, f64)>) -> f64 {
         let (mut worths, mut counts) = ([0.0; 2], [0.0; 2]);
         for (number, displacement) in answers {
@@ -373,7 +380,8 @@ impl<'a> Teacher<'a> {
         means.iter().sum::<f64>() / means.len().max(1) as f64
     }
 
-    /// Solves the lesson under the model, from a design on: what the model says of the solution, and the solution.
+    /// Solves the lesson under the model, from a design on: what the model says of the solution,
+    /// and the solution.
     fn solved(&self, from: &[Material], side: f64, solve: impl FnOnce(&mut Lesson)) -> (f64, Design) {
         let example = |image: &Image| {
             let moved = dot(&self.slopes, &image.example.widths(from));
@@ -408,7 +416,8 @@ mod tests {
     use crate::task::response::{Shown, random_image};
     use std::convert::Infallible;
 
-    /// A body that walks by the widths of its places, less and less far, and otherwise where they are narrow.
+    /// A body that walks by the widths of its places, less and less far, and otherwise where they
+    /// are narrow.
     struct Planted {
         gait: Gait,
         physics: Physics,
@@ -463,7 +472,8 @@ mod tests {
             Response::of(&(0..rollouts).map(&mut shown).collect::<Vec<_>>()).unwrap()
         }
 
-        /// What is taught, the rounds, and the share of images that the first and the last design answer right.
+        /// What is taught, the rounds, and the share of images that the first and the last design
+        /// answer right.
         fn taught(&mut self, images: usize, response: usize) -> (Taught, Vec<Round>, [f64; 2]) {
             let (gait, physics) = (self.gait.clone(), self.physics.clone());
             let images = self.images(images);

@@ -15,8 +15,8 @@ use std::sync::atomic::AtomicBool;
 /// Standard errors on either side of a 95 % interval.
 const INTERVAL: f64 = 1.96;
 
-/// Least scatter about a prediction, as a share of the whole scatter. Smaller ones make answers near
-/// the boundary depend on their last digit.
+/// Least scatter about a prediction, as a share of the whole scatter. Smaller ones make answers
+/// near the boundary depend on their last digit.
 const LEAST_SCATTER: f64 = 0.25;
 
 /// Scatter that stands for none \[voxel lengths\]: nothing is divided by 0.
@@ -127,8 +127,8 @@ impl<'a> Half<'a> {
         Some([half(0)?, half(1)?])
     }
 
-    /// The best design by the slopes of this half, and its side: 1 if it walks right where `right` of
-    /// an example is 1, −1 if it walks left there.
+    /// The best design by the slopes of this half, and its side: 1 if it walks right where `right`
+    /// of an example is 1, −1 if it walks left there.
     fn solved(&self, seed: u64, number: u64) -> Solved {
         let Response { slopes, intercept, .. } = &self.response;
         let soft = vec![Material::Soft; slopes.len()];

@@ -1,5 +1,5 @@
-//! What moves on the terminal while something runs: progress and live pictures. All of it is written by
-//! [`Console`].
+//! What moves on the terminal while something runs: progress and live pictures. All of it is
+//! written by [`Console`].
 
 use crate::base::observer::Generation;
 use crate::base::text::one_line;
@@ -61,8 +61,8 @@ impl<'c> Bar<'c> {
         Bar { begin: Mutex::new(None), line: Line::new(console, total) }
     }
 
-    /// Shows how far it is (JSON: an event `generation`). The first call counts as the beginning: a resumed run calls
-    /// it once before it goes on.
+    /// Shows how far it is (JSON: an event `generation`). The first call counts as the beginning: a
+    /// resumed run calls it once before it goes on.
     pub fn update(&self, progress: &Generation) {
         let begin = *lock(&self.begin).get_or_insert(*progress);
         self.line.show(progress.done, |seconds| generation_line(progress, &begin, seconds));
@@ -94,7 +94,8 @@ impl<'c> Counter<'c> {
         self.update(known);
     }
 
-    /// Shows that `done` of the things are done (JSON: an event `progress`, as often as a plain line).
+    /// Shows that `done` of the things are done (JSON: an event `progress`, as often as a plain
+    /// line).
     pub fn update(&self, done: u64) {
         #[derive(Serialize)]
         struct Count<'a> {

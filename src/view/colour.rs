@@ -1,4 +1,5 @@
-//! The colours of all pictures: the paper's, in tones that stay apart for colour-blind eyes and when shaded.
+//! The colours of all pictures: the paper's, in tones that stay apart for colour-blind eyes and
+//! when shaded.
 
 use crate::body::Material;
 

@@ -1,4 +1,5 @@
-//! [`Console`]: the only writer to the terminal. Results go to stdout; progress, notes and errors to stderr.
+//! [`Console`]: the only writer to the terminal. Results go to stdout; progress, notes and errors
+//! to stderr.
 #![allow(clippy::disallowed_methods, reason = "this is the module that writes")]
 
 pub use crate::view::bar::{Bar, Counter, Live};
@@ -22,7 +23,8 @@ pub enum Mode {
     Human,
     /// Results, warnings and errors only.
     Quiet,
-    /// Programs: one JSON object per line on stdout, its kind under `event`; warnings and errors on stderr too.
+    /// Programs: one JSON object per line on stdout, its kind under `event`; warnings and errors on
+    /// stderr too.
     Json,
 }
 
@@ -52,7 +54,8 @@ pub(super) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 }
 
 impl Console {
-    /// The process's stdout and stderr. No colours if `NO_COLOR` is set; no moving lines if `TERM` is `dumb`.
+    /// The process's stdout and stderr. No colours if `NO_COLOR` is set; no moving lines if `TERM`
+    /// is `dumb`.
     pub fn new(mode: Mode) -> Self {
         let set = |name| std::env::var_os(name).filter(|v| !v.is_empty());
         let smart = set("TERM").is_none_or(|term| term != "dumb");
@@ -90,8 +93,8 @@ impl Console {
         lock(&self.streams).lost
     }
 
-    /// A line of results, to stdout. Like all that people are told, it shows control characters and line breaks, which can
-    /// only come from a file or its name, and obeys none.
+    /// A line of results, to stdout. Like all that people are told, it shows control characters and
+    /// line breaks, which can only come from a file or its name, and obeys none.
     pub fn line(&self, text: &str) {
         match self.mode {
             Mode::Json => self.event("result", &Text { text }),
@@ -123,8 +126,8 @@ impl Console {
         }
     }
 
-    /// One JSON line on stdout: the payload's fields after `"event": name` (a payload that is no object: as `value`).
-    /// Nothing in the other modes.
+    /// One JSON line on stdout: the payload's fields after `"event": name` (a payload that is no
+    /// object: as `value`). Nothing in the other modes.
     pub fn event(&self, name: &str, payload: &impl Serialize) {
         if self.mode != Mode::Json {
             return;
@@ -137,7 +140,8 @@ impl Console {
             Some(fields) => format!(",{fields}"),
             None => format!(",\"value\":{payload}}}"),
         };
-        // Valid JSON that a terminal may take for a command all the same stands in texts only, where it may be written so.
+        // Valid JSON that a terminal may take for a command all the same stands in texts only,
+        // where it may be written so.
         let fields: String = match fields.contains(is_unseen) {
             true => fields.chars().map(in_json).collect(),
             false => fields,
@@ -159,8 +163,8 @@ impl Console {
         self.err(&format!("{} {}\n", self.paint("warning:", "1;33"), one_line(text)));
     }
 
-    /// An error with its causes and perhaps what to do, to stderr, in every mode. A cause that the line above it
-    /// already tells is left out.
+    /// An error with its causes and perhaps what to do, to stderr, in every mode. A cause that the
+    /// line above it already tells is left out.
     pub fn error(&self, error: &(dyn Error + 'static), hint: Option<&str>) {
         let mut told = error.to_string();
         let mut text = format!("{} {}\n", self.paint("error:", "1;31"), one_line(&told));
@@ -190,12 +194,14 @@ impl Console {
         Bar::new(self, total)
     }
 
-    /// Progress of anything counted: `label`, how many `unit`s in all ("images", "robots", "bytes").
+    /// Progress of anything counted: `label`, how many `unit`s in all ("images", "robots",
+    /// "bytes").
     pub fn counter(&self, label: &str, total: u64, unit: &str) -> Counter<'_> {
         Counter::new(self, label, total, unit)
     }
 
-    /// A picture of text that is drawn over by the next, on stdout; none if that is not a terminal for people.
+    /// A picture of text that is drawn over by the next, on stdout; none if that is not a terminal
+    /// for people.
     pub fn live(&self) -> Option<Live<'_>> {
         (self.mode == Mode::Human && self.terminals[0]).then(|| Live::new(self))
     }
@@ -236,7 +242,8 @@ impl Console {
         }
     }
 
-    /// A moving line on the terminal, if there is one for people; it is taken away by [`Console::clear_line`].
+    /// A moving line on the terminal, if there is one for people; it is taken away by
+    /// [`Console::clear_line`].
     pub(super) fn moving_line(&self, total: u64) -> Option<ProgressBar> {
         if self.mode != Mode::Human || !self.terminals[1] {
             return None;

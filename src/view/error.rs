@@ -58,8 +58,8 @@ impl From<PictureError> for Error {
     }
 }
 
-/// Writes a file in one go: into a temporary file of the same folder, then renamed, so that a reader sees the whole
-/// file or the old one.
+/// Writes a file in one go: into a temporary file of the same folder, then renamed, so that a
+/// reader sees the whole file or the old one.
 ///
 /// # Errors
 /// [`PictureError::Write`] with the path.

@@ -1,7 +1,7 @@
 //! Text in pictures: a small bitmap font, 5 × 7 dots a letter, drawn in `font.txt`.
 //!
-//! `font.txt` holds bands of eight lines: the letters, six columns apart, then their seven rows of dots. Letters of
-//! `DESCENDERS` stand `DESCENT` dots lower.
+//! `font.txt` holds bands of eight lines: the letters, six columns apart, then their seven rows of
+//! dots. Letters of `DESCENDERS` stand `DESCENT` dots lower.
 
 use crate::view::colour::Colour;
 use crate::view::scene::Primitive;
@@ -39,8 +39,8 @@ pub fn width(text: &str) -> f64 {
     (ADVANCE * text.chars().count() as f64 - 1.0).max(0.0)
 }
 
-/// Text as filled quads, one per horizontal run of dots, in pixels with y down; (x, y) is its top left corner, `dot`
-/// the side of a dot. Letters that the font lacks become a box.
+/// Text as filled quads, one per horizontal run of dots, in pixels with y down; (x, y) is its top
+/// left corner, `dot` the side of a dot. Letters that the font lacks become a box.
 pub fn text(text: &str, [x, y]: [f64; 2], dot: f64, colour: Colour) -> Vec<Primitive> {
     let mut out = Vec::new();
     for (k, letter) in text.chars().enumerate().filter(|(_, c)| *c != ' ') {

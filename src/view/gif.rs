@@ -16,12 +16,14 @@ use std::path::Path;
 /// How an animation is made.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GifOptions {
-    /// Width in pixels ([`stage::WIDTHS`](crate::view::stage::WIDTHS)); the height follows from the body.
+    /// Width in pixels ([`stage::WIDTHS`](crate::view::stage::WIDTHS)); the height follows from the
+    /// body.
     pub width: u32,
-    /// Frames per second, at most 50 (GIFs count in hundredths of a second, and viewers slow down faster ones).
+    /// Frames per second, at most 50 (GIFs count in hundredths of a second, and viewers slow down
+    /// faster ones).
     pub fps: f64,
-    /// Control steps from one frame to the next, at least 1. There are 50 control steps in a second of the robot's
-    /// time: 1 at 50 frames per second is real time.
+    /// Control steps from one frame to the next, at least 1. There are 50 control steps in a second
+    /// of the robot's time: 1 at 50 frames per second is real time.
     pub every: usize,
     /// How the world is drawn.
     pub look: Look,
@@ -37,7 +39,8 @@ impl Default for GifOptions {
 
 /// Frames whose colours make the palette.
 const SAMPLES: usize = 24;
-/// Shades of a material in the palette: few enough that voxels do not change colour with every frame.
+/// Shades of a material in the palette: few enough that voxels do not change colour with every
+/// frame.
 const SHADES: u32 = 9;
 /// Frames rendered at a time.
 const BATCH: usize = 32;
@@ -45,7 +48,8 @@ const BATCH: usize = 32;
 /// Writes a recording as an animated GIF that repeats for ever.
 ///
 /// # Errors
-/// [`PictureError`] if the recording cannot be drawn, the width is not possible or the file cannot be written.
+/// [`PictureError`] if the recording cannot be drawn, the width is not possible or the file cannot
+/// be written.
 pub fn write(path: &Path, recording: &Recording, options: &GifOptions) -> Result<(), PictureError> {
     write_whole(path, &encode(recording, options)?)
 }
@@ -129,8 +133,8 @@ fn indexed(walk: &Walk, stage: &Stage, palette: &Palette, frame: usize) -> Resul
     Ok(picture.data().chunks_exact(4).map(|p| palette.index([p[0], p[1], p[2]])).collect())
 }
 
-/// What changed from one image to the next as a compressed frame: the smallest rectangle, in it `unchanged` where
-/// nothing did; or all of the rectangle, if that is shorter.
+/// What changed from one image to the next as a compressed frame: the smallest rectangle, in it
+/// `unchanged` where nothing did; or all of the rectangle, if that is shorter.
 fn difference(before: &[u8], now: &[u8], width: u16, height: u16, unchanged: u8) -> Frame<'static> {
     let row = usize::from(width);
     let is_changed = |i: usize| before.get(i) != Some(&now[i]);

@@ -1,7 +1,8 @@
 //! One self-contained HTML page that plays a recording: no network, works from `file://`.
 //!
-//! Positions are embedded as 16-bit numbers, in steps of 1/200 voxel length from an origin per frame (near the centre of
-//! mass, in 64-bit floats): exact within 0.0025 voxel lengths however far the robot walks.
+//! Positions are embedded as 16-bit numbers, in steps of 1/200 voxel length from an origin per
+//! frame (near the centre of mass, in 64-bit floats): exact within 0.0025 voxel lengths however far
+//! the robot walks.
 
 use crate::body::Material;
 use crate::task::recording::Recording;
@@ -20,9 +21,11 @@ const TEMPLATE: &str = include_str!("replay.html");
 const SCRIPT: &str = concat!(include_str!("drawing.js"), include_str!("replay.js"));
 /// Steps of a position per voxel length.
 pub(crate) const STEPS: f64 = 200.0;
-/// The number for a position that is not finite or more than 163 voxel lengths from the frame's origin.
+/// The number for a position that is not finite or more than 163 voxel lengths from the frame's
+/// origin.
 const NOWHERE: i16 = i16::MIN;
-/// Most bytes of positions in a page (a third more in base64); longer recordings show every second frame, third …
+/// Most bytes of positions in a page (a third more in base64); longer recordings show every second
+/// frame, third …
 const MOST_BYTES: usize = 5_500_000;
 
 /// Writes the page. `title` and the `metadata` (shown as a table, in order) may be any text.
@@ -98,7 +101,8 @@ pub(super) fn packed(walk: &Walk, most: usize) -> Result<String, PictureError> {
     Ok(BASE64.encode(packer.finish().map_err(failed)?))
 }
 
-/// The recording as the page's script reads it; `most`: bytes of positions, of which there are fewer for longer rollouts.
+/// The recording as the page's script reads it; `most`: bytes of positions, of which there are
+/// fewer for longer rollouts.
 fn life(walk: &Walk, most: usize) -> serde_json::Value {
     let recording = walk.recording();
     let points = recording.frames.iter().map(|f| f.points.len()).min().unwrap_or(0);

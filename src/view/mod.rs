@@ -1,11 +1,12 @@
-//! Pictures and the terminal. Recordings of rollouts become images, animations, pages and text here.
+//! Pictures and the terminal. Recordings of rollouts become images, animations, pages and text
+//! here.
 //!
-//! A [`Walk`] is a checked [`Recording`](crate::task::recording::Recording); a [`Stage`] decides what part of the
-//! world a picture shows; `scene` and `panel` make drawing primitives of one frame; `raster` paints them. On top of
-//! these stand the animated GIF, the self-contained HTML page and the view in a terminal. Figures for print are vectors and
-//! stand apart, in [`plot`].
-//! these stand the animated GIF, the self-contained HTML page and the view in a terminal. `serve` is a page of its own,
-//! over HTTP.
+//! A [`Walk`] is a checked [`Recording`](crate::task::recording::Recording); a [`Stage`] decides
+//! what part of the world a picture shows; `scene` and `panel` make drawing primitives of one
+//! frame; `raster` paints them. On top of these stand the animated GIF, the self-contained HTML
+//! page and the view in a terminal. Figures for print are vectors and stand apart, in [`plot`].
+//! these stand the animated GIF, the self-contained HTML page and the view in a terminal. `serve`
+//! is a page of its own, over HTTP.
 
 #[cfg(feature = "cli")]
 pub mod bar;
@@ -50,8 +51,8 @@ pub mod walk;
 pub use stage::Stage;
 pub use walk::Walk;
 
-/// For tests: the simulation of a body (text form) that is shown `phases` images, dark and bright ones by turns, each for
-/// `steps` control steps.
+/// For tests: the simulation of a body (text form) that is shown `phases` images, dark and bright
+/// ones by turns, each for `steps` control steps.
 #[cfg(test)]
 pub(crate) fn simulated(
     body: &str,

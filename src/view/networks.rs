@@ -13,7 +13,8 @@ use crate::view::plot;
 use crate::view::report::tables::size;
 use std::path::{Path, PathBuf};
 
-/// The table: task, accuracy and capacity, the paper's beside ours; `out` is the file, if it was written.
+/// The table: task, accuracy and capacity, the paper's beside ours; `out` is the file, if it was
+/// written.
 pub fn capacity(console: &Console, file: &CapacityFile, out: Option<&Path>) {
     if console.mode() == Mode::Json {
         let written = out.filter(|_| !file.tasks.is_empty()).map(|out| out.display().to_string());
@@ -54,8 +55,8 @@ pub fn capacity(console: &Console, file: &CapacityFile, out: Option<&Path>) {
     }
 }
 
-/// The paper's table: each task with its robots, their accuracy (0 to 1) and their capacity as far as it is known, the
-/// paper's figures beside.
+/// The paper's table: each task with its robots, their accuracy (0 to 1) and their capacity as far
+/// as it is known, the paper's figures beside.
 pub(super) fn papers_table<'a>(
     console: &Console,
     dataset: &str,

@@ -16,8 +16,8 @@ pub struct Palette {
 }
 
 impl Palette {
-    /// A palette: the `fixed` colours, then the most frequent of the samples (RGBA bytes) that are not near one already
-    /// taken.
+    /// A palette: the `fixed` colours, then the most frequent of the samples (RGBA bytes) that are
+    /// not near one already taken.
     pub fn new<'a>(fixed: &[[u8; 3]], samples: impl IntoIterator<Item = &'a [u8]>) -> Self {
         let mut counts: BTreeMap<[u8; 3], u32> = BTreeMap::new();
         for sample in samples {

@@ -1,5 +1,5 @@
-//! What stands around the world in a raster picture: stimulus, read-outs, legend, numbers on the ruler. In pixels, y
-//! down.
+//! What stands around the world in a raster picture: stimulus, read-outs, legend, numbers on the
+//! ruler. In pixels, y down.
 
 use crate::base::number;
 use crate::body::{Body, Material};
@@ -67,7 +67,8 @@ pub fn signed(distance: f64) -> String {
     text.replace('-', "−")
 }
 
-/// The picture as the sensors see it, the sensor voxels framed in their colour. Returns its width and height.
+/// The picture as the sensors see it, the sensor voxels framed in their colour. Returns its width
+/// and height.
 fn stimulus(walk: &Walk, frame: usize, [x, y]: [f64; 2], z: f64, out: &mut Vec<Primitive>) -> [f64; 2] {
     let image = &walk.phase(frame).stimulus;
     let longest = image.height().max(image.width()) as f64;

@@ -115,7 +115,8 @@ impl Wanted {
     }
 }
 
-/// The default place of a robot's pictures: beside its run.json; for a published robot, the present folder.
+/// The default place of a robot's pictures: beside its run.json; for a published robot, the present
+/// folder.
 ///
 /// # Errors
 /// If there is no run.

@@ -1,4 +1,5 @@
-//! Plays a recording in the terminal: the robot's own speed, keys to pause and step, and the terminal as it was at the end.
+//! Plays a recording in the terminal: the robot's own speed, keys to pause and step, and the
+//! terminal as it was at the end.
 
 use crate::base::error::Error;
 use crate::base::signals;
@@ -127,14 +128,16 @@ fn terminal_size() -> (u16, u16) {
     size().ok().filter(|(columns, rows)| *columns > 0 && *rows > 0).unwrap_or(USUAL)
 }
 
-/// Columns and rows of the picture: a free column and line so that nothing scrolls, and a line for the keys.
+/// Columns and rows of the picture: a free column and line so that nothing scrolls, and a line for
+/// the keys.
 fn view((columns, rows): (u16, u16), has_keys: bool) -> (usize, usize) {
     let free = if has_keys { 2 } else { 1 };
     let (columns, rows) = (usize::from(columns).saturating_sub(1), usize::from(rows).saturating_sub(free));
     (columns.clamp(1, LARGEST.0), rows.clamp(1, LARGEST.1))
 }
 
-/// The terminal while a film plays: no cursor, and keys at once. Ends as it was, however the film ends.
+/// The terminal while a film plays: no cursor, and keys at once. Ends as it was, however the film
+/// ends.
 struct Screen<'c> {
     console: &'c Console,
     has_keys: bool,

@@ -3,8 +3,8 @@
 use crate::base::number;
 use crate::base::observer::Generation;
 
-/// How far an evolution is, in one line, given its beginning (of this session: a resumed run has done some generations
-/// already) and the seconds since.
+/// How far an evolution is, in one line, given its beginning (of this session: a resumed run has
+/// done some generations already) and the seconds since.
 pub fn generation_line(now: &Generation, begin: &Generation, seconds: f64) -> String {
     let best = now.best.map_or("none".into(), |best| number::fixed(best, 2));
     let rate = rate(now.evaluations.saturating_sub(begin.evaluations), seconds);
@@ -56,8 +56,8 @@ pub fn duration(seconds: f64) -> String {
     }
 }
 
-/// Decides when a plain line is due where lines cannot be rewritten: the first at once, then every ten seconds or
-/// every tenth of the work, and the last.
+/// Decides when a plain line is due where lines cannot be rewritten: the first at once, then every
+/// ten seconds or every tenth of the work, and the last.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Pacer(Option<(f64, f64)>);
 

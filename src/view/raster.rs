@@ -9,7 +9,8 @@ use crate::view::{panel, scene};
 use std::path::Path;
 use tiny_skia::{FillRule, LineCap, LineJoin, Paint, PathBuilder, Pixmap, Stroke, Transform};
 
-/// Pixels beyond the picture's edges where lines are cut: far enough to be unseen, near enough for 32-bit floats.
+/// Pixels beyond the picture's edges where lines are cut: far enough to be unseen, near enough for
+/// 32-bit floats.
 const BEYOND: f64 = 8192.0;
 
 /// The picture of a frame: opaque RGBA.
@@ -26,7 +27,8 @@ pub fn picture(walk: &Walk, frame: usize, stage: &Stage) -> Result<Pixmap, Pictu
     Ok(pixmap)
 }
 
-/// Draws primitives, whose coordinates `to_pixels` turns into pixels (y down); `zoom` multiplies line widths.
+/// Draws primitives, whose coordinates `to_pixels` turns into pixels (y down); `zoom` multiplies
+/// line widths.
 pub fn draw(
     pixmap: &mut Pixmap,
     primitives: &[Primitive],

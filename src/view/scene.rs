@@ -1,4 +1,5 @@
-//! One frame as drawing primitives in world coordinates (voxel lengths, y up): what all raster pictures are made of.
+//! One frame as drawing primitives in world coordinates (voxel lengths, y up): what all raster
+//! pictures are made of.
 
 use crate::view::colour;
 use crate::view::colour::Colour;
@@ -33,7 +34,8 @@ impl FromStr for Look {
     }
 }
 
-/// Something to draw. Coordinates are the world's (voxel lengths, y up) or pixels (y down), as the maker says.
+/// Something to draw. Coordinates are the world's (voxel lengths, y up) or pixels (y down), as the
+/// maker says.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Primitive {
     /// A filled quadrilateral.
@@ -99,16 +101,16 @@ impl Window {
     }
 }
 
-/// The whole numbers of voxel lengths from the ruler's zero that lie in the window, at most about 10⁴ of them; every
-/// `step`-th.
+/// The whole numbers of voxel lengths from the ruler's zero that lie in the window, at most about
+/// 10⁴ of them; every `step`-th.
 pub fn ruler(window: &Window, zero: f64, step: f64) -> impl Iterator<Item = f64> + use<> {
     let first = ((window.left - zero) / step).ceil();
     let count = ((window.right - zero) / step).floor() - first + 1.0;
     (0..count.clamp(0.0, 1e4) as u32).map(move |k| (first + f64::from(k)) * step)
 }
 
-/// The world at a frame, from back to front: sky, ground with its ruler, start marks, body, path of the centre of
-/// mass. The ruler's zero is the centre of mass at the start of the rollout.
+/// The world at a frame, from back to front: sky, ground with its ruler, start marks, body, path of
+/// the centre of mass. The ruler's zero is the centre of mass at the start of the rollout.
 pub fn world(walk: &Walk, frame: usize, window: &Window) -> Vec<Primitive> {
     let mut out = ground(walk, frame, window);
     out.extend(body(walk, frame, window));

@@ -45,10 +45,12 @@ pub enum SheetError {
     },
 }
 
-/// The first `samples` images of every class of a split, one class per row, each image three times its size; grey, 0 black.
+/// The first `samples` images of every class of a split, one class per row, each image three times
+/// its size; grey, 0 black.
 ///
 /// # Errors
-/// [`SheetError::Size`] if that is nothing or too large, [`SheetError::Dataset`] if an image cannot be had.
+/// [`SheetError::Size`] if that is nothing or too large, [`SheetError::Dataset`] if an image cannot
+/// be had.
 pub fn contact_sheet(dataset: &Dataset, split: Split, samples: usize) -> Result<Grid<u8>, SheetError> {
     let classes = dataset.classes(split);
     let info = dataset.info();

@@ -13,13 +13,16 @@ const PANEL: f64 = 104.0;
 const GROUND: f64 = 24.0;
 /// Sky left and right of the whole walk, voxel lengths.
 const MARGIN: f64 = 2.5;
-/// Largest and smallest size of a voxel in pixels at zoom 1; a walk that needs smaller ones is followed.
+/// Largest and smallest size of a voxel in pixels at zoom 1; a walk that needs smaller ones is
+/// followed.
 const VOXEL: RangeInclusive<f64> = 5.5..=22.0;
-/// Frames before and after over which the camera's path is averaged: a cycle, so that it does not shake with the body.
+/// Frames before and after over which the camera's path is averaged: a cycle, so that it does not
+/// shake with the body.
 const SMOOTHING: usize = 50;
 
-/// The camera and the layout of a picture: the panel on top, the world below it, the ground at the lower edge. If the
-/// whole recording fits, the view is fixed; else the camera follows the centre of mass smoothly.
+/// The camera and the layout of a picture: the panel on top, the world below it, the ground at the
+/// lower edge. If the whole recording fits, the view is fixed; else the camera follows the centre
+/// of mass smoothly.
 #[derive(Clone, Debug)]
 pub struct Stage {
     /// Width of the picture, pixels.
@@ -38,7 +41,8 @@ pub struct Stage {
 }
 
 impl Stage {
-    /// The stage for a recording in a picture `width` pixels wide; the height follows from the body.
+    /// The stage for a recording in a picture `width` pixels wide; the height follows from the
+    /// body.
     ///
     /// # Errors
     /// [`PictureError::Size`] if the width is not in [`WIDTHS`].
@@ -117,7 +121,8 @@ impl Stage {
     }
 }
 
-/// Leftmost and rightmost x of the walk, without a body's last throes: half a body more than the centres at most.
+/// Leftmost and rightmost x of the walk, without a body's last throes: half a body more than the
+/// centres at most.
 fn reach(walk: &Walk) -> (f64, f64) {
     let all = walk.extent(0..walk.len());
     let size = walk.recording().body.width() as f64;
@@ -126,8 +131,9 @@ fn reach(walk: &Walk) -> (f64, f64) {
     (all.left.max(low - size - 2.0).min(low), all.right.min(high + size + 2.0).max(high))
 }
 
-/// The centres' x, averaged twice over [`SMOOTHING`] frames on both sides, each rollout by itself, and never further than
-/// `most` voxel lengths from the centre: a body that is hurled away stays in view.
+/// The centres' x, averaged twice over [`SMOOTHING`] frames on both sides, each rollout by itself,
+/// and never further than `most` voxel lengths from the centre: a body that is hurled away stays in
+/// view.
 fn followed(walk: &Walk, most: f64) -> Vec<f64> {
     let mut path: Vec<f64> = (0..walk.len()).map(|f| walk.centre(f)[0]).collect();
     let mut start = 0;

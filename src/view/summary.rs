@@ -117,8 +117,9 @@ pub fn validation(console: &Console, best: &[Validated]) {
     console.table(&["best on validation", "task", "right", "balanced %"], &rows.collect::<Vec<_>>());
 }
 
-/// After an evaluation: a table per robot, the means and the baselines, and the paper's table; `capacity` is what is known
-/// from an analysis of these robots; `out` is the file, if it was written.
+/// After an evaluation: a table per robot, the means and the baselines, and the paper's table;
+/// `capacity` is what is known from an analysis of these robots; `out` is the file, if it was
+/// written.
 pub fn evaluation(console: &Console, report: &EvalFile, capacity: Option<&CapacityFile>, out: Option<&Path>) {
     if report.robots.is_empty() {
         return console.warning("no robot was evaluated");

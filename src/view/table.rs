@@ -1,7 +1,7 @@
 //! Tables as aligned text.
 
-/// The lines of a table: headers, a rule, rows; two spaces between columns, numbers to the right. Short rows are filled
-/// up with empty cells; cells without a header are left out.
+/// The lines of a table: headers, a rule, rows; two spaces between columns, numbers to the right.
+/// Short rows are filled up with empty cells; cells without a header are left out.
 pub fn align(headers: &[&str], rows: &[Vec<String>]) -> Vec<String> {
     let cell = |row: &[String], c: usize| row.get(c).cloned().unwrap_or_default();
     let columns: Vec<(usize, bool)> = (0..headers.len())
@@ -25,7 +25,8 @@ pub fn align(headers: &[&str], rows: &[Vec<String>]) -> Vec<String> {
     lines
 }
 
-/// Starts like a number, perhaps with a sign, and has a digit: "−3.2", "76.5 %", "12/30", "81.0 [78.4, 83.3]".
+/// Starts like a number, perhaps with a sign, and has a digit: "−3.2", "76.5 %", "12/30", "81.0
+/// [78.4, 83.3]".
 fn is_number(text: &str) -> bool {
     let body = text.trim_start_matches(['+', '-', '−', '±', '<', '>', '≤', '≥', '.', ' ']);
     let unit = |c: char| c.is_ascii_digit() || " .,%/()[]–-−+±:eEµmskhMGB×".contains(c);

@@ -9,8 +9,9 @@ use std::ops::Range;
 /// Positions beyond this (voxel lengths) are not drawn: an exploded body.
 const FAR: f64 = 1e9;
 
-/// A recording that can be drawn: it has frames, phases in order and corners that exist. Positions may still be
-/// anything (NaN in the last moments of an unstable rollout): voxels without finite corners are left out.
+/// A recording that can be drawn: it has frames, phases in order and corners that exist. Positions
+/// may still be anything (NaN in the last moments of an unstable rollout): voxels without finite
+/// corners are left out.
 #[derive(Clone, Debug)]
 pub struct Walk<'a> {
     recording: &'a Recording,
@@ -34,7 +35,8 @@ impl<'a> Walk<'a> {
     /// Checks a recording.
     ///
     /// # Errors
-    /// [`PictureError::Recording`] if there is no frame or phase, phases are not in order, or a corner does not exist.
+    /// [`PictureError::Recording`] if there is no frame or phase, phases are not in order, or a
+    /// corner does not exist.
     pub fn new(recording: &'a Recording) -> Result<Self, PictureError> {
         let bad = |what| Err(PictureError::Recording(what));
         let (frames, phases) = (&recording.frames, &recording.phases);
@@ -87,7 +89,8 @@ impl<'a> Walk<'a> {
         first(phase)..first(phase + 1)
     }
 
-    /// Whether the robot is put back to its start when the phase begins (the first phase always begins there).
+    /// Whether the robot is put back to its start when the phase begins (the first phase always
+    /// begins there).
     pub fn is_fresh(&self, phase: usize) -> bool {
         self.fresh.get(phase).copied().unwrap_or(false)
     }
@@ -102,7 +105,8 @@ impl<'a> Walk<'a> {
         self.centre(frame)[0] - self.centre(self.phase(frame).first_frame)[0]
     }
 
-    /// The frames of the continuous rollout that a frame is part of, from the last reset up to the next.
+    /// The frames of the continuous rollout that a frame is part of, from the last reset up to the
+    /// next.
     pub fn life(&self, frame: usize) -> Range<usize> {
         let phase = self.phase_index(frame);
         let resets = || self.fresh.iter().enumerate().filter(|(_, f)| **f).map(|(p, _)| p);
@@ -111,7 +115,8 @@ impl<'a> Walk<'a> {
         self.phase_frames(first).start..self.phase_frames(next).start
     }
 
-    /// Every voxel that can be drawn at a frame: its material and corners (clockwise from the top left).
+    /// Every voxel that can be drawn at a frame: its material and corners (clockwise from the top
+    /// left).
     pub fn voxels(&self, frame: usize) -> impl Iterator<Item = (Material, [[f64; 2]; 4])> {
         let body = &self.recording.body;
         self.recording.voxels.iter().filter_map(move |v| {
@@ -157,7 +162,8 @@ impl<'a> Walk<'a> {
     }
 }
 
-/// Area of a voxel from its corners (clockwise), square voxel lengths; 1 at rest, negative when turned inside out.
+/// Area of a voxel from its corners (clockwise), square voxel lengths; 1 at rest, negative when
+/// turned inside out.
 pub fn area(quad: &[[f64; 2]; 4]) -> f64 {
     let [a, b, c, d] = quad;
     0.5 * ((c[0] - a[0]) * (b[1] - d[1]) - (b[0] - d[0]) * (c[1] - a[1]))

@@ -1,4 +1,5 @@
-//! A real browser without a window, driven over its debugging pipe: JSON messages that end with a zero byte.
+//! A real browser without a window, driven over its debugging pipe: JSON messages that end with a
+//! zero byte.
 
 use super::program::Sandbox;
 use base64::Engine;

@@ -91,8 +91,8 @@ pub fn bytes(dice: &mut Dice, text: &[u8]) -> Vec<u8> {
     text
 }
 
-/// A value with one to three changes of what it says; half of the time only of how much it says, so that it is often read to
-/// its end and used.
+/// A value with one to three changes of what it says; half of the time only of how much it says, so
+/// that it is often read to its end and used.
 pub fn value(dice: &mut Dice, value: &Value) -> Value {
     let mut value = value.clone();
     if dice.below(2) == 0 {

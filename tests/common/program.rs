@@ -1,4 +1,5 @@
-//! Running the program itself, as a user does: in a folder of its own, with no settings from outside.
+//! Running the program itself, as a user does: in a folder of its own, with no settings from
+//! outside.
 
 use assert_cmd::Command;
 use morphcog::store::run::RunFile;
@@ -44,8 +45,8 @@ initial = 8
 parents = 8
 "#;
 
-/// The other way to evolve: [`TINY`] with the response as fitness, half of the offspring changed in up to four voxels, the six
-/// fittest kept.
+/// The other way to evolve: [`TINY`] with the response as fitness, half of the offspring changed in
+/// up to four voxels, the six fittest kept.
 pub fn gaits() -> String {
     let data = TINY.replace("train_images = [0, 1]", "images_per_class = 4");
     format!(

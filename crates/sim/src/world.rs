@@ -146,7 +146,8 @@ impl World {
             Err(Ended::Stopped) => return Err(Stopped),
             Err(Ended::Unstable(reason)) => return Ok(Err(Unstable { control_step, reason })),
         }
-        // What a substep leaves behind is looked at by the next; at the end of a control step, by no other.
+        // What a substep leaves behind is looked at by the next; at the end of a control step, by
+        // no other.
         if !self.centre_of_mass().iter().all(|coordinate| coordinate.is_finite()) {
             return Ok(Err(Unstable { control_step, reason: UnstableReason::BlownUp }));
         }

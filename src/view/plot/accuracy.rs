@@ -11,8 +11,8 @@ use crate::view::plot::{fonts, scales};
 /// Robots that have a line of their own with their name; of more, lines are thin and nameless.
 const NAMED: usize = 40;
 
-/// The accuracy of every robot on test or validation images with its 95 % interval, a block per task, with the mean and what takes no
-/// body.
+/// The accuracy of every robot on test or validation images with its 95 % interval, a block per
+/// task, with the mean and what takes no body.
 pub fn accuracy(report: &EvalFile) -> Figure {
     let mut canvas = Canvas::new();
     let of = format!("{}; {}", runs(report), report.selection());

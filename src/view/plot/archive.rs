@@ -1,7 +1,7 @@
 //! The figure of an archive: fitness over muscle, sensor and total voxels.
 //!
-//! A map has a square for every pair of muscle and sensor bins, and in it a strip for every bin of the total. A cell that
-//! could have an elite is framed; where no body can be there is nothing.
+//! A map has a square for every pair of muscle and sensor bins, and in it a strip for every bin of
+//! the total. A cell that could have an elite is framed; where no body can be there is nothing.
 
 use crate::qd::descriptor::{COUNT_BINS, DescriptorSpace, count_bin, possible_cells};
 use crate::store::run::RunFile;

@@ -223,7 +223,8 @@ pub fn path(points: &[[f64; 2]], closed: bool) -> String {
     data
 }
 
-/// A number with two decimals at most; what is not finite or absurd becomes something that can be drawn.
+/// A number with two decimals at most; what is not finite or absurd becomes something that can be
+/// drawn.
 pub fn number(value: f64) -> String {
     let value = if value.is_nan() { 0.0 } else { value.clamp(-1e6, 1e6) };
     let text = number::fixed(value, 2);

@@ -1,4 +1,5 @@
-//! The figure of the morphological cognition capacity: accuracy of networks over their size, and the robots'.
+//! The figure of the morphological cognition capacity: accuracy of networks over their size, and
+//! the robots'.
 
 use crate::baseline::curve::Crossing;
 use crate::store::capacity::{CapacityFile, Curve, Point, TaskCapacity};
@@ -16,8 +17,8 @@ const ROBOTS: Pen = Pen { colour: scales::VERMILLION, width: 1.1, dashes: None }
 const FIT: Pen = Pen { colour: colour::INK, width: 0.9, dashes: None };
 const CROSSING: Pen = Pen { colour: scales::VERMILLION, width: 0.9, dashes: Some([2.5, 1.8]) };
 
-/// Mean accuracy of networks over their size with its standard deviation, the fit of degree two, the robots' accuracy and
-/// where the fit reaches it; a panel per task and kind of network.
+/// Mean accuracy of networks over their size with its standard deviation, the fit of degree two,
+/// the robots' accuracy and where the fit reaches it; a panel per task and kind of network.
 pub fn capacity(file: &CapacityFile) -> Figure {
     let panels: Vec<(&TaskCapacity, &Curve)> =
         file.tasks.iter().flat_map(|task| task.curves.iter().map(move |curve| (task, curve))).collect();

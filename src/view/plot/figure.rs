@@ -25,7 +25,8 @@ pub enum Background {
     Transparent,
 }
 
-/// A vector picture. Its SVG has neither ids nor classes nor styles, so any number of them can stand in one page.
+/// A vector picture. Its SVG has neither ids nor classes nor styles, so any number of them can
+/// stand in one page.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Figure {
     title: String,
@@ -35,7 +36,8 @@ pub struct Figure {
 }
 
 impl Figure {
-    /// A figure of a width and height in points; `content` is SVG in points from the top left corner.
+    /// A figure of a width and height in points; `content` is SVG in points from the top left
+    /// corner.
     pub(super) fn new(title: &str, size: [f64; 2], content: String) -> Self {
         Figure { title: title.to_string(), size, content, background: Background::Paper }
     }
@@ -75,11 +77,12 @@ impl Figure {
         )
     }
 
-    /// The figure as PNG, `scale` pixels per point ([`PRINT`] is good for print); the file says how large it is meant
-    /// to be.
+    /// The figure as PNG, `scale` pixels per point ([`PRINT`] is good for print); the file says how
+    /// large it is meant to be.
     ///
     /// # Errors
-    /// [`PictureError::Figure`] if it would have no pixels or too many, [`PictureError::Encode`] if it cannot be made.
+    /// [`PictureError::Figure`] if it would have no pixels or too many, [`PictureError::Encode`] if
+    /// it cannot be made.
     pub fn png(&self, scale: f64) -> Result<Vec<u8>, PictureError> {
         let [width, height] = self.size.map(|points| (points * scale).ceil());
         let possible = |pixels: f64| (1.0..=MOST_PIXELS).contains(&pixels);

@@ -1,6 +1,7 @@
 //! The fonts of figures: embedded, so that pictures are the same on every machine.
 //!
-//! An SVG names a list of families as wide as the embedded one or a little narrower: with any of them the words fit.
+//! An SVG names a list of families as wide as the embedded one or a little narrower: with any of
+//! them the words fit.
 
 use resvg::usvg::fontdb::Database;
 use skrifa::prelude::{LocationRef, Size};

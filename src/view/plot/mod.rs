@@ -1,7 +1,7 @@
 //! Figures for print and pages: every one a function from what it shows to a [`Figure`].
 //!
-//! `canvas` makes SVG elements, `axes` and `scales` what figures share; `robot` draws bodies. The sizes are those of a
-//! journal's column or page, the words in them at least 7 points high.
+//! `canvas` makes SVG elements, `axes` and `scales` what figures share; `robot` draws bodies. The
+//! sizes are those of a journal's column or page, the words in them at least 7 points high.
 
 mod accuracy;
 mod archive;

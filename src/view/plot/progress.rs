@@ -22,8 +22,8 @@ const QUANTITIES: [Quantity; 3] = [
     ("best fitness", |moment| moment.obj_max.unwrap_or(f64::NAN), scales::VERMILLION),
 ];
 
-/// QD score, coverage and best fitness of runs over their evaluations; of several runs the median, and the band from the
-/// least to the largest, as far as the shortest of them goes.
+/// QD score, coverage and best fitness of runs over their evaluations; of several runs the median,
+/// and the band from the least to the largest, as far as the shortest of them goes.
 pub fn progress(runs: &[Progress]) -> Figure {
     let mut canvas = Canvas::new();
     let of = names(runs);

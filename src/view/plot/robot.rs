@@ -18,7 +18,8 @@ pub fn plain(material: Material) -> Colour {
     Colour::new(red, green, blue)
 }
 
-/// Squares of equal colour as one path each, so that a figure stays small; thin paper-white seams between them.
+/// Squares of equal colour as one path each, so that a figure stays small; thin paper-white seams
+/// between them.
 pub fn squares(
     canvas: &mut Canvas,
     [left, top]: [f64; 2],
@@ -88,7 +89,8 @@ pub fn stimulus(canvas: &mut Canvas, at: [f64; 2], side: f64, image: &Grid<f64>)
     size
 }
 
-/// The body at a frame: voxels in the colour of their material, darker the smaller they are, with their outline.
+/// The body at a frame: voxels in the colour of their material, darker the smaller they are, with
+/// their outline.
 pub fn pose(canvas: &mut Canvas, walk: &Walk, frame: usize, place: impl Fn([f64; 2]) -> [f64; 2]) {
     let [small, _, large] = colour::TONE_AREAS;
     let mut paths = BTreeMap::<[u8; 3], String>::new();

@@ -28,7 +28,8 @@ const VIRIDIS: [[u8; 3]; 11] = [
     [0xfd, 0xe7, 0x25],
 ];
 
-/// Purple over white to green (ColorBrewer's PRGn), the middle for nothing: neither is a muscle's colour.
+/// Purple over white to green (ColorBrewer's PRGn), the middle for nothing: neither is a muscle's
+/// colour.
 const PURPLE_GREEN: [[u8; 3]; 9] = [
     [0x76, 0x2a, 0x83],
     [0x99, 0x70, 0xab],

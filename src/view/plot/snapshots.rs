@@ -19,8 +19,8 @@ const LARGEST: f64 = 7.0;
 /// Opacity of the first pose.
 const FAINTEST: f64 = 0.22;
 
-/// Poses of a simulation, `every` number of control steps (0: chosen by the walk), earlier ones fainter; a panel per stimulus. `of`
-/// says whose it is.
+/// Poses of a simulation, `every` number of control steps (0: chosen by the walk), earlier ones
+/// fainter; a panel per stimulus. `of` says whose it is.
 ///
 /// # Errors
 /// [`PictureError::Recording`] if the recording cannot be drawn.
@@ -67,7 +67,8 @@ pub fn snapshots(recording: &Recording, every: usize, of: &str) -> Result<Figure
     Ok(Figure::new(&format!("Snapshots: {of}"), [width, below + 4.0 + MARGIN], canvas.finish()))
 }
 
-/// As many control steps as take the robot about half its width on, a tenth of the longest phase at least.
+/// As many control steps as take the robot about half its width on, a tenth of the longest phase at
+/// least.
 fn suitable(walk: &Walk) -> usize {
     let size = walk.extent(0..1);
     let half = 0.5 * (size.right - size.left).max(1.0);

@@ -26,8 +26,9 @@ const STIMULUS: f64 = 30.0;
 const PER_STEP: f64 = 0.2;
 const HEIGHTS: [f64; 2] = [90.0, 210.0];
 
-/// x over time, which runs downwards: every row is the robot as seen from above at that time, darker where its voxels are
-/// compressed. A panel per rollout, dashed lines where the stimulus changes. `of` says whose it is.
+/// x over time, which runs downwards: every row is the robot as seen from above at that time,
+/// darker where its voxels are compressed. A panel per rollout, dashed lines where the stimulus
+/// changes. `of` says whose it is.
 ///
 /// # Errors
 /// [`PictureError::Recording`] if the recording cannot be drawn.
@@ -127,7 +128,8 @@ fn rows(canvas: &mut Canvas, walk: &Walk, life: &Range<usize>, plot: &Plot, gray
     });
 }
 
-/// Areas of the darkest and the lightest gray: all but the extreme ones of the walk lie between them.
+/// Areas of the darkest and the lightest gray: all but the extreme ones of the walk lie between
+/// them.
 fn grays(walk: &Walk, lives: &[Range<usize>], x: &Axis) -> [f64; 2] {
     let mut all = Vec::new();
     for life in lives {

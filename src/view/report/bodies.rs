@@ -13,8 +13,8 @@ use std::fmt::Write;
 /// Robots shown of each kind.
 const SHOWN: usize = 5;
 
-/// A button that plays a robot. `look`: its style, what stands before the robot's figures for those who cannot see it, and
-/// whether it is played at first.
+/// A button that plays a robot. `look`: its style, what stands before the robot's figures for those
+/// who cannot see it, and whether it is played at first.
 pub(super) fn button(
     run: usize,
     dossier: &Dossier,

@@ -12,7 +12,8 @@ use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// Bytes of all rollouts of a page together, before they are packed: packed, as text, they are about as many.
+/// Bytes of all rollouts of a page together, before they are packed: packed, as text, they are
+/// about as many.
 const MOST_BYTES: usize = 13_000_000;
 /// Most bytes of a single one.
 const MOST_OF_ONE: usize = 1_500_000;

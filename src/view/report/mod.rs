@@ -1,5 +1,5 @@
-//! One self-contained page about runs: what was run, how it came along, an archive whose robots can be played, and what
-//! tests found of them. No network, works from `file://`.
+//! One self-contained page about runs: what was run, how it came along, an archive whose robots can
+//! be played, and what tests found of them. No network, works from `file://`.
 
 mod bodies;
 mod maps;

@@ -244,7 +244,8 @@ pub(crate) fn size(capacity: Option<Crossing>) -> String {
     capacity.map_or_else(|| "no match".to_string(), |size| size.to_string())
 }
 
-/// What tables of evaluated robots begin with: robot, task, fitness, accuracy, its interval, balanced accuracy.
+/// What tables of evaluated robots begin with: robot, task, fitness, accuracy, its interval,
+/// balanced accuracy.
 pub(crate) fn of_robot(robot: &RobotReport) -> Vec<String> {
     let [low, high] = robot.interval.map(percent);
     vec![

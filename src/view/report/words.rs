@@ -121,8 +121,8 @@ pub(super) fn methods(dossier: &Dossier) -> String {
     format!("<p>{}</p>\n", escape(&text))
 }
 
-/// The commands that make a run and its tests again; audits with other criteria, and networks trained with other hyperparameters, need
-/// these besides.
+/// The commands that make a run and its tests again; audits with other criteria, and networks
+/// trained with other hyperparameters, need these besides.
 pub(super) fn commands(dossier: &Dossier) -> String {
     let config = in_shell(&dossier.path.with_file_name(CONFIG));
     let again = format!("again/{}-seed{}", dossier.run.name, dossier.run.config.seed);
