@@ -57,7 +57,7 @@ fn lives(criterion: &mut Criterion<Processor>) {
 fn evaluations(criterion: &mut Criterion) {
     let config = config(&OVERRIDES);
     let bodies: Vec<Body> = (0..20)
-        .map(|child| stream(1, Purpose::Newcomer, 0, child))
+        .map(|child| stream(1, Purpose::RandomImmigrant, 0, child))
         .filter_map(|mut rng| Genome::random(config.body_spec(), &config.genome, &mut rng).ok())
         .map(|(_, body)| body)
         .collect();

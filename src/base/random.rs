@@ -13,7 +13,7 @@ use rand_pcg::Pcg64;
 #[repr(u64)]
 pub enum Purpose {
     /// Genomes of random individuals.
-    Newcomer = 1,
+    RandomImmigrant = 1,
     /// Mutation of one offspring.
     Mutation = 2,
     /// Which elites become parents.

@@ -76,7 +76,7 @@ impl Row {
         }
         self.larger_group = report.baselines.get(&self.task).map(|known| 100.0 * known.larger_group);
         let task = capacity.tasks.iter().find(|task| task.task == self.task);
-        let of = |network: &str| task?.worth(network)?;
+        let of = |network: &str| task?.size_of(network)?;
         (self.mlp, self.cnn) = (of("mlp"), of("cnn"));
     }
 }

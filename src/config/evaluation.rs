@@ -45,7 +45,7 @@ impl Config {
     /// respond as strongly, the one with more places can be taught more: together they can move it
     /// by at most so much (Cauchy's inequality), and by that only if all respond alike. More than a
     /// third leave too little that walks.
-    pub(crate) fn worth_of_places(&self, body: &Body) -> f64 {
+    pub(crate) fn place_factor(&self, body: &Body) -> f64 {
         match self.measures_response() {
             true => {
                 let most = body.height() * body.width() / 3;

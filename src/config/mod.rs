@@ -323,11 +323,11 @@ impl Config {
         if self.generations == 0 {
             return refuse("generations", self.generations.to_string(), "1 or more");
         }
-        if self.map_elites.parents == 0 && self.map_elites.newcomers == 0 {
+        if self.map_elites.parents == 0 && self.map_elites.random_immigrants == 0 {
             return refuse(
                 "map_elites.parents",
                 "0".to_string(),
-                "1 or more, or map_elites.newcomers above 0",
+                "1 or more, or map_elites.random_immigrants above 0",
             );
         }
         if !(1..=MAX_STEPS).contains(&self.protocol.control_steps) {

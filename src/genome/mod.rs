@@ -223,7 +223,7 @@ mod tests {
     pub(super) const PAPER: BodySpec = BodySpec { height: 14, width: 14, min_muscles: 3 };
 
     pub(super) fn rng(seed: u64) -> Stream {
-        stream(seed, Purpose::Newcomer, 0, 0)
+        stream(seed, Purpose::RandomImmigrant, 0, 0)
     }
 
     #[test]

@@ -14,13 +14,13 @@ pub struct EmitterParams {
     /// Most elites that become parents, of one offspring each. Default 20.
     pub parents: u16,
     /// Random individuals of later generations. Default 0.
-    pub newcomers: u16,
+    pub random_immigrants: u16,
 }
 
 impl Default for EmitterParams {
     fn default() -> Self {
         let initial = NonZeroU16::MIN.saturating_add(19);
-        EmitterParams { initial, parents: 20, newcomers: 0 }
+        EmitterParams { initial, parents: 20, random_immigrants: 0 }
     }
 }
 
@@ -45,7 +45,7 @@ pub trait Variation<S> {
     ///
     /// # Errors
     /// If none can be made.
-    fn newcomer(&self, generation: u64, child: u64) -> Result<S, Self::Error>;
+    fn random_immigrant(&self, generation: u64, child: u64) -> Result<S, Self::Error>;
 
     /// A varied copy of `parent`.
     ///
@@ -56,15 +56,15 @@ pub trait Variation<S> {
 
 impl EmitterParams {
     /// What `generation` consists of: offspring of different elites drawn uniformly, then
-    /// newcomers. While the archive is empty (in the first generation, and after it if no
+    /// random immigrants. While the archive is empty (in the first generation, and after it if no
     /// individual was stable): random individuals.
     pub fn ask<S>(&self, archive: &Archive<S>, seed: u64, generation: u64) -> Vec<Proposal> {
         let cells: Vec<usize> = archive.elites().map(|e| e.cell).collect();
         let mut rng = stream(seed, Purpose::Parents, generation, 0);
         let drawn = rng.sample(cells.len(), usize::from(self.parents));
-        let newcomers = if cells.is_empty() { self.initial.get() } else { self.newcomers };
+        let random_immigrants = if cells.is_empty() { self.initial.get() } else { self.random_immigrants };
         let parents = drawn.into_iter().map(|i| Some(cells[i]));
-        let all = parents.chain((0..newcomers).map(|_| None));
+        let all = parents.chain((0..random_immigrants).map(|_| None));
         all.zip(0..).map(|(parent, child)| Proposal { generation, child, parent }).collect()
     }
 }
@@ -91,7 +91,7 @@ mod tests {
 
     #[test]
     fn parents_are_different_elites_and_newcomers_come_after() {
-        let params = EmitterParams { parents: 5, newcomers: 2, ..EmitterParams::default() };
+        let params = EmitterParams { parents: 5, random_immigrants: 2, ..EmitterParams::default() };
         let asked = params.ask(&archive((0..90).map(|i| 3 * i)), 1, 4);
         assert_eq!(asked.iter().map(|p| p.child).collect::<Vec<_>>(), [0, 1, 2, 3, 4, 5, 6]);
         let mut parents: Vec<usize> = asked.iter().filter_map(|p| p.parent).collect();
@@ -120,7 +120,7 @@ mod tests {
     fn sizes_in_files_have_the_papers_defaults_and_are_checked() {
         let read = |text: &str| serde_json::from_str::<EmitterParams>(text).map_err(|e| e.to_string());
         let params = read("{}").unwrap();
-        assert_eq!((params.initial.get(), params.parents, params.newcomers), (20, 20, 0));
+        assert_eq!((params.initial.get(), params.parents, params.random_immigrants), (20, 20, 0));
         assert!(read(r#"{"initial": 0}"#).unwrap_err().contains("nonzero"));
         assert!(read(r#"{"parent": 5}"#).unwrap_err().contains("parent"));
     }

@@ -49,7 +49,7 @@ impl<S> MapElites<S> {
         self.params.ask(&self.archive, self.seed, generation)
     }
 
-    /// Makes one solution of a generation. (A newcomer, too, if the proposal's cell has no elite.)
+    /// Makes one solution of a generation. (A random immigrant, too, if the proposal's cell has no elite.)
     ///
     /// # Errors
     /// What the variation says.
@@ -57,7 +57,7 @@ impl<S> MapElites<S> {
         let Proposal { generation, child, parent } = proposal;
         match parent.and_then(|cell| self.archive.get(cell)) {
             Some(elite) => variation.offspring(&elite.solution, generation, child),
-            None => variation.newcomer(generation, child),
+            None => variation.random_immigrant(generation, child),
         }
     }
 
@@ -90,8 +90,8 @@ mod tests {
 
     impl Variation<f64> for Walk {
         type Error = Infallible;
-        fn newcomer(&self, generation: u64, child: u64) -> Result<f64, Infallible> {
-            Ok(stream(1, Purpose::Newcomer, generation, child).unit())
+        fn random_immigrant(&self, generation: u64, child: u64) -> Result<f64, Infallible> {
+            Ok(stream(1, Purpose::RandomImmigrant, generation, child).unit())
         }
         fn offspring(&self, parent: &f64, generation: u64, child: u64) -> Result<f64, Infallible> {
             Ok(parent + stream(1, Purpose::Mutation, generation, child).normal())

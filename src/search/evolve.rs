@@ -97,7 +97,7 @@ pub fn evolve(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> 
     let training = Training::of(config, &dataset)?;
     held_out::check(config, &dataset)?;
     let mutations = Mutations { seed: config.seed, spec: config.body_spec(), params: &config.genome, stop };
-    mutations.newcomer(0, 0).map_err(unmade)?;
+    mutations.random_immigrant(0, 0).map_err(unmade)?;
     // Open.
     let folder = RunFolder::open(&options.out, options.if_exists)?;
     let saved = match resumes {
@@ -287,8 +287,8 @@ impl<'a> Run<'a> {
             true => children.iter().map(|(_, _, robot)| robot.body.probe()).collect(),
             false => Vec::new(),
         };
-        let floors = self.floors();
-        let jobs = children.iter().map(|(_, parent, robot)| self.job(*parent, robot, &floors));
+        let thresholds = self.admission_thresholds();
+        let jobs = children.iter().map(|(_, parent, robot)| self.job(*parent, robot, &thresholds));
         let mut jobs: Vec<Job> = jobs.collect();
         jobs.iter_mut().zip(&probes).for_each(|(job, probe)| job.body = probe);
         let (physics, protocol) = (&config.physics, &config.protocol);
@@ -297,13 +297,13 @@ impl<'a> Run<'a> {
 
     /// Puts those into the archive that walked and are fit enough.
     fn tell(&mut self, children: Vec<Child>, evaluations: Vec<Evaluation>) -> Result<(), Error> {
-        let floors = self.floors();
+        let thresholds = self.admission_thresholds();
         let mut told = Vec::new();
         for ((child, _, robot), evaluation) in children.into_iter().zip(evaluations) {
             self.totals.count(&evaluation);
             match evaluation.outcome {
                 Outcome::Walked(displacements) => {
-                    told.extend(self.judged(child, robot, displacements, &floors))
+                    told.extend(self.judged(child, robot, displacements, &thresholds))
                 }
                 Outcome::Unstable(_) => self.totals.unstable += 1,
                 Outcome::Stopped(_) => {}
@@ -317,15 +317,15 @@ impl<'a> Run<'a> {
     }
 
     /// How a robot is to be evaluated; `parent` is the cell of its parent.
-    fn job<'b>(&'b self, parent: Option<usize>, robot: &'b Robot, floors: &[Option<f64>]) -> Job<'b> {
+    fn job<'b>(&'b self, parent: Option<usize>, robot: &'b Robot, thresholds: &[Option<f64>]) -> Job<'b> {
         let (archive, training, grouping) = (self.search.archive(), &self.training, &self.grouping);
         let config = &self.options.config;
-        let places = config.worth_of_places(&robot.body);
+        let places = config.place_factor(&robot.body);
         let bins = robot.bins();
         let to_beat = |task: usize| {
             let cell = self.space.index(&self.cell(bins.clone(), task));
             let in_cell = cell.and_then(|cell| archive.objective(cell));
-            in_cell.into_iter().chain(floors[task]).reduce(f64::max).map(|least| least / places)
+            in_cell.into_iter().chain(thresholds[task]).reduce(f64::max).map(|least| least / places)
         };
         let to_beat: Vec<Option<f64>> = (0..grouping.tasks().len()).map(to_beat).collect();
         let (order, given_up) = if config.measures_response() {
@@ -351,23 +351,23 @@ impl<'a> Run<'a> {
         child: u64,
         robot: Robot,
         displacements: Vec<f64>,
-        floors: &[Option<f64>],
+        thresholds: &[Option<f64>],
     ) -> Option<Evaluated<Robot>> {
         let answers = self.training.answers(displacements.iter().copied().map(Some));
         let score = self.grouping.score(&answers);
         let coordinates = self.cell(robot.bins(), score.task);
         let cell = self.space.index(&coordinates).expect("the coordinates are bins of this very space");
         let task = self.grouping.tasks()[score.task].name();
-        let objective = self.options.config.worth_of_places(&robot.body) * score.fitness;
+        let objective = self.options.config.place_factor(&robot.body) * score.fitness;
         let solution = Robot { cell: coordinates, task, objective, displacements, ..robot };
-        let is_in = floors[score.task].is_none_or(|floor| objective > floor);
+        let is_in = thresholds[score.task].is_none_or(|threshold| objective > threshold);
         is_in.then_some(Evaluated { child, cell, objective, solution })
     }
 
     /// By task the fitness of the last elite that `archive.keep` keeps; `None` while it keeps all,
     /// or there are fewer. It never decreases, so what did not exceed it, or lost its cell, never
     /// can: early stop and known bodies stay lossless.
-    fn floors(&self) -> Vec<Option<f64>> {
+    fn admission_thresholds(&self) -> Vec<Option<f64>> {
         let keep = self.options.config.archive.keep;
         let last = |name: String| self.search.archive().nth_fittest(keep?, |robot| robot.task == name);
         self.grouping.tasks().iter().map(|task| last(task.name())).collect()
@@ -433,7 +433,7 @@ impl<'a> Run<'a> {
     }
 }
 
-/// How robots vary: newcomers and mutated offspring, each from a random stream of its own.
+/// How robots vary: random immigrants and mutated offspring, each from a random stream of its own.
 struct Mutations<'a> {
     seed: u64,
     spec: BodySpec,
@@ -443,7 +443,7 @@ struct Mutations<'a> {
 }
 
 /// A robot that has not walked yet.
-fn newborn((genome, body): (Genome, Body), generation: u64, parent: Option<&Robot>) -> Robot {
+fn unevaluated((genome, body): (Genome, Body), generation: u64, parent: Option<&Robot>) -> Robot {
     Robot {
         id: genome.id(),
         cell: Vec::new(),
@@ -469,14 +469,14 @@ fn unmade(error: GenomeError) -> Error {
 impl Variation<Robot> for Mutations<'_> {
     type Error = GenomeError;
 
-    fn newcomer(&self, generation: u64, child: u64) -> Result<Robot, GenomeError> {
-        let rng = &mut stream(self.seed, Purpose::Newcomer, generation, child);
-        Ok(newborn(Genome::random_unless(self.spec, self.params, rng, self.stop)?, generation, None))
+    fn random_immigrant(&self, generation: u64, child: u64) -> Result<Robot, GenomeError> {
+        let rng = &mut stream(self.seed, Purpose::RandomImmigrant, generation, child);
+        Ok(unevaluated(Genome::random_unless(self.spec, self.params, rng, self.stop)?, generation, None))
     }
 
     fn offspring(&self, parent: &Robot, generation: u64, child: u64) -> Result<Robot, GenomeError> {
         let rng = &mut stream(self.seed, Purpose::Mutation, generation, child);
         let made = parent.genome.offspring_unless(self.spec, self.params, rng, self.stop)?;
-        Ok(newborn(made, generation, Some(parent)))
+        Ok(unevaluated(made, generation, Some(parent)))
     }
 }

@@ -145,7 +145,7 @@ impl CapacityFile {
 
 impl TaskCapacity {
     /// The capacity as one kind of network tells it, if that was trained; none within: no match.
-    pub fn worth(&self, network: &str) -> Option<Option<Crossing>> {
+    pub fn size_of(&self, network: &str) -> Option<Option<Crossing>> {
         self.curves.iter().find(|curve| curve.network == network).map(|curve| curve.capacity)
     }
 }

@@ -138,7 +138,7 @@ impl Place {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Taught {
-    /// Mean worth of its answers, `mean_clipped`: from −1 to 1.
+    /// Mean clipped margin of its answers, `mean_clipped`: from −1 to 1.
     pub fitness: f64,
     /// Its 95 % interval.
     pub fitness_interval: [f64; 2],

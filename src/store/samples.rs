@@ -13,7 +13,7 @@ pub fn run(robots: &[(&str, f64)]) -> RunFile {
     let config = Config::parse(BUILT_IN[0].1, BUILT_IN[0].0, &[]).unwrap();
     let image = |label| ImageRef { index: usize::from(label), label };
     let robot = |(number, (id, objective)): (usize, &(&str, f64))| {
-        let rng = &mut stream(1, Purpose::Newcomer, 0, number as u64);
+        let rng = &mut stream(1, Purpose::RandomImmigrant, 0, number as u64);
         let (genome, body) = Genome::random(config.body_spec(), &config.genome, rng).unwrap();
         Robot {
             id: id.to_string(),

@@ -83,7 +83,7 @@ impl Fitness {
         let mut sums = [best; 2];
         for (group, margin) in margins.filter_map(|(group, m)| Some((group, m?))) {
             for (way, m) in [margin, -margin].into_iter().enumerate() {
-                sums[way] += weights[group] * worth(m);
+                sums[way] += weights[group] * clipped_margin(m);
             }
         }
         let slack = if to_come == [0, 0] { 0.0 } else { SLACK };
@@ -92,8 +92,8 @@ impl Fitness {
     }
 }
 
-/// What an answer with this margin is worth in a mean: from −1 to 1.
-pub fn worth(margin: f64) -> f64 {
+/// A margin as it counts in a mean: divided by ten voxel lengths and clipped to −1 … 1.
+pub fn clipped_margin(margin: f64) -> f64 {
     (margin / ENOUGH).clamp(-1.0, 1.0)
 }
 

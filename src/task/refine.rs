@@ -14,7 +14,7 @@ use crate::base::random::{Purpose, Stream, stream};
 use crate::body::{Body, Material};
 use crate::genome::other_voxel;
 use crate::sim::{Physics, width};
-use crate::task::fitness::worth;
+use crate::task::fitness::clipped_margin;
 use crate::task::response::{CHOICES, Design, Evidence, Example, Gait, Lesson, Moments};
 use crate::task::teach::{Image, Rollouts};
 
@@ -181,15 +181,15 @@ impl<'a> Refinement<'a> {
         self.rollouts
     }
 
-    /// The champion's fitness: the weighted mean worth of its answers.
+    /// The champion's fitness: the weighted mean clipped margin of its answers.
     pub fn fitness(&self) -> f64 {
         let all: f64 = self.images.iter().map(|image| image.weight).sum();
-        let worths = self.images.iter().zip(&self.displacements).map(|(image, d)| self.worth(image, *d));
-        worths.sum::<f64>() / all
+        let scores = self.images.iter().zip(&self.displacements).map(|(image, d)| self.score(image, *d));
+        scores.sum::<f64>() / all
     }
 
-    fn worth(&self, image: &WeightedImage, displacement: f64) -> f64 {
-        image.weight * worth(image.right * displacement)
+    fn score(&self, image: &WeightedImage, displacement: f64) -> f64 {
+        image.weight * clipped_margin(image.right * displacement)
     }
 
     /// Lets a body challenge the champion.
@@ -312,12 +312,12 @@ impl<'a> Refinement<'a> {
 
     fn is_open(&self, number: usize) -> bool {
         let image = &self.images[number];
-        worth(image.right * self.displacements[number]) < 1.0
+        clipped_margin(image.right * self.displacements[number]) < 1.0
     }
 
     fn gain(&self, number: usize, displacement: f64) -> f64 {
         let image = &self.images[number];
-        self.worth(image, displacement) - self.worth(image, self.displacements[number])
+        self.score(image, displacement) - self.score(image, self.displacements[number])
     }
 
     /// Whether a challenger that goes on as it began, or somewhat better, will not beat the
@@ -339,7 +339,7 @@ impl<'a> Refinement<'a> {
                     }
                     None => {
                         let image = &self.images[*number];
-                        most += (image.weight - self.worth(image, self.displacements[*number])) / mean_weight;
+                        most += (image.weight - self.score(image, self.displacements[*number])) / mean_weight;
                         left += 1.0;
                     }
                 }

@@ -503,7 +503,7 @@ impl Lesson {
         self.objective = self.margins.iter().zip(&self.weights).map(worth).sum();
     }
 
-    /// The weighted mean [worth](crate::task::fitness::worth) of the margins: from −1 to 1, the
+    /// The weighted mean [worth](crate::task::fitness::clipped_margin) of the margins: from −1 to 1, the
     /// best.
     pub fn objective(&self) -> f64 {
         self.objective
@@ -806,7 +806,8 @@ mod tests {
         let weight: f64 = examples.iter().map(|example| example.weight).sum();
         let worth = |example: &Example| {
             let change = dot(slopes, &example.widths(design)) - dot(slopes, &example.widths(&gait.design()));
-            example.weight * crate::task::fitness::worth(example.right * (example.displacement + change))
+            example.weight
+                * crate::task::fitness::clipped_margin(example.right * (example.displacement + change))
         };
         examples.iter().map(worth).sum::<f64>() / weight
     }

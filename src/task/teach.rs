@@ -10,7 +10,7 @@ use crate::base::Grid;
 use crate::base::random::{Purpose, Stream, stream};
 use crate::body::{Body, Material};
 use crate::sim::Physics;
-use crate::task::fitness::worth;
+use crate::task::fitness::clipped_margin;
 use crate::task::refine::{Challenge, Refinement, WeightedImage};
 use crate::task::response::{CHOICES, Design, Evidence, Example, Gait, Lesson, Moments, Response, dot};
 
@@ -71,9 +71,9 @@ pub struct Image {
 pub struct Round {
     /// Its number, from 1.
     pub round: usize,
-    /// What the model said of the design: mean worth of its answers to all training images.
+    /// What the model said of the design: Mean clipped margin of its answers to all training images.
     pub predicted: f64,
-    /// Mean worth of its answers to the images of the round.
+    /// Mean clipped margin of its answers to the images of the round.
     pub measured: f64,
     /// By how far displacements were to the right of what the model said, on average \[voxel
     /// lengths\].
@@ -93,7 +93,7 @@ pub struct Taught {
     pub shown: Vec<usize>,
     /// Its displacement under each of them \[voxel lengths\].
     pub displacements: Vec<f64>,
-    /// Mean worth of its answers.
+    /// Mean clipped margin of its answers.
     pub objective: f64,
     /// Which way the first group walks: 1 right, −1 left.
     pub side: f64,
@@ -185,7 +185,7 @@ impl<'a> Teacher<'a> {
         teacher
     }
 
-    /// What the model says of the latest design: mean worth of its answers to all training images.
+    /// What the model says of the latest design: Mean clipped margin of its answers to all training images.
     pub fn predicted(&self) -> f64 {
         self.predicted
     }
@@ -238,7 +238,7 @@ impl<'a> Teacher<'a> {
             self.intercepts = known.into_iter().map(|intercept| intercept.unwrap_or(mean)).collect();
         }
         let of_itself = asked.iter().zip(&found).filter(|((_, design), _)| *design == self.design);
-        let measured = self.mean_worth(of_itself.map(|((number, _), found)| (*number, nowhere(*found))));
+        let measured = self.mean_score(of_itself.map(|((number, _), found)| (*number, nowhere(*found))));
         let before = self.design.clone();
         let (predicted, design) = self.solved(&before, self.side, |lesson| lesson.solve(&mut random));
         let round = Round {
@@ -365,17 +365,17 @@ impl<'a> Teacher<'a> {
         numbers.iter().map(|number| self.images[*number].condition).collect()
     }
 
-    /// Mean worth of displacements under training images, by their numbers; both groups weigh the
+    /// Mean clipped margin of displacements under training images, by their numbers; both groups weigh the
     /// same, however many images of each there are.
-    fn mean_worth(&self, answers: impl Iterator<Item = (usize, f64)>) -> f64 {
-        let (mut worths, mut counts) = ([0.0; 2], [0.0; 2]);
+    fn mean_score(&self, answers: impl Iterator<Item = (usize, f64)>) -> f64 {
+        let (mut scores, mut counts) = ([0.0; 2], [0.0; 2]);
         for (number, displacement) in answers {
             let right = self.images[number].example.right;
             let group = usize::from(right < 0.0);
-            worths[group] += worth(self.side * right * displacement);
+            scores[group] += clipped_margin(self.side * right * displacement);
             counts[group] += 1.0;
         }
-        let means = worths.iter().zip(&counts).filter(|(_, count)| **count > 0.0);
+        let means = scores.iter().zip(&counts).filter(|(_, count)| **count > 0.0);
         let means: Vec<f64> = means.map(|(worth, count)| worth / count).collect();
         means.iter().sum::<f64>() / means.len().max(1) as f64
     }

@@ -48,7 +48,7 @@ impl Estimate {
 /// What a gait could be taught.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Teachable {
-    /// Mean worth of its answers: from −1 to 1.
+    /// Mean clipped margin of its answers: from −1 to 1.
     pub fitness: Estimate,
     /// Share of its answers that are right.
     pub accuracy: Estimate,
@@ -148,7 +148,7 @@ impl<'a> Half<'a> {
         if right.0 >= left.0 { (right.1, 1.0) } else { (left.1, -1.0) }
     }
 
-    /// Mean worth of the answers of a design, and the share that are right.
+    /// Mean clipped margin of the answers of a design, and the share that are right.
     fn judged(&self, (design, side): &Solved, scatter: f64, threshold: f64) -> [Estimate; 2] {
         let total: f64 = self.examples.iter().map(|example| example.weight).sum();
         let fit = self.response.evidence.least_biased();
@@ -207,7 +207,7 @@ struct Answer {
     off: Vec<f64>,
 }
 
-/// The mean worth of margins that scatter normally about one, and by how much it grows with it.
+/// The Mean clipped margin of margins that scatter normally about one, and by how much it grows with it.
 fn expected_worth(margin: f64, scatter: f64, enough: f64) -> (f64, f64) {
     let [low, high] = [-enough, enough].map(|end| (end - margin) / scatter);
     let [below, under] = [low, high].map(normal);
@@ -315,7 +315,10 @@ mod tests {
                 steps().map(|x| 0.001 * density(x) * of(margin + scatter * x)).sum()
             };
             let (worth, slope) = expected_worth(margin, scatter, 10.0);
-            assert!((worth - mean(&|m| crate::task::fitness::worth(m))).abs() < 1e-6, "{margin} {scatter}");
+            assert!(
+                (worth - mean(&|m| crate::task::fitness::clipped_margin(m))).abs() < 1e-6,
+                "{margin} {scatter}"
+            );
             assert!((slope - mean(&|m| if m.abs() < 10.0 { 0.1 } else { 0.0 })).abs() < 1e-4);
             let (share, slope) = right(margin, scatter, 3.0);
             assert!((share - mean(&|m| if m > 3.0 { 1.0 } else { 0.0 })).abs() < 1e-3);

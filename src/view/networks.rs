@@ -64,7 +64,8 @@ pub(super) fn papers_table<'a>(
 ) {
     let rows = tasks.map(|(task, robots, accuracy, capacity)| {
         let paper = published::row(dataset, task);
-        let own = |network: &str| capacity.and_then(|known| known.worth(network)).map_or_else(unknown, size);
+        let own =
+            |network: &str| capacity.and_then(|known| known.size_of(network)).map_or_else(unknown, size);
         let theirs = |of: fn(&published::PaperRow) -> Option<f64>| {
             paper.map_or_else(unknown, |row| size(of(row).map(Crossing::At)))
         };

@@ -212,7 +212,7 @@ pub(super) fn audit(audit: &AuditFile) -> String {
 /// Capacities.
 pub(super) fn capacity(file: &CapacityFile) -> String {
     let rows = file.tasks.iter().map(|task| {
-        let own = |network: &str| or_none(task.worth(network), size);
+        let own = |network: &str| or_none(task.size_of(network), size);
         let paper = published::row(&file.dataset, &task.task);
         vec![
             task.task.clone(),
