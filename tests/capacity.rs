@@ -101,7 +101,7 @@ fn networks_are_trained_once_and_the_same_on_any_number_of_threads() {
 #[test]
 fn an_evaluation_shows_the_capacity_of_its_robots_and_of_no_others() {
     let sandbox = sandbox();
-    let known = capacity(&sandbox, "").tasks[0].worth("mlp").unwrap();
+    let known = capacity(&sandbox, "").tasks[0].size_of("mlp").unwrap();
     let eval = |robots: &str| {
         let archives = "--archive runs/3/run.json runs/4/run.json";
         sandbox.run(&format!("eval {archives} --images 40 --cycles 1 --robots {robots}")).ended(0, &[]).out
