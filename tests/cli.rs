@@ -366,7 +366,7 @@ fn an_error_blames_the_override_that_caused_it() {
     sandbox.run("evolve -c bad.toml -o run --set seed=4").ended(3, &["error: bad.toml:6: body.height = 0"]);
     // So it is with what else is set.
     sandbox.run("audit --set least_kept=2 --set threshold=1").ended(3, &["--set least_kept=2: "]);
-    sandbox.run("audit --set perturbations.start.9=1").ended(2, &["no perturbations.raised 9"]);
+    sandbox.run("audit --set perturbations.start.9=1").ended(2, &["no perturbations.start 9"]);
     sandbox
         .run("capacity --eval no.json --set step=2 --set mlp.epochs=0")
         .ended(3, &["--set mlp.epochs=0: "]);

@@ -116,9 +116,9 @@ fn unequal_groups_and_saturated_images() {
 }
 
 #[test]
-fn thresholded_images_and_newcomers() {
+fn thresholded_images_and_random_immigrants() {
     let config = TINY
         .replace("reduction = \"area\"", "reduction = \"area\"\nencoding = \"threshold\"\nlevel = 0.3")
-        .replace("parents = 8", "parents = 6\nnewcomers = 3");
+        .replace("parents = 8", "parents = 6\nrandom_immigrants = 3");
     check(&config, 2, &["known_bodies", "shared_lives"]);
 }
