@@ -12,7 +12,7 @@
 //!
 //! | layer | module | what is in it | begin with |
 //! |---|---|---|---|
-//! | 0 | [`base`] | random streams, hashes, whole-file writes, errors, what is told how a command goes on | [`base::error::Error`] |
+//! | 0 | [`base`] | random streams, hashes, whole-file writes, errors, observers, tables | [`base::error::Error`] |
 //! | 1 | [`body`] | bodies, which are the simulator's, and what they are known by | [`body::Body`] |
 //! | 2 | [`genome`] | CPPNs and their mutations | [`genome::Genome`] |
 //! | 2 | [`qd`] | archives and MAP-Elites over any type of solution | [`qd::MapElites`] |

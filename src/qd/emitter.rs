@@ -90,7 +90,7 @@ mod tests {
     }
 
     #[test]
-    fn parents_are_different_elites_and_newcomers_come_after() {
+    fn parents_are_different_elites_and_random_immigrants_come_after() {
         let params = EmitterParams { parents: 5, random_immigrants: 2, ..EmitterParams::default() };
         let asked = params.ask(&archive((0..90).map(|i| 3 * i)), 1, 4);
         assert_eq!(asked.iter().map(|p| p.child).collect::<Vec<_>>(), [0, 1, 2, 3, 4, 5, 6]);
