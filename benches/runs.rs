@@ -27,7 +27,7 @@ use std::sync::atomic::AtomicBool;
 const OVERRIDES: [&str; 5] = [
     "data.dataset=builtin",
     "data.train_images=[0, 1]",
-    "protocol.life=fresh",
+    "protocol.rollout=fresh",
     "generations=40",
     "protocol.control_steps=50",
 ];
@@ -41,7 +41,7 @@ fn stimulus(seed: usize) -> Grid<f64> {
     Grid::from_fn(14, 14, |row, column| f64::from(u8::from((row * 3 + column * 5 + seed).is_multiple_of(7))))
 }
 
-fn lives(criterion: &mut Criterion<Processor>) {
+fn rollouts(criterion: &mut Criterion<Processor>) {
     let config = config(&OVERRIDES[..4]);
     let mut group = criterion.benchmark_group("rollout, 500 control steps");
     group.sample_size(10);
@@ -67,9 +67,9 @@ fn evaluations(criterion: &mut Criterion) {
         ("eval: the full robot, 100 images", vec![&specimens[0].body], 100),
         ("eval: the mostly rigid robot, 100 images", vec![&specimens[3].body], 100),
     ];
-    let savings = Savings { known_bodies: false, early_stop: false, shared_lives: false };
-    let mut group =
-        criterion.benchmark_group(format!("lives of 50 control steps, {}", InstructionSet::in_use().name()));
+    let savings = Savings { known_bodies: false, early_stop: false, shared_rollouts: false };
+    let mut group = criterion
+        .benchmark_group(format!("rollouts of 50 control steps, {}", InstructionSet::in_use().name()));
     group.sample_size(10);
     for (name, bodies, images) in cases {
         let images: Vec<Grid<f64>> = (0..images).map(stimulus).collect();
@@ -122,7 +122,7 @@ fn bookkeeping(criterion: &mut Criterion) {
     });
 }
 
-criterion_group!(name = one_thread; config = Criterion::default().with_measurement(Processor); targets = lives);
+criterion_group!(name = one_thread; config = Criterion::default().with_measurement(Processor); targets = rollouts);
 // Threads that wait for each other, and files: what they take is the clock's time.
 criterion_group!(by_the_clock, evaluations, bookkeeping);
 criterion_main!(one_thread, by_the_clock);

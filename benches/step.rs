@@ -25,7 +25,7 @@ fn steps(criterion: &mut Criterion<Processor>) {
             let start = Start { column: 493, row: physics.ground_row };
             let mut world = World::new(Arc::clone(&system), start).with_instructions(set);
             world.set_stimulus(&stimulus);
-            (0..30).for_each(|_| world.step().expect("the life is stable"));
+            (0..30).for_each(|_| world.step().expect("the rollout is stable"));
             group.bench_function(set.name(), |bencher| bencher.iter(|| world.step()));
         }
     }

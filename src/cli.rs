@@ -16,6 +16,7 @@ use crate::base::error::Error;
 use crate::base::{error, signals};
 use crate::commands::one_by_one::Named;
 use crate::commands::plan::{PAPER_TOML, Plan};
+use crate::commands::schema::{self, Schema};
 use crate::commands::{bench, data, eval, one_by_one, replay, simulate};
 use crate::config;
 use crate::config::Config;
@@ -72,6 +73,14 @@ pub fn run(cli: Cli, console: &Console) -> Result<(), Error> {
         }
         Command::Config { name: Some(name), set } => {
             console.text(&Config::load(&name, &set)?.to_toml());
+            Ok(())
+        }
+        Command::Schema { name: None } => {
+            summary::schemas(console, &schema::ALL.map(|schema| (schema.name, schema.of)));
+            Ok(())
+        }
+        Command::Schema { name: Some(name) } => {
+            console.text(&format!("{:#}\n", Schema::named(&name)?.json()));
             Ok(())
         }
         Command::Completions { shell } => {

@@ -50,9 +50,9 @@ fn verdicts_are_the_same_bytes_on_any_number_of_threads_and_however_often_it_was
         ids(run.elites.iter().map(|r| &r.id).collect())
     );
     for (robot, elite) in file.robots.iter().zip(&run.elites) {
-        assert_eq!(robot.displacements.as_ref(), Some(&elite.displacements), "its life in its own run");
-        assert_eq!(robot.lives.is_empty(), robot.verdict == Verdict::NotAWalker);
-        assert!(robot.lives.iter().all(|life| life.persists) || robot.verdict != Verdict::Physical);
+        assert_eq!(robot.displacements.as_ref(), Some(&elite.displacements), "its rollout in its own run");
+        assert_eq!(robot.rollouts.is_empty(), robot.verdict == Verdict::NotAWalker);
+        assert!(robot.rollouts.iter().all(|rollout| rollout.persists) || robot.verdict != Verdict::Physical);
     }
     // Other criteria are another audit, which does not replace the one there is.
     let other = "audit --archive run/run.json --set threshold=1000";
@@ -229,16 +229,16 @@ fn what_cannot_be_audited_is_refused_with_what_to_do() {
 
 /// Stops an audit when it is half done.
 struct Impatient {
-    lives: AtomicU64,
+    rollouts: AtomicU64,
     stop: AtomicBool,
 }
 
 impl Observer for Impatient {
     fn begins(&self, work: &Work) {
-        self.lives.store(work.total, Ordering::Relaxed);
+        self.rollouts.store(work.total, Ordering::Relaxed);
     }
     fn progress(&self, done: u64) {
-        self.stop.fetch_or(2 * done > self.lives.load(Ordering::Relaxed), Ordering::Relaxed);
+        self.stop.fetch_or(2 * done > self.rollouts.load(Ordering::Relaxed), Ordering::Relaxed);
     }
     fn warning(&self, text: &str) {
         panic!("{text}");
@@ -251,7 +251,7 @@ fn what_a_stopped_audit_was_done_with_is_kept() {
     audit(&sandbox, "");
     let whole = verdicts(&sandbox);
     std::fs::remove_file(sandbox.path("run/audit.json")).unwrap();
-    let impatient = Impatient { lives: AtomicU64::new(0), stop: AtomicBool::new(false) };
+    let impatient = Impatient { rollouts: AtomicU64::new(0), stop: AtomicBool::new(false) };
     let options = Options {
         source: Source::Archive(sandbox.path("run/run.json")),
         robots: Selection::All,

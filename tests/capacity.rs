@@ -67,7 +67,7 @@ fn robots_that_know_less_than_the_smallest_network_are_worth_less_than_it() {
     let found: serde_json::Value = serde_json::from_str(&sandbox.read("runs/capacity.json")).unwrap();
     assert_eq!(found["tasks"][0]["curves"][1]["capacity"], serde_json::json!({ "below": 2.0 }));
     assert!(sandbox.read("runs/capacity.svg").contains("capacity &lt; 2"));
-    sandbox.run("report -q --archive runs/3 runs/4 --lives 0 -o runs/page.html").ended(0, &[]);
+    sandbox.run("report -q --archive runs/3 runs/4 --rollouts 0 -o runs/page.html").ended(0, &[]);
     assert!(sandbox.read("runs/page.html").contains(">&lt; 2<"));
 }
 

@@ -228,7 +228,7 @@ fn a_wrong_config_is_refused_with_file_line_and_key() {
     let two = ["own.toml:10", "task.groups", "a list of two"];
     wrong("own.toml", &TINY.replace("[[0], [1]]", "[[0], [1], [2]]"), &two);
     wrong("own.toml", &TINY.replace("[[0], [1]]", "[[0]]"), &two);
-    wrong("own.toml", &TINY.replace("\"fresh\"", "\"stale\""), &["own.toml:20", "protocol.life", "stale"]);
+    wrong("own.toml", &TINY.replace("\"fresh\"", "\"stale\""), &["own.toml:20", "protocol.rollout", "stale"]);
     wrong("own.toml", &TINY.replace("seed = 3", "seed = 3\nseed = 4"), &["own.toml:3", "duplicate key"]);
     wrong("own.toml", &TINY.replace("seed = 3", "sed = 3"), &["own.toml:2", "sed"]);
     // What is wrong with values that are well typed.
@@ -453,21 +453,21 @@ fn agree(ours: &[[f64; 2]], theirs: &[[f64; 2]]) {
 #[test]
 fn simulate_agrees_with_a_reference_trajectory() {
     let sandbox = Sandbox::new();
-    let life = scenario(&sandbox, "disc_5x5_00");
+    let rollout = scenario(&sandbox, "disc_5x5_00");
     let printed = sandbox.run("simulate scenario.json").ended(0, &[]);
     assert!(printed.err.is_empty(), "{}", printed.err);
-    agree(&rows(&printed.out), &life.com);
+    agree(&rows(&printed.out), &rollout.com);
     let written = sandbox.run("simulate scenario.json --out traj.csv").ended(0, &[]);
     assert!(written.out.is_empty());
     assert_eq!(sandbox.read("traj.csv"), printed.out);
 }
 
 #[test]
-fn an_unstable_life_ends_with_4_after_its_rows_and_says_when() {
+fn an_unstable_rollout_ends_with_4_after_its_rows_and_says_when() {
     let sandbox = Sandbox::new();
-    let life = scenario(&sandbox, "unstable_comb");
+    let rollout = scenario(&sandbox, "unstable_comb");
     let said = sandbox.run("simulate scenario.json").ended(4, &[]);
-    agree(&rows(&said.out), &life.com);
+    agree(&rows(&said.out), &rollout.com);
     let last = said.err.lines().last().unwrap();
     assert!(last.contains("unstable in control step 70"), "{last}");
     sandbox.run("simulate scenario.json -o traj.csv").ended(4, &["control step 70"]);
@@ -576,7 +576,7 @@ fn several_archives_are_named_in_the_same_way_by_every_command() {
         "plot -q archive",
         "plot -q progress",
         "plot -q body",
-        "report -q --lives 0",
+        "report -q --rollouts 0",
     ];
     for command in commands {
         for archives in ["--archive a b", "--archive a/run.json --archive b", "-a a -a b/run.json"] {
@@ -860,7 +860,7 @@ fn a_run_may_be_named_by_its_folder() {
         "audit -q -a run --robots top:1",
         "replay -q -a run --format gif",
         "plot accuracy -q -a run -o accuracy.svg",
-        "report -q run --lives 0",
+        "report -q run --rollouts 0",
     ] {
         sandbox.run(command).ended(0, &[]);
     }
@@ -871,7 +871,7 @@ fn a_run_may_be_named_by_its_folder() {
 }
 
 #[test]
-fn an_evaluation_that_cannot_be_written_fails_before_its_first_life() {
+fn an_evaluation_that_cannot_be_written_fails_before_its_first_rollout() {
     let sandbox = with_run();
     sandbox.write("file", "in the way");
     let said =
@@ -992,7 +992,7 @@ fn no_table_shows_a_minus_nothing() {
     sandbox.write("run/run.json", run.to_string());
     let mut said = sandbox.run("eval -a run -n 4 --cycles 1 --robots top:2").ended(0, &[]).out;
     said += &sandbox.run("replay -a run --format html").ended(0, &[]).out;
-    sandbox.run("report -q --archive run --lives 1").ended(0, &[]);
+    sandbox.run("report -q --archive run --rollouts 1").ended(0, &[]);
     sandbox.run("plot -q archive --archive run").ended(0, &[]);
     sandbox.run("plot -q body --archive run -o body.svg").ended(0, &[]);
     for file in ["run/report.html", "run/plot-archive.svg", "body.svg"] {
@@ -1072,8 +1072,8 @@ fn away_from_a_terminal_there_are_no_escape_sequences_with_or_without_no_color()
 #[test]
 fn a_reader_that_goes_away_is_no_error() {
     let sandbox = with_run();
-    let life = scenario(&sandbox, "disc_5x5_00");
-    assert_eq!(life.control_steps, 500);
+    let rollout = scenario(&sandbox, "disc_5x5_00");
+    assert_eq!(rollout.control_steps, 500);
     for args in [
         "simulate scenario.json",
         "config zero_one.toml",

@@ -129,8 +129,8 @@ fn pictures_and_trajectories_without_room_say_so_with_a_hint() {
         assert!(!said.err.contains(".tmp"), "{}", said.err);
         assert!(!sandbox.path(file).exists());
     };
-    without("simulate scenario.json --out life.csv", "life.csv");
+    without("simulate scenario.json --out rollout.csv", "rollout.csv");
     without("plot body --archive run/run.json --out body.svg", "body.svg");
-    without("report run --lives 0 --out report.html", "report.html");
+    without("report run --rollouts 0 --out report.html", "report.html");
     without("data sheet builtin --samples 1 --out sheet.png", "sheet.png");
 }

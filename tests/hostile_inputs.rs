@@ -62,7 +62,7 @@ train_images = [0, 1]
 [stimulus]
 reduction = "area"
 [protocol]
-life = "fresh"
+rollout = "fresh"
 control_steps = 20
 [map_elites]
 initial = 6
@@ -154,7 +154,7 @@ impl World {
             "physics": serde_json::to_value(morphcog::sim::Physics::default()).unwrap(),
         });
         let request = format!(
-            "POST /api/lives HTTP/1.1\r\nHost: 127.0.0.1:PORT\r\nOrigin: http://127.0.0.1:PORT\r\nContent-Length: LENGTH\r\n\r\n{}",
+            "POST /api/simulations HTTP/1.1\r\nHost: 127.0.0.1:PORT\r\nOrigin: http://127.0.0.1:PORT\r\nContent-Length: LENGTH\r\n\r\n{}",
             json!({ "subject": { "archive": 1, "robot": "ROBOT" }, "control_steps": 40, "speed": 0.0,
                     "shown": { "stimulus": [[0, 1, 0.5, 0], [1, 0, 0, 1], [0, 0, 1, 0]] } })
         );
@@ -243,8 +243,8 @@ fn scenario(world: &World, dice: &mut Dice, case: &mut Case) {
         rows += 1;
         if rows < 50 && begin.elapsed() < PATIENCE { Ok(()) } else { Err(gone()) }
     };
-    let lived = simulate(&scenario, row).map_err(|error| error.within("scenario.json"));
-    case.check(lived, "scenario.json");
+    let simulated = simulate(&scenario, row).map_err(|error| error.within("scenario.json"));
+    case.check(simulated, "scenario.json");
 }
 
 fn run(world: &World, dice: &mut Dice, case: &mut Case) {
@@ -377,9 +377,16 @@ fn request(world: &World, dice: &mut Dice, case: &mut Case) {
     if dice.below(3) > 0 {
         body = value(dice, &serde_json::from_slice(&body).unwrap()).to_string().into_bytes();
     }
-    let paths =
-        ["lives", "body", "stimulus", "scenario", "lives/1", "archives/1", "images?set=builtin&class=1"];
-    let mut head = head.replace("/api/lives", &format!("/api/{}", dice.pick(&paths)));
+    let paths = [
+        "rollouts",
+        "body",
+        "stimulus",
+        "scenario",
+        "rollouts/1",
+        "archives/1",
+        "images?set=builtin&class=1",
+    ];
+    let mut head = head.replace("/api/simulations", &format!("/api/{}", dice.pick(&paths)));
     head = head.replace("PORT", &world.port.to_string()).replace("LENGTH", &body.len().to_string());
     case.input = [head.as_bytes(), b"\r\n\r\n", &body].concat();
     if dice.below(2) == 0 {
@@ -461,11 +468,11 @@ fn mutated_inputs_are_refused_or_used_and_nothing_else_ever_happens() {
             let begin = Instant::now();
             *AT_WORK.lock().unwrap() = Some((label.clone(), begin));
             let mut case = Case::default();
-            let lived = catch_unwind(AssertUnwindSafe(|| {
+            let simulated = catch_unwind(AssertUnwindSafe(|| {
                 target(&world, &mut Dice::new(kind, number), &mut case);
                 assert_eq!(PANICS.load(Ordering::Relaxed), 0, "a panic in another thread");
             }));
-            if lived.is_err() {
+            if simulated.is_err() {
                 failures.push(kept(&label, &case.input));
                 PANICS.store(0, Ordering::Relaxed);
             }
@@ -527,7 +534,7 @@ fn the_worst_inputs_end_soon_in_every_command_that_reads_them() {
         match kind.as_str() {
             "scenario" => {
                 file("scenario.json");
-                put_to("simulate hostile/scenario.json --out hostile/life.csv", "scenario.json");
+                put_to("simulate hostile/scenario.json --out hostile/rollout.csv", "scenario.json");
             }
             "run" => {
                 file("run.json");

@@ -26,7 +26,7 @@ fn only_so_many_of_the_fittest_stay_and_savings_and_stops_change_nothing() {
         first_of_all.sort_by(|a, b| b.objective.total_cmp(&a.objective));
         assert!(all.len() > 6 || all.len() == first.len());
         assert_eq!(first_of_all, fittest);
-        let savings = "savings.known_bodies savings.shared_lives savings.early_stop";
+        let savings = "savings.known_bodies savings.shared_rollouts savings.early_stop";
         let off: String = savings.split(' ').map(|key| format!(" --set {key}=false")).collect();
         if !text.contains("response") {
             assert_eq!(elites(&sandbox, "other", &text, &format!("--force{off}")), kept);

@@ -59,13 +59,13 @@ fn bits(mut world: World) -> impl Iterator<Item = Vec<u8>> {
 #[test]
 fn every_point_of_the_golden_simulations_has_the_same_bits_after_every_control_step() {
     let physics = Physics::default();
-    let hash = |life: &Reference| {
-        let steps = life.control_steps as usize + 1;
-        let all: Vec<u8> = bits(life.world(&physics)).take(steps).flatten().collect();
-        (life.name.clone(), sha256_hex(&all))
+    let hash = |rollout: &Reference| {
+        let steps = rollout.control_steps as usize + 1;
+        let all: Vec<u8> = bits(rollout.world(&physics)).take(steps).flatten().collect();
+        (rollout.name.clone(), sha256_hex(&all))
     };
-    let lives: Vec<Reference> = references().into_iter().chain(sensitive()).collect();
-    let found: Vec<_> = lives.par_iter().map(hash).collect();
+    let rollouts: Vec<Reference> = references().into_iter().chain(sensitive()).collect();
+    let found: Vec<_> = rollouts.par_iter().map(hash).collect();
     let pinned = SIMULATIONS.map(|(name, hash)| (name.to_string(), hash.to_string()));
     assert_eq!(found, pinned, "these numbers have moved; see the beginning of this file");
 }
@@ -98,15 +98,15 @@ fn nudged(constants: &Map<String, Value>, name: &str) -> Physics {
 fn the_golden_simulations_feel_the_least_change_of_every_constant_or_its_bits_are_pinned() {
     let physics = Physics::default();
     let Value::Object(constants) = serde_json::to_value(&physics).unwrap() else { panic!("not by name") };
-    let lives = references();
+    let rollouts = references();
     // Within this number of control steps.
     let steps = 100;
     let felt = |name: &str| {
         let changed = nudged(&constants, name);
         assert_ne!(changed, physics, "{name}");
-        lives.iter().any(|life| {
-            let ours = bits(life.world(&physics)).take(steps);
-            !ours.eq(bits(life.world(&changed)).take(steps))
+        rollouts.iter().any(|rollout| {
+            let ours = bits(rollout.world(&physics)).take(steps);
+            !ours.eq(bits(rollout.world(&changed)).take(steps))
         })
     };
     let names: Vec<&String> = constants.keys().collect();
@@ -138,8 +138,8 @@ fn hash_of_run(config: &str) -> String {
 
 #[test]
 fn a_run_by_the_paper_s_protocol_has_the_same_elites_bit_for_bit() {
-    let ours = "life = \"fresh\"\ncontrol_steps = 20";
-    let paper = "life = \"sequential\"\ncontrol_steps = 500";
+    let ours = "rollout = \"fresh\"\ncontrol_steps = 20";
+    let paper = "rollout = \"sequential\"\ncontrol_steps = 500";
     assert!(TINY.contains(ours));
     assert_eq!(hash_of_run(&TINY.replace(ours, paper)), SEQUENTIAL_RUN, "see the beginning of this file");
 }

@@ -13,7 +13,7 @@ use morphcog::data::files::places;
 use morphcog::sim::{Physics, System};
 use morphcog::store::eval::EvalFile;
 use morphcog::task::grouping::Group::{A, B};
-use morphcog::task::protocol::{Life, Protocol};
+use morphcog::task::protocol::{Protocol, RolloutMode};
 use morphcog::task::rollout::{Rollout, fresh_rollout};
 use morphcog::task::score::two_group_fitness;
 use morphcog::task::stimulus::{Encoding, Reduction, StimulusParams, stimulus};
@@ -59,17 +59,18 @@ fn stimuli() -> Vec<Grid<f64>> {
 /// Displacements under the protocol of the robot's task.
 fn displacements(robot: &Published, stimuli: &[Grid<f64>], physics: &Physics) -> Vec<f64> {
     let system = Arc::new(System::new(&robot.body, physics.clone()));
-    let protocol = |life, control_steps| Protocol { life, control_steps, start_row: 2, start_column: 493 };
+    let protocol =
+        |rollout, control_steps| Protocol { rollout, control_steps, start_row: 2, start_column: 493 };
     match robot.task.as_str() {
         "zero_one" => {
-            let protocol = protocol(Life::Sequential, 500);
+            let protocol = protocol(RolloutMode::Sequential, 500);
             let mut rollout = Rollout::new(&system, &protocol);
             stimuli[..2].iter().map(|stimulus| rollout.show(stimulus, |_| ()).unwrap()).collect()
         }
         "four_digit" => {
-            let protocol = protocol(Life::Fresh, 250);
-            let life = |stimulus| fresh_rollout(&system, &protocol, stimulus, &NEVER).unwrap().unwrap();
-            stimuli.iter().map(life).collect()
+            let protocol = protocol(RolloutMode::Fresh, 250);
+            let rollout = |stimulus| fresh_rollout(&system, &protocol, stimulus, &NEVER).unwrap().unwrap();
+            stimuli.iter().map(rollout).collect()
         }
         other => panic!("no protocol for {other}"),
     }
@@ -124,7 +125,7 @@ fn the_built_in_gallery_holds_these_very_robots() {
         assert_eq!(published.task, "zero_one");
     }
     let config = gallery::config().unwrap();
-    assert_eq!((config.protocol.life, config.protocol.control_steps), (Life::Sequential, 500));
+    assert_eq!((config.protocol.rollout, config.protocol.control_steps), (RolloutMode::Sequential, 500));
     assert_eq!((config.protocol.start_row, config.protocol.start_column), (2, 493));
     assert_eq!(config.data.train_images.as_deref(), Some(&IMAGES[..2]));
     assert_eq!(config.physics, Physics::default());

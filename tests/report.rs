@@ -29,19 +29,20 @@ fn every_elite_can_be_played_and_nothing_is_loaded() {
         assert!(!found, "{forbidden}");
     }
     let run = sandbox.run_file("runs/3");
-    let lives = between(&page, "data-life=\"", "\"");
+    let rollouts = between(&page, "data-rollout=\"", "\"");
     for elite in &run.elites {
-        let id = format!("life-0-{}", elite.id);
-        assert!(lives.contains(&id.as_str()) && page.contains(&format!("id=\"{id}\"")), "{id}");
+        let id = format!("rollout-0-{}", elite.id);
+        assert!(rollouts.contains(&id.as_str()) && page.contains(&format!("id=\"{id}\"")), "{id}");
     }
     // What is packed is a rollout of that robot.
     let id = &run.elites[0].id;
-    let packed = between(&page, &format!("id=\"life-0-{id}\">"), "</script>")[0];
+    let packed = between(&page, &format!("id=\"rollout-0-{id}\">"), "</script>")[0];
     let bytes = base64::Engine::decode(&base64::engine::general_purpose::STANDARD, packed).unwrap();
-    let life: serde_json::Value = serde_json::from_reader(flate2::read::GzDecoder::new(&bytes[..])).unwrap();
-    assert_eq!(life["robot"], id.as_str());
-    assert_eq!(life["phases"].as_array().unwrap().len(), 2);
-    let walked = life["phases"][0]["displacement"].as_f64().unwrap();
+    let rollout: serde_json::Value =
+        serde_json::from_reader(flate2::read::GzDecoder::new(&bytes[..])).unwrap();
+    assert_eq!(rollout["robot"], id.as_str());
+    assert_eq!(rollout["phases"].as_array().unwrap().len(), 2);
+    let walked = rollout["phases"][0]["displacement"].as_f64().unwrap();
     assert!((walked - run.elites[0].displacements[0]).abs() < 1e-9);
     sandbox.run("report runs/3/run.json -o again.html").ended(0, &[]);
     let same = |page: &str| page.replace("runs/3/run.json", "").replace("runs/3", "");
@@ -64,27 +65,27 @@ fn what_lies_beside_the_run_is_in_it_and_several_runs_go_together() {
     assert!(page.contains("id=\"run0\"") && page.contains("id=\"run1\""));
     // The same run by another path would stand there twice.
     sandbox
-        .run("report runs/3 runs/3/run.json --lives 0")
+        .run("report runs/3 runs/3/run.json --rollouts 0")
         .ended(2, &["runs/3/run.json", "expected different runs"]);
     // Networks that other robots are worth are not put beside this test; without a test they stand
     // for themselves.
     sandbox.run("eval -q --archive runs/3/run.json --images 20 --cycles 1 --robots top:2").ended(0, &[]);
     let capacity = |sandbox: &Sandbox| sandbox.read("runs/3/report.html").contains("Capacity");
     sandbox
-        .run("report runs/3 --lives 0")
+        .run("report runs/3 --rollouts 0")
         .ended(0, &["capacity.json: it is not of the robots of", "left out"]);
     assert!(!capacity(&sandbox));
     std::fs::remove_file(sandbox.path("runs/3/eval.json")).unwrap();
-    let said = sandbox.run("report runs/3 --lives 0").ended(0, &[]);
+    let said = sandbox.run("report runs/3 --rollouts 0").ended(0, &[]);
     assert!(capacity(&sandbox) && !said.err.contains("left out"), "{}", said.err);
     // Nor would two states of one run be two.
     sandbox.run("evolve -q -c tiny.toml --seed 3 -g 14 -o later").ended(0, &[]);
     sandbox.run("eval -a runs/3 later --images 20").ended(2, &["later/run.json", "two states of one"]);
     // A broken file is left out, and said to be.
     sandbox.write("runs/3/eval.json", "{");
-    sandbox.run("report runs/3 --lives 0").ended(0, &["eval.json", "left out"]);
+    sandbox.run("report runs/3 --rollouts 0").ended(0, &["eval.json", "left out"]);
     let page = sandbox.read("runs/3/report.html");
-    assert!(!page.contains("Test on held-out images") && !page.contains("id=\"life-"));
+    assert!(!page.contains("Test on held-out images") && !page.contains("id=\"rollout-"));
 }
 
 #[test]
@@ -93,12 +94,13 @@ fn what_was_found_of_another_state_of_a_run_is_left_out_and_what_was_stopped_is_
     sandbox.run("eval -q --archive runs/3 --images 20 --cycles 1 --robots top:2").ended(0, &[]);
     let whole = sandbox.read("runs/3/eval.json");
     sandbox.write("runs/3/eval.json", whole.replace("\"stopped\":false", "\"stopped\":true"));
-    sandbox.run("report runs/3 --lives 0").ended(0, &[]);
+    sandbox.run("report runs/3 --rollouts 0").ended(0, &[]);
     assert!(sandbox.read("runs/3/report.html").contains("stopped before the last of them"));
     sandbox.write("runs/3/capacity.json", "{");
     sandbox.run("evolve -q -c tiny.toml -o runs/3 --resume -g 90").ended(0, &[]);
-    let said =
-        sandbox.run("report runs/3 --lives 0").ended(0, &["eval.json: stale", "capacity.json", "left out"]);
+    let said = sandbox
+        .run("report runs/3 --rollouts 0")
+        .ended(0, &["eval.json: stale", "capacity.json", "left out"]);
     assert!(!sandbox.read("runs/3/report.html").contains("Test on held-out images"), "{said:?}");
     sandbox.run("plot accuracy -a runs/3").ended(3, &["eval.json: stale", "morphcog eval"]);
     let trained = "capacity --eval runs/3/eval.json --set trainings=1 --set sizes=[1,3]";
@@ -149,7 +151,7 @@ fn its_commands_make_it_again() {
         "step=2",
     ])
     .ended(0, &[]);
-    told(&["report", "-q", run, "--lives", "0"]).ended(0, &[]);
+    told(&["report", "-q", run, "--rollouts", "0"]).ended(0, &[]);
     let page = sandbox.read(&format!("{run}/report.html"));
     let commands = between(&page, "<pre>morphcog evolve", "</pre>")[0];
     let commands = format!("morphcog evolve{commands}").replace("&#39;", "'").replace("&amp;", "&");

@@ -39,7 +39,7 @@ fn a_click_on_a_cell_plays_its_robot() {
         tab.eval(&format!("document.querySelector('.cells [data-robot=\"{other}\"]').click()"));
         tab.wait(&format!("document.querySelector('.about').textContent.startsWith('{other}')"));
         tab.wait(&format!(
-            "{playing} && JSON.parse(document.querySelector('iframe').contentDocument.getElementById('life').textContent).robot === '{other}'"
+            "{playing} && JSON.parse(document.querySelector('iframe').contentDocument.getElementById('rollout').textContent).robot === '{other}'"
         ));
         assert_eq!(tab.eval(chosen), other.as_str());
         // From cell to cell by keys.

@@ -82,7 +82,7 @@ fn it_is_the_same_on_threads_without_savings_and_resumed() {
     evolve(&sandbox, "two", "--threads 2");
     assert_eq!(read("two"), read("one"));
     let off =
-        "--set savings.early_stop=false --set savings.known_bodies=false --set savings.shared_lives=false";
+        "--set savings.early_stop=false --set savings.known_bodies=false --set savings.shared_rollouts=false";
     assert_eq!(evolve(&sandbox, "slow", off).elites, run.elites);
     evolve(&sandbox, "again", "--generations 5 --threads 2");
     evolve(&sandbox, "again", "--generations 12 --resume");

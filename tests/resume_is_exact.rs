@@ -227,7 +227,7 @@ fn resuming_with_another_config_is_refused_naming_the_key() {
         ("data.builtin.seed=2", "data.builtin.seed"),
         ("data.images_per_class=2", "data.images_per_class"),
         ("stimulus.encoding=saturated", "stimulus.encoding"),
-        ("protocol.life=sequential", "protocol.life"),
+        ("protocol.rollout=sequential", "protocol.rollout"),
         ("protocol.control_steps=21", "protocol.control_steps"),
         ("map_elites.parents=9", "map_elites.parents"),
         ("archive.qd_offset=1", "archive.qd_offset"),

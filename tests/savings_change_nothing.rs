@@ -8,7 +8,7 @@ use morphcog::store::run::Robot;
 use std::collections::BTreeMap;
 
 /// All three savings; bit `i` of a combination switches the `i`-th on.
-const SAVINGS: [&str; 3] = ["known_bodies", "early_stop", "shared_lives"];
+const SAVINGS: [&str; 3] = ["known_bodies", "early_stop", "shared_rollouts"];
 
 /// The last line of `metrics.csv` by column; in every line the counts must add up.
 fn totals(metrics: &str, images: u64) -> BTreeMap<String, u64> {
@@ -72,7 +72,7 @@ fn all_splits() {
     let config = TINY
         .replace("groups = [[0], [1]]", "splits = [0, 1, 2, 3]")
         .replace("train_images = [0, 1]", "train_images = [0, 1, 2, 3]");
-    check(&config, 4, &["known_bodies", "shared_lives"]);
+    check(&config, 4, &["known_bodies", "shared_rollouts"]);
 }
 
 #[test]
@@ -81,14 +81,14 @@ fn all_splits_with_the_bin_for_the_same_way() {
         .replace("generations = 12", "generations = 25")
         .replace("groups = [[0], [1]]", "splits = [3, 0, 7]\nsame_way_bin = true")
         .replace("train_images = [0, 1]", "train_images = [0, 3, 7]");
-    check(&config, 3, &["known_bodies", "shared_lives"]);
+    check(&config, 3, &["known_bodies", "shared_rollouts"]);
 }
 
 #[test]
-fn sequential_lives() {
+fn sequential_rollouts() {
     let config = TINY
         .replace("generations = 12", "generations = 30")
-        .replace("life = \"fresh\"", "life = \"sequential\"");
+        .replace("rollout = \"fresh\"", "rollout = \"sequential\"");
     check(&config, 2, &["known_bodies", "early_stop"]);
 }
 
@@ -103,7 +103,7 @@ fn splits_with_two_images_per_class() {
     let config = TINY
         .replace("groups = [[0], [1]]", "splits = [0, 1, 2]\nsame_way_bin = true")
         .replace("train_images = [0, 1]", "images_per_class = 2");
-    check(&config, 6, &["known_bodies", "shared_lives"]);
+    check(&config, 6, &["known_bodies", "shared_rollouts"]);
 }
 
 #[test]
@@ -112,7 +112,7 @@ fn unequal_groups_and_saturated_images() {
         .replace("groups = [[0], [1]]", "groups = [[5], [1, 2]]")
         .replace("train_images = [0, 1]", "train_images = [1, 5, 2, 12]")
         .replace("reduction = \"area\"", "reduction = \"area\"\nencoding = \"saturated\"");
-    check(&config, 4, &["known_bodies", "shared_lives"]);
+    check(&config, 4, &["known_bodies", "shared_rollouts"]);
 }
 
 #[test]
@@ -120,5 +120,5 @@ fn thresholded_images_and_random_immigrants() {
     let config = TINY
         .replace("reduction = \"area\"", "reduction = \"area\"\nencoding = \"threshold\"\nlevel = 0.3")
         .replace("parents = 8", "parents = 6\nrandom_immigrants = 3");
-    check(&config, 2, &["known_bodies", "shared_lives"]);
+    check(&config, 2, &["known_bodies", "shared_rollouts"]);
 }

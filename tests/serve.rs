@@ -13,7 +13,7 @@ use common::server::{Answer, Server};
 use morphcog::analysis::gallery;
 use morphcog::base::Grid;
 use morphcog::data::dataset::{BUILTIN, Dataset, Split};
-use morphcog::serve::lives::MAX_LIVES;
+use morphcog::serve::simulations::MAX_SIMULATIONS;
 use morphcog::sim::Physics;
 use morphcog::task::direction::Direction;
 use morphcog::task::protocol::Protocol;
@@ -117,7 +117,7 @@ fn what_is_wrong_is_refused_with_one_line_and_hurts_nothing() {
     let wrong = server.send(format!("POST / HTTP/1.1\r\n{own}Content-Length: 0\r\n\r\n"));
     refused(&wrong, 405, "GET");
     assert_eq!(wrong.header("allow"), "GET, HEAD");
-    refused(&server.get("/api/lives"), 405, "POST");
+    refused(&server.get("/api/simulations"), 405, "POST");
     refused(&server.send(format!("DELETE /api/status HTTP/1.1\r\n{own}\r\n")), 405, "GET");
 
     // Names that others let point here, and pages of others.
@@ -177,18 +177,18 @@ fn what_is_wrong_is_refused_with_one_line_and_hurts_nothing() {
         (json!({ "subject": { "body": [[3]] }, "shown": { "stimulus": [[1.5]] } }), "0 to 1"),
         (json!({ "subject": robot, "shown": { "stimulus": [[0.5]], "drawing": [[5]] } }), "one of"),
     ] {
-        refused(&server.post("/api/lives", &request), 400, words);
+        refused(&server.post("/api/simulations", &request), 400, words);
     }
-    refused(&server.post_text("/api/lives", "{\"subject\": "), 400, "request:1");
-    refused(&server.post_bytes("/api/lives", &[0xff, 0xfe]), 400, "UTF-8");
+    refused(&server.post_text("/api/simulations", "{\"subject\": "), 400, "request:1");
+    refused(&server.post_bytes("/api/simulations", &[0xff, 0xfe]), 400, "UTF-8");
     refused(
-        &server.post("/api/lives", &json!({ "subject": { "archive": 0, "robot": "x" } })),
+        &server.post("/api/simulations", &json!({ "subject": { "archive": 0, "robot": "x" } })),
         404,
         "no robot",
     );
     let image = json!({ "subject": robot, "shown": { "image": { "set": "builtin", "index": 99_999_999 } } });
-    refused(&server.post("/api/lives", &image), 404, "99999999");
-    refused(&server.post("/api/lives/5", &json!({ "paused": true })), 404, "no simulation 5");
+    refused(&server.post("/api/simulations", &image), 404, "99999999");
+    refused(&server.post("/api/simulations/5", &json!({ "paused": true })), 404, "no simulation 5");
     refused(
         &server.post_text("/api/scenario", "{\"body\": [[3]], \"physics\": {\"substeps\": 9}}"),
         400,
@@ -198,7 +198,7 @@ fn what_is_wrong_is_refused_with_one_line_and_hurts_nothing() {
 
     // After all that it is well, and no simulation has begun.
     let status = json_of(&server.get("/api/status"));
-    assert_eq!((&status["lives"], &status["begun"]), (&json!(0), &json!(0)));
+    assert_eq!((&status["simulations"], &status["begun"]), (&json!(0), &json!(0)));
     server.ended_by("INT");
 }
 
@@ -248,17 +248,17 @@ fn moments(text: &str, points: usize) -> Vec<Frame> {
 }
 
 #[test]
-fn a_life_is_what_the_engine_computes() {
+fn a_simulation_is_what_the_engine_computes() {
     let sandbox = Sandbox::new();
     let server = Server::start(&sandbox, "");
     let request = json!({
         "subject": { "archive": 0, "robot": "QMAXD" }, "shown": { "drawing": drawing() },
         "control_steps": 120, "speed": 0,
     });
-    let events: Vec<(String, Value)> = server.events("/api/lives", &request).collect();
+    let events: Vec<(String, Value)> = server.events("/api/simulations", &request).collect();
     let names: Vec<&str> = events.iter().map(|(name, _)| name.as_str()).collect();
     assert_eq!((names[0], names[names.len() - 1]), ("begin", "end"));
-    assert!(names[1..names.len() - 1].iter().all(|name| *name == "lived"));
+    assert!(names[1..names.len() - 1].iter().all(|name| *name == "moments"));
 
     let config = gallery::config().unwrap();
     let robot = gallery::find("QMAXD").unwrap().unwrap();
@@ -295,13 +295,13 @@ fn a_life_is_what_the_engine_computes() {
 }
 
 #[test]
-fn a_body_of_ones_own_lives_as_simulate_has_it() {
+fn a_body_of_ones_own_simulations_as_simulate_has_it() {
     let sandbox = Sandbox::new();
     let server = Server::start(&sandbox, "");
     let stimulus = json!([[0, 0.5, 1], [0, 0, 1]]);
     let body = json!([[3, 3, 6], [4, 0, 5]]);
     let request = json!({ "subject": { "body": body }, "shown": { "stimulus": stimulus }, "control_steps": 60, "speed": 0 });
-    let (_, end) = server.events("/api/lives", &request).last().unwrap();
+    let (_, end) = server.events("/api/simulations", &request).last().unwrap();
     let scenario = json!({ "body": body, "stimulus": stimulus, "control_steps": 60 });
     sandbox.write("scenario.json", scenario.to_string());
     let said = sandbox.run("simulate scenario.json").ended(0, &[]);
@@ -313,14 +313,14 @@ fn a_body_of_ones_own_lives_as_simulate_has_it() {
 }
 
 #[test]
-fn a_life_keeps_its_pace_and_is_told_to_change() {
+fn a_simulation_keeps_its_pace_and_is_told_to_change() {
     let sandbox = Sandbox::new();
     let server = Server::start(&sandbox, "");
     let request = json!({ "subject": { "body": [[3, 6, 4]] }, "control_steps": 50, "speed": 1 });
     let begun = Instant::now();
-    let mut events = server.events("/api/lives", &request);
+    let mut events = server.events("/api/simulations", &request);
     let (_, begin) = events.next().unwrap();
-    let path = format!("/api/lives/{}", begin["id"]);
+    let path = format!("/api/simulations/{}", begin["id"]);
     assert_eq!(server.post(&path, &json!({ "paused": true })).status, 204);
     std::thread::sleep(Duration::from_millis(600));
     refused(&server.post(&path, &json!({ "speed": 1000 })), 400, "speed");
@@ -338,33 +338,33 @@ fn a_life_keeps_its_pace_and_is_told_to_change() {
 }
 
 #[test]
-fn lives_end_when_nobody_listens_and_only_so_many_run() {
+fn simulations_end_when_nobody_listens_and_only_so_many_run() {
     let sandbox = Sandbox::new();
     let server = Server::start(&sandbox, "");
-    let lives = || json_of(&server.get("/api/status"))["lives"].as_u64().unwrap() as usize;
+    let simulations = || json_of(&server.get("/api/status"))["simulations"].as_u64().unwrap() as usize;
     let wait_for = |count: usize| {
         let until = Instant::now() + Duration::from_secs(5);
-        while lives() != count {
-            assert!(Instant::now() < until, "{} lives, expected {count}", lives());
+        while simulations() != count {
+            assert!(Instant::now() < until, "{} simulations, expected {count}", simulations());
             std::thread::sleep(Duration::from_millis(20));
         }
     };
     let request = json!({ "subject": { "body": [[3, 6, 4]] }, "control_steps": 5000, "speed": 1 });
     let begin = || {
-        let mut events = server.events("/api/lives", &request);
+        let mut events = server.events("/api/simulations", &request);
         let (_, begin) = events.next().unwrap();
         (begin["id"].as_u64().unwrap(), events)
     };
-    let mut open: Vec<_> = (0..MAX_LIVES).map(|_| begin()).collect();
-    wait_for(MAX_LIVES);
-    refused(&server.post("/api/lives", &request), 503, "simulations are running");
+    let mut open: Vec<_> = (0..MAX_SIMULATIONS).map(|_| begin()).collect();
+    wait_for(MAX_SIMULATIONS);
+    refused(&server.post("/api/simulations", &request), 503, "simulations are running");
     // One stands still when its tab closes.
     let (paused, events) = open.remove(0);
-    server.post(&format!("/api/lives/{paused}"), &json!({ "paused": true }));
+    server.post(&format!("/api/simulations/{paused}"), &json!({ "paused": true }));
     drop(events);
-    wait_for(MAX_LIVES - 1);
+    wait_for(MAX_SIMULATIONS - 1);
     open.push(begin());
-    wait_for(MAX_LIVES);
+    wait_for(MAX_SIMULATIONS);
     open.clear();
     wait_for(0);
 

@@ -132,23 +132,23 @@ fn a_drawn_zero_and_a_drawn_one_are_told_apart_and_the_page_fits_everywhere() {
 }
 
 #[test]
-fn a_life_ends_with_its_tab() {
+fn a_simulation_ends_with_its_tab() {
     let sandbox = Sandbox::new();
     let Some(mut browser) = browser(&sandbox) else { return };
     let server = Server::start(&sandbox, "");
-    let lives = || -> Value {
+    let simulations = || -> Value {
         let status: Value = serde_json::from_str(&server.get("/api/status").body).unwrap();
-        status["lives"].clone()
+        status["simulations"].clone()
     };
     let mut tab = browser.tab(800, 600, false);
     open(&mut tab, &server);
     tab.wait("document.getElementById('step').textContent.startsWith('step ')");
     tab.eval("document.getElementById('play').click()");
-    assert_eq!(lives(), 1);
+    assert_eq!(simulations(), 1);
     tab.close();
     let until = Instant::now() + Duration::from_secs(5);
-    while lives() != 0 {
-        assert!(Instant::now() < until, "{} lives", lives());
+    while simulations() != 0 {
+        assert!(Instant::now() < until, "{} simulations", simulations());
         std::thread::sleep(Duration::from_millis(30));
     }
 }

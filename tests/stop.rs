@@ -122,23 +122,23 @@ fn commands_that_have_nothing_to_save_are_ended_by_the_signal_and_leave_no_file(
 }
 
 #[test]
-fn a_life_that_is_watched_ends_with_its_tab_and_with_the_server() {
+fn a_rollout_that_is_watched_ends_with_its_tab_and_with_the_server() {
     let sandbox = Sandbox::new();
     let server = Server::start(&sandbox, "");
     let body: Vec<Vec<u8>> =
         (0..64).map(|row| (0..64).map(|c| 3 + ((row + c) % 2) as u8).collect()).collect();
-    let life = serde_json::json!({ "subject": { "body": body }, "control_steps": 5000, "speed": 0 });
+    let rollout = serde_json::json!({ "subject": { "body": body }, "control_steps": 5000, "speed": 0 });
     let running = || server.get("/api/status").body;
-    let mut events = server.events("/api/lives", &life);
+    let mut events = server.events("/api/simulations", &rollout);
     events.next().unwrap();
-    assert!(running().contains("\"lives\":1"), "{}", running());
+    assert!(running().contains("\"simulations\":1"), "{}", running());
     drop(events);
     let begin = Instant::now();
-    while !running().contains("\"lives\":0") {
+    while !running().contains("\"simulations\":0") {
         assert!(begin.elapsed() < SOON, "{}", running());
         std::thread::sleep(Duration::from_millis(10));
     }
-    let mut events = server.events("/api/lives", &life);
+    let mut events = server.events("/api/simulations", &rollout);
     events.next().unwrap();
     server.ended_by("TERM");
 }

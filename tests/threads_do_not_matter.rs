@@ -11,17 +11,17 @@ fn configs() -> Vec<(&'static str, String)> {
     let splits = TINY
         .replace("groups = [[0], [1]]", "splits = [0, 1, 2]\nsame_way_bin = true")
         .replace("train_images = [0, 1]", "train_images = [0, 1, 2]");
-    let sequential = "life = \"sequential\"";
+    let sequential = "rollout = \"sequential\"";
     let drawn = "images_per_class = 3";
     vec![
         ("fresh", TINY.to_string()),
-        ("sequential", TINY.replace("life = \"fresh\"", sequential)),
+        ("sequential", TINY.replace("rollout = \"fresh\"", sequential)),
         ("many", TINY.replace("train_images = [0, 1]", drawn).replace("[[0], [1]]", "[[0, 4], [1]]")),
         ("splits", splits.clone()),
-        ("splits-sequential", splits.replace("life = \"fresh\"", sequential)),
+        ("splits-sequential", splits.replace("rollout = \"fresh\"", sequential)),
         (
             "no-savings",
-            format!("{TINY}\n[savings]\nknown_bodies = false\nearly_stop = false\nshared_lives = false\n"),
+            format!("{TINY}\n[savings]\nknown_bodies = false\nearly_stop = false\nshared_rollouts = false\n"),
         ),
     ]
 }

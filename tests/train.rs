@@ -87,6 +87,14 @@ fn a_training_ends_with_the_same_bytes_on_any_threads_and_after_any_stop() {
         }
     }
     assert!(files(&sandbox.path("two")).keys().all(|name| !name.contains("tmp")));
+    // After its end it goes on with more challengers, as if there had been as many from the start.
+    let more = |options: &str| train("one", &format!("--set train.challengers=9 {options}"));
+    sandbox.run(&more("--resume")).ended(0, &[]);
+    let resumed = files(&sandbox.path("one"));
+    sandbox.run(&more("--force")).ended(0, &[]);
+    for file in same {
+        assert!(resumed[file] == files(&sandbox.path("one"))[file], "{file}");
+    }
     // Another training is not mixed with it.
     let other = train("two", "--resume --seed 9");
     sandbox.run(&other).ended(2, &["training.json", "--force"]);

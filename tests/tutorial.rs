@@ -1,8 +1,11 @@
-//! The pages for newcomers: every command of theirs works, in their order, in an empty folder.
+//! The pages for beginners: every command works, in their order, in an empty folder. All other pages:
+//! the program understands every command.
 
 mod common;
 
+use clap::Parser;
 use common::program::{Sandbox, said};
+use morphcog::cli::Cli;
 use std::path::Path;
 
 /// The commands of a page: lines of `console` blocks that begin with a prompt, without `morphcog`
@@ -49,6 +52,30 @@ fn all_work(page: &str, sandbox: &Sandbox) {
         let said = said(sandbox.command(&command));
         assert_eq!(said.code, Some(0), "{page}: {command:?}: {said:#?}");
     }
+}
+
+#[test]
+fn the_program_understands_every_command_of_every_page() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let pages = std::fs::read_dir(root.join("docs")).unwrap().map(|entry| entry.unwrap().path());
+    let pages = pages.filter(|path| path.extension().is_some_and(|ending| ending == "md"));
+    let mut count = 0;
+    for page in pages.chain([root.join("README.md"), root.join("CONTRIBUTING.md")]) {
+        let text = std::fs::read_to_string(&page).unwrap();
+        for line in text.lines() {
+            // `exec` stands before it in a job script.
+            let command = line.strip_prefix("$ morphcog ").or(line.strip_prefix("exec morphcog "));
+            let Some(command) = command else { continue };
+            let plain =
+                command.replace("\"$SLURM_ARRAY_TASK_ID\"", "1").replace("\"$SLURM_CPUS_PER_TASK\"", "8");
+            let all = words(plain.split(['#', '>']).next().unwrap());
+            let all = all.iter().map(|word| if word == "KIND" { "body" } else { word });
+            let parsed = Cli::try_parse_from(std::iter::once("morphcog").chain(all));
+            assert!(parsed.is_ok(), "{}: {line}\n{}", page.display(), parsed.unwrap_err());
+            count += 1;
+        }
+    }
+    assert!(count > 40, "{count}");
 }
 
 #[test]

@@ -50,7 +50,7 @@ const COMMANDS: [&str; 9] = [
     "audit -a runs/one --robots top:1 -o audit.json",
     "replay -a runs/one --images test:3 -o replay.png",
     "plot spacetime -a runs/one -o plot.svg",
-    "report runs/one -o report.html --lives 1",
+    "report runs/one -o report.html --rollouts 1",
     "capacity --eval runs/one/eval.json --set trainings=2 --set sizes=[1,2] -o capacity.json",
     "evolve -c shapes.toml -o runs/one -g 7 --resume",
 ];
@@ -157,7 +157,7 @@ fn robots_are_shown_another_dataset_if_it_is_asked_for_and_the_results_say_so() 
     assert!(report.baselines.values().all(|baselines| baselines.nearest_training_image.is_none()));
     sandbox.run("plot accuracy -a runs/one").ended(0, &[]);
     assert!(sandbox.read("runs/one/plot-accuracy.svg").contains("trained on shapes"));
-    sandbox.run("report runs/one --lives 0").ended(0, &[]);
+    sandbox.run("report runs/one --rollouts 0").ended(0, &[]);
     assert!(sandbox.read("runs/one/report.html").contains("trained on shapes"));
     sandbox.run(COMMANDS[7]).ended(3, &["runs/one/eval.json", "shapes", "builtin", "without --dataset"]);
     // Who is best is told by the run's own images.

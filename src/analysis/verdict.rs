@@ -94,14 +94,15 @@ impl<'a> Behaviour<'a> {
     }
 
     /// Verdict and reason.
-    pub fn judge(&self, lives: &[PerturbedRollout]) -> (Verdict, String) {
+    pub fn judge(&self, rollouts: &[PerturbedRollout]) -> (Verdict, String) {
         if let Some(flaw) = &self.flaw {
             return (Verdict::NotAWalker, flaw.clone());
         }
-        let failed = |kind: &&Kind| lives.iter().any(|life| life.kind == **kind && !life.persists);
+        let failed =
+            |kind: &&Kind| rollouts.iter().any(|rollout| rollout.kind == **kind && !rollout.persists);
         let failed: Vec<Kind> = Kind::ALL.iter().filter(failed).copied().collect();
-        let world = || lives.iter().filter(|life| life.kind.is_of_the_world());
-        let robust = world().filter(|life| life.persists).count() as f64;
+        let world = || rollouts.iter().filter(|rollout| rollout.kind.is_of_the_world());
+        let robust = world().filter(|rollout| rollout.persists).count() as f64;
         let is_robust = robust >= self.criteria.least_robust * world().count() as f64;
         let names = |of_the_world: bool| {
             let names = failed.iter().filter(|kind| kind.is_of_the_world() == of_the_world);
@@ -109,7 +110,7 @@ impl<'a> Behaviour<'a> {
         };
         let (artefacts, mut broken) = (names(false), names(true));
         if artefacts.is_empty() && broken.is_empty() {
-            return (Verdict::Physical, format!("persists in all {} changed rollouts", lives.len()));
+            return (Verdict::Physical, format!("persists in all {} changed rollouts", rollouts.len()));
         }
         if is_robust && !artefacts.is_empty() {
             return (Verdict::Exploits, artefacts.join(", "));
@@ -120,8 +121,8 @@ impl<'a> Behaviour<'a> {
 
     /// Root mean square difference of the perturbed rollouts' displacements from the unchanged
     /// ones, voxel lengths; unstable rollouts have none.
-    pub fn spread(&self, lives: &[PerturbedRollout]) -> f64 {
-        let stable = lives.iter().filter_map(|life| life.displacements.as_ref());
+    pub fn spread(&self, rollouts: &[PerturbedRollout]) -> f64 {
+        let stable = rollouts.iter().filter_map(|rollout| rollout.displacements.as_ref());
         let squares: Vec<f64> =
             stable.flat_map(|d| d.iter().zip(&self.plain).map(|(a, b)| (a - b) * (a - b))).collect();
         // + 0.0: the sum of nothing is −0.
@@ -144,21 +145,22 @@ mod tests {
     use crate::task::fitness::Fitness;
     use crate::task::grouping::Grouping;
 
-    fn judged(lives: &[(Kind, [f64; 2])]) -> (Verdict, String) {
+    fn judged(rollouts: &[(Kind, [f64; 2])]) -> (Verdict, String) {
         let criteria = Criteria::default();
         let split = Grouping::two_groups(&[0], &[1]).unwrap().tasks()[0].clone();
         let behaviour = Behaviour::new(&criteria, (&split, Fitness::Min), &[0, 1], vec![-10.0, 12.0]);
-        let life = |(kind, d): &(Kind, [f64; 2])| behaviour.compare(String::new(), *kind, Some(d.to_vec()));
-        behaviour.judge(&lives.iter().map(life).collect::<Vec<_>>())
+        let rollout =
+            |(kind, d): &(Kind, [f64; 2])| behaviour.compare(String::new(), *kind, Some(d.to_vec()));
+        behaviour.judge(&rollouts.iter().map(rollout).collect::<Vec<_>>())
     }
 
     const SAME: [f64; 2] = [-9.0, 13.0];
     const LOST: [f64; 2] = [-9.0, 1.0];
 
     #[test]
-    fn who_keeps_its_directions_in_all_lives_is_physical() {
-        let lives = Kind::ALL.map(|kind| (kind, SAME));
-        assert_eq!(judged(&lives).0, Verdict::Physical);
+    fn who_keeps_its_directions_in_all_rollouts_is_physical() {
+        let rollouts = Kind::ALL.map(|kind| (kind, SAME));
+        assert_eq!(judged(&rollouts).0, Verdict::Physical);
     }
 
     #[test]
@@ -186,8 +188,8 @@ mod tests {
         let short = compare(Some([-4.0, 4.0]));
         assert_eq!((short.kept, short.distance, short.persists), (1.0, 8.0 / 22.0, false));
         assert!(!compare(None).persists);
-        let lives = [compare(Some([-13.0, 12.0])), compare(None), compare(Some([-10.0, 15.0]))];
-        assert_eq!(behaviour.spread(&lives), (18.0f64 / 4.0).sqrt());
+        let rollouts = [compare(Some([-13.0, 12.0])), compare(None), compare(Some([-10.0, 15.0]))];
+        assert_eq!(behaviour.spread(&rollouts), (18.0f64 / 4.0).sqrt());
     }
 
     #[test]

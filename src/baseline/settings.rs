@@ -1,9 +1,10 @@
 //! Which networks there are, how they are trained, and how well a trained one does: plain data.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Kinds of network.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Kind {
     /// One hidden layer; its size is the number of hidden neurons.
@@ -26,7 +27,7 @@ impl Kind {
 }
 
 /// What follows the hidden layer.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Activation {
     /// max(0, x)
@@ -38,7 +39,7 @@ pub enum Activation {
 }
 
 /// What a convolution's maps are made to before the output head.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Pooling {
     /// Nothing: every pixel of every map goes into the head.
@@ -52,7 +53,7 @@ pub enum Pooling {
 }
 
 /// What training waits for an improvement of.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Watch {
     /// Share answered right: larger is better.
@@ -62,7 +63,7 @@ pub enum Watch {
 }
 
 /// How networks are trained.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Hyperparameters {
     /// Passes over the training images. Default 50, the paper's.

@@ -35,8 +35,8 @@ pub struct Cli {
     /// Results, warnings and errors only.
     #[arg(short, long, global = true, conflicts_with = "json")]
     pub(super) quiet: bool,
-    /// For programs: one JSON object per line on stdout (but for what config, simulate, completions
-    /// and man print).
+    /// For programs: one JSON object per line on stdout (but for what config, schema, simulate,
+    /// completions and man print).
     #[arg(long, global = true)]
     pub(super) json: bool,
 }
@@ -58,7 +58,7 @@ Examples:
   morphcog eval --archive runs/zero_one-seed1/run.json --images 1000 --robots top:10
 
 Exit codes:
-  0 done   1 failed   2 wrong command line   3 wrong or missing input file   4 life unstable (simulate)
+  0 done   1 failed   2 wrong command line   3 wrong or missing input file   4 rollout unstable (simulate)
   5 run folder taken   75 stopped by a signal, saved, can be resumed   130 stopped at once";
 
 #[derive(Debug, Subcommand)]
@@ -124,7 +124,7 @@ scenario.json:
    \"stimulus\": [[0, 0.5, 1], [0, 0, 1]],   one pixel per voxel, 0 to 1; or \"stimuli\": [...] with \"switch_every\": 500
    \"control_steps\": 500, \"start_row\": 2, \"start_column\": 493, \"reset_between\": false}
 
-Output: step,com_x,com_y in world units (a voxel is 0.1). Exit code 4 if the life becomes unstable.")]
+Output: step,com_x,com_y in world units (a voxel is 0.1). Exit code 4 if the rollout becomes unstable.")]
     Simulate(SimulateArgs),
     /// Draw a digit and watch robots walk, in the browser.
     #[command(after_help = serve::EXAMPLES)]
@@ -149,6 +149,14 @@ Examples:
         name: Option<String>,
         #[arg(long, value_name = "KEY=VALUE", requires = "name", help = SET)]
         set: Vec<String>,
+    },
+    /// JSON Schemas of configs and results, for editors and validators: list them, or print one.
+    #[command(
+        after_help = "Examples:\n  morphcog schema\n  morphcog schema config > morphcog-config.schema.json"
+    )]
+    Schema {
+        /// Name of a schema, as morphcog schema lists them.
+        name: Option<String>,
     },
     /// Completions for a shell.
     #[command(

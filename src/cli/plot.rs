@@ -18,7 +18,7 @@ pub(super) const EXAMPLES: &str = "\
 Kinds:
   body         a robot's voxels by material
   spacetime    its position over time, seen from above
-  snapshots    poses of its life laid over each other
+  snapshots    poses of its rollout laid over each other
   archive      fitness over muscle, sensor and total voxels
   progress     QD score, coverage and best fitness; several archives (seeds) make a band
   accuracy     what morphcog eval found (eval.json beside run.json, or named in its place by --archive)

@@ -15,7 +15,7 @@ pub(super) const EXAMPLES: &str = "\
 Examples:
   morphcog report --archive runs/zero_one-seed1
   morphcog report --archive runs/zero_one-seed* -o seeds.html
-  morphcog report --archive runs/zero_one-seed1 --lives 20 --open
+  morphcog report --archive runs/zero_one-seed1 --rollouts 20 --open
 
 What lies beside a run.json is part of its report: metrics.csv, eval.json, audit.json, capacity.json. Of several runs, those of
 them together are looked for above their folders.";
@@ -30,7 +30,7 @@ pub(super) struct ReportArgs {
     /// Robots that can be watched, the fittest of each run; the more, the fewer frames each has
     /// (the page stays below 20 MB).
     #[arg(long, default_value_t = 100)]
-    lives: usize,
+    rollouts: usize,
     /// Folder with the images.
     #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,
@@ -51,12 +51,12 @@ pub(super) fn run(args: ReportArgs, console: &Console) -> Result<(), Error> {
     let out = args.out.unwrap_or_else(|| folder::above(&archives).join("report.html"));
     folder::writable(&out)?;
     let gathered =
-        report::gather(&archives, args.data.as_deref(), args.lives > 0, &|text| console.warning(text))?;
-    let lives = args.lives.div_ceil(archives.len());
-    let content = Content { gathered: &gathered, lives };
+        report::gather(&archives, args.data.as_deref(), args.rollouts > 0, &|text| console.warning(text))?;
+    let rollouts = args.rollouts.div_ceil(archives.len());
+    let content = Content { gathered: &gathered, rollouts };
     let page = {
         let counter = console.counter("simulating for the page:", content.count() as u64, "rollouts");
-        content.page(&|lived| counter.update(lived))
+        content.page(&|simulated| counter.update(simulated))
     };
     let page = page?;
     write_whole(&out, page.as_bytes())?;

@@ -235,7 +235,7 @@ fn training_of(run: &RunFile, path: &Path, whereabouts: &Whereabouts) -> Result<
 
 impl Trial {
     fn perturbations(&self, subject: &Subject) -> Vec<Perturbation> {
-        Perturbation::all(&self.criteria.perturbations, &subject.body, self.config.protocol.life)
+        Perturbation::all(&self.criteria.perturbations, &subject.body, self.config.protocol.rollout)
     }
 
     /// One robot's audit; `None` if stopped before its end.
@@ -246,8 +246,8 @@ impl Trial {
         done: &AtomicU64,
         observer: &dyn Observer,
     ) -> Option<RobotAudit> {
-        let count = |lives: usize| {
-            observer.progress(done.fetch_add(lives as u64, Ordering::Relaxed) + lives as u64);
+        let count = |rollouts: usize| {
+            observer.progress(done.fetch_add(rollouts as u64, Ordering::Relaxed) + rollouts as u64);
         };
         let setting = Setting {
             body: subject.body.clone(),
@@ -269,28 +269,28 @@ impl Trial {
             &classes,
             displacements.clone().unwrap_or(still),
         );
-        let life = |perturbation: &Perturbation| {
+        let rollout = |perturbation: &Perturbation| {
             let walked = live(&perturbation.apply(&setting), false, stop).ok()?;
             let walked = walked.map(|(d, _)| perturbation.undo(d));
             count(1);
             Some(behaviour.compare(perturbation.name(), perturbation.kind, walked))
         };
         let perturbations = self.perturbations(subject);
-        let lives: Vec<PerturbedRollout> = match behaviour.is_walker() {
+        let rollouts: Vec<PerturbedRollout> = match behaviour.is_walker() {
             true => {
-                let lives: Option<Vec<_>> = perturbations.par_iter().map(life).collect();
-                let counts = |(life, perturbation): &(PerturbedRollout, &Perturbation)| {
-                    life.displacements.is_some() || perturbation.counts_if_unstable()
+                let rollouts: Option<Vec<_>> = perturbations.par_iter().map(rollout).collect();
+                let counts = |(rollout, perturbation): &(PerturbedRollout, &Perturbation)| {
+                    rollout.displacements.is_some() || perturbation.counts_if_unstable()
                 };
-                lives?.into_iter().zip(&perturbations).filter(counts).map(|(life, _)| life).collect()
+                rollouts?.into_iter().zip(&perturbations).filter(counts).map(|(rollout, _)| rollout).collect()
             }
             false => {
                 count(perturbations.len());
                 Vec::new()
             }
         };
-        let (verdict, reason) = behaviour.judge(&lives);
-        let persisting = lives.iter().filter(|life| life.persists).count() as f64;
+        let (verdict, reason) = behaviour.judge(&rollouts);
+        let persisting = rollouts.iter().filter(|rollout| rollout.persists).count() as f64;
         let steps = f64::from(setting.protocol.control_steps) * setting.stimuli.len() as f64;
         let cycles = steps / f64::from(setting.physics.cycle_steps);
         Some(RobotAudit {
@@ -298,11 +298,11 @@ impl Trial {
             task: subject.task.clone(),
             verdict,
             reason,
-            persisting: persisting / lives.len().max(1) as f64,
-            spread: behaviour.spread(&lives),
+            persisting: persisting / rollouts.len().max(1) as f64,
+            spread: behaviour.spread(&rollouts),
             energy_per_cycle: Energy { drive: energy.drive / cycles, limits: energy.limits / cycles },
             displacements,
-            lives,
+            rollouts,
         })
     }
 }
@@ -332,7 +332,7 @@ mod tests {
     use crate::sim::Physics;
     use crate::store::audit::Verdict;
     use crate::store::images::{DatasetRef, ImageRef};
-    use crate::task::protocol::{Life, Protocol};
+    use crate::task::protocol::{Protocol, RolloutMode};
 
     /// Two images, of classes 0 and 1, the first dark and the second bright, each in a fresh
     /// rollout of five cycles.
@@ -369,7 +369,7 @@ mod tests {
             let found = audited("1221/1221", task, Physics::default());
             assert_eq!(found.verdict, Verdict::NotAWalker, "{found:?}");
             assert!(found.reason.contains("the right way for 0"), "{}", found.reason);
-            assert!(found.lives.is_empty() && found.energy_per_cycle.drive == 0.0);
+            assert!(found.rollouts.is_empty() && found.energy_per_cycle.drive == 0.0);
         }
     }
 
@@ -377,7 +377,7 @@ mod tests {
     fn a_plain_walker_is_physical() {
         let found = audited(WALKER, "same way", Physics::default());
         assert_eq!(found.verdict, Verdict::Physical, "{found:#?}");
-        assert_eq!((found.persisting, found.lives.len()), (1.0, 14));
+        assert_eq!((found.persisting, found.rollouts.len()), (1.0, 14));
         assert!(found.displacements.unwrap().iter().all(|d| *d > 5.0));
         assert!(found.spread < 1.0 && found.energy_per_cycle.drive > 0.0);
         // It sees nothing, so that it cannot tell classes apart.
@@ -393,7 +393,7 @@ mod tests {
     }
 
     #[test]
-    fn images_that_are_the_same_to_the_sensors_are_one_life_with_the_same_end() {
+    fn images_that_are_the_same_to_the_sensors_are_one_rollout_with_the_same_end() {
         // Its one sensor sees the top right pixel; the images differ elsewhere, too.
         let body: Body = "444425/444422/333311/330011".parse().unwrap();
         let image = |sensed: f64, other: f64| {
@@ -407,8 +407,10 @@ mod tests {
         let (all, _) = live(&setting, true, &NEVER).unwrap().unwrap();
         assert_eq!(displacements, all);
         assert_ne!(all[0], all[1], "it sees something");
-        let sequential =
-            Setting { protocol: Protocol { life: Life::Sequential, ..setting.protocol.clone() }, ..setting };
+        let sequential = Setting {
+            protocol: Protocol { rollout: RolloutMode::Sequential, ..setting.protocol.clone() },
+            ..setting
+        };
         let (displacements, _) = live(&sequential, false, &NEVER).unwrap().unwrap();
         assert_eq!(displacements.len(), 5);
         assert_ne!(displacements[0], displacements[2], "what comes later begins elsewhere");

@@ -141,7 +141,7 @@ mod tests {
     }
 
     #[test]
-    fn every_specimen_lives_and_is_measured() {
+    fn every_specimen_rollouts_and_is_measured() {
         for specimen in specimens() {
             let speed = measure(&specimen, InstructionSet::in_use(), 1);
             assert!(speed.microseconds > 0.0 && speed.control_steps > 0.0);

@@ -174,7 +174,7 @@ pub fn eval(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Re
     let mut unwritten = Unwritten::default();
     for Chosen { source, robot } in robots {
         let Some(split) = task_of(&grouping, robot) else { continue };
-        let Some((displacements, simulated)) = walker.lives(robot, &shown.stimuli) else { break };
+        let Some((displacements, simulated)) = walker.rollouts(robot, &shown.stimuli) else { break };
         left -= 1;
         report.stopped = left > 0;
         let run = &sources[source].run;

@@ -18,6 +18,8 @@ pub mod replay;
 pub mod report;
 #[cfg(feature = "networks")]
 pub mod reproduce;
+#[cfg(feature = "networks")]
+pub mod schema;
 pub mod simulate;
 #[cfg(feature = "networks")]
 pub mod table;

@@ -6,6 +6,7 @@ use crate::config::audit::Criteria;
 use crate::config::capacity::CapacityConfig;
 use crate::config::{Config, reading};
 use crate::store::folder;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -14,7 +15,7 @@ use std::path::Path;
 pub const PAPER_TOML: (&str, &str) = ("paper.toml", include_str!("../../configs/paper.toml"));
 
 /// What belongs to a reproduction.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Plan {
     /// Seeds of the runs of each experiment.
@@ -34,7 +35,7 @@ pub struct Plan {
 }
 
 /// An experiment: a config, and what is changed in it.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Experiment {
     /// A config file, or the name of a built-in one.

@@ -11,7 +11,7 @@ use crate::store::folder;
 use crate::store::images::{DatasetRef, ImageRef};
 use crate::store::robots::{Selection, Source};
 use crate::store::whereabouts::{Whereabouts, load_dataset_of, see};
-use crate::task::protocol::Life;
+use crate::task::protocol::RolloutMode;
 use crate::task::recording::Recording;
 use crate::task::rollout::record;
 use std::path::PathBuf;
@@ -92,15 +92,15 @@ pub fn replay(options: &Options) -> Result<Replay, Error> {
     let subject = subject(options)?;
     let recording = record_subject(&subject);
     let Found { name, config, mut about, .. } = subject.found;
-    let fresh = config.protocol.life == Life::Fresh;
+    let fresh = config.protocol.rollout == RolloutMode::Fresh;
     about.push((
         "Images".to_string(),
         format!("{}, {:?} encoding", config.data.dataset, config.stimulus.encoding).to_lowercase(),
     ));
-    let life = if fresh { "a fresh rollout for every image" } else { "one continuous rollout" };
+    let rollout = if fresh { "a fresh rollout for every image" } else { "one continuous rollout" };
     about.push((
         "Protocol".to_string(),
-        format!("{life}, {} control steps each", config.protocol.control_steps),
+        format!("{rollout}, {} control steps each", config.protocol.control_steps),
     ));
     Ok(Replay { recording, about, name })
 }
@@ -108,7 +108,7 @@ pub fn replay(options: &Options) -> Result<Replay, Error> {
 /// Records a rollout.
 pub fn record_subject(subject: &Subject) -> Recording {
     let Subject { found: Found { name, body, config, .. }, images } = subject;
-    let fresh = config.protocol.life == Life::Fresh;
+    let fresh = config.protocol.rollout == RolloutMode::Fresh;
     record(name, body, &config.physics, &config.protocol, fresh, images)
 }
 

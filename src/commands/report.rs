@@ -13,7 +13,7 @@ use crate::store::images::ImageRef;
 use crate::store::names::{AUDIT_JSON, CAPACITY_JSON, EVAL_JSON, METRICS};
 use crate::store::run::{Robot, RunFile, different};
 use crate::store::whereabouts::{Whereabouts, load_dataset_of, see};
-use crate::task::protocol::Life;
+use crate::task::protocol::RolloutMode;
 use crate::task::recording::Recording;
 use crate::task::rollout::record;
 use std::path::{Path, PathBuf};
@@ -87,7 +87,7 @@ pub struct Gathered {
     pub together: Findings,
 }
 
-/// Reads runs and what lies beside them; `warn` is told what cannot be read. Without `with_lives`
+/// Reads runs and what lies beside them; `warn` is told what cannot be read. Without `with_rollouts`
 /// no images are needed.
 ///
 /// # Errors
@@ -95,7 +95,7 @@ pub struct Gathered {
 pub fn gather(
     archives: &[PathBuf],
     data: Option<&Path>,
-    with_lives: bool,
+    with_rollouts: bool,
     warn: &dyn Fn(&str),
 ) -> Result<Gathered, Error> {
     let mut runs = Vec::new();
@@ -107,7 +107,7 @@ pub fn gather(
             false => None,
         };
         let whereabouts = Whereabouts::given(data).and_of(path);
-        let images = if with_lives { images(&run, path, &whereabouts)? } else { Vec::new() };
+        let images = if with_rollouts { images(&run, path, &whereabouts)? } else { Vec::new() };
         let findings = Findings::read(folder, &[&run], warn);
         runs.push(Dossier { path: path.clone(), run, progress, findings, images });
     }
@@ -125,7 +125,7 @@ pub fn gather(
 /// The training images, or one of each class if they are many.
 fn images(run: &RunFile, path: &Path, whereabouts: &Whereabouts) -> Result<Vec<(String, Grid<f64>)>, Error> {
     let hint = |error: Error| match &error.hint {
-        None => error.hint("or --lives 0 for a report without moving pictures".to_string()),
+        None => error.hint("or --rollouts 0 for a report without moving pictures".to_string()),
         Some(_) => error,
     };
     let dataset = load_dataset_of(Some(&run.dataset), &run.config, whereabouts, &[Split::Train]);
@@ -153,7 +153,7 @@ impl Dossier {
     /// The rollout of a robot under the images.
     pub fn record(&self, robot: &Robot) -> Recording {
         let config = &self.run.config;
-        let fresh = config.protocol.life == Life::Fresh;
+        let fresh = config.protocol.rollout == RolloutMode::Fresh;
         record(&robot.id, &robot.body, &config.physics, &config.protocol, fresh, &self.images)
     }
 

@@ -3,11 +3,12 @@
 use crate::base::error::Error;
 use crate::config::reading;
 use crate::task::perturbation::Sizes;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
 /// What an audit does and how it judges; keys of `--criteria FILE` and `--set`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Criteria {
     /// A walk this far or shorter is no answer \[voxel lengths\]. Default 3, as in `eval`.

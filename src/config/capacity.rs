@@ -3,6 +3,7 @@
 use crate::base::error::Error;
 use crate::baseline::{Hyperparameters, Kind, Pooling};
 use crate::config::{pair, reading};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -13,7 +14,7 @@ const MOST: usize = 1000;
 const MOST_TRAININGS: usize = 100_000;
 
 /// What is trained, and how.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct CapacityConfig {
     /// Kinds of network.

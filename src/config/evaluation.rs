@@ -5,14 +5,15 @@ use crate::base::error::Error;
 use crate::body::{Body, key};
 use crate::config::Config;
 use crate::task::fitness::Fitness;
-use crate::task::protocol::Life;
+use crate::task::protocol::RolloutMode;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Fewest images that a response is measured under: two pairs in each condition, to differ.
 pub(crate) const LEAST_IMAGES: usize = 8;
 
 /// How robots are evaluated: section `[evaluation]`.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct EvaluationConfig {
     /// How answers to several images are judged together. Default the smallest margin, the paper's.
@@ -75,8 +76,8 @@ impl Config {
                 "one task, as groups = [[0], [1]]: a response belongs to no task",
             ),
             (
-                self.protocol.life == Life::Sequential,
-                "protocol.life",
+                self.protocol.rollout == RolloutMode::Sequential,
+                "protocol.rollout",
                 "\"sequential\"".to_string(),
                 "\"fresh\"",
             ),

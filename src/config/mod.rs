@@ -26,6 +26,7 @@ use crate::task::evaluation::Savings;
 use crate::task::grouping::Grouping;
 use crate::task::protocol::{MAX_COLUMN, MAX_ROW, MAX_STEPS, Protocol};
 use crate::task::stimulus::StimulusParams;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
@@ -46,7 +47,7 @@ pub const MAX_NUMBER: u64 = i64::MAX as u64;
 const MAX_OFFSET: f64 = 1e9;
 
 /// Everything a run depends on. Every key but `task` and `data` has a default.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Config {
     /// Seed of all chance. Default 1.
@@ -107,7 +108,7 @@ fn paper_generations() -> u64 {
 }
 
 /// Size of bodies and which are valid: section `[body]`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct BodyConfig {
     /// Rows. Default 14.
@@ -125,7 +126,7 @@ impl Default for BodyConfig {
 }
 
 /// Which images: section `[data]`.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct DataConfig {
     /// "mnist", "fashion-mnist", "builtin", or a name of one's own.
@@ -162,7 +163,7 @@ fn one_image() -> usize {
 }
 
 /// How the archive is measured: section `[archive]`.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct ArchiveConfig {
     /// Fitness that counts as nothing in the QD score \[voxel lengths\]; a smaller one counts less
@@ -175,7 +176,7 @@ pub struct ArchiveConfig {
 }
 
 /// When the run is saved: section `[checkpoint]`. Whichever comes first.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct CheckpointConfig {
     /// Generations between two checkpoints. Default 1000; larger values lose more at a power cut.

@@ -3,10 +3,11 @@
 use crate::base::error::Error;
 use crate::config::pair;
 use crate::task::grouping::Grouping;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Which classes are to be told apart: section `[task]`, either `groups` or `splits`.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct TaskConfig {
     /// One task: two groups of classes that are to walk opposite ways.

@@ -2,10 +2,11 @@
 
 use crate::base::error::Error;
 use crate::task::perturbation::ByTurns;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// How gaits are taught by `morphcog train`: section `[train]`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct TrainConfig {
     /// Training images of each class that the model sees; only a few of them are shown to robots.

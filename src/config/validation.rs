@@ -1,12 +1,13 @@
 //! [`ValidationConfig`]: a config's section `[validation]`.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Least number of validation images.
 pub const LEAST: usize = 40;
 
 /// Validation at a run's end: section `[validation]`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct ValidationConfig {
     /// Images in all, evenly divided between the classes; none of them is trained on. Default 400.

@@ -6,11 +6,12 @@ use crate::base::hash::sha256_hex;
 use crate::base::random::{Purpose, stream};
 use crate::data::info::Split;
 use crate::data::pen;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Which built-in digits there are. In each split the classes take turns: index i shows `classes[i
 /// % k]`, so that indices 0, 1, …, k − 1 are one image of each class.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct BuiltinDigits {
     /// Another seed, other images.

@@ -3,6 +3,7 @@
 use crate::body::Material;
 use crate::genome::file::{CppnFile, VERSION};
 use crate::genome::function::Function;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Inputs: nodes 0 (x), 1 (y), 2 (distance to the centre) and 3 (bias).
@@ -15,7 +16,7 @@ pub const FIRST_HIDDEN: usize = INPUTS + OUTPUTS;
 pub const MAX_HIDDEN: usize = 1000;
 
 /// A weighted connection; in files `[from, to, weight]`.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(from = "(usize, usize, f64)", into = "(usize, usize, f64)")]
 pub struct Edge {
     /// Node it comes from: an input or a hidden node.
@@ -38,7 +39,7 @@ pub struct Edge {
 /// `outputs` and `hidden` are the nodes' functions in the order of their numbers (squash is for
 /// outputs only); edges lead out of inputs and hidden nodes into outputs and hidden nodes, no two
 /// between the same nodes, no cycle.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(try_from = "CppnFile", into = "CppnFile")]
 pub struct Cppn {
     pub(super) outputs: [Function; OUTPUTS],

@@ -2,6 +2,7 @@
 
 use crate::base::Grid;
 use crate::body::{Body, MAX_SIDE, Material};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -9,7 +10,7 @@ use std::collections::BTreeMap;
 /// for the last touches that no change of a network makes alone (HybrID of Clune, Beckmann, Pennock
 /// & Ofria, ECAL 2009). In files a list of `[row, column, material]`. Those outside a body's grid
 /// have no effect.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(try_from = "Vec<(usize, usize, Material)>", into = "Vec<(usize, usize, Material)>")]
 pub struct Edits(BTreeMap<(usize, usize), Material>);
 

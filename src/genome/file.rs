@@ -2,17 +2,22 @@
 
 use crate::genome::cppn::{Cppn, Edge, FIRST_HIDDEN, INPUTS, MAX_HIDDEN, OUTPUTS};
 use crate::genome::function::Function;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Version of the file form.
 pub(super) const VERSION: u32 = 1;
 
-#[derive(Serialize, Deserialize)]
+#[derive(Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct CppnFile {
+    /// Version of this form, 1.
     version: u32,
+    /// Functions of the nodes 4 to 10, one for each material in the order of their numbers.
     outputs: Vec<Function>,
+    /// Functions of the hidden nodes, from 11 on.
     hidden: Vec<Function>,
+    /// Edges, each `[from, to, weight]`, sorted by the node that they go to.
     edges: Vec<Edge>,
 }
 

@@ -1,10 +1,11 @@
 //! [`Function`]: what a CPPN node does with the sum of its inputs.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// The function of a node, applied to the weighted sum s of its predecessors (paper, section
 /// "Genome").
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 #[repr(u8)]
 pub enum Function {

@@ -17,16 +17,19 @@ pub use cppn::Cppn;
 pub use edits::{EditError, Edits};
 pub use file::CppnError;
 pub use params::MutationParams;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::sync::atomic::AtomicBool;
 pub use voxels::other_voxel;
 
 /// What evolution varies: a network that describes a body, and single voxels in which the body
 /// differs from that. In files `{"cppn": …, "edits": …}`, see [`Cppn`] and [`Edits`].
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Genome {
+    /// The network.
     cppn: Cppn,
+    /// Voxels that are not what the network describes.
     #[serde(default, skip_serializing_if = "Edits::is_empty")]
     edits: Edits,
 }

@@ -1,9 +1,10 @@
 //! [`MutationParams`]: sizes and shares of mutations.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer, Serialize};
 
 /// Sizes of mutations: section `[genome]` of a config (paper, section "Genome").
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct MutationParams {
     /// Standard deviation of what is added to a weight that changes. Default 0.5.

@@ -1,5 +1,6 @@
 //! [`Archive`]: the best solution found so far in every cell.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize, Serializer};
 use std::collections::BTreeMap;
 
@@ -54,7 +55,7 @@ pub enum ArchiveError {
 
 /// Figures of an archive: pyribs' `ArchiveStats`, of an archive that has the possible cells and no
 /// others.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ArchiveStats {
     /// Number of elites.
     pub num_elites: usize,

@@ -2,11 +2,12 @@
 
 use crate::base::random::{Purpose, stream};
 use crate::qd::archive::Archive;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::num::NonZeroU16;
 
 /// Sizes of generations (paper, section "MAP-Elites"); keys of a config's section `[map_elites]`.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct EmitterParams {
     /// Random individuals of a generation that finds the archive empty: the first. Default 20.

@@ -153,7 +153,7 @@ mod tests {
                 "data.train_images = 9 images",
                 "an even number",
             ),
-            ("protocol.life=\"sequential\"", "protocol.life = \"sequential\"", "\"fresh\""),
+            ("protocol.rollout=\"sequential\"", "protocol.rollout = \"sequential\"", "\"fresh\""),
         ];
         for (set, found, expected) in refused {
             let message = config(RESPONSE, &[set]).unwrap_err().message;

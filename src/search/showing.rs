@@ -6,7 +6,7 @@ use crate::config::Config;
 use crate::store::run::Robot;
 use crate::task::evaluation::fresh_rollouts;
 use crate::task::grouping::{self, Grouping};
-use crate::task::protocol::{Life, Protocol};
+use crate::task::protocol::{Protocol, RolloutMode};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 /// Displacements up to this count as wrong in the paper's test \[voxel lengths\].
@@ -47,10 +47,13 @@ impl Walker<'_> {
     /// The displacement under each image (`None`: unstable), and the number of rollouts it took:
     /// images that show the sensors the same pixels share a rollout. `None` if stopped before the
     /// end.
-    pub fn lives(&self, robot: &Robot, stimuli: &[Grid<f64>]) -> Option<(Vec<Option<f64>>, usize)> {
+    pub fn rollouts(&self, robot: &Robot, stimuli: &[Grid<f64>]) -> Option<(Vec<Option<f64>>, usize)> {
         let Walker { config, stop, observer, done, .. } = self;
-        let protocol =
-            Protocol { life: Life::Fresh, control_steps: self.control_steps, ..config.protocol.clone() };
+        let protocol = Protocol {
+            rollout: RolloutMode::Fresh,
+            control_steps: self.control_steps,
+            ..config.protocol.clone()
+        };
         let told = |count: u64| observer.progress(done.fetch_add(count, Ordering::Relaxed) + count);
         let found = self
             .pool

@@ -13,6 +13,7 @@ use crate::base::{Grid, number};
 use crate::body::Body;
 use crate::config::evaluation::EvaluationConfig;
 use crate::config::task::TaskConfig;
+use crate::config::train::TrainConfig;
 use crate::config::validation::ValidationConfig;
 use crate::config::{Config, DataConfig, reading};
 use crate::data::dataset::{Dataset, Split};
@@ -33,7 +34,7 @@ use crate::store::whereabouts::Whereabouts;
 use crate::task::evaluation::fresh_rollouts;
 use crate::task::fitness::Fitness;
 use crate::task::perturbation::Condition;
-use crate::task::protocol::{Life, Protocol};
+use crate::task::protocol::{Protocol, RolloutMode};
 use crate::task::refine::Challenge;
 use crate::task::response::{Example, Gait, Response};
 use crate::task::teach::{FINALISTS, Image, Plan, Rollouts, Round, Taught, Teacher};
@@ -181,7 +182,7 @@ fn config(of_walkers: &Config, options: &Options) -> Result<Config, Error> {
         generations: 1,
         task: TaskConfig { groups: Some(options.groups.clone()), ..TaskConfig::default() },
         data: DataConfig { train_images: None, ..of_walkers.data.clone() },
-        protocol: Protocol { life: Life::Fresh, ..of_walkers.protocol.clone() },
+        protocol: Protocol { rollout: RolloutMode::Fresh, ..of_walkers.protocol.clone() },
         evaluation,
         validation: ValidationConfig { best: 1, ..ValidationConfig::default() },
         ..of_walkers.clone()
@@ -231,11 +232,12 @@ fn walkers<'a>(source: &'a Source, robots: &Selection, seed: u64) -> Result<Vec<
     Ok(walkers)
 }
 
-/// Of all that rollouts depend on.
+/// Of all that rollouts depend on; more challengers come after those that there were.
 fn key(config: &Config, walkers: &[Walker], training: &Training) -> String {
     let bodies: Vec<String> = walkers.iter().map(|walker| walker.robot.body.to_string()).collect();
     let images: Vec<usize> = training.images.iter().map(|image| image.index).collect();
-    let essence = config.essence().to_toml();
+    let train = TrainConfig { challengers: 0, ..config.train };
+    let essence = Config { train, ..config.essence() }.to_toml();
     let text = format!(
         "{} {essence} {bodies:?} {} {images:?}",
         env!("CARGO_PKG_VERSION"),

@@ -259,7 +259,7 @@ fn screened(
             scores = Vec::with_capacity(left.len());
             for (robot, mut displacements) in left {
                 let Some(split) = split_of(robot) else { continue };
-                let Some((others, _)) = walker.lives(robot, &stimuli[displacements.len()..shown]) else {
+                let Some((others, _)) = walker.rollouts(robot, &stimuli[displacements.len()..shown]) else {
                     return Ok(None);
                 };
                 displacements.extend(others);

@@ -17,7 +17,7 @@ pub fn asset(path: &str) -> Option<Response> {
         "/main.js" => (JS, include_str!("page/main.js")),
         "/api.js" => (JS, include_str!("page/api.js")),
         "/stage.js" => (JS, include_str!("page/stage.js")),
-        "/life.js" => (JS, include_str!("page/life.js")),
+        "/simulation.js" => (JS, include_str!("page/simulation.js")),
         "/pad.js" => (JS, include_str!("page/pad.js")),
         "/images.js" => (JS, include_str!("page/images.js")),
         "/robots.js" => (JS, include_str!("page/robots.js")),

@@ -6,12 +6,12 @@ pub mod catalogue;
 pub mod http;
 pub mod images;
 pub mod judge;
-pub mod life;
-pub mod lives;
 pub mod refusal;
 pub mod request;
 pub mod routes;
 pub mod server;
+pub mod simulation;
+pub mod simulations;
 pub mod stream;
 
 use crate::base::error::Error;
@@ -20,10 +20,10 @@ use crate::commands::simulate::Scenario;
 use crate::sim::Physics;
 use catalogue::Catalogue;
 use images::ImageSets;
-use lives::Lives;
 use refusal::Refusal;
 use request::Plan;
 use serde::Serialize;
+use simulations::Simulations;
 use std::path::PathBuf;
 
 /// What to serve.
@@ -42,7 +42,7 @@ pub struct Service {
     /// Test images to choose from.
     pub images: ImageSets,
     /// What runs at the moment.
-    pub lives: Lives,
+    pub simulations: Simulations,
 }
 
 /// What `/api/status` says.
@@ -51,9 +51,9 @@ pub struct Status {
     /// Version of the program.
     pub version: &'static str,
     /// Simulations running now.
-    pub lives: usize,
+    pub simulations: usize,
     /// Most simulations at once.
-    pub max_lives: usize,
+    pub max_simulations: usize,
     /// Simulations begun so far.
     pub begun: u64,
 }
@@ -98,16 +98,16 @@ impl Service {
         let (catalogue, mut notes) = Catalogue::open(&options.archives)?;
         let (images, missing) = ImageSets::open(&catalogue, options.data.as_deref())?;
         notes.extend(missing);
-        Ok((Service { catalogue, images, lives: Lives::default() }, notes))
+        Ok((Service { catalogue, images, simulations: Simulations::default() }, notes))
     }
 
     /// How it is doing.
     pub fn status(&self) -> Status {
         Status {
             version: env!("CARGO_PKG_VERSION"),
-            lives: self.lives.running(),
-            max_lives: lives::MAX_LIVES,
-            begun: self.lives.begun(),
+            simulations: self.simulations.running(),
+            max_simulations: simulations::MAX_SIMULATIONS,
+            begun: self.simulations.begun(),
         }
     }
 
@@ -153,7 +153,7 @@ impl Service {
     ///
     /// # Errors
     /// What is wrong with it.
-    pub fn plan(&self, request: request::LifeRequest) -> Result<Plan, Refusal> {
+    pub fn plan(&self, request: request::SimulationRequest) -> Result<Plan, Refusal> {
         request.plan(&self.catalogue, &self.images)
     }
 }

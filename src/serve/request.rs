@@ -49,7 +49,7 @@ pub struct Shown {
 /// A simulation to begin.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct LifeRequest {
+pub struct SimulationRequest {
     /// The robot.
     subject: Subject,
     /// What it sees.
@@ -222,7 +222,7 @@ impl Shown {
     }
 }
 
-impl LifeRequest {
+impl SimulationRequest {
     pub(crate) fn plan(self, catalogue: &Catalogue, images: &ImageSets) -> Result<Plan, Refusal> {
         let mut who = self.subject.find(catalogue)?;
         let steps = self.control_steps.unwrap_or(who.protocol.control_steps.min(MAX_STEPS));

@@ -4,7 +4,7 @@ use crate::body::Body;
 use crate::serve::assets::asset;
 use crate::serve::http::{Request, Response};
 use crate::serve::refusal::Refusal;
-use crate::serve::request::{ChangeRequest, LifeRequest, Pace, Plan, SeeRequest};
+use crate::serve::request::{ChangeRequest, Pace, Plan, SeeRequest, SimulationRequest};
 use crate::serve::{Service, request, stream};
 use serde::Deserialize;
 use serde_json::json;
@@ -14,7 +14,7 @@ pub enum Reply {
     /// It is answered as a whole.
     Whole(Response),
     /// A simulation begins.
-    Life(Box<Plan>),
+    Simulation(Box<Plan>),
 }
 
 /// Answers a request to the server at a port.
@@ -58,12 +58,16 @@ pub fn reply(service: &Service, port: u16, request: &Request) -> Reply {
             let text = text.map_err(|_| Refusal::Wrong("scenario: not UTF-8 text".to_string()))?;
             Ok(Response::json(&service.load(text)?))
         }),
-        ["api", "lives"] if post => {
-            let plan = request::read::<LifeRequest>(&request.body).and_then(|asked| service.plan(asked));
-            plan.map_or_else(|refusal| Reply::Whole(refused(refusal)), |plan| Reply::Life(Box::new(plan)))
+        ["api", "simulations"] if post => {
+            let plan =
+                request::read::<SimulationRequest>(&request.body).and_then(|asked| service.plan(asked));
+            plan.map_or_else(
+                |refusal| Reply::Whole(refused(refusal)),
+                |plan| Reply::Simulation(Box::new(plan)),
+            )
         }
-        ["api", "lives"] => Reply::Whole(Response::wrong_method("POST")),
-        ["api", "lives", id] => posting(&|| change(service, id, &request.body)),
+        ["api", "simulations"] => Reply::Whole(Response::wrong_method("POST")),
+        ["api", "simulations", id] => posting(&|| change(service, id, &request.body)),
         _ => match asset(&request.path) {
             Some(_) if !get => Reply::Whole(Response::wrong_method("GET, HEAD")),
             Some(file) => Reply::Whole(file),
@@ -136,9 +140,9 @@ fn images(service: &Service, request: &Request) -> Result<Response, Refusal> {
 }
 
 fn change(service: &Service, id: &str, body: &[u8]) -> Result<Response, Refusal> {
-    let life = service.lives.life(number(id, "simulation")?)?;
+    let simulation = service.simulations.simulation(number(id, "simulation")?)?;
     let ChangeRequest { shown, speed, paused } = request::read(body)?;
-    let seen = shown.map(|shown| shown.seen(&life.who, &service.images)).transpose()?;
-    life.change(speed.map(Pace::of).transpose()?, paused, seen);
+    let seen = shown.map(|shown| shown.seen(&simulation.who, &service.images)).transpose()?;
+    simulation.change(speed.map(Pace::of).transpose()?, paused, seen);
     Ok(Response::done())
 }

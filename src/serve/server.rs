@@ -2,10 +2,10 @@
 
 use crate::base::error::Error;
 use crate::serve::http::Response;
-use crate::serve::life::{Gone, live};
-use crate::serve::lives::Control;
 use crate::serve::request::Plan;
 use crate::serve::routes::Reply;
+use crate::serve::simulation::{Gone, live};
+use crate::serve::simulations::Control;
 use crate::serve::{Service, http, routes, stream};
 use std::io::{self, ErrorKind, Write};
 use std::net::{Ipv4Addr, SocketAddr, TcpListener, TcpStream};
@@ -60,11 +60,11 @@ impl Server {
             std::thread::sleep(LOOK);
         }
         ended.store(true, Ordering::Relaxed);
-        service.lives.close();
+        service.simulations.close();
         // The thread that accepts wakes up, and sees.
         drop(TcpStream::connect_timeout(&address, LOOK));
         let until = Instant::now() + TO_END;
-        while service.lives.running() > 0 && Instant::now() < until {
+        while service.simulations.running() > 0 && Instant::now() < until {
             std::thread::sleep(Duration::from_millis(5));
         }
     }
@@ -112,7 +112,7 @@ fn connection(service: &Service, port: u16, stream: &mut TcpStream) {
         Err(refusal) => (refusal, false),
         Ok(Some(request)) => match routes::reply(service, port, &request) {
             Reply::Whole(response) => (response, request.method == "HEAD"),
-            Reply::Life(plan) => match life(service, &plan, stream) {
+            Reply::Simulation(plan) => match simulation(service, &plan, stream) {
                 None => return,
                 Some(refusal) => (refusal, false),
             },
@@ -126,8 +126,8 @@ fn connection(service: &Service, port: u16, stream: &mut TcpStream) {
 
 /// Runs a simulation over a connection; it ends when that does. What is to be answered if there is
 /// no place for it.
-fn life(service: &Service, plan: &Plan, stream: &mut TcpStream) -> Option<Response> {
-    let slot = match service.lives.begin(plan.who.clone()) {
+fn simulation(service: &Service, plan: &Plan, stream: &mut TcpStream) -> Option<Response> {
+    let slot = match service.simulations.begin(plan.who.clone()) {
         Ok(slot) => slot,
         Err(refusal) => return Some(routes::refused(refusal)),
     };

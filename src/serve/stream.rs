@@ -5,8 +5,8 @@
 
 use crate::body::Material;
 use crate::serve::judge::THRESHOLD;
-use crate::serve::life::{Event, STEPS_PER_SECOND};
 use crate::serve::request::{Plan, Seen};
+use crate::serve::simulation::{Event, STEPS_PER_SECOND};
 use crate::task::recording::{Frame, VoxelCorners};
 use crate::view::colour::{TONE_AREAS, tones};
 use crate::view::html::{STEPS, quantised};
@@ -25,8 +25,8 @@ pub fn text(event: &Event) -> String {
     let (name, data) = match event {
         Event::Begin { id, plan, voxels, frame } => ("begin", begin(*id, plan, voxels, frame)),
         Event::Seen { step, until, seen } => ("seen", looks(*step, *until, seen)),
-        Event::Lived { step, frames, answer } => {
-            ("lived", json!({ "step": step, "frames": positions(frames), "answer": answer }))
+        Event::Moments { step, frames, answer } => {
+            ("moments", json!({ "step": step, "frames": positions(frames), "answer": answer }))
         }
         // A comment: nothing to do for the page.
         Event::Still => return ":\n\n".to_string(),

@@ -9,6 +9,7 @@ use crate::sim::Energy;
 use crate::store::names::AUDIT_JSON;
 use crate::store::run::RunFile;
 use crate::task::perturbation::Kind;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
@@ -18,12 +19,14 @@ pub const FORMAT: &str = "morphcog-audit";
 pub const FORMAT_VERSION: u32 = 1;
 
 /// The content of `audit.json`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct AuditFile {
-    /// [`FORMAT`].
+    /// "morphcog-audit".
+    #[schemars(extend("const" = FORMAT))]
     pub format: String,
-    /// [`FORMAT_VERSION`].
+    /// Version of this schema.
+    #[schemars(range(min = 1, max = FORMAT_VERSION))]
     pub format_version: u32,
     /// Version of morphcog that wrote it.
     pub program_version: String,
@@ -40,7 +43,7 @@ pub struct AuditFile {
 }
 
 /// What an audit found of one robot.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RobotAudit {
     /// Its id.
@@ -61,7 +64,7 @@ pub struct RobotAudit {
     /// unstable.
     pub displacements: Option<Vec<f64>>,
     /// The perturbed rollouts; none for one that is not a walker.
-    pub lives: Vec<PerturbedRollout>,
+    pub rollouts: Vec<PerturbedRollout>,
 }
 
 impl RobotAudit {
@@ -187,8 +190,8 @@ impl AuditFile {
         let images = self.robots.iter().filter_map(|r| r.displacements.as_ref()).map(Vec::len).max();
         let images = images.unwrap_or(0);
         let about = ["id", "task", "verdict", "reason", "persisting", "spread", "drive_per_cycle"];
-        let life = ["limits_per_cycle", "life", "kept", "distance", "persists"];
-        let columns = about.into_iter().chain(life).map(str::to_string);
+        let rollout = ["limits_per_cycle", "rollout", "kept", "distance", "persists"];
+        let columns = about.into_iter().chain(rollout).map(str::to_string);
         let columns = columns.chain(table::numbered("displacement", images));
         let rows = self.robots.iter().flat_map(|robot| {
             let Energy { drive, limits } = robot.energy_per_cycle;
@@ -203,8 +206,12 @@ impl AuditFile {
                 (about, name, kept, distance, persists, walks)
             };
             let unchanged = row("unchanged", None, &robot.displacements);
-            let changed = robot.lives.iter().map(move |life| {
-                row(life.name.as_str(), Some((life.kept, life.distance, life.persists)), &life.displacements)
+            let changed = robot.rollouts.iter().map(move |rollout| {
+                row(
+                    rollout.name.as_str(),
+                    Some((rollout.kept, rollout.distance, rollout.persists)),
+                    &rollout.displacements,
+                )
             });
             std::iter::once(unchanged).chain(changed)
         });
@@ -225,7 +232,7 @@ impl AuditFile {
 }
 
 /// What an audit finds.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
     /// Its directions survive every change.
@@ -253,7 +260,7 @@ impl Verdict {
 }
 
 /// A perturbed rollout.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PerturbedRollout {
     /// What was changed, and how much.

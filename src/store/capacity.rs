@@ -7,6 +7,7 @@ use crate::baseline::curve::Crossing;
 use crate::config::reading;
 use crate::store::eval::EvalFile;
 use crate::store::names::CAPACITY_JSON;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -16,12 +17,14 @@ pub const FORMAT: &str = "morphcog-capacity";
 pub const FORMAT_VERSION: u32 = 1;
 
 /// The content of `capacity.json`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CapacityFile {
-    /// [`FORMAT`].
+    /// "morphcog-capacity".
+    #[schemars(extend("const" = FORMAT))]
     pub format: String,
-    /// [`FORMAT_VERSION`].
+    /// Version of this schema.
+    #[schemars(range(min = 1, max = FORMAT_VERSION))]
     pub format_version: u32,
     /// Version of morphcog that wrote it.
     pub program_version: String,
@@ -50,7 +53,7 @@ fn is_false(value: &bool) -> bool {
 }
 
 /// The capacity of the robots of one task.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TaskCapacity {
     /// Its name, as "0|1".
@@ -64,7 +67,7 @@ pub struct TaskCapacity {
 }
 
 /// Accuracy over size for one kind of network.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Curve {
     /// "mlp" (size: hidden neurons) or "cnn" (size: kernels).
@@ -79,7 +82,7 @@ pub struct Curve {
 }
 
 /// One size of network.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Point {
     /// Hidden neurons, or kernels.

@@ -14,6 +14,7 @@ use crate::store::setting::{RunRef, Setting};
 use crate::store::validation::Validated;
 use crate::task::direction::Assignment;
 use crate::task::grouping::{Group, Split};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::mem::replace;
@@ -25,11 +26,13 @@ pub const FORMAT: &str = "morphcog-eval";
 pub const FORMAT_VERSION: u32 = 1;
 
 /// The content of `eval.json`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct EvalFile {
-    /// [`FORMAT`].
+    /// "morphcog-eval".
+    #[schemars(extend("const" = FORMAT))]
     pub format: String,
-    /// [`FORMAT_VERSION`].
+    /// Version of this schema.
+    #[schemars(range(min = 1, max = FORMAT_VERSION))]
     pub format_version: u32,
     /// Version of morphcog that wrote it.
     pub program_version: String,
@@ -74,7 +77,7 @@ pub struct EvalFile {
 }
 
 /// Accuracies on the same images that take no body.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Baselines {
     /// Always answering the larger group.
     pub larger_group: f64,
@@ -88,7 +91,7 @@ pub struct Baselines {
 }
 
 /// Averages over the robots of a task.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Mean {
     /// Robots.
     pub robots: usize,
@@ -106,7 +109,7 @@ pub struct Mean {
 }
 
 /// What one robot did.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct RobotReport {
     /// Its id.
     pub id: String,

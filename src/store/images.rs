@@ -2,12 +2,13 @@
 //! robots see them.
 
 use crate::task::score::Answer;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::str::FromStr;
 
 /// An image by its place in a dataset.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct ImageRef {
     /// Index in its split.
     pub index: usize,
@@ -16,7 +17,7 @@ pub struct ImageRef {
 }
 
 /// Which data a run was made with, wherever they lay: the same data have the same fingerprint.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct DatasetRef {
     /// Name of the dataset.
     pub name: String,
@@ -25,7 +26,7 @@ pub struct DatasetRef {
 }
 
 /// Which images that robots are not trained on.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum HeldOut {
     /// Those of the test split, which nothing should be chosen by.

@@ -23,7 +23,7 @@ pub struct Totals {
     /// Showings saved by stopping early (or because an earlier one was unstable).
     pub saved_early_stop: u64,
     /// Showings saved because another image looks the same to the sensors.
-    pub saved_shared_lives: u64,
+    pub saved_shared_rollouts: u64,
     /// Offspring found unstable.
     pub unstable: u64,
     /// Wall-clock time, all sessions of the run together \[s\].
@@ -33,19 +33,19 @@ pub struct Totals {
 impl Totals {
     /// Showings saved altogether.
     pub fn saved(&self) -> u64 {
-        self.saved_known_bodies + self.saved_early_stop + self.saved_shared_lives
+        self.saved_known_bodies + self.saved_early_stop + self.saved_shared_rollouts
     }
 
     /// Counts one evaluation.
     pub fn count(&mut self, evaluation: &Evaluation) {
         self.simulated += evaluation.simulated;
         self.saved_early_stop += evaluation.stopped;
-        self.saved_shared_lives += evaluation.shared;
+        self.saved_shared_rollouts += evaluation.shared;
     }
 }
 
 const HEADER: &str = "generation,num_elites,coverage,qd_score,norm_qd_score,obj_max,obj_mean,evaluations,\
-simulated,saved,saved_known_bodies,saved_early_stop,saved_shared_lives,unstable,seconds";
+simulated,saved,saved_known_bodies,saved_early_stop,saved_shared_rollouts,unstable,seconds";
 
 /// Writes `metrics.csv`.
 pub struct Metrics {
@@ -98,7 +98,7 @@ impl Metrics {
             totals.saved(),
             totals.saved_known_bodies,
             totals.saved_early_stop,
-            totals.saved_shared_lives,
+            totals.saved_shared_rollouts,
         )
         .map_err(|error| Error::writing(&self.path, &error))
     }

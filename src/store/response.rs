@@ -8,6 +8,7 @@ use crate::store::images::DatasetRef;
 use crate::task::perturbation::Condition;
 use crate::task::response::{Gait, Response};
 use crate::task::teachable::{Estimate, Teachable};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
@@ -23,12 +24,14 @@ pub const PICTURES: [&str; 2] = ["svg", "png"];
 const JSON: &str = "JSON has all of it: keys are texts, and numbers are finite";
 
 /// The content of `response.json`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ResponseFile {
-    /// [`FORMAT`].
+    /// "morphcog-response".
+    #[schemars(extend("const" = FORMAT))]
     pub format: String,
-    /// [`FORMAT_VERSION`].
+    /// Version of this schema.
+    #[schemars(range(min = 1, max = FORMAT_VERSION))]
     pub format_version: u32,
     /// Version of morphcog that wrote it.
     pub program_version: String,
@@ -45,7 +48,7 @@ pub struct ResponseFile {
 }
 
 /// How responses were measured.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Setting {
     /// Seed of the random images.
@@ -67,7 +70,7 @@ pub struct Setting {
 }
 
 /// Why a measurement ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum EndedBy {
     /// The slopes were known well enough.
@@ -77,7 +80,7 @@ pub enum EndedBy {
 }
 
 /// The response of a robot's gait.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RobotResponse {
     /// Its id, or the name of a published robot.
@@ -113,7 +116,7 @@ pub struct RobotResponse {
 }
 
 /// A soft voxel or a sensor.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Place {
     /// Its row, from 0 at the top.
@@ -135,7 +138,7 @@ impl Place {
 }
 
 /// What a gait could be taught, by the linear model.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Taught {
     /// Mean clipped margin of its answers, `mean_clipped`: from −1 to 1.

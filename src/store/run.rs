@@ -15,6 +15,7 @@ use crate::store::images::{DatasetRef, ImageRef, answers};
 use crate::store::training::Origin;
 use crate::task::fitness::Fitness;
 use crate::task::score::Answer;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -28,7 +29,7 @@ pub const FORMAT_VERSION: u32 = 1;
 const JSON: &str = "JSON has all of it: keys are texts, and nothing fails to be written";
 
 /// A robot: a genome, its body, and what it did on the training images.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Robot {
     /// Content hash of the genome (ten hexadecimal digits).
@@ -64,7 +65,7 @@ impl Robot {
 }
 
 /// Dimensions of an archive.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Dimensions {
     /// Names: muscle, sensor, total, and with several tasks, task.
@@ -94,12 +95,14 @@ impl Dimensions {
 }
 
 /// The content of `run.json`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RunFile {
-    /// [`FORMAT`].
+    /// "morphcog-run".
+    #[schemars(extend("const" = FORMAT))]
     pub format: String,
-    /// [`FORMAT_VERSION`].
+    /// Version of this schema.
+    #[schemars(range(min = 1, max = FORMAT_VERSION))]
     pub format_version: u32,
     /// Version of morphcog that wrote it.
     pub program_version: String,

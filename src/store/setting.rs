@@ -13,10 +13,11 @@ use crate::store::run::RunFile;
 use crate::task::evaluation::Savings;
 use crate::task::protocol::Protocol;
 use crate::task::stimulus::StimulusParams;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// A run that robots are from.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct RunRef {
     /// Its name.
     pub name: String,
@@ -31,7 +32,7 @@ pub struct RunRef {
 }
 
 /// What networks need to know to be given the same images as the robots.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Setting {
     /// Rows and columns of a stimulus.
     pub body: BodyConfig,

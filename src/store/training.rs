@@ -1,13 +1,14 @@
 //! `training.json`: every rollout of a training, so that it goes on where it was stopped; and which
 //! run its gaits are from.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// What the file calls itself, and the version of its schema.
 pub(crate) const FILE: (&str, u32) = ("morphcog-training", 1);
 
 /// The run whose gaits a robot was trained from, wherever that lay.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Origin {
     /// Name of the run.
@@ -25,7 +26,7 @@ pub struct Origin {
 pub type Batch = Vec<Option<f64>>;
 
 /// The content of `training.json`.
-#[derive(Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct File {
     /// What it calls itself.

@@ -4,6 +4,7 @@ use crate::base::files::read_text;
 use crate::config::reading;
 use crate::store::names::VALIDATION_JSON;
 use crate::store::robots::Source;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -11,7 +12,7 @@ use std::path::Path;
 pub(crate) const FORMAT: (&str, u32) = ("morphcog-validation", 1);
 
 /// How a robot did on all validation images.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Validated {
     /// Its id.
@@ -27,7 +28,7 @@ pub struct Validated {
 }
 
 /// The content of `validation.json`.
-#[derive(Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct ValidationFile {
     pub format: String,

@@ -6,9 +6,10 @@ use crate::base::stop::{Stopped, check};
 use crate::body::Body;
 use crate::sim::{Physics, System, Unstable};
 use crate::task::perturbation::{Condition, Kind, Perturbation};
-use crate::task::protocol::{Life, Protocol};
+use crate::task::protocol::{Protocol, RolloutMode};
 use crate::task::rollout::{Rollout, fresh_rollout, same_to_sensors};
 use rayon::prelude::*;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, HashMap};
@@ -16,7 +17,7 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// Savings that change no archive; keys of a config's section `[savings]`. All on by default.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Savings {
     /// A body already evaluated in this run is not simulated again: it would be exactly as fit, and
@@ -26,12 +27,12 @@ pub struct Savings {
     /// further.
     pub early_stop: bool,
     /// Images that show a body's sensors the same pixels share a rollout.
-    pub shared_lives: bool,
+    pub shared_rollouts: bool,
 }
 
 impl Default for Savings {
     fn default() -> Self {
-        Savings { known_bodies: true, early_stop: true, shared_lives: true }
+        Savings { known_bodies: true, early_stop: true, shared_rollouts: true }
     }
 }
 
@@ -184,7 +185,7 @@ impl Shown {
 #[derive(Default)]
 struct Progress {
     /// In the order in which they count, until they are counted.
-    lived: Vec<Option<Shown>>,
+    ended: Vec<Option<Shown>>,
     /// How many are.
     counted: usize,
     /// Of those, in the order of showing.
@@ -304,7 +305,7 @@ struct Candidate<'a> {
     order: Vec<usize>,
     /// For each image its place in that order, or that of the image whose rollout it shares.
     places: Vec<usize>,
-    lives: Mutex<Progress>,
+    rollouts: Mutex<Progress>,
     /// Whether it is known how it ends.
     is_over: AtomicBool,
 }
@@ -313,8 +314,8 @@ impl<'a> Candidate<'a> {
     fn new(job: &'a Job<'a>, setup: &'a Setup<'a>, savings: Savings) -> Self {
         let images = setup.images;
         let all: Vec<usize> = (0..images.len()).collect();
-        let is_fresh = setup.protocol().life == Life::Fresh;
-        let same_as = match is_fresh && savings.shared_lives {
+        let is_fresh = setup.protocol().rollout == RolloutMode::Fresh;
+        let same_as = match is_fresh && savings.shared_rollouts {
             true => setup.same_as(job.body),
             false => all.clone(),
         };
@@ -330,7 +331,7 @@ impl<'a> Candidate<'a> {
             .iter()
             .map(|&image| places[image].expect("every image is in the order, or the one it is the same as"))
             .collect();
-        let lives = if is_fresh { order.len() } else { 1 };
+        let rollouts = if is_fresh { order.len() } else { 1 };
         Candidate {
             job,
             setup,
@@ -338,18 +339,21 @@ impl<'a> Candidate<'a> {
             systems: setup.systems(job.body),
             order,
             places,
-            lives: Mutex::new(Progress { lived: (0..lives).map(|_| None).collect(), ..Progress::default() }),
+            rollouts: Mutex::new(Progress {
+                ended: (0..rollouts).map(|_| None).collect(),
+                ..Progress::default()
+            }),
             is_over: AtomicBool::new(false),
         }
     }
 
     fn rollouts(&self) -> usize {
-        self.locked().lived.len()
+        self.locked().ended.len()
     }
 
     fn locked(&self) -> MutexGuard<'_, Progress> {
         // A thread that panicked leaves whole entries.
-        self.lives.lock().unwrap_or_else(PoisonError::into_inner)
+        self.rollouts.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Simulates one rollout, unless the robot has dropped out.
@@ -357,25 +361,25 @@ impl<'a> Candidate<'a> {
         if self.is_over.load(Ordering::Relaxed) {
             return Ok(());
         }
-        let mut lived = Shown { displacements: Vec::new(), unstable: None };
-        match self.setup.protocol().life {
-            Life::Fresh => {
-                lived.add(self.setup.fresh_rollout(self.job.body, &self.systems, self.order[place])?);
+        let mut shown = Shown { displacements: Vec::new(), unstable: None };
+        match self.setup.protocol().rollout {
+            RolloutMode::Fresh => {
+                shown.add(self.setup.fresh_rollout(self.job.body, &self.systems, self.order[place])?);
             }
-            Life::Sequential => {
+            RolloutMode::Sequential => {
                 let mut rollout = Rollout::new(&self.systems[0], self.setup.protocol());
                 for image in self.setup.images {
-                    lived.add(rollout.show_unless(image, self.setup.stop)?);
-                    if lived.unstable.is_some() || self.outcome(&lived.displacements).is_some() {
+                    shown.add(rollout.show_unless(image, self.setup.stop)?);
+                    if shown.unstable.is_some() || self.outcome(&shown.displacements).is_some() {
                         break;
                     }
                 }
             }
         }
-        let mut lives = self.locked();
-        lives.lived[place] = Some(lived);
-        self.count(&mut lives);
-        if lives.verdict.is_some() {
+        let mut rollouts = self.locked();
+        rollouts.ended[place] = Some(shown);
+        self.count(&mut rollouts);
+        if rollouts.verdict.is_some() {
             self.is_over.store(true, Ordering::Relaxed);
         }
         Ok(())
@@ -398,29 +402,29 @@ impl<'a> Candidate<'a> {
 
     /// Counts the rollouts that are known, in their order, whichever was done first: every one
     /// once, since each takes a look at all images.
-    fn count(&self, lives: &mut Progress) {
-        let is_over = |lives: &Progress| {
-            self.early_stop && lives.unstable.is_some() || lives.counted == lives.lived.len()
+    fn count(&self, rollouts: &mut Progress) {
+        let is_over = |rollouts: &Progress| {
+            self.early_stop && rollouts.unstable.is_some() || rollouts.counted == rollouts.ended.len()
         };
-        if lives.verdict.is_some() {
+        if rollouts.verdict.is_some() {
             return;
         }
-        while !is_over(lives) {
-            let Some(life) = lives.lived[lives.counted].take() else { return };
-            lives.counted += 1;
-            for displacement in life.displacements {
-                lives.displacements.push(displacement);
-                let shown = &lives.displacements;
+        while !is_over(rollouts) {
+            let Some(rollout) = rollouts.ended[rollouts.counted].take() else { return };
+            rollouts.counted += 1;
+            for displacement in rollout.displacements {
+                rollouts.displacements.push(displacement);
+                let shown = &rollouts.displacements;
                 if let Some(outcome) = displacement.and_then(|_| self.outcome(shown)) {
-                    lives.verdict = Some(self.ended(outcome, shown.len()));
+                    rollouts.verdict = Some(self.ended(outcome, shown.len()));
                     return;
                 }
             }
-            lives.unstable = lives.unstable.or(life.unstable);
+            rollouts.unstable = rollouts.unstable.or(rollout.unstable);
         }
-        let shown = &lives.displacements;
-        let outcome = lives.unstable.map_or_else(|| walked(self.known(shown)), Outcome::Unstable);
-        lives.verdict = Some(self.ended(outcome, shown.len()));
+        let shown = &rollouts.displacements;
+        let outcome = rollouts.unstable.map_or_else(|| walked(self.known(shown)), Outcome::Unstable);
+        rollouts.verdict = Some(self.ended(outcome, shown.len()));
     }
 
     fn ended(&self, outcome: Outcome, simulated: usize) -> Evaluation {
@@ -432,9 +436,9 @@ impl<'a> Candidate<'a> {
     fn evaluation(&self) -> Evaluation {
         // All rollouts are done that the verdict needs; without images there is nothing to walk
         // for.
-        let mut lives = self.locked();
-        self.count(&mut lives);
-        lives.verdict.take().unwrap_or_else(|| self.ended(Outcome::Walked(Vec::new()), 0))
+        let mut rollouts = self.locked();
+        self.count(&mut rollouts);
+        rollouts.verdict.take().unwrap_or_else(|| self.ended(Outcome::Walked(Vec::new()), 0))
     }
 }
 
@@ -472,12 +476,12 @@ mod tests {
 
     fn run(
         rows: &[[f64; 3]],
-        life: Life,
+        rollout: RolloutMode,
         savings: Savings,
         order: &[usize],
         may_win: Box<MayWin>,
     ) -> Evaluation {
-        let protocol = Protocol { life, control_steps: 8, ..Protocol::default() };
+        let protocol = Protocol { rollout, control_steps: 8, ..Protocol::default() };
         let body = body();
         let job = Job { body: &body, order: order.to_vec(), may_win, given_up: None };
         let mut evaluations =
@@ -486,7 +490,7 @@ mod tests {
         let evaluation = evaluations.remove(0);
         let Evaluation { simulated, shared, stopped, .. } = evaluation;
         assert_eq!(simulated + shared + stopped, rows.len() as u64, "{evaluation:?}");
-        assert!(savings.shared_lives || shared == 0, "{evaluation:?}");
+        assert!(savings.shared_rollouts || shared == 0, "{evaluation:?}");
         evaluation
     }
 
@@ -502,20 +506,21 @@ mod tests {
         (0..4).map(|mask| Savings {
             known_bodies: true,
             early_stop: mask & 1 > 0,
-            shared_lives: mask & 2 > 0,
+            shared_rollouts: mask & 2 > 0,
         })
     }
 
     #[test]
     fn every_image_is_simulated_shared_or_stopped_in_every_outcome() {
-        for (life, savings) in
-            [Life::Fresh, Life::Sequential].into_iter().flat_map(|l| all_savings().map(move |s| (l, s)))
+        for (rollout, savings) in [RolloutMode::Fresh, RolloutMode::Sequential]
+            .into_iter()
+            .flat_map(|l| all_savings().map(move |s| (l, s)))
         {
             for (rows, order) in [&CALM, &WILD].into_iter().flat_map(|r| ORDERS.map(|order| (r, order))) {
                 // After none, after some, never.
                 for patience in [0, 1, 2, 5] {
                     let may_win = move |known: &[Option<f64>]| known.iter().flatten().count() <= patience;
-                    let evaluation = run(rows, life, savings, order, Box::new(may_win));
+                    let evaluation = run(rows, rollout, savings, order, Box::new(may_win));
                     let is_stopped = matches!(evaluation.outcome, Outcome::Stopped(_));
                     assert!(!is_stopped || savings.early_stop && patience < 5, "{evaluation:?}");
                     assert_eq!(
@@ -529,18 +534,18 @@ mod tests {
 
     #[test]
     fn the_outcome_is_the_same_with_each_saving_and_in_any_order() {
-        for life in [Life::Fresh, Life::Sequential] {
-            let none = Savings { known_bodies: false, early_stop: false, shared_lives: false };
-            let walked = run(&CALM, life, none, &[], Box::new(|_| true));
+        for rollout in [RolloutMode::Fresh, RolloutMode::Sequential] {
+            let none = Savings { known_bodies: false, early_stop: false, shared_rollouts: false };
+            let walked = run(&CALM, rollout, none, &[], Box::new(|_| true));
             let Outcome::Walked(displacements) = &walked.outcome else { panic!("{walked:?}") };
             assert!(displacements.len() == 5 && displacements.iter().any(|d| *d != 0.0));
             assert_eq!(walked.simulated, 5);
             for (savings, order) in all_savings().flat_map(|savings| ORDERS.map(|order| (savings, order))) {
-                let other = run(&CALM, life, savings, order, Box::new(|_| true));
+                let other = run(&CALM, rollout, savings, order, Box::new(|_| true));
                 assert_eq!(other.outcome, walked.outcome);
-                let lives = if savings.shared_lives && life == Life::Fresh { 3 } else { 5 };
-                assert_eq!((other.simulated, other.stopped), (lives, 0));
-                let wild = run(&WILD, life, savings, order, Box::new(|_| true));
+                let rollouts = if savings.shared_rollouts && rollout == RolloutMode::Fresh { 3 } else { 5 };
+                assert_eq!((other.simulated, other.stopped), (rollouts, 0));
+                let wild = run(&WILD, rollout, savings, order, Box::new(|_| true));
                 let Outcome::Unstable(end) = wild.outcome else { panic!("{wild:?}") };
                 assert_eq!(end.reason, UnstableReason::BlownUp);
             }
@@ -548,15 +553,15 @@ mod tests {
     }
 
     #[test]
-    fn fresh_lives_follow_the_order_and_stop_when_nothing_can_be_won() {
+    fn fresh_rollouts_follow_the_order_and_stop_when_nothing_can_be_won() {
         // Image 3 shares image 1's rollout, image 4 image 0's: with both known, nothing can be won
         // any more.
         let may_win = |known: &[Option<f64>]| {
             assert!(known[3].is_some() && known[1] == known[3], "image 3 comes first: {known:?}");
             known[0].is_none()
         };
-        let evaluation = run(&CALM, Life::Fresh, Savings::default(), &[3, 4], Box::new(may_win));
-        let all = run(&CALM, Life::Fresh, Savings::default(), &[], Box::new(|_| true)).outcome.known();
+        let evaluation = run(&CALM, RolloutMode::Fresh, Savings::default(), &[3, 4], Box::new(may_win));
+        let all = run(&CALM, RolloutMode::Fresh, Savings::default(), &[], Box::new(|_| true)).outcome.known();
         let mut known = all.unwrap_or_default();
         known[2] = None;
         let outcome = Outcome::Stopped(known);
@@ -564,7 +569,7 @@ mod tests {
     }
 
     #[test]
-    fn every_life_is_looked_at_once() {
+    fn every_rollout_is_looked_at_once() {
         let rows: Vec<[f64; 3]> = (0..60).map(|i| [0.4 / 60.0 * f64::from(i), 0.0, 0.3]).collect();
         let looks = Arc::new(AtomicUsize::new(0));
         let look = Arc::clone(&looks);
@@ -572,15 +577,16 @@ mod tests {
             look.fetch_add(1, Ordering::Relaxed);
             true
         });
-        let evaluation = rayon(2).install(|| run(&rows, Life::Fresh, Savings::default(), &[], may_win));
+        let evaluation =
+            rayon(2).install(|| run(&rows, RolloutMode::Fresh, Savings::default(), &[], may_win));
         assert_eq!(evaluation.simulated, 60);
         // After the last one there is no rest to be dropped.
         assert_eq!(looks.load(Ordering::Relaxed), 59);
     }
 
     #[test]
-    fn a_raised_start_is_another_life_even_under_the_same_image() {
-        let protocol = Protocol { life: Life::Fresh, control_steps: 30, ..Protocol::default() };
+    fn a_raised_start_is_another_rollout_even_under_the_same_image() {
+        let protocol = Protocol { rollout: RolloutMode::Fresh, control_steps: 30, ..Protocol::default() };
         let (body, physics, images) = (body(), physics(), images(&CALM));
         let system = Arc::new(System::new(&body, physics.clone()));
         let live = |image: usize, rows: u32| {
@@ -602,14 +608,14 @@ mod tests {
             };
             let evaluation = evaluated(&raised);
             assert_eq!((evaluation.outcome, evaluation.simulated), (Outcome::Walked(expected.to_vec()), 5));
-            let lives = if savings.shared_lives { 4 } else { 5 };
-            assert_eq!(evaluated(&[1, 0, 1, 2, 1]).simulated, lives);
+            let rollouts = if savings.shared_rollouts { 4 } else { 5 };
+            assert_eq!(evaluated(&[1, 0, 1, 2, 1]).simulated, rollouts);
         }
     }
 
     #[test]
-    fn a_life_without_limits_is_another_life_and_leads_nowhere_where_it_becomes_unstable() {
-        let protocol = Protocol { life: Life::Fresh, control_steps: 30, ..Protocol::default() };
+    fn a_rollout_without_limits_is_another_rollout_and_leads_nowhere_where_it_becomes_unstable() {
+        let protocol = Protocol { rollout: RolloutMode::Fresh, control_steps: 30, ..Protocol::default() };
         let images = images(&WILD);
         let evaluated = |physics: &Physics, without_limits: &[bool]| {
             let conditions: Vec<Condition> = without_limits.iter().map(|off| condition(0, *off)).collect();
@@ -651,9 +657,9 @@ mod tests {
     #[test]
     fn every_perturbation_of_an_audit_is_shown_as_a_condition_of_its_own() {
         let (body, physics, images) = (body(), Physics::default(), images(&CALM));
-        let protocol = Protocol { life: Life::Fresh, control_steps: 30, ..Protocol::default() };
+        let protocol = Protocol { rollout: RolloutMode::Fresh, control_steps: 30, ..Protocol::default() };
         let sizes = Sizes { least_sensors: 1, ..Sizes::default() };
-        for perturbation in Perturbation::all(&sizes, &body, Life::Fresh) {
+        for perturbation in Perturbation::all(&sizes, &body, RolloutMode::Fresh) {
             let setting = Setting {
                 body: body.clone(),
                 physics: physics.clone(),
@@ -674,7 +680,7 @@ mod tests {
     }
 
     #[test]
-    fn a_sequential_life_keeps_the_order_of_the_images() {
+    fn a_sequential_rollout_keeps_the_order_of_the_images() {
         let asked = Mutex::new(BTreeSet::new());
         let may_win = |known: &[Option<f64>]| {
             let first = known.iter().map_while(|displacement| *displacement).count();
@@ -682,16 +688,16 @@ mod tests {
             asked.lock().unwrap().insert(first);
             true
         };
-        run(&CALM, Life::Sequential, Savings::default(), &[3, 4], Box::new(may_win));
+        run(&CALM, RolloutMode::Sequential, Savings::default(), &[3, 4], Box::new(may_win));
         assert_eq!(*asked.lock().unwrap(), BTreeSet::from([1, 2, 3, 4]));
     }
 
     #[test]
-    fn what_is_stopped_is_no_evaluation_and_ends_in_the_middle_of_a_life() {
+    fn what_is_stopped_is_no_evaluation_and_ends_in_the_middle_of_a_rollout() {
         let (body, images) = (body(), images(&CALM));
         // A rollout that lasts for minutes.
-        for life in [Life::Fresh, Life::Sequential] {
-            let protocol = Protocol { life, control_steps: 10_000_000, ..Protocol::default() };
+        for rollout in [RolloutMode::Fresh, RolloutMode::Sequential] {
+            let protocol = Protocol { rollout, control_steps: 10_000_000, ..Protocol::default() };
             let may_win = Box::new(|_: &[Option<f64>]| true);
             let job = Job { body: &body, order: Vec::new(), may_win, given_up: None };
             let stop = AtomicBool::new(false);

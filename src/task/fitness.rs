@@ -2,6 +2,7 @@
 
 use crate::task::grouping::Group;
 use crate::task::perturbation::CONDITIONS_OF_RESPONSE;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Margin at which an answer is as good as can be, for [`Fitness::MeanClipped`] \[voxel lengths\].
@@ -19,7 +20,7 @@ const SLACK: f64 = 1e-9;
 /// Where images are averaged, both groups weigh the same, however many images they have: with one
 /// class against three, a robot that always walks the way of the three would else be right on three
 /// quarters, and the fittest for long.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Fitness {
     /// The smallest margin \[voxel lengths\]: the paper's. With many images one wrong answer makes

@@ -10,11 +10,12 @@ use crate::base::random::{Purpose, stream};
 use crate::base::{Grid, number};
 use crate::body::Body;
 use crate::sim::Physics;
-use crate::task::protocol::{Life, Protocol};
+use crate::task::protocol::{Protocol, RolloutMode};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// What is changed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Kind {
     /// The robot starts above the ground, and so touches it first in another way; at another
@@ -83,7 +84,7 @@ impl Kind {
 }
 
 /// How much an audit changes.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Sizes {
     /// Rows by which the start is raised, a rollout each. Default 1 and 2.
@@ -125,7 +126,7 @@ const HALF_AS_FAST: f64 = 0.5;
 const OUT_OF_REACH: f64 = 0.0;
 
 /// Under what the images of a training are shown by turns; keys of `train.perturbations`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct ByTurns {
     /// Rows up to which the start is raised. Default 2.
@@ -183,7 +184,7 @@ pub(crate) fn condition(rows: u32, without_limits: bool) -> Condition {
 }
 
 /// One change.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Perturbation {
     /// What is changed.
@@ -202,13 +203,13 @@ fn is_zero(seed: &u64) -> bool {
 impl Perturbation {
     /// All changes of these sizes that mean something to a body under a protocol, in the order of a
     /// report.
-    pub fn all(sizes: &Sizes, body: &Body, life: Life) -> Vec<Self> {
+    pub fn all(sizes: &Sizes, body: &Body, rollout: RolloutMode) -> Vec<Self> {
         let sees = body.counts().sensor >= sizes.least_sensors;
         let amounts = |kind| match kind {
             Kind::Start => sizes.start.iter().map(|&rows| f64::from(rows)).collect(),
             Kind::TimeStep => sizes.time_step.iter().map(|&by| f64::from(by)).collect(),
             Kind::Stiffness | Kind::Friction | Kind::Gravity => vec![1.0 - sizes.share, 1.0 + sizes.share],
-            Kind::Order if life == Life::Fresh => Vec::new(),
+            Kind::Order if rollout == RolloutMode::Fresh => Vec::new(),
             Kind::Pixel if !sees => Vec::new(),
             Kind::Pixel => (1..=sizes.pixels).map(f64::from).collect(),
             Kind::LengthLimits => vec![HALF_AS_FAST, OUT_OF_REACH],
@@ -341,19 +342,19 @@ mod tests {
         Setting { body, physics: Physics::default(), protocol: Protocol::default(), stimuli }
     }
 
-    fn all(life: Life) -> Vec<Perturbation> {
+    fn all(rollout: RolloutMode) -> Vec<Perturbation> {
         let sizes = Sizes { least_sensors: 2, ..Sizes::default() };
-        Perturbation::all(&sizes, &setting().body, life)
+        Perturbation::all(&sizes, &setting().body, rollout)
     }
 
     fn of(kind: Kind) -> Vec<Setting> {
-        all(Life::Sequential).iter().filter(|p| p.kind == kind).map(|p| p.apply(&setting())).collect()
+        all(RolloutMode::Sequential).iter().filter(|p| p.kind == kind).map(|p| p.apply(&setting())).collect()
     }
 
     #[test]
     fn every_perturbation_changes_what_it_says_and_nothing_else() {
         let plain = setting();
-        for perturbation in all(Life::Sequential) {
+        for perturbation in all(RolloutMode::Sequential) {
             let changed = perturbation.apply(&plain);
             let parts = [
                 changed.body != plain.body,
@@ -394,7 +395,7 @@ mod tests {
         }
         assert!(changed.iter().any(|other| *other != changed[0]));
         // To two sensors one pixel is no noise.
-        let few = Perturbation::all(&Sizes::default(), &setting().body, Life::Fresh);
+        let few = Perturbation::all(&Sizes::default(), &setting().body, RolloutMode::Fresh);
         assert!(few.iter().all(|p| p.kind != Kind::Pixel));
         let blind = Setting { body: "33/44".parse().unwrap(), ..setting() };
         let pixel = Perturbation { kind: Kind::Pixel, amount: 1.0, seed: 1 };
@@ -425,7 +426,7 @@ mod tests {
 
     #[test]
     fn names_are_distinct_and_a_mirror_image_walks_the_other_way() {
-        let all = all(Life::Sequential);
+        let all = all(RolloutMode::Sequential);
         let mut names: Vec<String> = all.iter().map(Perturbation::name).collect();
         assert!(names.contains(&"time step / 4".to_string()) && names.contains(&"gravity -5 %".to_string()));
         names.sort();
@@ -443,7 +444,7 @@ mod tests {
             assert_eq!(perturbation.undo(vec![2.0, 3.0]), expected);
         }
         // Fresh rollouts have no order.
-        let fresh = super::tests::all(Life::Fresh);
+        let fresh = super::tests::all(RolloutMode::Fresh);
         assert!(fresh.iter().all(|p| p.kind != Kind::Order) && fresh.len() + 1 == names.len());
     }
 }

@@ -1,5 +1,6 @@
 //! [`Protocol`]: how a robot is shown images.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Farthest start column either way \[voxels\]: world coordinates stay exact to far below a voxel.
@@ -13,9 +14,9 @@ pub const MAX_STEPS: u32 = 1_000_000;
 pub const MAX_ROW: u32 = 2_000_000;
 
 /// Whether images share a rollout.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
-pub enum Life {
+pub enum RolloutMode {
     /// One rollout per image, from the initial state (the paper's text).
     Fresh,
     /// One continuous rollout: each image in turn, without a reset (the published zero-one runs).
@@ -23,11 +24,11 @@ pub enum Life {
 }
 
 /// How a robot is shown images (paper, "Protocol"); keys of a config's section `[protocol]`.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Protocol {
     /// Whether images share a rollout. Default fresh.
-    pub life: Life,
+    pub rollout: RolloutMode,
     /// Control steps an image is shown for. Default 500: ten actuation cycles.
     pub control_steps: u32,
     /// Grid row of the body's bottom row at the start \[voxels\]. Default 2: on the ground.
@@ -39,6 +40,6 @@ pub struct Protocol {
 
 impl Default for Protocol {
     fn default() -> Self {
-        Protocol { life: Life::Fresh, control_steps: 500, start_row: 2, start_column: 493 }
+        Protocol { rollout: RolloutMode::Fresh, control_steps: 500, start_row: 2, start_column: 493 }
     }
 }

@@ -4,7 +4,7 @@ use crate::base::Grid;
 use crate::base::stop::Stopped;
 use crate::body::Body;
 use crate::sim::{Energy, Physics, Start, System, Unstable, World};
-use crate::task::protocol::{Life, Protocol};
+use crate::task::protocol::{Protocol, RolloutMode};
 use crate::task::recording::{Frame, Phase, Recording, VoxelCorners};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -148,7 +148,7 @@ pub fn walk(
     }
     let mut displacements = Vec::with_capacity(stimuli.len());
     for stimulus in stimuli {
-        if protocol.life == Life::Fresh {
+        if protocol.rollout == RolloutMode::Fresh {
             rollout.reset();
         }
         match rollout.show_unless(stimulus, stop)? {
@@ -230,7 +230,7 @@ mod tests {
     const STEPS: u32 = 12;
 
     fn protocol() -> Protocol {
-        Protocol { life: Life::Fresh, control_steps: STEPS, ..Protocol::default() }
+        Protocol { rollout: RolloutMode::Fresh, control_steps: STEPS, ..Protocol::default() }
     }
 
     fn body() -> Body {
@@ -278,7 +278,7 @@ mod tests {
     }
 
     #[test]
-    fn a_life_that_is_stopped_has_no_displacement() {
+    fn a_rollout_that_is_stopped_has_no_displacement() {
         let (system, protocol) = (system(), protocol());
         let stop = AtomicBool::new(true);
         let image = image(1.0, 0.0);
@@ -292,7 +292,7 @@ mod tests {
     }
 
     #[test]
-    fn a_continuous_life_is_recorded_as_one_with_a_frame_per_control_step() {
+    fn a_continuous_rollout_is_recorded_as_one_with_a_frame_per_control_step() {
         let physics = Physics::default();
         let recording = recorded(false, &physics);
         let steps = STEPS as usize;
@@ -315,7 +315,7 @@ mod tests {
     }
 
     #[test]
-    fn a_fresh_life_jumps_back_to_the_start_for_every_image() {
+    fn a_fresh_rollout_jumps_back_to_the_start_for_every_image() {
         let physics = Physics::default();
         let (fresh, continuous) = (recorded(true, &physics), recorded(false, &physics));
         let steps = STEPS as usize;
@@ -331,11 +331,11 @@ mod tests {
     fn a_walk_is_what_the_protocol_says() {
         let (physics, system) = (Physics::default(), system());
         let images = [image(0.0, 0.0), image(1.0, 0.0)];
-        for life in [Life::Fresh, Life::Sequential] {
-            let protocol = Protocol { life, ..protocol() };
+        for rollout in [RolloutMode::Fresh, RolloutMode::Sequential] {
+            let protocol = Protocol { rollout, ..protocol() };
             let walk = |measured| walk(&system, &protocol, &images, measured, &NEVER);
             let [(plain, nothing), (measured, energy)] = [false, true].map(|m| walk(m).unwrap().unwrap());
-            let recorded = recorded(life == Life::Fresh, &physics).phases;
+            let recorded = recorded(rollout == RolloutMode::Fresh, &physics).phases;
             assert_eq!(plain, recorded.iter().map(|phase| phase.displacement).collect::<Vec<_>>());
             assert_eq!((plain, nothing), (measured, Energy::default()));
             assert!(energy.drive > 0.0, "{energy:?}");
@@ -343,7 +343,7 @@ mod tests {
     }
 
     #[test]
-    fn an_unstable_life_is_recorded_up_to_its_end() {
+    fn an_unstable_rollout_is_recorded_up_to_its_end() {
         let physics = Physics { blow_up_extent: 0.12, ..Physics::default() };
         let recording = recorded(true, &physics);
         assert!(recording.unstable && recording.phases.len() == 1);

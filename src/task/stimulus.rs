@@ -2,10 +2,11 @@
 //! "Task").
 
 use crate::base::Grid;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// How an image is reduced to the body's grid.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Reduction {
     /// Every s-th row and column (0, s, 2s, …), as in the paper, where s = 2 takes 28 × 28 to 14 ×
@@ -18,7 +19,7 @@ pub enum Reduction {
 }
 
 /// How a pixel value becomes a stimulus in [0, 1].
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Encoding {
     /// value / 255: "proportional to the intensity of the pixel" (the paper's text).
@@ -31,7 +32,7 @@ pub enum Encoding {
 }
 
 /// From image to stimulus; keys of a config's section `[stimulus]`.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct StimulusParams {
     /// "stride" (default) or "area".

@@ -59,7 +59,7 @@ pub fn page(
     } else {
         ""
     };
-    let life = life(&walk, MOST_BYTES).to_string();
+    let rollout = rollout(&walk, MOST_BYTES).to_string();
     Ok(fill(
         TEMPLATE,
         &[
@@ -69,13 +69,13 @@ pub fn page(
             ("metadata", &rows.collect::<String>()),
             ("warning", warning),
             // In a script element only "<" could end it or open another.
-            ("life", &life.replace('<', "\\u003c")),
+            ("rollout", &rollout.replace('<', "\\u003c")),
         ],
     ))
 }
 
-/// A page in which `life` stands where its recording belongs.
-pub(super) fn player(life: &str) -> String {
+/// A page in which `rollout` stands where its recording belongs.
+pub(super) fn player(rollout: &str) -> String {
     fill(
         TEMPLATE,
         &[
@@ -84,7 +84,7 @@ pub(super) fn player(life: &str) -> String {
             ("script", SCRIPT),
             ("metadata", ""),
             ("warning", ""),
-            ("life", life),
+            ("rollout", rollout),
         ],
     )
 }
@@ -97,13 +97,13 @@ pub(super) fn packed(walk: &Walk, most: usize) -> Result<String, PictureError> {
     let failed = |error: std::io::Error| PictureError::Encode(error.to_string());
     // The same bytes every time: the header has no time in it.
     let mut packer = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::best());
-    packer.write_all(life(walk, most).to_string().as_bytes()).map_err(failed)?;
+    packer.write_all(rollout(walk, most).to_string().as_bytes()).map_err(failed)?;
     Ok(BASE64.encode(packer.finish().map_err(failed)?))
 }
 
 /// The recording as the page's script reads it; `most`: bytes of positions, of which there are
 /// fewer for longer rollouts.
-fn life(walk: &Walk, most: usize) -> serde_json::Value {
+fn rollout(walk: &Walk, most: usize) -> serde_json::Value {
     let recording = walk.recording();
     let points = recording.frames.iter().map(|f| f.points.len()).min().unwrap_or(0);
     let every = (walk.len() * points * 4).div_ceil(most.max(1)).max(1);
@@ -198,21 +198,22 @@ mod tests {
     use crate::view::simulated;
 
     fn embedded(page: &str) -> serde_json::Value {
-        let (_, rest) = page.split_once("<script type=\"application/json\" id=\"life\">").unwrap();
+        let (_, rest) = page.split_once("<script type=\"application/json\" id=\"rollout\">").unwrap();
         serde_json::from_str(rest.split_once("</script>").unwrap().0).unwrap()
     }
 
     /// Positions by shown frame, as the script decodes them.
-    fn positions(life: &serde_json::Value) -> Vec<Vec<Option<[f64; 2]>>> {
-        let data = |key: &str| BASE64.decode(life[key].as_str().unwrap()).unwrap();
+    fn positions(rollout: &serde_json::Value) -> Vec<Vec<Option<[f64; 2]>>> {
+        let data = |key: &str| BASE64.decode(rollout[key].as_str().unwrap()).unwrap();
         let origins: Vec<f64> =
             data("origins").chunks(8).map(|b| f64::from_le_bytes(b.try_into().unwrap())).collect();
         let steps: Vec<i16> =
             data("positions").chunks(2).map(|b| i16::from_le_bytes(b.try_into().unwrap())).collect();
-        let points = life["points"].as_u64().unwrap() as usize;
+        let points = rollout["points"].as_u64().unwrap() as usize;
         let frames = steps.chunks(2 * points).zip(origins.chunks(2));
         let position = |p: &[i16], o: &[f64]| {
-            (p[0] != NOWHERE).then(|| [0, 1].map(|k| f64::from(p[k]) / life["unit"].as_f64().unwrap() + o[k]))
+            (p[0] != NOWHERE)
+                .then(|| [0, 1].map(|k| f64::from(p[k]) / rollout["unit"].as_f64().unwrap() + o[k]))
         };
         frames.map(|(frame, o)| frame.chunks(2).map(|p| position(p, o)).collect()).collect()
     }
@@ -225,8 +226,8 @@ mod tests {
                 f.points.iter_mut().for_each(|p| p[0] += far);
                 f.centre[0] += far;
             });
-            let life = embedded(&page(&recording, "", &[]).unwrap());
-            let decoded = positions(&life);
+            let rollout = embedded(&page(&recording, "", &[]).unwrap());
+            let decoded = positions(&rollout);
             assert_eq!(decoded.len(), recording.frames.len());
             for (frame, points) in recording.frames.iter().zip(&decoded) {
                 for (p, q) in frame.points.iter().zip(points) {
@@ -234,8 +235,8 @@ mod tests {
                     assert!((p[0] - q[0]).abs() < 0.005 && (p[1] - q[1]).abs() < 0.005, "{p:?} {q:?}");
                 }
             }
-            assert_eq!(life["phases"][1]["first"], 41);
-            assert_eq!(life["phases"][1]["fresh"], true);
+            assert_eq!(rollout["phases"][1]["first"], 41);
+            assert_eq!(rollout["phases"][1]["fresh"], true);
         }
     }
 
@@ -244,9 +245,10 @@ mod tests {
         let mut recording = simulated("34/56", 1, 5, false);
         recording.robot = "</script><script>alert(1)</script>".into();
         recording.phases[0].label = "<script>".into();
-        let metadata = [("<b>".to_string(), "\"{{life}}\" & <script>x</script>".to_string())];
+        let metadata = [("<b>".to_string(), "\"{{rollout}}\" & <script>x</script>".to_string())];
         let page = page(&recording, "<script>alert('t')</script>", &metadata).unwrap();
-        for forbidden in ["http://", "https://", "src=", "@import", "url(", "<link", "{{title", "{{life}}</"]
+        for forbidden in
+            ["http://", "https://", "src=", "@import", "url(", "<link", "{{title", "{{rollout}}</"]
         {
             assert!(!page.contains(forbidden), "{forbidden}");
         }
@@ -254,13 +256,14 @@ mod tests {
         assert_eq!(page.matches("<script").count(), scripts);
         assert_eq!(page.matches("</script").count(), scripts);
         assert!(
-            page.contains("&lt;script&gt;alert(&#39;t&#39;)") && page.contains("{{life}}&quot; &amp; &lt;")
+            page.contains("&lt;script&gt;alert(&#39;t&#39;)")
+                && page.contains("{{rollout}}&quot; &amp; &lt;")
         );
         assert_eq!(embedded(&page)["robot"], recording.robot.as_str());
     }
 
     #[test]
-    fn unstable_lives_say_so_and_leave_out_what_is_nowhere() {
+    fn unstable_rollouts_say_so_and_leave_out_what_is_nowhere() {
         let mut recording = simulated("34/56", 1, 5, false);
         assert!(!page(&recording, "", &[]).unwrap().contains("became unstable"));
         recording.unstable = true;

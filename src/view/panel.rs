@@ -156,7 +156,7 @@ fn legend(walk: &Walk, [x, y]: [f64; 2], z: f64, out: &mut Vec<Primitive>) {
 
 fn numbers(walk: &Walk, frame: usize, stage: &Stage, out: &mut Vec<Primitive>) {
     let z = stage.zoom;
-    let zero = walk.centre(walk.life(frame).start)[0];
+    let zero = walk.centre(walk.rollout(frame).start)[0];
     let window = stage.window(frame);
     let step = if window.scale * 10.0 > 45.0 * z { 10.0 } else { 50.0 };
     for mark in ruler(&window, zero, step) {

@@ -102,8 +102,11 @@ mod tests {
         assert_eq!(line, "train images 5.0/10.0 MB · 2.5 MB/s · 2 s left");
         assert!(count_line("x", [0, 3, 0], "images", 0.0).contains("3/0"));
         // What was known before took no time.
-        assert_eq!(count_line("x", [40, 40, 50], "lives", 1e-9), "x 40/50 lives · 0.0 lives/s");
-        assert_eq!(count_line("x", [40, 45, 50], "lives", 5.0), "x 45/50 lives · 1.0 lives/s · 5 s left");
+        assert_eq!(count_line("x", [40, 40, 50], "rollouts", 1e-9), "x 40/50 rollouts · 0.0 rollouts/s");
+        assert_eq!(
+            count_line("x", [40, 45, 50], "rollouts", 5.0),
+            "x 45/50 rollouts · 1.0 rollouts/s · 5 s left"
+        );
     }
 
     #[test]

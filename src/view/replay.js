@@ -1,27 +1,27 @@
 (() => {
   const { css, fit } = Drawing;
   const $ = (id) => document.getElementById(id);
-  const life = JSON.parse($("life").textContent);
+  const rollout = JSON.parse($("rollout").textContent);
   const view = (text) => {
     const raw = atob(text), bytes = new Uint8Array(raw.length);
     for (let i = 0; i < raw.length; i++) bytes[i] = raw.charCodeAt(i);
     return new DataView(bytes.buffer);
   };
-  const N = life.steps.length, P = life.points, UNIT = life.unit, NOWHERE = -32768;
-  const positions = view(life.positions), origins = view(life.origins);
+  const N = rollout.steps.length, P = rollout.points, UNIT = rollout.unit, NOWHERE = -32768;
+  const positions = view(rollout.positions), origins = view(rollout.origins);
   const origin = (f, k) => origins.getFloat64(16 * f + 8 * k, true);
   // A point in voxel lengths, or null where the simulation had lost it.
   const point = (f, i) => {
     const at = 4 * (f * P + i), x = positions.getInt16(at, true);
     return x === NOWHERE ? null : [x / UNIT + origin(f, 0), positions.getInt16(at + 2, true) / UNIT + origin(f, 1)];
   };
-  const rows = life.body.split("\n");
+  const rows = rollout.body.split("\n");
 
-  // Phases and lives (a life goes from one reset to the next).
-  const phases = life.phases;
+  // Phases and rollouts (a rollout goes from one reset to the next).
+  const phases = rollout.phases;
   const end = (p) => (p + 1 < phases.length ? phases[p + 1].first : N);
   const phaseOf = (f) => { let p = phases.length - 1; while (p > 0 && phases[p].first > f) p--; return p; };
-  const lifeOf = (f) => {
+  const rolloutOf = (f) => {
     let a = phaseOf(f), b = a + 1;
     while (a > 0 && !phases[a].fresh) a--;
     while (b < phases.length && !phases[b].fresh) b++;
@@ -29,7 +29,7 @@
   };
   const stepsIn = (p) => {
     const goesOn = p + 1 < phases.length && !phases[p + 1].fresh;
-    return life.steps[goesOn ? end(p) : end(p) - 1] - life.steps[phases[p].first];
+    return rollout.steps[goesOn ? end(p) : end(p) - 1] - rollout.steps[phases[p].first];
   };
   const moved = (f) => origin(f, 0) - origin(phases[phaseOf(f)].first, 0);
   const signed = (d) => {
@@ -50,7 +50,7 @@
   const left = low - size * 0.75 - 1.5, right = high + size * 0.75 + 1.5;
   const path = new Float64Array(N);
   for (let f = 0; f < N;) {
-    const [a, b] = lifeOf(f);
+    const [a, b] = rolloutOf(f);
     let line = Array.from({ length: b - a }, (_, i) => origin(a + i, 0));
     for (let pass = 0; pass < 2; pass++) {
       const sums = [0];
@@ -62,7 +62,7 @@
   }
 
   let frame = 0;
-  const body = { voxels: life.voxels, sides: Drawing.sidesOf(life.voxels, P), areas: life.areas, materials: life.materials };
+  const body = { voxels: rollout.voxels, sides: Drawing.sidesOf(rollout.voxels, P), areas: rollout.areas, materials: rollout.materials };
 
   const drawWorld = () => {
     const canvas = $("world"), width = canvas.parentElement.clientWidth - 24, groundHeight = 30;
@@ -79,7 +79,7 @@
     const Y = (y) => Math.min(Math.max(surface - y * scale, -9999), 9999);
     ctx.fillStyle = css("sky"); ctx.fillRect(0, 0, width, height);
     ctx.fillStyle = css("ground"); ctx.fillRect(0, surface, width, groundHeight);
-    const [first] = lifeOf(frame), zero = origin(first, 0), begin = origin(phases[phaseOf(frame)].first, 0);
+    const [first] = rolloutOf(frame), zero = origin(first, 0), begin = origin(phases[phaseOf(frame)].first, 0);
     ctx.strokeStyle = css("mark"); ctx.lineWidth = 1; ctx.setLineDash([5, 5]);
     for (const x of begin === zero ? [zero] : [zero, begin]) { ctx.beginPath(); ctx.moveTo(X(x), 0); ctx.lineTo(X(x), surface); ctx.stroke(); }
     ctx.setLineDash([]);
@@ -92,7 +92,7 @@
   const drawStimulus = () => {
     const canvas = $("stimulus"), p = phaseOf(frame), { height, width } = phases[p];
     const grey = (r, c) => images[p].getUint8(r * width + c);
-    Drawing.stimulus(canvas, canvas.parentElement.clientWidth, { height, width, grey }, rows, life.materials);
+    Drawing.stimulus(canvas, canvas.parentElement.clientWidth, { height, width, grey }, rows, rollout.materials);
   };
 
   const gutter = 52;
@@ -101,7 +101,7 @@
     const ctx = fit(canvas, width, height);
     ctx.clearRect(0, 0, width, height);
     let lo = Infinity, hi = -Infinity;
-    for (let f = 0; f < N; f++) { const d = origin(f, 0) - origin(lifeOf.cache[f], 0); lo = Math.min(lo, d); hi = Math.max(hi, d); }
+    for (let f = 0; f < N; f++) { const d = origin(f, 0) - origin(rolloutOf.cache[f], 0); lo = Math.min(lo, d); hi = Math.max(hi, d); }
     const pad = Math.max(0.5, (hi - lo) * 0.08); lo -= pad; hi += pad;
     const X = (f) => gutter + (width - gutter - 6) * (N > 1 ? f / (N - 1) : 0);
     const Y = (d) => 18 + (bottom - 18) * (hi - d) / (hi - lo);
@@ -124,22 +124,22 @@
     });
     ctx.strokeStyle = css("accent"); ctx.lineWidth = 1.8; ctx.lineJoin = "round"; ctx.beginPath();
     for (let f = 0; f < N; f++) {
-      const first = lifeOf.cache[f], y = Y(origin(f, 0) - origin(first, 0));
+      const first = rolloutOf.cache[f], y = Y(origin(f, 0) - origin(first, 0));
       if (f === first) ctx.moveTo(X(f), y); else ctx.lineTo(X(f), y);
     }
     ctx.stroke();
     ctx.strokeStyle = css("ink"); ctx.lineWidth = 1;
     ctx.beginPath(); ctx.moveTo(X(frame), 16); ctx.lineTo(X(frame), bottom); ctx.stroke();
     ctx.fillStyle = css("accent"); ctx.beginPath();
-    ctx.arc(X(frame), Y(origin(frame, 0) - origin(lifeOf.cache[frame], 0)), 4, 0, 7); ctx.fill();
+    ctx.arc(X(frame), Y(origin(frame, 0) - origin(rolloutOf.cache[frame], 0)), 4, 0, 7); ctx.fill();
   };
-  lifeOf.cache = Array.from({ length: N }, (_, f) => lifeOf(f)[0]);
+  rolloutOf.cache = Array.from({ length: N }, (_, f) => rolloutOf(f)[0]);
 
   const draw = () => {
-    const p = phaseOf(frame), step = life.steps[frame] - life.steps[phases[p].first], d = moved(frame);
+    const p = phaseOf(frame), step = rollout.steps[frame] - rollout.steps[phases[p].first], d = moved(frame);
     $("label").textContent = phases[p].label;
     $("step").textContent = `${step} of ${stepsIn(p)}`;
-    $("cycle").textContent = (step / life.cycle).toFixed(1);
+    $("cycle").textContent = (step / rollout.cycle).toFixed(1);
     $("moved").textContent = (Math.abs(d) < 0.005 ? "" : d < 0 ? "← " : "→ ") + signed(d);
     $("time").value = frame;
     $("time").setAttribute("aria-valuetext", `${phases[p].label}, step ${step} of ${stepsIn(p)}`);
@@ -156,7 +156,7 @@
     if (!playing) return;
     at += Math.min(now - clock, 100) / 1000 * 50 * speed; clock = now;
     let f = frame;
-    while (f + 1 < N && life.steps[f + 1] <= at) f++;
+    while (f + 1 < N && rollout.steps[f + 1] <= at) f++;
     if (f !== frame) show(f);
     if (f >= N - 1) { play(false); return; }
     requestAnimationFrame(tick);
@@ -166,10 +166,10 @@
     $("play").textContent = playing ? "Pause" : "Play";
     if (!playing) return;
     if (frame >= N - 1) show(0);
-    at = life.steps[frame]; clock = performance.now();
+    at = rollout.steps[frame]; clock = performance.now();
     requestAnimationFrame(tick);
   };
-  const seek = (f) => { show(f); at = life.steps[frame]; };
+  const seek = (f) => { show(f); at = rollout.steps[frame]; };
   const halt = (f) => { play(false); seek(f); };
 
   $("time").max = N - 1;
@@ -184,8 +184,8 @@
     button.type = "button"; button.textContent = p.label; far.textContent = signed(p.displacement ?? NaN);
     button.append(far); button.onclick = () => seek(p.first); $("phases").append(button);
   });
-  const used = new Set(life.voxels.map(([m]) => m));
-  life.materials.forEach((m, k) => {
+  const used = new Set(rollout.voxels.map(([m]) => m));
+  rollout.materials.forEach((m, k) => {
     if (!used.has(k)) return;
     const item = document.createElement("li"), swatch = document.createElement("div");
     for (const tone of m.tones) { const i = document.createElement("i"); i.style.background = `rgb(${tone.join(",")})`; swatch.append(i); }

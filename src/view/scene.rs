@@ -124,7 +124,7 @@ fn ground(walk: &Walk, frame: usize, window: &Window) -> Vec<Primitive> {
         Primitive::rectangle([left, top], [right, bottom], colour::PAPER),
         Primitive::rectangle([left, 0.0], [right, bottom], colour::GROUND),
     ];
-    let zero = walk.centre(walk.life(frame).start)[0];
+    let zero = walk.centre(walk.rollout(frame).start)[0];
     if window.look == Look::Paper {
         grid(window, &mut out);
     }
@@ -195,8 +195,8 @@ fn body(walk: &Walk, frame: usize, window: &Window) -> Vec<Primitive> {
 }
 
 fn path(walk: &Walk, frame: usize, window: &Window) -> Vec<Primitive> {
-    let life = walk.life(frame).start..=frame;
-    let points: Vec<[f64; 2]> = life.map(|f| walk.centre(f)).collect();
+    let rollout = walk.rollout(frame).start..=frame;
+    let points: Vec<[f64; 2]> = rollout.map(|f| walk.centre(f)).collect();
     let mut out = Vec::new();
     // Split where the path leaves the window, so that a long walk costs no more than a short one.
     for piece in points.chunk_by(|a, b| window.shows(&[*a, *b])).filter(|piece| piece.len() > 1) {

@@ -138,11 +138,11 @@ fn followed(walk: &Walk, most: f64) -> Vec<f64> {
     let mut path: Vec<f64> = (0..walk.len()).map(|f| walk.centre(f)[0]).collect();
     let mut start = 0;
     while start < path.len() {
-        let life = walk.life(start);
+        let rollout = walk.rollout(start);
         for _ in 0..2 {
-            smooth(&mut path[life.clone()]);
+            smooth(&mut path[rollout.clone()]);
         }
-        start = life.end.max(start + 1);
+        start = rollout.end.max(start + 1);
     }
     for (f, x) in path.iter_mut().enumerate() {
         let centre = walk.centre(f)[0];

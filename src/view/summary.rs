@@ -72,7 +72,7 @@ pub fn evolution(console: &Console, finished: &Finished, out: &Path) {
         share(totals.saved()),
         share(totals.saved_known_bodies),
         share(totals.saved_early_stop),
-        share(totals.saved_shared_lives)
+        share(totals.saved_shared_rollouts)
     ));
     if run.elites.is_empty() {
         return console
@@ -251,6 +251,12 @@ pub fn configs(console: &Console, configs: &[(&str, &str)]) {
         vec![name.to_string(), about.split_once(". ").map_or(about.as_str(), |(first, _)| first).to_string()]
     });
     console.table(&["config", "what it is"], &rows.collect::<Vec<_>>());
+}
+
+/// The schemas: name, and what each is of.
+pub fn schemas(console: &Console, schemas: &[(&str, &str)]) {
+    let rows: Vec<_> = schemas.iter().map(|(name, of)| vec![name.to_string(), of.to_string()]).collect();
+    console.table(&["schema", "what it is of"], &rows);
 }
 
 /// After a download.

@@ -114,7 +114,7 @@ fn pixels(walk: &Walk, frame: usize, columns: usize, rows: usize, tall: f64) -> 
         .min((rows - ground.min(rows - 1)) as f64 * tall / (1.2 * top + 1.0));
     let left = ((walk.centre(frame)[0] * scale).round() - (columns / 2) as f64) / scale;
     let surface = rows.saturating_sub(ground);
-    let zero = walk.centre(walk.life(frame).start)[0];
+    let zero = walk.centre(walk.rollout(frame).start)[0];
     let mut out = vec![Pixel::Sky; columns * rows];
     for (i, pixel) in out.iter_mut().enumerate().skip(surface * columns) {
         let x = left + ((i % columns) as f64 + 0.5) / scale - zero;

@@ -11,7 +11,7 @@ pub fn audit(console: &Console, finished: &Finished, out: &Path) {
     let Finished { file, asked, stopped, unwritten } = finished;
     let robots: Vec<&RobotAudit> = asked.iter().filter_map(|id| file.robot(id)).collect();
     if console.mode() == Mode::Json {
-        let short = |robot: &&RobotAudit| RobotAudit { lives: Vec::new(), ..(*robot).clone() };
+        let short = |robot: &&RobotAudit| RobotAudit { rollouts: Vec::new(), ..(*robot).clone() };
         let done = serde_json::json!({
             "file": unwritten.is_none().then(|| out.display().to_string()), "stopped": stopped, "run": file.run, "elites": file.elites,
             "robots": robots.iter().map(short).collect::<Vec<_>>(),
@@ -66,20 +66,20 @@ fn row(robot: &RobotAudit) -> Vec<String> {
 /// For every change, in how many robots the walk does not persist.
 fn breaking(console: &Console, robots: &[&RobotAudit]) {
     let mut names: Vec<&str> = Vec::new();
-    let lives = || robots.iter().flat_map(|robot| &robot.lives);
-    for life in lives() {
-        if !names.contains(&life.name.as_str()) {
-            names.push(&life.name);
+    let rollouts = || robots.iter().flat_map(|robot| &robot.rollouts);
+    for rollout in rollouts() {
+        if !names.contains(&rollout.name.as_str()) {
+            names.push(&rollout.name);
         }
     }
     if names.is_empty() {
         return;
     }
     let rows = names.into_iter().map(|name| {
-        let lives: Vec<_> = lives().filter(|life| life.name == name).collect();
-        let broken = lives.iter().filter(|life| !life.persists).count();
-        let mean = lives.iter().map(|life| life.distance).sum::<f64>() / lives.len() as f64;
-        let counts = [broken, lives.len()].map(|count| count.to_string());
+        let rollouts: Vec<_> = rollouts().filter(|rollout| rollout.name == name).collect();
+        let broken = rollouts.iter().filter(|rollout| !rollout.persists).count();
+        let mean = rollouts.iter().map(|rollout| rollout.distance).sum::<f64>() / rollouts.len() as f64;
+        let counts = [broken, rollouts.len()].map(|count| count.to_string());
         [vec![name.to_string()], counts.to_vec(), vec![number::percent(mean)]].concat()
     });
     let rows: Vec<Vec<String>> = rows.collect();

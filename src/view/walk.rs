@@ -107,7 +107,7 @@ impl<'a> Walk<'a> {
 
     /// The frames of the continuous rollout that a frame is part of, from the last reset up to the
     /// next.
-    pub fn life(&self, frame: usize) -> Range<usize> {
+    pub fn rollout(&self, frame: usize) -> Range<usize> {
         let phase = self.phase_index(frame);
         let resets = || self.fresh.iter().enumerate().filter(|(_, f)| **f).map(|(p, _)| p);
         let first = resets().rfind(|&p| p <= phase).unwrap_or(0);
@@ -217,14 +217,14 @@ mod tests {
     }
 
     #[test]
-    fn fresh_lives_end_at_each_phase_and_sequential_ones_go_on() {
+    fn fresh_rollouts_end_at_each_phase_and_sequential_ones_go_on() {
         let fresh = simulated("33/44", 2, 10, true);
         let walk = Walk::new(&fresh).unwrap();
-        assert_eq!((walk.life(3), walk.life(15)), (0..11, 11..22));
+        assert_eq!((walk.rollout(3), walk.rollout(15)), (0..11, 11..22));
         assert_eq!(walk.displacement(11), 0.0);
         let sequential = simulated("33/44", 2, 10, false);
         let walk = Walk::new(&sequential).unwrap();
-        assert_eq!((walk.life(3), walk.life(15)), (0..21, 0..21));
+        assert_eq!((walk.rollout(3), walk.rollout(15)), (0..21, 0..21));
         assert_eq!((walk.phase_index(9), walk.phase_index(10)), (0, 1));
         assert!((walk.displacement(20) - sequential.phases[1].displacement).abs() < 1e-9);
     }

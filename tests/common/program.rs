@@ -37,7 +37,7 @@ train_images = [0, 1]
 reduction = "area"
 
 [protocol]
-life = "fresh"
+rollout = "fresh"
 control_steps = 20
 
 [map_elites]

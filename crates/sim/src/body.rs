@@ -8,6 +8,7 @@ use std::str::FromStr;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(try_from = "u8", into = "u8"))]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema), schemars(extend("maximum" = 6)))]
 #[repr(u8)]
 pub enum Material {
     /// No voxel.
@@ -109,11 +110,13 @@ pub const MAX_SIDE: usize = 64;
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(try_from = "Grid<Material>", into = "Grid<Material>"))]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema), schemars(with = "Vec<Vec<Material>>"))]
 pub struct Body(Grid<Material>);
 
 /// How many voxels of a kind a body has.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 pub struct VoxelCounts {
     /// Muscle voxels, both phases.
     pub muscle: usize,

@@ -14,6 +14,7 @@ use crate::system::System;
 /// Energies put into a robot \[mass·wu²/s²\].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 pub struct Energy {
     /// By the actuators, whose goals move while the springs are as they are.
     pub drive: f64,

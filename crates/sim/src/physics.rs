@@ -22,6 +22,7 @@ pub const MOST_CELLS: u32 = 1000;
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(default, deny_unknown_fields))]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 pub struct Physics {
     /// Side of a voxel at rest \[wu\]. (Units)
     pub cell_size: f64,

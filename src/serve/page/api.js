@@ -17,8 +17,8 @@ export const post = async (path, value, signal) => {
   return response.status === 204 ? null : response.json();
 };
 
-// Server-sent events in the answer to a POST (EventSource can only GET): one request begins a life, and to drop it ends
-// that life.
+// Server-sent events in the answer to a POST (EventSource can only GET): one request begins a simulation, and to drop it ends
+// that simulation.
 export const stream = async (path, value, signal, tell) => {
   const response = await fetch(path, { method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify(value), signal });
   if (!response.ok) return fail(response);

@@ -8,7 +8,7 @@ const AREA = (encoding) => ({ reduction: "area", encoding, level: 0.2 });
 const FIRST = ["4444444", "4444445", "5444465", "5544465", "5544445", "5444444", "4444444"];
 
 export class Editor {
-  // `live(subject, steps)` is asked for a life, `see()` tells what the picture is now.
+  // `live(subject, steps)` is asked for a simulation, `see()` tells what the picture is now.
   constructor(materials, { live, see, say, chosen }) {
     Object.assign(this, { materials, say, see, material: 3, cursor: null, painting: null, before: [], stimulus: null, steps: 500 });
     this.cells = FIRST.map((row) => [...row].map(Number));

@@ -3,19 +3,19 @@
 import { $, element, get, post, tabs } from "./api.js";
 import { Editor } from "./editor.js";
 import { Images } from "./images.js";
-import { Life } from "./life.js";
+import { Simulation } from "./simulation.js";
 import { Pad } from "./pad.js";
 import { Robots, rows, signed } from "./robots.js";
 import { Stage, drawStimulus } from "./stage.js";
 
-// Strokes may follow each other that fast without a life for each.
+// Strokes may follow each other that fast without a simulation for each.
 const AFTER_STROKE = 450, WHILE_DRAWING = 60;
 
 const materials = await get("/api/materials");
-let life = null, timer = 0, seen = null, previous = 0, drawn = null, looked = 0;
+let simulation = null, timer = 0, seen = null, previous = 0, drawn = null, looked = 0;
 // The picture: { drawing } or { image }; and the words for it.
 let picture = { shown: {}, about: "nothing, it is dark" };
-// Who lives: a robot of an archive, or the editor's body.
+// Whose simulation it is: a robot of an archive, or the editor's body.
 let who = null;
 
 const say = (error) => {
@@ -33,24 +33,24 @@ const start = () => {
   clearTimeout(timer);
   if (!who) return;
   mark("living");
-  life?.stop();
-  const own = new Life({ subject: who.subject(), shown: shownTo(), control_steps: who.steps() }, Number($("speed").value), (name) => {
-    if (life !== own) return;
+  simulation?.stop();
+  const own = new Simulation({ subject: who.subject(), shown: shownTo(), control_steps: who.steps() }, Number($("speed").value), (name) => {
+    if (simulation !== own) return;
     if (name === "begin" || name === "seen") { seen = own.phase(own.last); look(); }
     drawn = null;
   });
-  life = own;
-  own.running.catch((error) => { if (life === own) say(error); }).finally(() => { own.lose(); drawn = null; status(); });
+  simulation = own;
+  own.running.catch((error) => { if (simulation === own) say(error); }).finally(() => { own.lose(); drawn = null; status(); });
   say(null);
   status();
 };
 
-// The picture has changed: the same life sees it, or a fresh one does.
+// The picture has changed: the same simulation sees it, or a fresh one does.
 const show = (next, after) => {
   picture = next;
   editor.stimulus = null;
   clearTimeout(timer);
-  if ($("manner").value === "on" && life?.begun && !life.end) timer = setTimeout(() => life.change({ shown: picture.shown }).catch(say), after ? WHILE_DRAWING : 0);
+  if ($("manner").value === "on" && simulation?.begun && !simulation.end) timer = setTimeout(() => simulation.change({ shown: picture.shown }).catch(say), after ? WHILE_DRAWING : 0);
   else {
     mark("waiting");
     timer = setTimeout(start, after);
@@ -77,7 +77,7 @@ const pad = new Pad($("pad"), (done) => {
   if (done) return show(next, AFTER_STROKE);
   picture = next; editor.stimulus = null;
   clearTimeout(timer);
-  if ($("manner").value === "on" && life?.begun && !life.end) timer = setTimeout(() => life.change({ shown: next.shown }).catch(say), WHILE_DRAWING);
+  if ($("manner").value === "on" && simulation?.begun && !simulation.end) timer = setTimeout(() => simulation.change({ shown: next.shown }).catch(say), WHILE_DRAWING);
   else if (!glancing) glancing = setTimeout(() => { glancing = 0; glance().catch(say); }, WHILE_DRAWING);
 });
 
@@ -119,31 +119,31 @@ const words = (answer, over) => {
   const distance = Math.abs(answer.moved).toFixed(1);
   if (!answer.way) return { state: over ? "none" : "idle", says: over ? "undecided" : "", moved: `moved ${distance} voxels` };
   const says = answer.says.length ? answer.says.join(" or ") : answer.way === "left" ? "←" : "→";
-  const label = life.phase(life.frame).label;
-  const { left, right } = life.begun.judge ?? { left: [], right: [] };
+  const label = simulation.phase(simulation.frame).label;
+  const { left, right } = simulation.begun.judge ?? { left: [], right: [] };
   const known = over && answer.says.length && left.concat(right).includes(label);
   return { state: known ? (answer.says.includes(label) ? "right" : "wrong") : "answer", says, moved: `moved ${distance} voxels ${answer.way}` };
 };
 
 const draw = () => {
-  const ready = life?.begun && life.moments.length;
-  const answer = ready ? life.answered(life.frame) : null;
-  stage.draw(life, answer);
+  const ready = simulation?.begun && simulation.moments.length;
+  const answer = ready ? simulation.answered(simulation.frame) : null;
+  stage.draw(simulation, answer);
   if (!ready) return;
-  const unstable = life.over && life.end.unstable;
-  const text = unstable ? { state: "none", says: "unstable", moved: life.end.unstable } : words(answer, life.over);
+  const unstable = simulation.over && simulation.end.unstable;
+  const text = unstable ? { state: "none", says: "unstable", moved: simulation.end.unstable } : words(answer, simulation.over);
   $("verdict").dataset.state = text.state;
   $("says").textContent = text.says;
   $("moved").textContent = text.moved;
-  const play = life.over ? "Play" : life.playing ? "Pause" : "Play";
+  const play = simulation.over ? "Play" : simulation.playing ? "Pause" : "Play";
   if ($("play").textContent !== play) $("play").textContent = play;
-  $("time").max = Math.max(life.until, 1);
-  $("time").value = life.frame;
-  $("step").textContent = `step ${life.frame} of ${life.until}`;
+  $("time").max = Math.max(simulation.until, 1);
+  $("time").value = simulation.frame;
+  $("step").textContent = `step ${simulation.frame} of ${simulation.until}`;
   $("time").setAttribute("aria-valuetext", $("step").textContent);
   $("world").setAttribute("aria-label", `${who.name} sees ${picture.about}; ${text.moved}`);
-  if (life.over && life.told !== life.end) {
-    life.told = life.end;
+  if (simulation.over && simulation.told !== simulation.end) {
+    simulation.told = simulation.end;
     if (document.documentElement.dataset.state === "living") mark("over");
     $("spoken").textContent = `${who.name} sees ${picture.about}. ${text.says ? `It says ${text.says}: ` : ""}${text.moved}.`;
   }
@@ -151,25 +151,25 @@ const draw = () => {
 
 const stage = new Stage($("world"), materials);
 const tick = (now) => {
-  life?.pass(Math.min(now - previous, 200) / 1000);
+  simulation?.pass(Math.min(now - previous, 200) / 1000);
   previous = now;
-  const state = life?.begun ? `${life.frame} ${life.last} ${life.end !== null} ${life.playing}` : "none";
+  const state = simulation?.begun ? `${simulation.frame} ${simulation.last} ${simulation.end !== null} ${simulation.playing}` : "none";
   if (state !== drawn) { drawn = state; draw(); }
   requestAnimationFrame(tick);
 };
 
 const play = () => {
-  if (!life || life.over) return start();
-  life.play(!life.playing).catch(say);
+  if (!simulation || simulation.over) return start();
+  simulation.play(!simulation.playing).catch(say);
   drawn = null;
 };
 $("play").onclick = play;
 $("again").onclick = start;
-$("speed").onchange = () => life?.pace(Number($("speed").value)).catch(say);
+$("speed").onchange = () => simulation?.pace(Number($("speed").value)).catch(say);
 $("time").oninput = () => {
-  if (!life?.begun) return;
-  if (life.playing) life.play(false).catch(say);
-  life.look(Number($("time").value));
+  if (!simulation?.begun) return;
+  if (simulation.playing) simulation.play(false).catch(say);
+  simulation.look(Number($("time").value));
   drawn = null;
 };
 document.addEventListener("keydown", (e) => {
@@ -182,9 +182,9 @@ document.addEventListener("keydown", (e) => {
 
 const status = async () => {
   try {
-    const { lives, max_lives: most } = await get("/api/status");
-    $("status").dataset.state = lives ? "alive" : "";
-    $("status").textContent = lives === 1 ? "1 simulation running" : `${lives} simulations running`;
+    const { simulations, max_simulations: most } = await get("/api/status");
+    $("status").dataset.state = simulations ? "alive" : "";
+    $("status").textContent = simulations === 1 ? "1 simulation running" : `${simulations} simulations running`;
     $("status").title = `at most ${most} at once`;
   } catch {
     $("status").dataset.state = "lost";
@@ -203,8 +203,8 @@ for (const material of materials.list.slice(1)) {
 const redraw = () => { drawn = null; look(); pad.draw(); editor.draw(); };
 window.addEventListener("resize", redraw);
 window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { redraw(); images.draw(); });
-// A tab that closes drops its connection, and with it its life.
-window.addEventListener("pagehide", () => life?.stop());
+// A tab that closes drops its connection, and with it its simulation.
+window.addEventListener("pagehide", () => simulation?.stop());
 requestAnimationFrame(tick);
 
 try {
@@ -213,6 +213,6 @@ try {
   const first = images.shown[0];
   if (first) picture = { shown: { image: { set: images.set.name, index: first.index } }, about: `a ${first.label} (${images.set.name} test image ${first.index})` };
   await robots.load();
-  if (window.matchMedia("(prefers-reduced-motion: reduce)").matches) life?.play(false);
+  if (window.matchMedia("(prefers-reduced-motion: reduce)").matches) simulation?.play(false);
 } catch (error) { say(error); }
 document.documentElement.dataset.ready = "yes";

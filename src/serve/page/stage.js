@@ -5,33 +5,33 @@ const { css, fit } = Drawing;
 const NOWHERE = -32768;
 
 export class Stage {
-  constructor(canvas, materials) { this.canvas = canvas; this.materials = materials; this.camera = null; this.life = null; }
+  constructor(canvas, materials) { this.canvas = canvas; this.materials = materials; this.camera = null; this.simulation = null; }
 
-  // What stays the same all through a life.
-  prepare(life) {
-    const first = this.places(life, 0);
+  // What stays the same all through a simulation.
+  prepare(simulation) {
+    const first = this.places(simulation, 0);
     let size = 1, top = 1;
-    for (const q of first) { size = Math.max(size, 2 * Math.abs(q[0] - life.moments[0].x)); top = Math.max(top, q[1]); }
-    this.life = life; this.sides = Drawing.sidesOf(life.begun.voxels, life.begun.points); this.size = size; this.tall = top; this.camera = null;
+    for (const q of first) { size = Math.max(size, 2 * Math.abs(q[0] - simulation.moments[0].x)); top = Math.max(top, q[1]); }
+    this.simulation = simulation; this.sides = Drawing.sidesOf(simulation.begun.voxels, simulation.begun.points); this.size = size; this.tall = top; this.camera = null;
   }
 
   // Points in voxel lengths; null where the simulation had lost one.
-  places(life, frame) {
-    const { x, y, points } = life.moments[frame], unit = life.begun.unit;
-    return Array.from({ length: life.begun.points }, (_, i) =>
+  places(simulation, frame) {
+    const { x, y, points } = simulation.moments[frame], unit = simulation.begun.unit;
+    return Array.from({ length: simulation.begun.points }, (_, i) =>
       points[2 * i] === NOWHERE ? null : [points[2 * i] / unit + x, points[2 * i + 1] / unit + y]);
   }
 
-  draw(life, answer) {
+  draw(simulation, answer) {
     const canvas = this.canvas, { clientWidth: width, clientHeight: height } = canvas.parentElement, groundHeight = 30;
     const phone = width < 480;
     const ctx = fit(canvas, width, height), surface = height - groundHeight;
-    const ready = life && life.begun && life.moments.length;
-    if (ready && this.life !== life) this.prepare(life);
+    const ready = simulation && simulation.begun && simulation.moments.length;
+    if (ready && this.simulation !== simulation) this.prepare(simulation);
     const shown = ready ? (phone ? 1.25 * this.size + 11 : 1.9 * this.size + 12) : 40;
     const scale = Math.min(width / shown, (surface - 30) / (ready ? 1.22 * this.tall : 10), 36);
-    const frame = ready ? life.frame : 0;
-    const at = ready ? life.moments[frame].x : 0, zero = ready ? life.moments[0].x : 0;
+    const frame = ready ? simulation.frame : 0;
+    const at = ready ? simulation.moments[frame].x : 0, zero = ready ? simulation.moments[0].x : 0;
     // The camera stands until the robot nears the edge.
     const room = Math.max(0, width / scale / 2 - this.size / 2 - 4);
     const from = this.camera ?? at, camera = Math.min(Math.max(from, at - room), at + room);
@@ -40,18 +40,18 @@ export class Stage {
     const X = (x) => Math.min(Math.max((x - x0) * scale, -9999), 9999);
     const Y = (y) => Math.min(Math.max(surface - y * scale, -9999), 9999);
     ctx.fillStyle = css("sky"); ctx.fillRect(0, 0, width, height);
-    const begin = ready ? life.moments[Math.min(life.phase(frame).step, life.last)].x : 0;
-    if (ready) this.signs(ctx, life, answer, X(begin), scale, width, surface);
+    const begin = ready ? simulation.moments[Math.min(simulation.phase(frame).step, simulation.last)].x : 0;
+    if (ready) this.signs(ctx, simulation, answer, X(begin), scale, width, surface);
     ctx.fillStyle = css("ground"); ctx.fillRect(0, surface, width, groundHeight);
     Drawing.ruler(ctx, { x0, zero, X, scale, width, surface });
     if (!ready) return;
-    this.robot(ctx, life, frame, { X, Y, scale });
-    Drawing.path(ctx, life.moments.slice(0, frame + 1).map(({ x, y }) => [x, y]), { X, Y });
+    this.robot(ctx, simulation, frame, { X, Y, scale });
+    Drawing.path(ctx, simulation.moments.slice(0, frame + 1).map(({ x, y }) => [x, y]), { X, Y });
   }
 
   // Which way means what: the classes on both sides of the strip in which a walk says nothing.
-  signs(ctx, life, answer, begin, scale, width, surface) {
-    const { judge, threshold } = life.begun, reach = threshold * scale;
+  signs(ctx, simulation, answer, begin, scale, width, surface) {
+    const { judge, threshold } = simulation.begun, reach = threshold * scale;
     ctx.strokeStyle = css("mark"); ctx.lineWidth = 1;
     for (const [x, dash] of [[begin, [5, 5]], [begin - reach, [1, 4]], [begin + reach, [1, 4]]]) {
       ctx.setLineDash(dash); ctx.beginPath(); ctx.moveTo(Math.round(x) + 0.5, 0); ctx.lineTo(Math.round(x) + 0.5, surface); ctx.stroke();
@@ -69,11 +69,11 @@ export class Stage {
     }
   }
 
-  robot(ctx, life, frame, view) {
-    const { areas, list: materials } = this.materials, { voxels } = life.begun, points = this.places(life, frame);
+  robot(ctx, simulation, frame, view) {
+    const { areas, list: materials } = this.materials, { voxels } = simulation.begun, points = this.places(simulation, frame);
     Drawing.robot(ctx, { voxels, points, sides: this.sides, areas, materials }, view);
     // Lit sensors.
-    const { X, Y, scale } = view, { stimulus } = life.phase(frame);
+    const { X, Y, scale } = view, { stimulus } = simulation.phase(frame);
     ctx.strokeStyle = css("lit"); ctx.lineWidth = Math.max(1.2, 0.13 * scale);
     for (const [material, corners, row, column] of voxels) {
       const light = materials[material].sensor ? stimulus[row][column] : 0, ends = corners.map((i) => points[i]);

@@ -34,50 +34,50 @@ const HEIGHTS: [f64; 2] = [90.0, 210.0];
 /// [`PictureError::Recording`] if the recording cannot be drawn.
 pub fn spacetime(recording: &Recording, of: &str) -> Result<Figure, PictureError> {
     let walk = Walk::new(recording)?;
-    let mut lives = Vec::<Range<usize>>::new();
-    while lives.last().map_or(0, |life| life.end) < walk.len() {
-        let life = walk.life(lives.last().map_or(0, |life| life.end));
-        lives.push(life.start..life.end.max(life.start + 1));
+    let mut rollouts = Vec::<Range<usize>>::new();
+    while rollouts.last().map_or(0, |rollout| rollout.end) < walk.len() {
+        let rollout = walk.rollout(rollouts.last().map_or(0, |rollout| rollout.end));
+        rollouts.push(rollout.start..rollout.end.max(rollout.start + 1));
     }
-    let columns = lives.len().min(4);
+    let columns = rollouts.len().min(4);
     let width = if columns <= 2 { COLUMN } else { PAGE };
     let mut canvas = Canvas::new();
     let top = heading(&mut canvas, "Position over time", of, width);
-    let x = positions(&walk, &lives, columns);
-    let grays = grays(&walk, &lives, &x);
-    let longest = lives.iter().map(|life| life.len() - 1).max().unwrap_or(1).max(1);
+    let x = positions(&walk, &rollouts, columns);
+    let grays = grays(&walk, &rollouts, &x);
+    let longest = rollouts.iter().map(|rollout| rollout.len() - 1).max().unwrap_or(1).max(1);
     let cycle = recording.cycle.max(1) as f64;
     let y = Axis::exact(0.0, longest as f64 / cycle, 5);
     let height = (PER_STEP * longest as f64).clamp(HEIGHTS[0], HEIGHTS[1]);
     let left = MARGIN + left_space(y.labels_width());
     // One rollout has its stimuli beside it, several have them above.
-    let (beside, above) = if lives.len() == 1 { (STIMULUS + 8.0, 4.0) } else { (0.0, STIMULUS + 6.0) };
+    let (beside, above) = if rollouts.len() == 1 { (STIMULUS + 8.0, 4.0) } else { (0.0, STIMULUS + 6.0) };
     let gap = 8.0;
     let wide = (width - MARGIN - 4.0 - left - beside - gap * (columns - 1) as f64) / columns as f64;
     let row_height = above + height + AXIS + 6.0;
-    for (k, life) in lives.iter().enumerate() {
+    for (k, rollout) in rollouts.iter().enumerate() {
         let at =
             [left + (k % columns) as f64 * (wide + gap), top + above + (k / columns) as f64 * row_height];
         let plot = Plot { at, size: [wide, height], x: x.clone(), y: y.clone() };
-        rows(&mut canvas, &walk, life, &plot, grays);
-        stimuli(&mut canvas, &walk, life, &plot, lives.len() == 1);
+        rows(&mut canvas, &walk, rollout, &plot, grays);
+        stimuli(&mut canvas, &walk, rollout, &plot, rollouts.len() == 1);
         axes(&mut canvas, &plot, k % columns == 0);
     }
-    let bottom = top + lives.len().div_ceil(columns) as f64 * row_height;
+    let bottom = top + rollouts.len().div_ceil(columns) as f64 * row_height;
     Ok(Figure::new(&format!("Position over time: {of}"), [width, bottom + MARGIN - 4.0], canvas.finish()))
 }
 
 /// An axis that holds all rollouts, each counted from its start.
-fn positions(walk: &Walk, lives: &[Range<usize>], columns: usize) -> Axis {
+fn positions(walk: &Walk, rollouts: &[Range<usize>], columns: usize) -> Axis {
     let size = walk.recording().body.width() as f64 + 2.0;
-    let reach = |life: &Range<usize>| {
-        let zero = walk.centre(life.start)[0];
-        let all = walk.extent(life.clone());
-        let centres = || life.clone().map(|frame| walk.centre(frame)[0] - zero);
+    let reach = |rollout: &Range<usize>| {
+        let zero = walk.centre(rollout.start)[0];
+        let all = walk.extent(rollout.clone());
+        let centres = || rollout.clone().map(|frame| walk.centre(frame)[0] - zero);
         let low = (all.left - zero).max(centres().fold(0.0, f64::min) - size);
         (low, (all.right - zero).min(centres().fold(0.0, f64::max) + size))
     };
-    let (low, high) = lives.iter().map(reach).fold((0.0f64, 0.0f64), |a, b| (a.0.min(b.0), a.1.max(b.1)));
+    let (low, high) = rollouts.iter().map(reach).fold((0.0f64, 0.0f64), |a, b| (a.0.min(b.0), a.1.max(b.1)));
     Axis::exact(low - 1.0, high + 1.0, if columns == 1 { 6 } else { 4 })
 }
 
@@ -87,20 +87,20 @@ fn moment(plot: &Plot, cycles: f64) -> f64 {
 }
 
 /// Every how many frames a row is drawn.
-fn every(life: &Range<usize>) -> usize {
-    life.len().div_ceil(ROWS).max(1)
+fn every(rollout: &Range<usize>) -> usize {
+    rollout.len().div_ceil(ROWS).max(1)
 }
 
-fn rows(canvas: &mut Canvas, walk: &Walk, life: &Range<usize>, plot: &Plot, grays: [f64; 2]) {
+fn rows(canvas: &mut Canvas, walk: &Walk, rollout: &Range<usize>, plot: &Plot, grays: [f64; 2]) {
     let cycle = walk.recording().cycle.max(1) as f64;
-    let zero = walk.centre(life.start)[0];
-    let high = moment(plot, every(life) as f64 / cycle) - plot.at[1];
+    let zero = walk.centre(rollout.start)[0];
+    let high = moment(plot, every(rollout) as f64 / cycle) - plot.at[1];
     let mut paths = vec![String::new(); GRAYS];
     let cell = plot.size[0] / CELLS as f64;
-    for frame in life.clone().step_by(every(life)) {
+    for frame in rollout.clone().step_by(every(rollout)) {
         let row: Vec<Option<usize>> =
             areas(walk, frame, zero, &plot.x).into_iter().map(|area| Some(gray(area?, grays))).collect();
-        let y = number(moment(plot, (frame - life.start) as f64 / cycle) + high / 2.0);
+        let y = number(moment(plot, (frame - rollout.start) as f64 / cycle) + high / 2.0);
         let mut from = 0;
         for run in row.chunk_by(|a, b| a == b) {
             if let Some(gray) = run[0] {
@@ -116,10 +116,10 @@ fn rows(canvas: &mut Canvas, walk: &Walk, life: &Range<usize>, plot: &Plot, gray
             // A little higher than a row, so that no light shines through.
             canvas.path(data, Pen::new(Colour::gray(level), high + 0.12));
         }
-        let centres = life.clone().step_by(2).map(|frame| {
+        let centres = rollout.clone().step_by(2).map(|frame| {
             [
                 plot.place([walk.centre(frame)[0] - zero, 0.0])[0],
-                moment(plot, (frame - life.start) as f64 / cycle),
+                moment(plot, (frame - rollout.start) as f64 / cycle),
             ]
         });
         let centres: Vec<[f64; 2]> = centres.collect();
@@ -130,11 +130,11 @@ fn rows(canvas: &mut Canvas, walk: &Walk, life: &Range<usize>, plot: &Plot, gray
 
 /// Areas of the darkest and the lightest gray: all but the extreme ones of the walk lie between
 /// them.
-fn grays(walk: &Walk, lives: &[Range<usize>], x: &Axis) -> [f64; 2] {
+fn grays(walk: &Walk, rollouts: &[Range<usize>], x: &Axis) -> [f64; 2] {
     let mut all = Vec::new();
-    for life in lives {
-        let zero = walk.centre(life.start)[0];
-        for frame in life.clone().step_by(4 * every(life)) {
+    for rollout in rollouts {
+        let zero = walk.centre(rollout.start)[0];
+        for frame in rollout.clone().step_by(4 * every(rollout)) {
             all.extend(areas(walk, frame, zero, x).into_iter().flatten());
         }
     }
@@ -168,15 +168,15 @@ fn areas(walk: &Walk, frame: usize, zero: f64, axis: &Axis) -> Vec<Option<f64>> 
     sums.into_iter().map(|(sum, count)| (count > 0).then(|| sum / f64::from(count))).collect()
 }
 
-fn stimuli(canvas: &mut Canvas, walk: &Walk, life: &Range<usize>, plot: &Plot, beside: bool) {
+fn stimuli(canvas: &mut Canvas, walk: &Walk, rollout: &Range<usize>, plot: &Plot, beside: bool) {
     let recording = walk.recording();
     let cycle = recording.cycle.max(1) as f64;
     let [left, top] = plot.at;
     let right = left + plot.size[0];
-    for (k, phase) in recording.phases.iter().enumerate().filter(|(_, p)| life.contains(&p.first_frame)) {
+    for (k, phase) in recording.phases.iter().enumerate().filter(|(_, p)| rollout.contains(&p.first_frame)) {
         let words = format!("{} vl", signed(phase.displacement));
-        let y = moment(plot, (phase.first_frame - life.start) as f64 / cycle);
-        if phase.first_frame > life.start {
+        let y = moment(plot, (phase.first_frame - rollout.start) as f64 / cycle);
+        if phase.first_frame > rollout.start {
             canvas.line([left, y], [right + STIMULUS + 8.0, y], Pen::new(colour::INK, 0.7).dashed(3.0, 2.0));
         }
         if beside {
@@ -231,7 +231,7 @@ mod tests {
     use crate::view::simulated;
 
     #[test]
-    fn fresh_lives_have_a_panel_each_and_a_continuous_one_has_a_dashed_line_per_change() {
+    fn fresh_rollouts_have_a_panel_each_and_a_continuous_one_has_a_dashed_line_per_change() {
         let panels = |fresh| {
             let recording = simulated("3344/5566", 3, 60, fresh);
             let svg = spacetime(&recording, "robot x").unwrap().svg();

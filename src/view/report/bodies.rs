@@ -6,7 +6,7 @@ use crate::commands::report::Dossier;
 use crate::store::run::Robot;
 use crate::view::colour::tones;
 use crate::view::html::escape;
-use crate::view::report::maps::Lives;
+use crate::view::report::maps::Rollouts;
 use std::collections::BTreeSet;
 use std::fmt::Write;
 
@@ -18,19 +18,19 @@ const SHOWN: usize = 5;
 pub(super) fn button(
     run: usize,
     dossier: &Dossier,
-    lives: &Lives,
+    rollouts: &Rollouts,
     robot: &Robot,
     (style, name, first): (&str, &str, bool),
     content: &str,
 ) -> String {
     let about = about(dossier, robot);
-    let life = lives.id(run, &robot.id).unwrap_or_default();
+    let rollout = rollouts.id(run, &robot.id).unwrap_or_default();
     let command = format!("morphcog replay --robot {} --archive {}", robot.id, dossier.path.display());
     format!(
-        "<button type=\"button\" style=\"{style}\" data-robot=\"{}\" data-life=\"{}\" data-about=\"{}\" data-command=\"{}\" \
+        "<button type=\"button\" style=\"{style}\" data-robot=\"{}\" data-rollout=\"{}\" data-about=\"{}\" data-command=\"{}\" \
          aria-pressed=\"false\" aria-label=\"{}\" title=\"{}\"{}>{content}</button>",
         escape(&robot.id),
-        escape(&life),
+        escape(&rollout),
         escape(&about),
         escape(&command),
         escape(&format!("{name}{}{about}", if name.is_empty() { "" } else { ": " })),
@@ -57,7 +57,7 @@ fn about(dossier: &Dossier, robot: &Robot) -> String {
 }
 
 /// The fittest robots, and the most different ones.
-pub(super) fn bodies(run: usize, dossier: &Dossier, lives: &Lives) -> String {
+pub(super) fn bodies(run: usize, dossier: &Dossier, rollouts: &Rollouts) -> String {
     let mut fittest: Vec<&Robot> = dossier.run.elites.iter().collect();
     fittest.sort_by(|a, b| b.objective.total_cmp(&a.objective));
     let mut seen = BTreeSet::new();
@@ -74,7 +74,7 @@ pub(super) fn bodies(run: usize, dossier: &Dossier, lives: &Lives) -> String {
                 escape(&robot.task),
                 walks.join(" ")
             );
-            button(run, dossier, lives, robot, ("", "", false), &content)
+            button(run, dossier, rollouts, robot, ("", "", false), &content)
         })
         .collect();
     format!("<div class=\"bodies\">{buttons}</div>\n")

@@ -19,7 +19,7 @@ const MOST_BYTES: usize = 13_000_000;
 const MOST_OF_ONE: usize = 1_500_000;
 
 /// Rollouts, packed, by run and robot.
-pub(super) struct Lives(BTreeMap<(usize, String), String>);
+pub(super) struct Rollouts(BTreeMap<(usize, String), String>);
 
 /// The robots of a run that can be played: the fittest.
 pub(super) fn played(dossier: &Dossier, most: usize) -> Vec<&Robot> {
@@ -32,12 +32,12 @@ pub(super) fn played(dossier: &Dossier, most: usize) -> Vec<&Robot> {
     robots
 }
 
-impl Lives {
+impl Rollouts {
     /// Rollouts them.
-    pub fn live(
+    pub fn record(
         gathered: &Gathered,
         most: usize,
-        lived: &(dyn Fn(u64) + Sync),
+        simulated: &(dyn Fn(u64) + Sync),
     ) -> Result<Self, PictureError> {
         let jobs: Vec<(usize, &Dossier, &Robot)> = gathered
             .runs
@@ -51,22 +51,22 @@ impl Lives {
         let done = AtomicU64::new(0);
         let one = |&(number, dossier, robot): &(usize, &Dossier, &Robot)| {
             let recording = dossier.record(robot);
-            let life = packed(&Walk::new(&recording)?, each)?;
-            lived(done.fetch_add(1, Ordering::Relaxed) + 1);
-            Ok(((number, robot.id.clone()), life))
+            let rollout = packed(&Walk::new(&recording)?, each)?;
+            simulated(done.fetch_add(1, Ordering::Relaxed) + 1);
+            Ok(((number, robot.id.clone()), rollout))
         };
-        jobs.par_iter().map(one).collect::<Result<BTreeMap<_, _>, _>>().map(Lives)
+        jobs.par_iter().map(one).collect::<Result<BTreeMap<_, _>, _>>().map(Rollouts)
     }
 
     /// Id of the element with a robot's rollout.
     pub fn id(&self, run: usize, robot: &str) -> Option<String> {
-        self.0.contains_key(&(run, robot.to_string())).then(|| format!("life-{run}-{robot}"))
+        self.0.contains_key(&(run, robot.to_string())).then(|| format!("rollout-{run}-{robot}"))
     }
 
     /// The elements that hold them.
     pub fn elements(&self) -> String {
-        let element = |((run, robot), life): (&(usize, String), &String)| {
-            format!("<script type=\"text/plain\" id=\"life-{run}-{}\">{life}</script>\n", escape(robot))
+        let element = |((run, robot), rollout): (&(usize, String), &String)| {
+            format!("<script type=\"text/plain\" id=\"rollout-{run}-{}\">{rollout}</script>\n", escape(robot))
         };
         self.0.iter().map(element).collect()
     }
@@ -80,7 +80,7 @@ fn range(bin: usize, area: usize) -> String {
 }
 
 /// The map with its player.
-pub(super) fn archive(number: usize, dossier: &Dossier, lives: &Lives) -> String {
+pub(super) fn archive(number: usize, dossier: &Dossier, rollouts: &Rollouts) -> String {
     let run = &dossier.run;
     let tasks = &run.dimensions.tasks;
     let area = run.config.body.height * run.config.body.width;
@@ -139,7 +139,7 @@ pub(super) fn archive(number: usize, dossier: &Dossier, lives: &Lives) -> String
                         Some(robot) => {
                             let style = format!("background:{}", colour(robot.objective));
                             let first = best.as_ref() == Some(&robot.id);
-                            button(number, dossier, lives, robot, (&style, &name, first), "")
+                            button(number, dossier, rollouts, robot, (&style, &name, first), "")
                         }
                         None if possible.contains(&cell) => {
                             format!("<span class=\"empty\" role=\"img\" aria-label=\"{name}: empty\"></span>")

@@ -11,7 +11,7 @@ use crate::view::error::PictureError;
 use crate::view::html::{escape, fill};
 use crate::view::plot::Figure;
 use crate::view::{html, plot};
-use maps::Lives;
+use maps::Rollouts;
 
 /// What goes into a page.
 #[derive(Clone, Copy, Debug)]
@@ -19,32 +19,32 @@ pub struct Content<'a> {
     /// What is known.
     pub gathered: &'a Gathered,
     /// Most robots of each run that can be played; the fittest of them.
-    pub lives: usize,
+    pub rollouts: usize,
 }
 
 impl Content<'_> {
     /// Rollouts that have to be simulated for it.
     pub fn count(&self) -> usize {
-        self.gathered.runs.iter().map(|dossier| maps::played(dossier, self.lives).len()).sum()
+        self.gathered.runs.iter().map(|dossier| maps::played(dossier, self.rollouts).len()).sum()
     }
 
-    /// The page as text; `lived` gets the number of rollouts simulated so far.
+    /// The page as text; `simulated` gets the number of rollouts simulated so far.
     ///
     /// # Errors
     /// If a rollout cannot be drawn.
-    pub fn page(&self, lived: &(dyn Fn(u64) + Sync)) -> Result<String, PictureError> {
+    pub fn page(&self, simulated: &(dyn Fn(u64) + Sync)) -> Result<String, PictureError> {
         let Gathered { runs, together } = self.gathered;
-        let lives = Lives::live(self.gathered, self.lives, lived)?;
+        let rollouts = Rollouts::record(self.gathered, self.rollouts, simulated)?;
         let mut content = words::contents(runs);
         if runs.len() > 1 {
             content += &overview(runs, together);
         }
         for (number, dossier) in runs.iter().enumerate() {
-            content += &run(number, dossier, &lives, runs.len() > 1);
+            content += &run(number, dossier, &rollouts, runs.len() > 1);
         }
-        content += &lives.elements();
+        content += &rollouts.elements();
         let style = [include_str!("../replay.css"), include_str!("report.css")].concat();
-        let player = serde_json::Value::from(html::player("%LIFE%")).to_string().replace('<', "\\u003c");
+        let player = serde_json::Value::from(html::player("%ROLLOUT%")).to_string().replace('<', "\\u003c");
         Ok(fill(
             include_str!("report.html"),
             &[
@@ -76,16 +76,16 @@ fn overview(runs: &[Dossier], together: &Findings) -> String {
 }
 
 /// A run.
-fn run(number: usize, dossier: &Dossier, lives: &Lives, is_one_of_several: bool) -> String {
+fn run(number: usize, dossier: &Dossier, rollouts: &Rollouts, is_one_of_several: bool) -> String {
     let name = if is_one_of_several { format!("{}: ", words::name(dossier)) } else { String::new() };
     let heading = |what: &str| format!("<h2>{}{what}</h2>\n", escape(&name));
     let mut out = format!("<section id=\"run{number}\" data-run=\"{number}\">\n{}", heading("What was run"));
     out += &tables::about(dossier);
     out += &heading("Archive");
-    out += &maps::archive(number, dossier, lives);
+    out += &maps::archive(number, dossier, rollouts);
     out += &heading("The fittest, and the most different");
     out += "<p>The fittest robots, then those whose bodies differ most from each other. Press one to watch it above.</p>\n";
-    out += &bodies::bodies(number, dossier, lives);
+    out += &bodies::bodies(number, dossier, rollouts);
     let mut figures = String::new();
     if let Some(progress) = &dossier.progress {
         figures += &figure(&plot::progress(std::slice::from_ref(progress)), "column");

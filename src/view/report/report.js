@@ -1,7 +1,7 @@
 "use strict";
 (() => {
   const page = JSON.parse(document.getElementById("player").textContent);
-  // Text of a life: gzip in base64, in an element of its own.
+  // Text of a rollout: gzip in base64, in an element of its own.
   const unpack = async (id) => {
     const raw = atob(document.getElementById(id).textContent), bytes = new Uint8Array(raw.length);
     for (let i = 0; i < raw.length; i++) bytes[i] = raw.charCodeAt(i);
@@ -23,17 +23,17 @@
         other.setAttribute("aria-pressed", String(other.dataset.robot === button.dataset.robot));
       }
       about.textContent = button.dataset.about;
-      const life = button.dataset.life;
-      if (!life) {
+      const rollout = button.dataset.rollout;
+      if (!rollout) {
         frame.hidden = true;
-        about.textContent += " Its life is not in this report: " + button.dataset.command;
+        about.textContent += " Its rollout is not in this report: " + button.dataset.command;
         return;
       }
       frame.hidden = false;
       try {
-        const text = await unpack(life);
+        const text = await unpack(rollout);
         // Only the robot that was asked for last.
-        if (turn === asked) frame.srcdoc = page.split("%LIFE%").join(text.replaceAll("<", "\\u003c"));
+        if (turn === asked) frame.srcdoc = page.split("%ROLLOUT%").join(text.replaceAll("<", "\\u003c"));
       } catch (error) {
         about.textContent += " This browser cannot unpack it (" + error + ").";
       }

@@ -10,7 +10,7 @@ use crate::store::eval::Mean;
 use crate::store::folder::in_shell;
 use crate::store::names::{CONFIG, EVAL_JSON};
 use crate::task::fitness::Fitness;
-use crate::task::protocol::Life;
+use crate::task::protocol::RolloutMode;
 use crate::task::stimulus::Encoding;
 use crate::view::html::escape;
 use std::path::Path;
@@ -54,9 +54,9 @@ pub(super) fn methods(dossier: &Dossier) -> String {
     };
     let steps = config.protocol.control_steps;
     let cycles = number::fixed(f64::from(steps) / f64::from(config.physics.cycle_steps), 0);
-    let life = match config.protocol.life {
-        Life::Fresh => "a rollout of its own from the initial state",
-        Life::Sequential => "one continuous rollout for all images",
+    let rollout = match config.protocol.rollout {
+        RolloutMode::Fresh => "a rollout of its own from the initial state",
+        RolloutMode::Sequential => "one continuous rollout for all images",
     };
     let fitness = match run.fitness() {
         Fitness::Min => {
@@ -79,7 +79,7 @@ pub(super) fn methods(dossier: &Dossier) -> String {
          pattern-producing networks and evolved with MAP-Elites for {} generations{evaluations}, seed {}, using morphcog {}. \
          The archive's dimensions are the numbers of muscle, sensor and all voxels in seven bins each{}; {} of its {} cells can be filled. \
          Each generation mutated up to {} elites; an offspring replaced an elite only if it was strictly fitter. \
-         Robots were trained on {} images of {} ({}); each image was shown for {steps} control steps ({cycles} actuation cycles) in {life}, \
+         Robots were trained on {} images of {} ({}); each image was shown for {steps} control steps ({cycles} actuation cycles) in {rollout}, \
          a sensor's stimulus being {encoding}. Fitness is {fitness}.",
         run.generations,
         config.seed,

@@ -1,8 +1,8 @@
 //! One simulation at the pace that is asked for, reported moment by moment.
 
 use crate::serve::judge::{Answer, answer};
-use crate::serve::lives::{Control, Slot};
 use crate::serve::request::{MAX_STEPS, Pace, Plan, Seen};
+use crate::serve::simulations::{Control, Slot};
 use crate::sim::System;
 use crate::task::recording::{Frame, VoxelCorners};
 use crate::task::rollout::Rollout;
@@ -17,7 +17,7 @@ const BATCH: u32 = 20;
 const TICK: Duration = Duration::from_millis(40);
 /// What takes longer is told in parts.
 const MOST_AT_ONCE: Duration = Duration::from_millis(100);
-/// How often a paused simulation sends a sign of life; so it notices that the page was closed.
+/// How often a paused simulation sends a sign of simulation; so it notices that the page was closed.
 const HEARTBEAT: Duration = Duration::from_millis(400);
 /// A simulation that cannot keep its pace does not try to make up for more than this.
 const MOST_BEHIND: f64 = 0.5;
@@ -45,7 +45,7 @@ pub enum Event<'a> {
         seen: &'a Seen,
     },
     /// It went on.
-    Lived {
+    Moments {
         /// Control steps simulated at the last of the moments.
         step: u32,
         /// The moments, one per control step.
@@ -114,7 +114,7 @@ pub fn live(slot: &Slot, plan: &Plan, mut tell: impl FnMut(Event) -> Result<(), 
             if let Err(unstable) = stepped {
                 let answer = answer(judge, before);
                 if !frames.is_empty() {
-                    tell(Event::Lived { step, frames: &frames, answer: answer.clone() })?;
+                    tell(Event::Moments { step, frames: &frames, answer: answer.clone() })?;
                 }
                 return tell(Event::End { step, answer, unstable: Some(unstable.to_string()) });
             }
@@ -126,7 +126,7 @@ pub fn live(slot: &Slot, plan: &Plan, mut tell: impl FnMut(Event) -> Result<(), 
             }
         }
         if !frames.is_empty() {
-            tell(Event::Lived { step, frames: &frames, answer: answer(judge, rollout.moved()) })?;
+            tell(Event::Moments { step, frames: &frames, answer: answer(judge, rollout.moved()) })?;
         }
         clock.sleep(&slot.control);
     }
@@ -183,14 +183,14 @@ impl Clock {
 mod tests {
     use super::*;
     use crate::base::Grid;
-    use crate::serve::lives::Lives;
     use crate::serve::request::Who;
+    use crate::serve::simulations::Simulations;
     use crate::sim::Physics;
     use crate::task::protocol::Protocol;
     use crate::task::stimulus::StimulusParams;
 
     #[test]
-    fn a_life_ends_in_the_middle_of_a_control_step_when_it_is_to_end() {
+    fn a_simulation_ends_in_the_middle_of_a_control_step_when_it_is_to_end() {
         let who = Who {
             body: "3434/4343".parse().unwrap(),
             // A control step of a quarter of an hour.
@@ -201,14 +201,14 @@ mod tests {
         };
         let seen = Seen { stimulus: Grid::filled(2, 4, 0.0), label: None };
         let plan = Plan { who: who.clone(), seen, pace: Pace::Free };
-        let lives = Lives::default();
-        let slot = lives.begin(who).unwrap();
+        let simulations = Simulations::default();
+        let slot = simulations.begin(who).unwrap();
         let begin = Instant::now();
         let mut ends = 0;
         std::thread::scope(|threads| {
             threads.spawn(|| {
                 std::thread::sleep(Duration::from_millis(50));
-                lives.close();
+                simulations.close();
             });
             live(&slot, &plan, |event| {
                 ends += u32::from(matches!(event, Event::End { step: 0, .. }));

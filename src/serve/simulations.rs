@@ -1,4 +1,4 @@
-//! [`Lives`]: what runs at the moment, and how it is told to change.
+//! [`Simulations`]: what runs at the moment, and how it is told to change.
 
 use crate::serve::refusal::Refusal;
 use crate::serve::request::{Pace, Seen, Who};
@@ -8,7 +8,7 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 /// Most simulations at once.
-pub const MAX_LIVES: usize = 8;
+pub const MAX_SIMULATIONS: usize = 8;
 
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     // What the locks guard is whole after every statement, even if a thread panicked.
@@ -89,35 +89,36 @@ impl Control {
 
 #[derive(Default)]
 struct Running {
-    lives: BTreeMap<u64, Arc<Control>>,
+    simulations: BTreeMap<u64, Arc<Control>>,
     begun: u64,
     closed: bool,
 }
 
 /// The simulations that run.
 #[derive(Default)]
-pub struct Lives {
+pub struct Simulations {
     running: Mutex<Running>,
 }
 
-/// A simulation's place among [`Lives`], free again when this goes.
+/// A simulation's place among [`Simulations`], free again when this goes.
 pub struct Slot<'a> {
-    lives: &'a Lives,
+    simulations: &'a Simulations,
     /// Its number.
     pub id: u64,
     /// The way to it.
     pub control: Arc<Control>,
 }
 
-impl Lives {
+impl Simulations {
     /// Takes a place.
     ///
     /// # Errors
     /// If all are taken.
     pub fn begin(&self, who: Who) -> Result<Slot<'_>, Refusal> {
         let mut running = lock(&self.running);
-        if running.closed || running.lives.len() >= MAX_LIVES {
-            let text = format!("{MAX_LIVES} simulations are running, the most at once; close a tab or wait");
+        if running.closed || running.simulations.len() >= MAX_SIMULATIONS {
+            let text =
+                format!("{MAX_SIMULATIONS} simulations are running, the most at once; close a tab or wait");
             return Err(Refusal::Busy(text));
         }
         running.begun += 1;
@@ -128,22 +129,22 @@ impl Lives {
             changed: Condvar::new(),
             over: AtomicBool::new(false),
         });
-        running.lives.insert(id, Arc::clone(&control));
-        Ok(Slot { lives: self, id, control })
+        running.simulations.insert(id, Arc::clone(&control));
+        Ok(Slot { simulations: self, id, control })
     }
 
     /// A simulation that runs.
     ///
     /// # Errors
     /// If there is none of that number (any more).
-    pub fn life(&self, id: u64) -> Result<Arc<Control>, Refusal> {
-        let found = lock(&self.running).lives.get(&id).cloned();
+    pub fn simulation(&self, id: u64) -> Result<Arc<Control>, Refusal> {
+        let found = lock(&self.running).simulations.get(&id).cloned();
         found.ok_or_else(|| Refusal::Unknown(format!("there is no simulation {id}; perhaps it has ended")))
     }
 
     /// How many run.
     pub fn running(&self) -> usize {
-        lock(&self.running).lives.len()
+        lock(&self.running).simulations.len()
     }
 
     /// How many have been begun.
@@ -155,12 +156,12 @@ impl Lives {
     pub fn close(&self) {
         let mut running = lock(&self.running);
         running.closed = true;
-        running.lives.values().for_each(|control| control.end());
+        running.simulations.values().for_each(|control| control.end());
     }
 }
 
 impl Drop for Slot<'_> {
     fn drop(&mut self) {
-        lock(&self.lives.running).lives.remove(&self.id);
+        lock(&self.simulations.running).simulations.remove(&self.id);
     }
 }

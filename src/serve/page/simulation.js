@@ -1,15 +1,15 @@
-// A life as it comes from the server, kept moment by moment, and where in it we look.
+// A simulation as it comes from the server, kept moment by moment, and where in it we look.
 
 import { bytes, post, stream } from "./api.js";
 
-export class Life {
+export class Simulation {
   constructor(request, speed, changed) {
     this.moments = []; this.phases = []; this.end = null; this.begun = null;
     this.at = 0; this.speed = speed; this.playing = true; this.waiting = null; this.changed = changed;
     // Whether we look at a moment of our own choice and not at the newest.
     this.apart = false;
     this.abort = new AbortController();
-    this.running = stream("/api/lives", { ...request, speed }, this.abort.signal, (name, data) => this.hear(name, data));
+    this.running = stream("/api/simulations", { ...request, speed }, this.abort.signal, (name, data) => this.hear(name, data));
   }
 
   hear(name, data) {
@@ -18,7 +18,7 @@ export class Life {
       if (this.waiting) this.change(this.waiting).catch(() => {});
     }
     if (name === "seen") this.phases.push(data);
-    if (name === "lived") { this.keep(data.frames); this.answer = data.answer; }
+    if (name === "moments") { this.keep(data.frames); this.answer = data.answer; }
     if (name === "end") { this.end = data; this.answer = data.answer; }
     this.changed(name);
   }
@@ -34,7 +34,7 @@ export class Life {
 
   get last() { return this.moments.length - 1; }
   get frame() { return Math.min(Math.floor(this.at), this.last); }
-  // Up to where the life goes: the phase that is shown last.
+  // Up to where the simulation goes: the phase that is shown last.
   get until() { return this.end ? this.last : this.phases.length ? this.phases[this.phases.length - 1].until : 500; }
   get over() { return this.end !== null && this.frame >= this.last; }
 
@@ -69,8 +69,8 @@ export class Life {
   change(value) {
     if (!this.begun) this.waiting = { ...this.waiting, ...value };
     if (this.end || !this.begun) return Promise.resolve();
-    // A life that has just ended cannot be changed any more, and need not.
-    return post("/api/lives/" + this.begun.id, value).catch((error) => { if (error.status !== 404) throw error; });
+    // A simulation that has just ended cannot be changed any more, and need not.
+    return post("/api/simulations/" + this.begun.id, value).catch((error) => { if (error.status !== 404) throw error; });
   }
 
   play(on) { this.playing = on; return this.change({ paused: !on }); }
