@@ -5,6 +5,7 @@ use crate::analysis::verdict::Behaviour;
 use crate::base::error::Error;
 use crate::base::hash::sha256_hex;
 use crate::base::observer::{Observer, Work};
+use crate::base::ranks::Ranks;
 use crate::base::stop::Stopped;
 use crate::base::threads::pool;
 use crate::body::Body;
@@ -21,10 +22,11 @@ use crate::store::robots::Selection;
 use crate::store::run::{Robot, RunFile};
 use crate::store::unwritten::Unwritten;
 use crate::store::whereabouts::{Whereabouts, load_dataset_of, see};
-use crate::task::evaluation::{Job, Outcome, Savings, evaluate};
+use crate::task::evaluation::{Job, Outcome, Savings, evaluate, fresh_rollouts};
 use crate::task::fitness::Fitness;
 use crate::task::grouping::Grouping;
 use crate::task::perturbation::{Perturbation, Setting};
+use crate::task::protocol::RolloutMode;
 use crate::task::rollout::walk;
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
@@ -63,6 +65,8 @@ pub struct Options {
     pub out: PathBuf,
     /// Number of threads; `None`: one per core.
     pub threads: Option<usize>,
+    /// The processes that do it together; each calls [`audit`] with the same options.
+    pub ranks: Ranks,
 }
 
 /// An audit's end.
@@ -124,15 +128,21 @@ pub fn audit(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> R
     let open: Vec<Subject> =
         subjects.into_iter().filter(|subject| file.robot(&subject.id).is_none()).collect();
     let rollouts: usize = open.iter().map(|subject| 1 + trial.perturbations(subject).len()).sum();
+    let rollouts = rollouts.div_ceil(options.ranks.size());
     let label = format!("auditing {} robots:", open.len());
     observer.begins(&Work::new(label, rollouts as u64, "rollouts"));
     let pool = pool(options.threads)?;
     let done = AtomicU64::new(0);
     let mut unwritten = Unwritten::default();
-    for batch in open.chunks(BATCH) {
-        let found: Vec<Option<RobotAudit>> = pool.install(|| {
-            batch.par_iter().map(|subject| trial.robot(subject, stop, &done, observer)).collect()
-        });
+    let ranks = options.ranks;
+    for batch in open.chunks(BATCH * ranks.size()) {
+        let own = batch.par_iter().enumerate().filter(|(place, _)| place % ranks.size() == ranks.rank());
+        let own: Vec<Option<RobotAudit>> =
+            pool.install(|| own.map(|(_, subject)| trial.robot(subject, stop, &done, observer)).collect());
+        let mut shares: Vec<_> = ranks.share(&own).into_iter().map(Vec::into_iter).collect();
+        let next =
+            |place: usize| shares[place % ranks.size()].next().expect("a rank audits all of its share");
+        let found: Vec<Option<RobotAudit>> = (0..batch.len()).map(next).collect();
         let stopped = found.iter().any(Option::is_none);
         for (subject, found) in batch.iter().zip(&found) {
             let walked = found.as_ref().map(|found| &found.displacements);
@@ -145,12 +155,16 @@ pub fn audit(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> R
         // Another audit of the same run may have written meanwhile.
         file.add_known(&options.out);
         file.robots.sort_by_key(|robot| order.iter().position(|id| *id == robot.id));
-        unwritten.tried(file.write(&options.out).map(|_| ()), |text| observer.warning(text));
+        if ranks.leads() {
+            unwritten.tried(file.write(&options.out).map(|_| ()), |text| observer.warning(text));
+        }
         if stopped {
             return Ok(Finished { file, asked, stopped, unwritten: unwritten.error() });
         }
     }
-    unwritten.tried(file.write(&options.out).map(|_| ()), |text| observer.warning(text));
+    if ranks.leads() {
+        unwritten.tried(file.write(&options.out).map(|_| ()), |text| observer.warning(text));
+    }
     Ok(Finished { file, asked, stopped: false, unwritten: unwritten.error() })
 }
 
@@ -313,6 +327,11 @@ fn live(setting: &Setting, measured: bool, stop: &AtomicBool) -> Result<Option<(
     if measured {
         let system = Arc::new(System::new(body, physics.clone()));
         return Ok(walk(&system, protocol, stimuli, true, stop)?.ok());
+    }
+    if protocol.rollout == RolloutMode::Fresh {
+        let (found, _) = fresh_rollouts(body, stimuli, &[], (physics, protocol), &|_| (), stop)?;
+        let displacements: Option<Vec<f64>> = found.into_iter().map(Result::ok).collect();
+        return Ok(displacements.map(|displacements| (displacements, Energy::default())));
     }
     let job = Job { body, order: Vec::new(), may_win: Box::new(|_| true), given_up: None };
     let savings = Savings { early_stop: false, ..Savings::default() };

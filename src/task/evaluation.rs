@@ -4,10 +4,10 @@
 use crate::base::Grid;
 use crate::base::stop::{Stopped, check};
 use crate::body::Body;
-use crate::sim::{Physics, System, Unstable};
+use crate::sim::{Physics, System, Unstable, Worlds};
 use crate::task::perturbation::{Condition, Kind, Perturbation};
 use crate::task::protocol::{Protocol, RolloutMode};
-use crate::task::rollout::{Rollout, fresh_rollout, same_to_sensors};
+use crate::task::rollout::{Rollout, fresh_rollout, fresh_rollouts_of, same_to_sensors};
 use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -37,7 +37,7 @@ impl Default for Savings {
 }
 
 /// How an evaluation ended.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Outcome {
     /// The displacement under every image, in the images' order, voxel lengths.
     Walked(Vec<f64>),
@@ -61,7 +61,7 @@ impl Outcome {
 
 /// An outcome and the simulation it took. A *showing* is one image shown to one robot: a fresh
 /// rollout, or one phase of a sequential one.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Evaluation {
     /// How it ended.
     pub outcome: Outcome,
@@ -153,14 +153,15 @@ pub fn fresh_rollouts(
     let same_as = setup.same_as(body);
     let mut shared = BTreeMap::<usize, u64>::new();
     same_as.iter().for_each(|&first| *shared.entry(first).or_default() += 1);
-    let shared: Vec<(usize, u64)> = shared.into_iter().collect();
-    let roll = |&(image, count): &(usize, u64)| {
-        let displacement = setup.fresh_rollout(body, &systems, image)?;
-        told(count);
-        Ok((image, displacement))
+    let roll = |&(number, ref images): &(usize, Vec<usize>)| {
+        let rolled = setup.side_by_side(body, &systems[number], images)?;
+        images.iter().for_each(|image| told(shared[image]));
+        Ok(images.iter().copied().zip(rolled).collect())
     };
-    let rolled = shared.par_iter().with_max_len(1).map(roll);
-    let rolled: BTreeMap<usize, Result<f64, Unstable>> = rolled.collect::<Result<_, Stopped>>()?;
+    let parts = setup.parts(&systems, shared.keys().copied());
+    let rolled: Vec<Vec<(usize, Result<f64, Unstable>)>> =
+        parts.par_iter().with_max_len(1).map(roll).collect::<Result<_, Stopped>>()?;
+    let rolled: BTreeMap<usize, Result<f64, Unstable>> = rolled.into_iter().flatten().collect();
     Ok((same_as.iter().map(|first| rolled[first]).collect(), rolled.len()))
 }
 
@@ -282,15 +283,57 @@ impl<'a> Setup<'a> {
         image: usize,
     ) -> Result<Result<f64, Unstable>, Stopped> {
         let number = self.condition_of[image];
-        let condition = &self.conditions[number];
-        let see = |stimulus: Grid<f64>, change: &Perturbation| change.stimulus(body, &stimulus, image as u64);
-        let stimulus = condition.iter().fold(self.images[image].clone(), see);
+        let stimulus = self.stimulus(body, image);
         let displacement = fresh_rollout(&systems[number], &self.protocols[number], &stimulus, self.stop)?;
+        Ok(self.undone(displacement, number))
+    }
+
+    /// Fresh rollouts under images of the same condition, at most [`Worlds::MOST`]; the same bits as
+    /// one by one.
+    fn side_by_side(
+        &self,
+        body: &Body,
+        system: &Arc<System>,
+        images: &[usize],
+    ) -> Result<Vec<Result<f64, Unstable>>, Stopped> {
+        let number = images.first().map_or(0, |image| self.condition_of[*image]);
+        let stimuli: Vec<Grid<f64>> = images.iter().map(|image| self.stimulus(body, *image)).collect();
+        let found = fresh_rollouts_of(system, &self.protocols[number], &stimuli, self.stop)?;
+        Ok(found.into_iter().map(|displacement| self.undone(displacement, number)).collect())
+    }
+
+    /// Images in parts that are shown side by side, each with the number of its condition: of bodies
+    /// that gain by it as many as go together, but no fewer parts than threads.
+    fn parts(
+        &self,
+        systems: &[Arc<System>],
+        images: impl Iterator<Item = usize>,
+    ) -> Vec<(usize, Vec<usize>)> {
+        let mut by_condition = BTreeMap::<usize, Vec<usize>>::new();
+        images.for_each(|image| by_condition.entry(self.condition_of[image]).or_default().push(image));
+        let split = |(number, images): (usize, Vec<usize>)| {
+            let share = images.len().div_ceil(rayon::current_num_threads());
+            let most = if Worlds::gain(&systems[number]) { share.clamp(1, Worlds::MOST) } else { 1 };
+            images.chunks(most).map(|part| (number, part.to_vec())).collect::<Vec<_>>()
+        };
+        by_condition.into_iter().flat_map(split).collect()
+    }
+
+    /// What is shown for an image under its condition.
+    fn stimulus(&self, body: &Body, image: usize) -> Grid<f64> {
+        let condition = &self.conditions[self.condition_of[image]];
+        let see = |stimulus: Grid<f64>, change: &Perturbation| change.stimulus(body, &stimulus, image as u64);
+        condition.iter().fold(self.images[image].clone(), see)
+    }
+
+    /// A displacement under a condition as it counts.
+    fn undone(&self, displacement: Result<f64, Unstable>, condition: usize) -> Result<f64, Unstable> {
+        let condition = &self.conditions[condition];
         let undo = |d: f64, change: &Perturbation| change.undo(vec![d])[0];
         let displacement = displacement.map(|d| condition.iter().fold(d, undo));
         // A body that needs a stop, as any material has one, is not refused for that.
         let is_excused = condition.iter().any(|change| !change.counts_if_unstable());
-        Ok(if is_excused { displacement.or(Ok(0.0)) } else { displacement })
+        if is_excused { displacement.or(Ok(0.0)) } else { displacement }
     }
 }
 
@@ -508,6 +551,32 @@ mod tests {
             early_stop: mask & 1 > 0,
             shared_rollouts: mask & 2 > 0,
         })
+    }
+
+    #[test]
+    fn rollouts_side_by_side_have_the_bits_of_each_by_itself() {
+        let body: Body = "1111111/1311141/1161511/3111114/1111111".parse().unwrap();
+        let images: Vec<Grid<f64>> = (0..11)
+            .map(|k| {
+                Grid::from_fn(5, 7, |row, column| f64::from((row * 5 + column * 3 + k) as u32 % 4) / 3.0)
+            })
+            .collect();
+        let raised = condition(1, false);
+        let conditions: Vec<Condition> =
+            (0..11).map(|k| if k % 3 == 0 { raised.clone() } else { Condition::new() }).collect();
+        let protocol = Protocol { control_steps: 40, ..Protocol::default() };
+        let physics = Physics::default();
+        let setup = Setup::new(&images, &conditions, (&physics, &protocol), &NEVER);
+        let systems = setup.systems(&body);
+        assert!(Worlds::gain(&systems[0]));
+        let one_by_one: Vec<_> =
+            (0..11).map(|image| setup.fresh_rollout(&body, &systems, image).unwrap()).collect();
+        for threads in [1, 3] {
+            let together =
+                || fresh_rollouts(&body, &images, &conditions, (&physics, &protocol), &|_| (), &NEVER);
+            let (found, _) = rayon(threads).install(together).unwrap();
+            assert_eq!(found, one_by_one, "{threads} threads");
+        }
     }
 
     #[test]

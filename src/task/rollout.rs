@@ -3,7 +3,7 @@
 use crate::base::Grid;
 use crate::base::stop::Stopped;
 use crate::body::Body;
-use crate::sim::{Energy, Physics, Start, System, Unstable, World};
+use crate::sim::{Energy, Physics, Start, System, Unstable, World, Worlds};
 use crate::task::protocol::{Protocol, RolloutMode};
 use crate::task::recording::{Frame, Phase, Recording, VoxelCorners};
 use std::sync::Arc;
@@ -127,6 +127,34 @@ pub fn fresh_rollout(
     stop: &AtomicBool,
 ) -> Result<Result<f64, Unstable>, Stopped> {
     Rollout::new(system, protocol).show_unless(stimulus, stop)
+}
+
+/// Fresh rollouts under at most [`Worlds::MOST`] images, side by side, unless `stop` is set
+/// meanwhile: the displacement of each in voxel lengths, with the bits of [`fresh_rollout`].
+///
+/// # Errors
+/// [`Stopped`] then; within, [`Unstable`] for a rollout that ended early.
+pub fn fresh_rollouts_of(
+    system: &Arc<System>,
+    protocol: &Protocol,
+    stimuli: &[Grid<f64>],
+    stop: &AtomicBool,
+) -> Result<Vec<Result<f64, Unstable>>, Stopped> {
+    if let [one] = stimuli {
+        return Ok(vec![fresh_rollout(system, protocol, one, stop)?]);
+    }
+    let start = Start { column: protocol.start_column, row: protocol.start_row };
+    let mut worlds = Worlds::new(Arc::clone(system), start, stimuli.len());
+    stimuli.iter().enumerate().for_each(|(number, stimulus)| worlds.set_stimulus(number, stimulus));
+    let begin = worlds.all()[0].centre_of_mass()[0];
+    for _ in 0..protocol.control_steps {
+        worlds.step_unless(stop)?;
+    }
+    let moved = |(world, ended): (&World, &Option<Unstable>)| match ended {
+        Some(unstable) => Err(*unstable),
+        None => Ok(voxel_lengths(world.centre_of_mass()[0] - begin, system.physics())),
+    };
+    Ok(worlds.all().iter().zip(worlds.ended()).map(moved).collect())
 }
 
 /// A robot shown images as the protocol has it, in fresh rollouts or one: its displacement under

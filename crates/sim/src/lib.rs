@@ -40,6 +40,8 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
+//! Many simulations of one system are faster side by side, with the same bits: [`Worlds`].
+//!
 //! Feature `serde` (off by default) reads and writes bodies, grids, constants and states.
 //!
 //! # Same bits
@@ -84,6 +86,7 @@ mod step;
 pub mod stop;
 mod system;
 mod world;
+mod worlds;
 
 pub use body::{Body, Material};
 pub use energy::Energy;
@@ -94,3 +97,4 @@ pub use state::State;
 pub use step::actuation::width;
 pub use system::System;
 pub use world::{Start, StateMismatch, Unstable, UnstableReason, World};
+pub use worlds::Worlds;

@@ -23,6 +23,7 @@ pub struct Start {
 
 /// How a simulation became unstable.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum UnstableReason {
     /// Too many distant surface voxels overlap (EvoGym's criterion).
     Overlaps,
@@ -32,6 +33,7 @@ pub enum UnstableReason {
 
 /// A simulation became unstable: it ended there, and has no displacement.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[error("unstable in control step {control_step}: {}", match reason {
     UnstableReason::Overlaps => "too many surface voxels overlap",
     UnstableReason::BlownUp => "a voxel has blown up",
@@ -51,15 +53,15 @@ pub struct StateMismatch;
 /// One simulation: system, state and the stimulus of the moment.
 #[derive(Clone, Debug)]
 pub struct World {
-    system: Arc<System>,
-    start: Start,
-    state: State,
-    scratch: Scratch,
+    pub(crate) system: Arc<System>,
+    pub(crate) start: Start,
+    pub(crate) state: State,
+    pub(crate) scratch: Scratch,
     /// The pixel of each active voxel, in [0, 1]; muscles have one too, unused.
     pixels: Vec<f64>,
     targets: Vec<f64>,
-    instructions: InstructionSet,
-    meter: Option<Meter>,
+    pub(crate) instructions: InstructionSet,
+    pub(crate) meter: Option<Meter>,
 }
 
 impl World {
@@ -133,26 +135,35 @@ impl World {
     /// [`Stopped`] then; within, [`Unstable`] if the simulation ends in it. The state is of no use
     /// in either case.
     pub fn step_unless(&mut self, stop: &AtomicBool) -> Result<Result<(), Unstable>, Stopped> {
-        let (system, control_step) = (&*self.system, self.state.control_step);
-        self.scratch.begin();
-        let goals = &mut self.scratch.goals;
-        actuation::set_goals(system, control_step, &self.pixels, &mut self.targets, goals);
-        self.meter.iter_mut().for_each(|meter| meter.drive(&self.scratch.goals, &self.state.position));
-        let (state, scratch, meter) = (&mut self.state, &mut self.scratch, self.meter.as_mut());
-        let start_column = self.start.column;
+        self.begin_step();
+        let World { system, start, state, scratch, meter, .. } = self;
+        let control_step = state.control_step;
+        let (system, meter, start_column) = (&**system, meter.as_mut(), start.column);
         let steps = ControlStep { system, start_column, state, scratch, meter, stop };
         match dispatch(self.instructions, steps) {
-            Ok(()) => {}
-            Err(Ended::Stopped) => return Err(Stopped),
-            Err(Ended::Unstable(reason)) => return Ok(Err(Unstable { control_step, reason })),
+            Ok(()) => Ok(self.end_step()),
+            Err(Ended::Stopped) => Err(Stopped),
+            Err(Ended::Unstable(reason)) => Ok(Err(Unstable { control_step, reason })),
         }
-        // What a substep leaves behind is looked at by the next; at the end of a control step, by
-        // no other.
+    }
+
+    /// What comes before the substeps of a control step.
+    pub(crate) fn begin_step(&mut self) {
+        let World { system, state, scratch, pixels, targets, meter, .. } = self;
+        scratch.begin();
+        actuation::set_goals(system, state.control_step, pixels, targets, &mut scratch.goals);
+        meter.iter_mut().for_each(|meter| meter.drive(&scratch.goals, &state.position));
+    }
+
+    /// What comes after them. What a substep leaves behind is looked at by the next; at the end of
+    /// a control step, by no other.
+    pub(crate) fn end_step(&mut self) -> Result<(), Unstable> {
+        let control_step = self.state.control_step;
         if !self.centre_of_mass().iter().all(|coordinate| coordinate.is_finite()) {
-            return Ok(Err(Unstable { control_step, reason: UnstableReason::BlownUp }));
+            return Err(Unstable { control_step, reason: UnstableReason::BlownUp });
         }
         self.state.control_step += 1;
-        Ok(Ok(()))
+        Ok(())
     }
 
     /// Control steps done.

@@ -4,7 +4,7 @@
 //! A spring beyond a limit l is corrected by (1 − l/d) of its vector; with t = d²/l² − 1, which is
 //! small, that is 1 − 1/√(1 + t) again: mostly neither root nor division.
 
-use crate::lattice::FAMILIES;
+use crate::lattice::{FAMILIES, Lattice};
 use crate::simd::{BLOCK, Lanes, each};
 use crate::state::{Pair, X, Y, slices, slices_mut};
 use crate::step::series::{RANGE, TERMS, rsqrt_exact, rsqrt_series};
@@ -205,6 +205,103 @@ pub(crate) fn limit_rigid(System { lattice, physics }: &System, [x, y]: &mut Pai
             y[b] -= factor * dy;
         }
     }
+}
+
+/// The rigid pass for several simulations of one system at once, one to a lane: the same bits as
+/// [`limit_rigid`] for each.
+#[derive(Clone, Debug)]
+pub(crate) struct SharedRigidPass {
+    /// Points of rigid sides.
+    points: Vec<usize>,
+    /// [`Lattice::rigid_links`] by the places of their ends in `points`.
+    links: Vec<[usize; 2]>,
+    /// Their coordinates, those of all simulations side by side.
+    at: [Vec<[f64; BLOCK]>; 2],
+}
+
+impl SharedRigidPass {
+    /// Fewest rigid sides for which it pays.
+    pub const LEAST: usize = 4 * BLOCK;
+
+    pub fn new(lattice: &Lattice) -> Self {
+        let mut points: Vec<usize> = lattice.rigid_links.iter().flatten().copied().collect();
+        points.sort_unstable();
+        points.dedup();
+        let place = |point: usize| points.binary_search(&point).expect("every end is among the points");
+        let links = lattice.rigid_links.iter().map(|ends| ends.map(place)).collect();
+        let at = || vec![[0.0; BLOCK]; points.len()];
+        SharedRigidPass { links, at: [at(), at()], points }
+    }
+
+    /// Whether it is faster for this many simulations than one after the other: copying forth and
+    /// back costs about as much as three of them.
+    pub fn is_worth_it(&self, simulations: usize) -> bool {
+        simulations > 3 && self.links.len() >= SharedRigidPass::LEAST
+    }
+
+    /// Corrects positions, each simulation's its own; at most [`BLOCK`] of them.
+    #[inline(always)]
+    pub fn limit<'p, L: Lanes>(
+        &mut self,
+        System { physics, .. }: &System,
+        positions: impl Iterator<Item = &'p mut Pair>,
+    ) {
+        let SharedRigidPass { points, links, at: [x, y] } = self;
+        let mut positions: [Option<&mut Pair>; BLOCK] = {
+            let mut positions = positions;
+            std::array::from_fn(|_| positions.next())
+        };
+        for (lane, position) in positions.iter().enumerate() {
+            let Some([from_x, from_y]) = position else { continue };
+            for (&point, (x, y)) in points.iter().zip(x.iter_mut().zip(y.iter_mut())) {
+                (x[lane], y[lane]) = (from_x[point], from_y[point]);
+            }
+        }
+        let limits = Limits::new(physics.cell_size, physics.rigid_limit_low, physics.rigid_limit_high);
+        let [low, high] = each!(i in [0, 1] => L::splat(limits.squares[i]));
+        let [of_low, of_high] = each!(i in [0, 1] => L::splat(1.0 / limits.squares[i]));
+        let (share, zero) = (L::splat(physics.rigid_limit_share / 2.0), L::splat(0.0));
+        for &[a, b] in links.iter() {
+            for lane in (0..BLOCK).step_by(L::WIDTH) {
+                let [xa, xb, ya, yb] =
+                    [L::load(&x[a], lane), L::load(&x[b], lane), L::load(&y[a], lane), L::load(&y[b], lane)];
+                let (dx, dy) = (xb - xa, yb - ya);
+                let square = dx * dx + dy * dy;
+                let (long, short) = (square.gt(high), low.gt(square));
+                let beyond = long | short;
+                if !L::any(beyond) {
+                    continue;
+                }
+                let t = (square - high.or_else(long, low)) * of_high.or_else(long, of_low);
+                let factor = share * shrink(t.or_else(beyond, zero));
+                // Where nothing is beyond, not even a zero's sign may change.
+                (xa + factor * dx).or_else(beyond, xa).store(&mut x[a], lane);
+                (ya + factor * dy).or_else(beyond, ya).store(&mut y[a], lane);
+                (xb - factor * dx).or_else(beyond, xb).store(&mut x[b], lane);
+                (yb - factor * dy).or_else(beyond, yb).store(&mut y[b], lane);
+            }
+        }
+        for (lane, position) in positions.iter_mut().enumerate() {
+            let Some([to_x, to_y]) = position else { continue };
+            for (&point, (x, y)) in points.iter().zip(x.iter().zip(y.iter())) {
+                (to_x[point], to_y[point]) = (x[lane], y[lane]);
+            }
+        }
+    }
+}
+
+/// [`shrink_scalar`] in every lane.
+#[inline(always)]
+fn shrink<L: Lanes>(t: L) -> L {
+    let [c0, c1, c2, c3, c4, c5] = each!(i in [0, 1, 2, 3, 4, 5] => L::splat(TERMS[i]));
+    let square = t * t;
+    let near = ((c0 + c1 * t) + square * ((c2 + c3 * t) + square * (c4 + c5 * t))) * t;
+    let far = t.abs().gt(L::splat(RANGE));
+    if !L::any(far) {
+        return near;
+    }
+    let one = L::splat(1.0);
+    (one - one / (one + t).sqrt()).or_else(far, near)
 }
 
 /// 1 − 1/√(1 + t), in the order with the shortest chain.

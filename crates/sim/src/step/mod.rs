@@ -58,17 +58,30 @@ fn substep<L: Lanes>(
     scratch: &mut Scratch,
     mut meter: Option<&mut Meter>,
 ) -> Result<(), UnstableReason> {
-    scratch.broad_phase.refresh::<L>(system, state)?;
-    let unstable = scratch.broad_phase.too_many_overlaps(system, state);
+    before_rigid::<L>(system, start_column, state, scratch, meter.as_deref_mut())?;
+    limits::limit_rigid(system, &mut state.position);
+    meter.iter_mut().for_each(|meter| meter.after_limits(&state.position));
+    Ok(())
+}
 
+/// A substep up to the rigid pass.
+#[inline(always)]
+pub(crate) fn before_rigid<L: Lanes>(
+    system: &System,
+    start_column: i64,
+    state: &mut State,
+    scratch: &mut Scratch,
+    mut meter: Option<&mut Meter>,
+) -> Result<(), UnstableReason> {
+    scratch.broad_phase.refresh::<L>(system, state)?;
+    if scratch.broad_phase.too_many_overlaps(system, state) {
+        return Err(UnstableReason::Overlaps);
+    }
     scratch.contact.iter_mut().for_each(|axis| axis.fill(0.0));
     contact::add_contacts(system, start_column, state, &scratch.broad_phase, &mut scratch.contact);
     // Contacts see true velocities: position now less position then. The integrator knows its own.
     rk4::integrate::<L>(system, state, scratch);
     meter.iter_mut().for_each(|meter| meter.before_limits(&scratch.position));
     rk4::limit::<L>(system, state, scratch);
-    limits::limit_rigid(system, &mut state.position);
-    meter.iter_mut().for_each(|meter| meter.after_limits(&state.position));
-
-    if unstable { Err(UnstableReason::Overlaps) } else { Ok(()) }
+    Ok(())
 }
