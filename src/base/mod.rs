@@ -8,6 +8,7 @@ pub mod hash;
 pub mod number;
 pub mod observer;
 pub mod random;
+pub mod ranks;
 pub mod signals;
 pub mod statistics;
 pub mod table;

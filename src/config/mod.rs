@@ -28,6 +28,7 @@ use crate::task::protocol::{MAX_COLUMN, MAX_ROW, MAX_STEPS, Protocol};
 use crate::task::stimulus::StimulusParams;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// Configs that are part of the program: name and text.
@@ -97,6 +98,21 @@ pub struct Config {
     /// Constants of the simulator.
     #[serde(default)]
     pub physics: Physics,
+}
+
+/// Keys in dots, with their values.
+pub type Settings = BTreeMap<String, toml::Value>;
+
+fn flatten(name: &str, value: toml::Value, settings: &mut Settings) {
+    match value {
+        toml::Value::Table(table) => {
+            let below = |key: String| if name.is_empty() { key } else { format!("{name}.{key}") };
+            table.into_iter().for_each(|(key, value)| flatten(&below(key), value, settings));
+        }
+        value => {
+            settings.insert(name.to_string(), value);
+        }
+    }
 }
 
 fn one() -> u64 {
@@ -268,6 +284,18 @@ impl Config {
             data: DataConfig { dir: None, ..self.data.clone() },
             ..self.clone()
         }
+    }
+
+    /// All keys that results depend on, as `map_elites.parents`, with their values.
+    pub fn settings(&self) -> Settings {
+        let root = toml::Value::try_from(self.essence());
+        let mut settings = Settings::new();
+        flatten(
+            "",
+            root.expect("every field is a number, text, list or table, which TOML has"),
+            &mut settings,
+        );
+        settings
     }
 
     /// What bodies evolution makes.

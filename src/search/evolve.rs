@@ -4,7 +4,8 @@ use crate::base::error::{Error, ErrorKind};
 use crate::base::files::write_atomically;
 use crate::base::observer::{Generation, Observer};
 use crate::base::random::{Purpose, stream};
-use crate::base::stop::check;
+use crate::base::ranks::Ranks;
+use crate::base::stop::{Stopped, check};
 use crate::base::threads::pool;
 use crate::body::Body;
 use crate::config::Config;
@@ -26,7 +27,7 @@ use crate::task::evaluation::{Evaluation, Job, MayWin, Outcome, evaluate};
 use crate::task::grouping::Grouping;
 use rayon::prelude::*;
 use std::path::PathBuf;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
 /// What to evolve and where to.
@@ -44,6 +45,8 @@ pub struct Options {
     pub data: Option<PathBuf>,
     /// Number of threads; `None`: one per core.
     pub threads: Option<usize>,
+    /// The processes that do it together; each calls [`evolve`] with the same options.
+    pub ranks: Ranks,
 }
 
 /// How a session of a run ended.
@@ -98,45 +101,85 @@ pub fn evolve(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> 
     held_out::check(config, &dataset)?;
     let mutations = Mutations { seed: config.seed, spec: config.body_spec(), params: &config.genome, stop };
     mutations.random_immigrant(0, 0).map_err(unmade)?;
-    // Open.
-    let folder = RunFolder::open(&options.out, options.if_exists)?;
-    let saved = match resumes {
-        true => resume::saved(&folder, config, &training, |text| observer.warning(&text))?,
-        false => None,
+    // Open. Only the leading rank has a folder.
+    let ranks = options.ranks;
+    let folder = ranks.leads().then(|| RunFolder::open(&options.out, options.if_exists)).transpose()?;
+    let saved = match &folder {
+        Some(folder) if resumes => resume::saved(folder, config, &training, |text| observer.warning(&text))?,
+        _ => None,
     };
-    // A config that says the same stays as it is, with its comments: it may be what this run was
-    // asked for with.
-    let there = Config::load(&folder.path().join(CONFIG).to_string_lossy(), &[]);
-    if there.ok().as_ref() != Some(config) {
-        let path = folder.path().join(CONFIG);
-        write_atomically(&path, config.to_toml().as_bytes())
-            .map_err(|error| Error::writing(&path, &error))?;
+    let saved = ranks.from_lead(saved);
+    if let Some(folder) = &folder {
+        say_what_it_is(folder, config)?;
+        whereabouts::remember(folder, &dataset)?;
     }
-    whereabouts::remember(&folder, &dataset)?;
     let pool = pool(options.threads)?;
     let mut run = Run::new(options, training, saved)?;
-    let mut metrics = Metrics::open(folder.path(), run.generation)?;
-    if metrics.missing > 0 {
-        let (path, missing) = (folder.path().join(METRICS).display().to_string(), metrics.missing);
-        observer.warning(&format!("{path}: {missing} of {} generations are missing in it", run.generation));
-    }
+    let mut files = match folder {
+        Some(folder) => Some(Files { metrics: metrics(&folder, run.generation, observer)?, folder }),
+        None => None,
+    };
     // Evolve.
-    pool.install(|| run.evolve(&mutations, &folder, &mut metrics, stop, observer)).map_err(goes_on)?;
+    pool.install(|| run.evolve(&mutations, &mut files, stop, observer)).map_err(goes_on)?;
     // Write, and choose robots.
-    let unwritten = metrics.flush().and_then(|()| run.save(&folder)).err().map(goes_on);
     let (file, totals) = (run.file(), run.totals());
     let is_whole = run.generation >= config.generations;
+    let Some(mut files) = files else {
+        return Ok(Finished {
+            run: file,
+            totals,
+            validated: Vec::new(),
+            stopped: !is_whole,
+            unwritten: None,
+        });
+    };
+    let unwritten = files.save(&run).err().map(goes_on);
     // Those of a run that is not in its file would be chosen from another.
     let chooses = is_whole && unwritten.is_none() && config.validation.best > 0 && !file.elites.is_empty();
     let validated = match chooses {
         true => {
-            let archive = folder.path().join(RUN_JSON);
+            let archive = files.folder.path().join(RUN_JSON);
             validation::at_end(&archive, &dataset, &pool, stop, observer)?
         }
         false => Some(Vec::new()),
     };
     let stopped = !is_whole || validated.is_none();
     Ok(Finished { run: file, totals, validated: validated.unwrap_or_default(), stopped, unwritten })
+}
+
+/// Writes the config into the folder. One that says the same stays as it is, with its comments: it
+/// may be what this run was asked for with.
+fn say_what_it_is(folder: &RunFolder, config: &Config) -> Result<(), Error> {
+    let path = folder.path().join(CONFIG);
+    let there = Config::load(&path.to_string_lossy(), &[]);
+    if there.ok().as_ref() == Some(config) {
+        return Ok(());
+    }
+    write_atomically(&path, config.to_toml().as_bytes()).map_err(|error| Error::writing(&path, &error))
+}
+
+/// The run's metrics.csv, to go on after a generation.
+fn metrics(folder: &RunFolder, generation: u64, observer: &dyn Observer) -> Result<Metrics, Error> {
+    let metrics = Metrics::open(folder.path(), generation)?;
+    if metrics.missing > 0 {
+        let (path, missing) = (folder.path().join(METRICS).display().to_string(), metrics.missing);
+        observer.warning(&format!("{path}: {missing} of {generation} generations are missing in it"));
+    }
+    Ok(metrics)
+}
+
+/// Where a run is written.
+struct Files {
+    folder: RunFolder,
+    metrics: Metrics,
+}
+
+impl Files {
+    /// Writes metrics, checkpoint, `run.json` and `elites.csv`.
+    fn save(&mut self, run: &Run) -> Result<(), Error> {
+        self.metrics.flush()?;
+        run.save(&self.folder)
+    }
 }
 
 /// An error, if it is one of a full disk, with how to go on when there is space again.
@@ -197,39 +240,37 @@ impl<'a> Run<'a> {
     fn evolve(
         &mut self,
         mutations: &Mutations,
-        folder: &RunFolder,
-        metrics: &mut Metrics,
+        files: &mut Option<Files>,
         stop: &AtomicBool,
         observer: &dyn Observer,
     ) -> Result<(), Error> {
         let config = &self.options.config;
         let verb = if self.generation > 0 { "going on with" } else { "evolving in" };
-        let dataset = &self.training.dataset.name;
-        observer.note(&format!(
-            "{verb} {}; images from {dataset}: {}",
-            folder.path().display(),
-            self.training.listed()
-        ));
+        let (out, dataset) = (self.options.out.display(), &self.training.dataset.name);
+        observer.note(&format!("{verb} {out}; images from {dataset}: {}", self.training.listed()));
         observer.generation(&self.progress());
         let every = Duration::try_from_secs_f64(config.checkpoint.seconds).unwrap_or(Duration::MAX);
         let mut saved = Instant::now();
-        while self.generation < config.generations && !stop.load(Ordering::Relaxed) {
+        while self.generation < config.generations {
             match self.next_generation(mutations, stop) {
                 Err(error) if error.kind == ErrorKind::Stopped => break,
                 done => done?,
             }
-            metrics.write(self.generation - 1, &self.stats(), &self.totals())?;
+            if let Some(files) = files {
+                files.metrics.write(self.generation - 1, &self.stats(), &self.totals())?;
+            }
             observer.generation(&self.progress());
+            let Some(files) = files else { continue };
             if self.generation.is_multiple_of(config.checkpoint.generations) || saved.elapsed() >= every {
-                metrics.flush()?;
-                self.save(folder)?;
+                files.save(self)?;
                 saved = Instant::now();
             }
         }
         Ok(())
     }
 
-    /// Makes, evaluates and tells one generation.
+    /// Makes, evaluates and tells one generation; every rank the same, but for the evaluation, of
+    /// which each does its share.
     ///
     /// # Errors
     /// Of kind [`ErrorKind::Stopped`] if it was stopped meanwhile: all is then as it was before.
@@ -239,7 +280,8 @@ impl<'a> Run<'a> {
             check(stop)?;
             self.search.make(proposal, mutations).map_err(unmade)
         };
-        let robots = proposals.par_iter().map(make).collect::<Result<Vec<Robot>, Error>>()?;
+        let robots = proposals.par_iter().map(make).collect::<Result<Vec<Robot>, Error>>();
+        let robots = self.together(robots)?;
         let children = proposals.iter().zip(robots).map(|(asked, robot)| (asked.child, asked.parent, robot));
         let children: Vec<Child> = children.collect();
         let count = children.len() as u64;
@@ -292,7 +334,26 @@ impl<'a> Run<'a> {
         let mut jobs: Vec<Job> = jobs.collect();
         jobs.iter_mut().zip(&probes).for_each(|(job, probe)| job.body = probe);
         let (physics, protocol) = (&config.physics, &config.protocol);
-        Ok(evaluate(&jobs, stimuli, conditions, physics, protocol, config.savings, stop)?)
+        let ranks = self.options.ranks;
+        let sizes: Vec<u64> = jobs.iter().map(|job| job.body.counts().total as u64).collect();
+        let owners = ranks.owners(&sizes);
+        let mut owner = owners.iter();
+        jobs.retain(|_| owner.next().is_some_and(|owner| *owner == ranks.rank()));
+        let own = evaluate(&jobs, stimuli, conditions, physics, protocol, config.savings, stop);
+        let shares = ranks.share(&own.ok());
+        // A generation that one rank drops is dropped by all.
+        let shares: Option<Vec<Vec<Evaluation>>> = shares.into_iter().collect();
+        let mut shares: Vec<_> = shares.ok_or(Stopped)?.into_iter().map(Vec::into_iter).collect();
+        let next = |owner: &usize| shares[*owner].next().expect("a rank evaluates all of its share");
+        Ok(owners.iter().map(next).collect())
+    }
+
+    /// What this rank made, if all ranks made theirs.
+    fn together<T>(&self, own: Result<T, Error>) -> Result<T, Error> {
+        let is_made = own.is_ok();
+        let are_made = self.options.ranks.share(&is_made);
+        let own = own?;
+        if are_made.contains(&false) { Err(Stopped.into()) } else { Ok(own) }
     }
 
     /// Puts those into the archive that walked and are fit enough.

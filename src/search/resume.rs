@@ -2,13 +2,12 @@
 //! images.
 
 use crate::base::error::Error;
-use crate::config::Config;
+use crate::config::{Config, Settings};
 use crate::search::training::Training;
 use crate::store::checkpoint;
 use crate::store::checkpoint::Checkpoint;
 use crate::store::folder::RunFolder;
 use crate::store::names::RUN_JSON;
-use std::collections::BTreeMap;
 
 const ANEW: &str = "start the run anew with --force";
 
@@ -57,9 +56,9 @@ fn compatible(saved: &Checkpoint, config: &Config, training: &Training) -> Resul
         );
         return Err(Error::input(text).hint(format!("go on with morphcog {theirs}, or {ANEW}")));
     }
-    let (theirs, ours) = (keys(&saved.run.config), keys(config));
+    let (theirs, ours) = (saved.run.config.settings(), config.settings());
     let differs = |key: &&String| theirs.get(*key) != ours.get(*key);
-    let value = |keys: &Keys, key: &str| keys.get(key).map_or("not set".to_string(), ToString::to_string);
+    let value = |keys: &Settings, key: &str| keys.get(key).map_or("not set".to_string(), ToString::to_string);
     if let Some(key) = theirs.keys().chain(ours.keys()).find(differs) {
         let (theirs, ours) = (value(&theirs, key), value(&ours, key));
         let text = format!("the run in this folder has another config: {key} = {theirs} there, {ours} now");
@@ -76,26 +75,4 @@ fn compatible(saved: &Checkpoint, config: &Config, training: &Training) -> Resul
         return Err(Error::input(text).hint(format!("ask for {done} or more, or {ANEW}")));
     }
     Ok(())
-}
-
-type Keys = BTreeMap<String, toml::Value>;
-
-/// All keys that results depend on, as `map_elites.parents`, with their values.
-fn keys(config: &Config) -> Keys {
-    let mut keys = Keys::new();
-    let root = toml::Value::try_from(config.essence());
-    flatten("", root.expect("every field is a number, text, list or table, which TOML has"), &mut keys);
-    keys
-}
-
-fn flatten(name: &str, value: toml::Value, keys: &mut Keys) {
-    match value {
-        toml::Value::Table(table) => {
-            let below = |key: String| if name.is_empty() { key } else { format!("{name}.{key}") };
-            table.into_iter().for_each(|(key, value)| flatten(&below(key), value, keys));
-        }
-        value => {
-            keys.insert(name.to_string(), value);
-        }
-    }
 }

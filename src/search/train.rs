@@ -120,7 +120,7 @@ pub fn train(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> R
     let whereabouts = Whereabouts::given(options.data.as_deref())
         .and_of(&options.out.join(RUN_JSON))
         .and_of(&options.archive);
-    let config = config(&source.run.config, options)?;
+    let config = config_of(&source.run.config, &options.groups, options.seed, &options.set)?;
     let dataset = whereabouts.load(&config.data, &[Split::Train])?;
     let config = with_images(config, &dataset)?;
     let mut training = Training::of(&config, &dataset)?;
@@ -174,20 +174,29 @@ pub fn train(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> R
     Ok(Finished { run, rollouts: log.simulated, validated })
 }
 
-/// The config of the run that is made: that of the walkers' run with another task.
-fn config(of_walkers: &Config, options: &Options) -> Result<Config, Error> {
+/// The config of the run that is made: that of the walkers' run with another task, perhaps another
+/// seed, and the keys that are set.
+///
+/// # Errors
+/// What is wrong with these.
+pub(crate) fn config_of(
+    of_walkers: &Config,
+    groups: &[Vec<u8>; 2],
+    seed: Option<u64>,
+    set: &[String],
+) -> Result<Config, Error> {
     let evaluation = EvaluationConfig { fitness: Fitness::MeanClipped };
     let base = Config {
-        seed: options.seed.unwrap_or(of_walkers.seed),
+        seed: seed.unwrap_or(of_walkers.seed),
         generations: 1,
-        task: TaskConfig { groups: Some(options.groups.clone()), ..TaskConfig::default() },
+        task: TaskConfig { groups: Some(groups.clone()), ..TaskConfig::default() },
         data: DataConfig { train_images: None, ..of_walkers.data.clone() },
         protocol: Protocol { rollout: RolloutMode::Fresh, ..of_walkers.protocol.clone() },
         evaluation,
         validation: ValidationConfig { best: 1, ..ValidationConfig::default() },
         ..of_walkers.clone()
     };
-    reading::changed(base, &options.set, |config: &Config| config.validate(), |error| error)
+    reading::changed(base, set, |config: &Config| config.validate(), |error| error)
 }
 
 /// The same with as many training images as there are beside those that validate.

@@ -2,13 +2,13 @@
 
 use crate::base::error::Error;
 use crate::base::files::{check_writable, remove_half_written};
+use crate::store::lock::{Lock, Refusal};
 use crate::store::names::{
     AUDIT_JSON, CAPACITY_JSON, CHECKPOINTS, CONFIG, DATA_FOLDER, ELITES, EVAL_JSON, EVAL_VALIDATION_JSON,
     METRICS, RESPONSE_JSON, RUN_JSON, TRAINING_JSON, VALIDATION_JSON,
 };
 use crate::store::run::RunFile;
 use std::ffi::OsStr;
-use std::fs::{File, TryLockError};
 use std::path::{Path, PathBuf};
 
 const LOCK: &str = ".lock";
@@ -34,8 +34,7 @@ pub enum IfExists {
 #[derive(Debug)]
 pub struct RunFolder {
     path: PathBuf,
-    /// The operating system lets the lock go when the process ends, however it ends.
-    _lock: File,
+    _lock: Lock,
 }
 
 impl RunFolder {
@@ -53,17 +52,14 @@ impl RunFolder {
             return Err(Error::occupied(text).hint(hint.to_string()));
         }
         let lock = path.join(LOCK);
-        let file = File::options().create(true).truncate(false).write(true).open(&lock);
-        let file = file.map_err(|error| Error::writing(&lock, &error))?;
-        match file.try_lock() {
-            Ok(()) => {}
-            Err(TryLockError::WouldBlock) => {
-                let text = format!("{}: another morphcog is using this run folder", path.display());
-                return Err(Error::occupied(text)
-                    .hint("wait for it to end, or write elsewhere with --out".to_string()));
+        let lock = Lock::take(&lock).map_err(|refusal| match refusal {
+            Refusal::Held(holder) => {
+                let by = holder.map_or(String::new(), |holder| format!(" ({holder})"));
+                let text = format!("{}: another morphcog is using this run folder{by}", path.display());
+                Error::occupied(text).hint("wait for it to end, or write elsewhere with --out".to_string())
             }
-            Err(TryLockError::Error(error)) => return Err(Error::writing(&lock, &error)),
-        }
+            Refusal::Io(error) => Error::writing(&lock, &error),
+        })?;
         remove_half_written(path, &RunFolder::files()).map_err(|error| Error::writing(path, &error))?;
         if if_exists == IfExists::Overwrite {
             for name in RunFolder::files() {
@@ -76,7 +72,7 @@ impl RunFolder {
                 }
             }
         }
-        Ok(RunFolder { path: path.to_path_buf(), _lock: file })
+        Ok(RunFolder { path: path.to_path_buf(), _lock: lock })
     }
 
     /// Where it is.

@@ -7,6 +7,7 @@ pub mod checkpoint;
 pub mod eval;
 pub mod folder;
 pub mod images;
+pub mod lock;
 pub mod metrics;
 pub mod names;
 pub mod response;
@@ -15,6 +16,7 @@ pub mod run;
 #[cfg(test)]
 pub(crate) mod samples;
 pub mod setting;
+pub mod task;
 pub mod training;
 #[cfg(feature = "networks")]
 pub mod trainings;

@@ -18,6 +18,9 @@ pub const RESPONSE_JSON: &str = "response.json";
 /// What a training keeps of its rollouts, beside `run.json`.
 pub const TRAINING_JSON: &str = "training.json";
 
+/// How far a task of a sweep is, beside `run.json`.
+pub const TASK_JSON: &str = "task.json";
+
 /// The robots that were chosen on validation images, beside `run.json`.
 pub const VALIDATION_JSON: &str = "validation.json";
 

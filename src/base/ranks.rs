@@ -1,0 +1,195 @@
+//! [`Ranks`]: processes that share the work of one command, by MPI (feature `mpi`).
+//!
+//! Every process, a *rank*, does the same with the same data, and so knows the same; only what takes
+//! time is divided, and its results are exchanged. The first rank leads: it alone writes files and
+//! speaks.
+
+use crate::base::error::Error;
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use std::cmp::Reverse;
+
+/// The ranks as one of them sees them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Ranks {
+    rank: usize,
+    size: usize,
+}
+
+/// Keeps MPI up; when it goes, all ranks part.
+pub struct Guard {
+    #[cfg(feature = "mpi")]
+    _universe: Option<mpi::environment::Universe>,
+}
+
+/// Variables by which MPI's launchers tell a process how many there are.
+const LAUNCHED: [&str; 3] = ["OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "PMIX_SIZE"];
+
+impl Ranks {
+    /// A process by itself.
+    pub const ALONE: Ranks = Ranks { rank: 0, size: 1 };
+
+    /// The ranks that this process was started with, which is alone without MPI.
+    ///
+    /// # Errors
+    /// If MPI started several processes, and this program was built without it: all of them would do
+    /// the same; if MPI cannot be used.
+    pub fn join() -> Result<(Ranks, Guard), Error> {
+        let launched =
+            LAUNCHED.iter().find_map(|name| std::env::var(name).ok()?.trim().parse::<usize>().ok());
+        join(launched)
+    }
+
+    /// Whether this is the rank that writes and speaks.
+    pub fn leads(self) -> bool {
+        self.rank == 0
+    }
+
+    /// Number of this rank, from 0.
+    pub fn rank(self) -> usize {
+        self.rank
+    }
+
+    /// How many there are.
+    pub fn size(self) -> usize {
+        self.size
+    }
+
+    /// The rank that does each piece of work, by the pieces' sizes.
+    pub fn owners(self, sizes: &[u64]) -> Vec<usize> {
+        owners(sizes, self.size)
+    }
+
+    /// What every rank has to say, in their order. All ranks must call it, and wait for each other.
+    ///
+    /// # Panics
+    /// If what a rank says cannot be read by the others: they are the same program.
+    pub fn share<T: Serialize + DeserializeOwned + Clone>(self, own: &T) -> Vec<T> {
+        const WHY: &str = "all ranks are the same program, and say numbers, texts and lists";
+        if self.size == 1 {
+            return vec![own.clone()];
+        }
+        let all = gather(&serde_json::to_vec(own).expect(WHY));
+        all.iter().map(|bytes| serde_json::from_slice(bytes).expect(WHY)).collect()
+    }
+
+    /// What the leading rank has to say. All ranks must call it.
+    pub fn from_lead<T: Serialize + DeserializeOwned + Clone>(self, own: Option<T>) -> Option<T> {
+        self.share(&own).swap_remove(0)
+    }
+
+    /// Ends all ranks at once, this one with an exit code; for what only this one may know of.
+    pub fn abort(self, code: u8) -> ! {
+        abort(code)
+    }
+}
+
+/// Divides pieces of work of these sizes among ranks: the largest first, each to the rank that has
+/// least to do. So it depends on the work, and on nothing that differs from one time to the next.
+pub fn owners(sizes: &[u64], ranks: usize) -> Vec<usize> {
+    let mut order: Vec<usize> = (0..sizes.len()).collect();
+    // Stable: pieces of the same size stay in their order.
+    order.sort_by_key(|piece| Reverse(sizes[*piece]));
+    let (mut owners, mut loads) = (vec![0; sizes.len()], vec![0_u64; ranks]);
+    for piece in order {
+        let owner = (0..ranks).min_by_key(|rank| loads[*rank]).unwrap_or(0);
+        owners[piece] = owner;
+        loads[owner] += sizes[piece].max(1);
+    }
+    owners
+}
+
+#[cfg(feature = "mpi")]
+mod world {
+    use super::{Error, Guard, Ranks};
+    use mpi::Threading;
+    use mpi::collective::CommunicatorCollectives;
+    use mpi::datatype::PartitionMut;
+    use mpi::topology::{Communicator, SimpleCommunicator};
+
+    pub(super) fn join(_launched: Option<usize>) -> Result<(Ranks, Guard), Error> {
+        // One thread at a time calls MPI, but not always the first one.
+        let Some((universe, _)) = mpi::initialize_with_threading(Threading::Serialized) else {
+            return Err(Error::other("MPI cannot be used: it was initialised before".to_string()));
+        };
+        let world = universe.world();
+        let number = |number: i32| usize::try_from(number).expect("ranks are counted from 0");
+        let ranks = Ranks { rank: number(world.rank()), size: number(world.size()) };
+        Ok((ranks, Guard { _universe: Some(universe) }))
+    }
+
+    pub(super) fn gather(own: &[u8]) -> Vec<Vec<u8>> {
+        let world = SimpleCommunicator::world();
+        let length = i32::try_from(own.len()).expect("what ranks exchange is far below two gigabytes");
+        let size = usize::try_from(world.size()).expect("ranks are counted from 0");
+        let mut lengths = vec![0_i32; size];
+        world.all_gather_into(&length, &mut lengths[..]);
+        let starts: Vec<i32> = lengths
+            .iter()
+            .scan(0_i32, |start, length| {
+                let here = *start;
+                *start += length;
+                Some(here)
+            })
+            .collect();
+        let place = |number: i32| usize::try_from(number).expect("lengths are not negative");
+        let total: usize = lengths.iter().copied().map(place).sum();
+        let mut all = vec![0_u8; total];
+        {
+            let mut parts = PartitionMut::new(&mut all[..], &lengths[..], &starts[..]);
+            world.all_gather_varcount_into(own, &mut parts);
+        }
+        let part =
+            |(start, length): (&i32, &i32)| all[place(*start)..place(*start) + place(*length)].to_vec();
+        starts.iter().zip(&lengths).map(part).collect()
+    }
+
+    pub(super) fn abort(code: u8) -> ! {
+        SimpleCommunicator::world().abort(i32::from(code))
+    }
+}
+
+#[cfg(not(feature = "mpi"))]
+mod world {
+    use super::{Error, Guard, Ranks};
+
+    pub(super) fn join(launched: Option<usize>) -> Result<(Ranks, Guard), Error> {
+        match launched {
+            Some(size) if size > 1 => {
+                let text = format!("MPI started {size} processes, and this morphcog is built without MPI");
+                let hint = "build it with --features mpi, or start it once".to_string();
+                Err(Error::usage(text).hint(hint))
+            }
+            _ => Ok((Ranks::ALONE, Guard {})),
+        }
+    }
+
+    pub(super) fn gather(own: &[u8]) -> Vec<Vec<u8>> {
+        vec![own.to_vec()]
+    }
+
+    pub(super) fn abort(code: u8) -> ! {
+        std::process::exit(i32::from(code))
+    }
+}
+
+use world::{abort, gather, join};
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_largest_pieces_go_first_and_every_rank_has_about_as_much() {
+        assert_eq!(owners(&[1, 9, 5, 5, 4], 3), [2, 0, 1, 2, 1]);
+        assert_eq!(owners(&[0, 0, 0, 0], 3), [0, 1, 2, 0], "what weighs nothing is divided, too");
+        assert_eq!(Ranks::ALONE.owners(&[3, 1]), [0, 0]);
+        assert_eq!(owners(&[], 3), Vec::<usize>::new());
+    }
+
+    #[test]
+    fn a_process_alone_shares_with_itself() {
+        assert_eq!(Ranks::ALONE.share(&vec![1.5, -0.0]), [vec![1.5, -0.0]]);
+        assert_eq!(Ranks::ALONE.from_lead(Some(7)), Some(7));
+    }
+}

@@ -1,0 +1,329 @@
+//! [`Lock`]: a file that says that a process is at work in a folder.
+//!
+//! Where the file system has locks, the system lets one go when its process ends, however it ends.
+//! Some parallel file systems have none, and others have them on one machine only. So the file also
+//! names host and process, and a heartbeat counts up in it: another process waits until it knows
+//! whether the heart still beats.
+
+use gethostname::gethostname;
+use serde::{Deserialize, Serialize};
+use std::fs::{File, TryLockError};
+use std::io::{self, Read, Seek, SeekFrom, Write};
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Condvar, Mutex, PoisonError};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant, SystemTime};
+
+/// Time between two heartbeats. Longer: a dead process is known later; shorter: more writes to a
+/// shared file system.
+const BEAT: Duration = Duration::from_secs(5);
+
+/// A heart that did not beat for so long is dead. Longer: a task that was killed elsewhere begins
+/// later; shorter: a file system that hesitates looks like a death.
+const DEAD_AFTER: Duration = Duration::from_secs(25);
+
+/// How often a waiting process looks.
+const LOOK: Duration = Duration::from_millis(500);
+
+/// How often a lock is tried: another process may hold it for a moment, only to see whether it is
+/// held.
+const TRIES: u32 = 5;
+
+/// Who is at work.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Holder {
+    /// Name of the machine.
+    pub host: String,
+    /// Number of the process.
+    pub process: u32,
+    /// Heartbeats so far.
+    pub beats: u64,
+}
+
+impl std::fmt::Display for Holder {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "process {} on {}", self.process, self.host)
+    }
+}
+
+/// What a lock file says.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum State {
+    /// Nobody is at work.
+    Free,
+    /// A process is at work; its name, if the file says it.
+    Held(Option<Holder>),
+    /// A process was at work, and ended without letting go.
+    Stale(Holder),
+}
+
+/// Why a lock could not be taken.
+#[derive(Debug)]
+pub enum Refusal {
+    /// Another process has it; its name, if the file says it.
+    Held(Option<Holder>),
+    /// The file cannot be made or written.
+    Io(io::Error),
+}
+
+impl From<io::Error> for Refusal {
+    fn from(error: io::Error) -> Self {
+        Refusal::Io(error)
+    }
+}
+
+/// How locks are taken: the system's, and how long a heart may be silent.
+#[derive(Clone, Copy, Debug)]
+struct Manner {
+    /// Whether the file system's own locks are tried.
+    by_system: bool,
+    beat: Duration,
+    dead_after: Duration,
+}
+
+const USUAL: Manner = Manner { by_system: true, beat: BEAT, dead_after: DEAD_AFTER };
+
+/// A taken lock; let go when it is dropped.
+#[derive(Debug)]
+pub struct Lock {
+    path: PathBuf,
+    own: Holder,
+    /// Whether it is to end, and what wakes the heart for it.
+    end: Arc<(Mutex<bool>, Condvar)>,
+    heart: Option<JoinHandle<()>>,
+    /// With the system's lock on it.
+    _file: File,
+}
+
+impl Lock {
+    /// Takes a lock. If the file names a process that may be alive on another machine, it waits up
+    /// to 25 seconds for its next heartbeat.
+    ///
+    /// # Errors
+    /// If another process has it; what the system says.
+    pub fn take(path: &Path) -> Result<Self, Refusal> {
+        Lock::take_in(path, USUAL)
+    }
+
+    fn take_in(path: &Path, manner: Manner) -> Result<Self, Refusal> {
+        let file = File::options().create(true).truncate(false).read(true).write(true).open(path)?;
+        let is_locked = lock(&file, manner)?;
+        let host = gethostname().to_string_lossy().into_owned();
+        if let Some(before) = read(path)? {
+            // What was on this machine and has no lock any more has ended.
+            let has_ended = is_locked && before.host == host;
+            if !has_ended && is_alive(path, &before, manner.dead_after)? {
+                return Err(Refusal::Held(read(path)?));
+            }
+        }
+        let own = Holder { host, process: std::process::id(), beats: 0 };
+        write(path, &own)?;
+        if !is_locked {
+            // Two that found it free at once: the one whose name stays has it.
+            std::thread::sleep(LOOK);
+            if read(path)?.is_none_or(|now| !is_same(&now, &own)) {
+                return Err(Refusal::Held(read(path)?));
+            }
+        }
+        let end = Arc::new((Mutex::new(false), Condvar::new()));
+        let (ends, place, name) = (Arc::clone(&end), path.to_path_buf(), own.clone());
+        let beat = move || beats(&ends, &place, name, manner.beat);
+        let heart = std::thread::Builder::new().name("heartbeat".to_string()).spawn(beat)?;
+        Ok(Lock { path: path.to_path_buf(), own, end, heart: Some(heart), _file: file })
+    }
+}
+
+impl Drop for Lock {
+    fn drop(&mut self) {
+        let (ended, wake) = &*self.end;
+        *ended.lock().unwrap_or_else(PoisonError::into_inner) = true;
+        wake.notify_all();
+        if let Some(heart) = self.heart.take() {
+            // It does nothing that can panic; if it did, the lock goes all the same.
+            let _ = heart.join();
+        }
+        // If this cannot be written, the lock is found stale.
+        if read(&self.path).ok().flatten().is_some_and(|now| is_same(&now, &self.own)) {
+            let _ = File::options().write(true).truncate(true).open(&self.path);
+        }
+    }
+}
+
+/// What a lock file says; it takes no time, and no lock.
+///
+/// # Errors
+/// What the system says.
+pub fn state(path: &Path) -> io::Result<State> {
+    let file = match File::options().read(true).write(true).open(path) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(State::Free),
+        opened => opened?,
+    };
+    let is_locked = match file.try_lock() {
+        Ok(()) => Some(false),
+        Err(TryLockError::WouldBlock) => Some(true),
+        Err(TryLockError::Error(_)) => None,
+    };
+    let holder = read(path)?;
+    if is_locked == Some(true) {
+        return Ok(State::Held(holder));
+    }
+    let Some(holder) = holder else { return Ok(State::Free) };
+    let is_here = holder.host == gethostname().to_string_lossy();
+    let beaten = file.metadata()?.modified()?;
+    // A clock that goes ahead on the other machine counts as no time.
+    let silent = SystemTime::now().duration_since(beaten).unwrap_or_default();
+    let is_silent = silent > DEAD_AFTER + BEAT;
+    let has_ended = is_silent || is_here && is_locked == Some(false);
+    Ok(if has_ended { State::Stale(holder) } else { State::Held(Some(holder)) })
+}
+
+/// Takes the system's lock; whether the system has locks.
+fn lock(file: &File, manner: Manner) -> Result<bool, Refusal> {
+    if !manner.by_system {
+        return Ok(false);
+    }
+    for _ in 0..TRIES {
+        match file.try_lock() {
+            Ok(()) => return Ok(true),
+            Err(TryLockError::Error(_)) => return Ok(false),
+            Err(TryLockError::WouldBlock) => std::thread::sleep(LOOK / 10),
+        }
+    }
+    let mut text = String::new();
+    let mut file = file;
+    file.seek(SeekFrom::Start(0))?;
+    file.read_to_string(&mut text)?;
+    Err(Refusal::Held(serde_json::from_str(&text).ok()))
+}
+
+/// Who is named in a lock file; what is no name, as after a power cut, is none.
+fn read(path: &Path) -> io::Result<Option<Holder>> {
+    Ok(serde_json::from_slice(&std::fs::read(path)?).ok())
+}
+
+/// Names a holder; the text has the same length at every heartbeat, so that it is never half there.
+fn write(path: &Path, holder: &Holder) -> io::Result<()> {
+    let text = serde_json::to_string(holder).expect("a text and two numbers are JSON");
+    let mut file = File::options().write(true).truncate(false).open(path)?;
+    let room = 400.max(text.len());
+    file.write_all(format!("{text:room$}\n").as_bytes())?;
+    file.set_len(room as u64 + 1)
+}
+
+fn is_same(a: &Holder, b: &Holder) -> bool {
+    (&a.host, a.process) == (&b.host, b.process)
+}
+
+/// Whether a heart beats, or lets go and is taken by another, within some time.
+fn is_alive(path: &Path, before: &Holder, dead_after: Duration) -> io::Result<bool> {
+    let began = Instant::now();
+    while began.elapsed() < dead_after {
+        match read(path)? {
+            None => return Ok(false),
+            Some(now) if now != *before => return Ok(true),
+            Some(_) => std::thread::sleep(LOOK.min(dead_after / 10)),
+        }
+    }
+    Ok(false)
+}
+
+/// Beats until the end, as long as the file names the holder.
+fn beats(end: &(Mutex<bool>, Condvar), path: &Path, mut own: Holder, beat: Duration) {
+    let (ended, wake) = end;
+    let mut is_over = ended.lock().unwrap_or_else(PoisonError::into_inner);
+    while !*is_over {
+        let (over, waited) = wake.wait_timeout(is_over, beat).unwrap_or_else(PoisonError::into_inner);
+        is_over = over;
+        // A heartbeat that cannot be written is tried again.
+        let is_named = || read(path).is_ok_and(|now| now.is_some_and(|now| is_same(&now, &own)));
+        if !*is_over && waited.timed_out() && is_named() {
+            own.beats += 1;
+            let _ = write(path, &own);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// No locks of the system, and a quick heart.
+    const WITHOUT: Manner =
+        Manner { by_system: false, beat: Duration::from_millis(40), dead_after: Duration::from_millis(400) };
+
+    fn path(folder: &tempfile::TempDir) -> PathBuf {
+        folder.path().join("lock")
+    }
+
+    fn elsewhere(path: &Path) {
+        let dead = Holder { host: "another-machine".to_string(), process: 7, beats: 3 };
+        std::fs::write(path, "").unwrap();
+        write(path, &dead).unwrap();
+    }
+
+    #[test]
+    fn a_held_lock_is_refused_with_its_holder_and_free_again_when_dropped() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = path(&folder);
+        for manner in [USUAL, WITHOUT] {
+            assert_eq!(read(&path).ok().flatten(), None);
+            let lock = Lock::take_in(&path, manner).unwrap();
+            let Err(Refusal::Held(Some(holder))) = Lock::take_in(&path, manner) else {
+                panic!("{manner:?}: taken twice")
+            };
+            assert_eq!((holder.process, &holder.host), (std::process::id(), &lock.own.host));
+            drop(lock);
+            assert_eq!(state(&path).unwrap(), State::Free);
+            drop(Lock::take_in(&path, manner).unwrap());
+        }
+    }
+
+    #[test]
+    fn without_locks_a_heart_that_beats_is_respected_and_a_silent_one_is_not() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = path(&folder);
+        elsewhere(&path);
+        let began = Instant::now();
+        let lock = Lock::take_in(&path, WITHOUT).unwrap();
+        assert!(began.elapsed() >= WITHOUT.dead_after);
+        let before = read(&path).unwrap().unwrap();
+        std::thread::sleep(WITHOUT.beat * 5);
+        assert!(read(&path).unwrap().unwrap().beats > before.beats);
+        assert!(matches!(Lock::take_in(&path, WITHOUT), Err(Refusal::Held(_))));
+        drop(lock);
+    }
+
+    #[test]
+    fn with_locks_a_process_that_ended_here_is_no_reason_to_wait() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = path(&folder);
+        let host = gethostname().to_string_lossy().into_owned();
+        std::fs::write(&path, "").unwrap();
+        write(&path, &Holder { host: host.clone(), process: 1, beats: 9 }).unwrap();
+        assert!(matches!(state(&path).unwrap(), State::Stale(holder) if holder.host == host));
+        let began = Instant::now();
+        let _lock = Lock::take(&path).unwrap();
+        assert!(began.elapsed() < Duration::from_secs(5));
+    }
+
+    #[test]
+    fn a_process_on_another_machine_is_held_as_long_as_its_file_is_fresh() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = path(&folder);
+        elsewhere(&path);
+        assert!(matches!(state(&path).unwrap(), State::Held(Some(_))));
+        let long_ago = SystemTime::now() - Duration::from_secs(3600);
+        File::options().write(true).open(&path).unwrap().set_modified(long_ago).unwrap();
+        assert!(matches!(state(&path).unwrap(), State::Stale(_)));
+    }
+
+    #[test]
+    fn what_is_no_name_is_overwritten() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = path(&folder);
+        std::fs::write(&path, b"\0\0\xff").unwrap();
+        let _lock = Lock::take(&path).unwrap();
+        assert_eq!(read(&path).unwrap().unwrap().process, std::process::id());
+    }
+}
