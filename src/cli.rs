@@ -9,10 +9,13 @@ mod report;
 mod reproduce;
 mod response;
 mod serve;
+mod sweep;
+mod tasks;
 mod train;
 
 use crate::analysis::gallery;
 use crate::base::error::Error;
+use crate::base::ranks::Ranks;
 use crate::base::{error, signals};
 use crate::commands::one_by_one::Named;
 use crate::commands::plan::{PAPER_TOML, Plan};
@@ -46,16 +49,22 @@ use std::path::Path;
 ///
 /// # Errors
 /// What went wrong; its kind has the exit code.
-pub fn run(cli: Cli, console: &Console) -> Result<(), Error> {
+pub fn run(cli: Cli, console: &Console, ranks: Ranks) -> Result<(), Error> {
     InstructionSet::asked().map_err(|text| Error::usage(text).hint("or leave it unset".to_string()))?;
+    let is_shared = matches!(cli.command, Command::Evolve(_) | Command::Eval(_) | Command::Audit(_));
+    if ranks.size() > 1 && !is_shared {
+        let text = "MPI: expected evolve, eval or audit: several processes can share only these";
+        return Err(Error::usage(text.to_string()).hint("start it without mpirun".to_string()));
+    }
     match cli.command {
-        Command::Evolve(args) => run_evolve(args, console),
-        Command::Eval(args) => run_eval(args, console),
+        Command::Evolve(args) => run_evolve(args, console, ranks),
+        Command::Eval(args) => run_eval(args, console, ranks),
         Command::Response(args) => response::run(args, console),
         Command::Train(args) => train::run(args, console),
-        Command::Audit(args) => audit::run(args, console),
+        Command::Audit(args) => audit::run(args, console, ranks),
         Command::Capacity(args) => capacity::run(args, console),
         Command::Report(args) => report::run(args, console),
+        Command::Sweep(args) => sweep::run(args, console),
         Command::Reproduce(args) => reproduce::run(args, console),
         Command::Replay(args) => run_replay(args, console),
         Command::Plot(args) => plot::run(args, console),
@@ -112,7 +121,7 @@ pub fn run(cli: Cli, console: &Console) -> Result<(), Error> {
     }
 }
 
-fn run_evolve(args: EvolveArgs, console: &Console) -> Result<(), Error> {
+fn run_evolve(args: EvolveArgs, console: &Console, ranks: Ranks) -> Result<(), Error> {
     let mut set = args.set;
     set.extend(args.seed.map(|seed| format!("seed={seed}")));
     set.extend(args.generations.map(|generations| format!("generations={generations}")));
@@ -125,8 +134,8 @@ fn run_evolve(args: EvolveArgs, console: &Console) -> Result<(), Error> {
         _ => IfExists::Refuse,
     };
     let threads = args.threads.map(usize::from);
-    let options =
-        evolve::Options { config, name, out: out.clone(), if_exists, data: args.data.clone(), threads };
+    let (data, place) = (args.data.clone(), out.clone());
+    let options = evolve::Options { config, name, out: place, if_exists, data, threads, ranks };
     let stop = signals::stop_flag()?;
     let finished = {
         let reporter = Reporter::new(console);
@@ -152,7 +161,7 @@ fn run_evolve(args: EvolveArgs, console: &Console) -> Result<(), Error> {
     }
     // Nothing is left to be saved: from here on a signal ends the process.
     drop(stop);
-    if args.replay {
+    if args.replay && ranks.leads() {
         let archive = Some(out.join(RUN_JSON));
         let robot = BEST.to_string();
         let replay = replay::Options { robot, archive, data: args.data, ..replay::Options::default() };
@@ -163,7 +172,7 @@ fn run_evolve(args: EvolveArgs, console: &Console) -> Result<(), Error> {
     Ok(())
 }
 
-fn run_eval(args: EvalArgs, console: &Console) -> Result<(), Error> {
+fn run_eval(args: EvalArgs, console: &Console, ranks: Ranks) -> Result<(), Error> {
     let (archives, robots) = (args.archives.archive, selected(args.robots)?.unwrap_or(Selection::All));
     let of_gallery = archives.is_empty() && gallery::is_meant(&robots)?;
     if of_gallery && args.physical_only {
@@ -196,6 +205,7 @@ fn run_eval(args: EvalArgs, console: &Console) -> Result<(), Error> {
         data: args.data,
         dataset: args.dataset,
         threads: args.threads.map(usize::from),
+        ranks,
         out,
         archives,
     };

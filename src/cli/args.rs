@@ -8,8 +8,9 @@ use crate::cli::report::ReportArgs;
 use crate::cli::reproduce::ReproduceArgs;
 use crate::cli::response::ResponseArgs;
 use crate::cli::serve::ServeArgs;
+use crate::cli::sweep::SweepArgs;
 use crate::cli::train::TrainArgs;
-use crate::cli::{audit, capacity, plot, report, reproduce, response, serve, train};
+use crate::cli::{audit, capacity, plot, report, reproduce, response, serve, sweep, train};
 use crate::commands::replay::Shown;
 use crate::config;
 use crate::data::dataset::BUILTIN;
@@ -97,6 +98,9 @@ Examples:
     /// Make a page about runs: archive, robots to watch, tests, methods.
     #[command(after_help = report::EXAMPLES)]
     Report(ReportArgs),
+    /// Run many seeds, tasks and settings, here or on a cluster.
+    #[command(after_help = sweep::EXAMPLES)]
+    Sweep(SweepArgs),
     /// Run the whole paper, at a chosen scale.
     #[command(after_help = reproduce::EXAMPLES)]
     Reproduce(ReproduceArgs),

@@ -2,6 +2,7 @@
 
 use crate::analysis::gallery;
 use crate::base::error::Error;
+use crate::base::ranks::Ranks;
 use crate::base::signals;
 use crate::cli::choice::{Archives, ROBOTS, selected};
 use crate::commands::audit;
@@ -58,7 +59,7 @@ pub(super) struct AuditArgs {
     threads: Option<u16>,
 }
 
-pub(super) fn run(args: AuditArgs, console: &Console) -> Result<(), Error> {
+pub(super) fn run(args: AuditArgs, console: &Console, ranks: Ranks) -> Result<(), Error> {
     let criteria = Criteria::load(args.criteria.as_deref(), &args.set)?;
     let stop = signals::stop_flag()?;
     let (archives, chosen) = (&args.archives.archive, selected(args.robots.clone())?);
@@ -97,6 +98,7 @@ pub(super) fn run(args: AuditArgs, console: &Console) -> Result<(), Error> {
             data: args.data.clone(),
             out: args.out.clone().unwrap_or(beside),
             threads: args.threads.map(usize::from),
+            ranks,
         };
         let finished = audit::audit(&options, &stop, &Reporter::new(console))?;
         verdicts::audit(console, &finished, &options.out);

@@ -2,14 +2,16 @@
 
 use crate::base::error::Error;
 use crate::base::signals;
+use crate::cli::tasks::{Command, What, Where, asked, ended};
 use crate::commands::plan::{PAPER_TOML, Plan};
 use crate::commands::reproduce;
 use crate::commands::reproduce::Options;
+use crate::store::folder::in_shell;
 use crate::view::console::Console;
 use crate::view::networks;
 use crate::view::reporters::Reporter;
 use clap::Args;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 pub(super) const EXAMPLES: &str = "\
 Examples:
@@ -36,24 +38,31 @@ pub(super) struct ReproduceArgs {
     /// Folder for everything.
     #[arg(short, long, value_name = "DIR", default_value = "reproduction")]
     out: PathBuf,
-    /// Folder with the images.
-    #[arg(long, value_name = "DIR")]
-    data: Option<PathBuf>,
-    /// Threads (default: one per core).
-    #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
-    threads: Option<u16>,
+    #[command(flatten)]
+    what: What,
+    #[command(flatten)]
+    place: Where,
 }
 
 pub(super) fn run(args: ReproduceArgs, console: &Console) -> Result<(), Error> {
-    let options = Options {
-        plan: Plan::load(&args.plan, &args.set)?,
-        scale: args.scale,
-        out: args.out,
-        data: args.data,
-        threads: args.threads.map(usize::from),
-    };
+    let plan = Plan::load(&args.plan, &args.set)?;
+    let tasks = reproduce::tasks(&plan, args.scale)?;
+    let place = args.place.place(&args.out);
+    let name = if Plan::is_built_in(&args.plan) { args.plan.clone() } else { absolute(&args.plan)? };
+    let mut words = ["reproduce", &name, "--scale", &args.scale.to_string()].map(quoted).to_vec();
+    words.extend(args.set.iter().flat_map(|set| ["--set".to_string(), quoted(set)]));
+    if asked(&args.what, &tasks, &Command { words, name: "reproduce", place: &place }, console)? {
+        if args.what.list || args.what.slurm {
+            console
+                .info("when all tasks are done, the same command without --list or --slurm makes the table");
+        }
+        return Ok(());
+    }
+    let jobs = args.place.jobs.map(usize::from);
+    let options = Options { plan, scale: args.scale, place, jobs };
     let stop = signals::stop_flag()?;
     let finished = reproduce::reproduce(&options, &stop, &Reporter::new(console))?;
+    ended(&finished.runs, tasks.len())?;
     if finished.stopped {
         let text = "stopped; what is done so far is kept".to_string();
         return Err(Error::stopped(text).hint("the same command goes on".to_string()));
@@ -67,4 +76,14 @@ pub(super) fn run(args: ReproduceArgs, console: &Console) -> Result<(), Error> {
         console.line(&format!("wrote {}", made[1].display()));
     }
     Ok(())
+}
+
+fn absolute(path: &str) -> Result<String, Error> {
+    let path = Path::new(path);
+    let absolute = std::path::absolute(path).map_err(|error| Error::reading(path, &error))?;
+    Ok(absolute.to_string_lossy().into_owned())
+}
+
+fn quoted(text: &str) -> String {
+    in_shell(Path::new(text))
 }

@@ -1,6 +1,7 @@
 //! `morphcog train`: its words, and what it calls.
 
 use crate::base::error::Error;
+use crate::base::ranks::Ranks;
 use crate::base::signals;
 use crate::cli::choice::{ROBOTS, run_json, selected};
 use crate::commands::audit;
@@ -120,6 +121,7 @@ pub(super) fn run(args: TrainArgs, console: &Console) -> Result<(), Error> {
         data: args.data,
         out: archive.with_file_name(AUDIT_JSON),
         threads,
+        ranks: Ranks::ALONE,
         source: audit::Source::Archive(archive),
     };
     let audited = audit::audit(&options, &stop, &Reporter::new(console))?;

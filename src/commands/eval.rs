@@ -4,6 +4,7 @@ use crate::analysis::gallery;
 use crate::base::error::Error;
 use crate::base::files::write_atomically;
 use crate::base::observer::{Observer, Work};
+use crate::base::ranks::Ranks;
 use crate::base::threads::pool;
 use crate::commands::eval_images::HeldOutImages;
 use crate::config::Config;
@@ -52,6 +53,8 @@ pub struct Options {
     pub out: PathBuf,
     /// Number of threads; `None`: one per core.
     pub threads: Option<usize>,
+    /// The processes that do it together; each calls [`eval`] with the same options.
+    pub ranks: Ranks,
 }
 
 /// An evaluation's end.
@@ -164,25 +167,33 @@ pub fn eval(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Re
             best.into_iter().unzip()
         }
     };
-    let (count, images) = (robots.len(), shown.images.len());
+    let (count, images, ranks) = (robots.len(), shown.images.len(), options.ranks);
     let label = format!("evaluating {count} robots on {images} images:");
-    observer.begins(&Work::new(label, (count * images) as u64, "rollouts"));
+    observer.begins(&Work::new(label, (count.div_ceil(ranks.size()) * images) as u64, "rollouts"));
     let walker = walker();
     let mut scores = scores.into_iter();
-    let mut left = robots.len();
+    let mut left = count;
     report.stopped = left > 0;
     let mut unwritten = Unwritten::default();
-    for Chosen { source, robot } in robots {
-        let Some(split) = task_of(&grouping, robot) else { continue };
-        let Some((displacements, simulated)) = walker.rollouts(robot, &shown.stimuli) else { break };
-        left -= 1;
-        report.stopped = left > 0;
-        let run = &sources[source].run;
-        let trial = Trial { run, robot, split, images: &shown.images, threshold: options.threshold };
-        let (validation, of_trial) = (scores.next(), RobotReport::new(&trial, displacements, simulated));
-        report.robots.push(RobotReport { run: source, validation, ..of_trial });
-        report.conclude();
-        unwritten.tried(write(options, &report), |text| observer.warning(text));
+    // One robot for each rank at a time.
+    for robots in robots.chunks(ranks.size()) {
+        let own = robots.get(ranks.rank()).and_then(|own| walker.rollouts(own.robot, &shown.stimuli));
+        for (Chosen { source, robot }, walked) in robots.iter().zip(ranks.share(&own)) {
+            let Some((displacements, simulated)) = walked else {
+                return Ok(Finished { file: report, unwritten: unwritten.error() });
+            };
+            let split = task_of(&grouping, robot).expect("robots without a task are left out above");
+            left -= 1;
+            report.stopped = left > 0;
+            let run = &sources[*source].run;
+            let trial = Trial { run, robot, split, images: &shown.images, threshold: options.threshold };
+            let (validation, of_trial) = (scores.next(), RobotReport::new(&trial, displacements, simulated));
+            report.robots.push(RobotReport { run: *source, validation, ..of_trial });
+            report.conclude();
+        }
+        if ranks.leads() {
+            unwritten.tried(write(options, &report), |text| observer.warning(text));
+        }
     }
     Ok(Finished { file: report, unwritten: unwritten.error() })
 }

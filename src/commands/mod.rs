@@ -7,6 +7,7 @@ pub mod bench;
 pub mod capacity;
 #[cfg(feature = "networks")]
 pub mod capacity_images;
+pub mod collect;
 pub mod data;
 pub mod eval;
 pub mod eval_images;
@@ -21,5 +22,7 @@ pub mod reproduce;
 #[cfg(feature = "networks")]
 pub mod schema;
 pub mod simulate;
+pub mod sweep;
 #[cfg(feature = "networks")]
 pub mod table;
+pub mod tasks;

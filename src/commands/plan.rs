@@ -2,6 +2,7 @@
 
 use crate::base::error::Error;
 use crate::base::files::read_text;
+use crate::commands::sweep::beside;
 use crate::config::audit::Criteria;
 use crate::config::capacity::CapacityConfig;
 use crate::config::{Config, reading};
@@ -9,7 +10,7 @@ use crate::store::folder;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// The built-in plan: the paper's.
 pub const PAPER_TOML: (&str, &str) = ("paper.toml", include_str!("../../configs/paper.toml"));
@@ -32,13 +33,16 @@ pub struct Plan {
     /// The networks.
     #[serde(default)]
     pub capacity: CapacityConfig,
+    /// The plan's folder: configs are looked for from there on.
+    #[serde(skip)]
+    pub folder: PathBuf,
 }
 
 /// An experiment: a config, and what is changed in it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Experiment {
-    /// A config file, or the name of a built-in one.
+    /// A config file, from the plan's folder on, or the name of a built-in one.
     pub config: String,
     /// Changes, as with `--set`.
     #[serde(default)]
@@ -73,8 +77,12 @@ impl Plan {
         let is_json = name.ends_with(".json");
         let format = if is_json { reading::Format::Json } else { reading::Format::Toml };
         let plan: Plan = reading::read(&text, format, name)?;
-        let check = |plan: &Plan| plan.check().and_then(|()| plan.experiments().map(|_| ()));
-        reading::changed(plan, overrides, check, |error| reading::placed(error, &text, format, name))
+        let folder = Path::new(name).parent().unwrap_or(Path::new("")).to_path_buf();
+        let placed = |plan: &Plan| Plan { folder: folder.clone(), ..plan.clone() };
+        let check = |plan: &Plan| plan.check().and_then(|()| placed(plan).experiments().map(|_| ()));
+        let plan =
+            reading::changed(plan, overrides, check, |error| reading::placed(error, &text, format, name))?;
+        Ok(placed(&plan))
     }
 
     /// Checks what a type cannot.
@@ -106,7 +114,8 @@ impl Plan {
             if experiments.iter().any(|(other, _)| *other == name) {
                 return Err(within(Error::input(format!("config: {name}: expected once"))));
             }
-            let config = Config::load(&experiment.config, &experiment.set).map_err(within)?;
+            let path = beside(&self.folder, &experiment.config);
+            let config = Config::load(&path, &experiment.set).map_err(within)?;
             for &seed in &self.seeds {
                 let seeded = Config { seed, ..config.clone() };
                 seeded.validate().map_err(|error| error.within("seeds").of("seeds"))?;

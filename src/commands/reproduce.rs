@@ -3,19 +3,19 @@
 use crate::base::error::Error;
 use crate::base::observer::Observer;
 use crate::base::random::{Purpose, stream};
+use crate::base::ranks::Ranks;
 use crate::commands::plan::Plan;
 use crate::commands::table::Row;
+use crate::commands::tasks::{self, Place, Run, Steps, Summary, Task, is_of, written};
 use crate::commands::{audit, capacity, eval, plan, table};
 use crate::config::Config;
-use crate::search::{evolve, showing};
+use crate::search::showing;
 use crate::store::audit::{AuditFile, Verdict};
 use crate::store::capacity::CapacityFile;
 use crate::store::eval::EvalFile;
-use crate::store::folder::IfExists;
 use crate::store::images::HeldOut;
 use crate::store::names::{AUDIT_JSON, RUN_JSON};
 use crate::store::robots::{Chosen, Selection, Source};
-use crate::store::setting::RunRef;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -27,17 +27,17 @@ pub struct Options {
     pub plan: Plan,
     /// Its scale, more than 0, up to 1.
     pub scale: f64,
-    /// The folder.
-    pub out: PathBuf,
-    /// Where the data are, if the command line says.
-    pub data: Option<PathBuf>,
-    /// Number of threads; `None`: one per core.
-    pub threads: Option<usize>,
+    /// Where, and with what.
+    pub place: Place,
+    /// Runs at once; `None`: one per core.
+    pub jobs: Option<usize>,
 }
 
 /// How a reproduction ended.
 #[derive(Clone, Debug)]
 pub struct Finished {
+    /// How the runs ended; the table is made when all are done.
+    pub runs: Summary,
     /// The paper's table, so far.
     pub rows: Vec<Row>,
     /// Files written at the end.
@@ -50,30 +50,61 @@ pub struct Finished {
     pub unwritten: Option<Error>,
 }
 
-/// Does what of a plan is not done yet; what was done by an earlier, interrupted call stays.
+/// The runs of a plan at a scale: every experiment from every seed.
+///
+/// # Errors
+/// What is wrong with scale or plan.
+pub fn tasks(plan: &Plan, scale: f64) -> Result<Vec<Task>, Error> {
+    if !(scale > 0.0 && scale <= 1.0) {
+        return Err(Error::usage(format!("--scale {scale}: expected more than 0, up to 1")));
+    }
+    let mut tasks = Vec::new();
+    for (name, config) in plan.experiments()? {
+        for &seed in &plan.seeds {
+            let config = Config { seed, ..plan::scaled(&config, scale) };
+            let varied =
+                vec![("experiment".to_string(), name.clone().into()), ("seed".to_string(), seed.into())];
+            tasks.push(Task {
+                name: format!("{name}-seed{seed}"),
+                run: Run::Evolve(Box::new(config), name.clone()),
+                steps: Steps::default(),
+                varied,
+            });
+        }
+    }
+    Ok(tasks)
+}
+
+/// Does what of a plan is not done yet: its runs, and then the last step, from their robots to the
+/// table. What was done by an earlier, interrupted call stays.
 ///
 /// # Errors
 /// Of what is wrong.
 pub fn reproduce(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Result<Finished, Error> {
-    if !(options.scale > 0.0 && options.scale <= 1.0) {
-        return Err(Error::usage(format!("--scale {}: expected more than 0, up to 1", options.scale)));
+    let tasks = tasks(&options.plan, options.scale)?;
+    let place = &options.place;
+    tasks::check_folders(&tasks, place).map_err(|mut refused| refused.swap_remove(0))?;
+    let runs = tasks::run_all(&tasks, place, options.jobs, stop, observer)?;
+    let (rows, capacities) = (Vec::new(), Vec::new());
+    let stopped = runs.done < tasks.len();
+    let mut finished = Finished { runs, rows, files: Vec::new(), capacities, stopped, unwritten: None };
+    if stopped {
+        return Ok(finished);
     }
     let plan = options.plan.at(options.scale);
-    let job = Job { options, plan: &plan, stop, observer };
-    let experiments = plan.experiments()?;
-    let (mut rows, mut capacities) = (Vec::new(), Vec::new());
-    for (name, config) in &experiments {
+    let job = Job { place, plan: &plan, stop, observer };
+    for (name, config) in &plan.experiments()? {
         let Some((found, networks)) = job.experiment(name, config)? else {
-            return Ok(Finished { rows, files: Vec::new(), capacities, stopped: true, unwritten: None });
+            return Ok(Finished { stopped: true, ..finished });
         };
-        rows.extend(found);
-        capacities.extend(networks);
+        finished.rows.extend(found);
+        finished.capacities.extend(networks);
     }
-    let (files, unwritten) = match table::write(&options.out, options.scale, &rows) {
-        Ok(files) => (files, None),
-        Err(error) => (Vec::new(), Some(error)),
-    };
-    Ok(Finished { rows, files, capacities, stopped: false, unwritten })
+    match table::write(&place.out, options.scale, &finished.rows) {
+        Ok(files) => finished.files = files,
+        Err(error) => finished.unwritten = Some(error),
+    }
+    Ok(finished)
 }
 
 /// Chosen robots, and by task how many are physical of how many that were audited.
@@ -81,9 +112,10 @@ type Drawn<'s> = (Vec<Chosen<'s>>, BTreeMap<String, (usize, usize)>);
 
 /// Rows of the table, and networks with their file.
 type Experienced = (Vec<Row>, Option<(PathBuf, CapacityFile)>);
+
 /// One call.
 struct Job<'a> {
-    options: &'a Options,
+    place: &'a Place,
     plan: &'a Plan,
     stop: &'a AtomicBool,
     observer: &'a dyn Observer,
@@ -92,7 +124,9 @@ struct Job<'a> {
 impl Job<'_> {
     /// All steps of an experiment; its rows of the table and its networks, or `None` if stopped.
     fn experiment(&self, name: &str, config: &Config) -> Result<Option<Experienced>, Error> {
-        let Some(sources) = self.evolved(name, config)? else { return Ok(None) };
+        let of_seed =
+            |seed: &u64| Source::read(&self.place.out.join(format!("{name}-seed{seed}")).join(RUN_JSON));
+        let sources: Vec<Source> = self.plan.seeds.iter().map(of_seed).collect::<Result<_, _>>()?;
         let Some((chosen, audited)) = self.chosen(&sources)? else { return Ok(None) };
         let (tasks, grouping) = (&sources[0].run.dimensions.tasks, config.grouping()?);
         let tasks: Vec<&String> = tasks
@@ -107,16 +141,16 @@ impl Job<'_> {
             self.observer.note(&format!("{name}: every robot exploits the simulator: nothing to test"));
             return Ok(Some((rows, None)));
         }
-        let path = self.options.out.join(format!("{name}-eval.json"));
+        let path = self.place.out.join(format!("{name}-eval.json"));
         let Some(report) = self.tested(name, &path, &sources, &chosen)? else { return Ok(None) };
         self.observer.note(&format!("{name}: networks"));
         let options = capacity::Options {
             eval: path.clone(),
             config: self.plan.capacity.clone(),
             physical_only: false,
-            data: self.options.data.clone(),
-            out: self.options.out.join(format!("{name}-capacity.json")),
-            threads: self.options.threads,
+            data: self.place.data.clone(),
+            out: self.place.out.join(format!("{name}-capacity.json")),
+            threads: self.place.threads,
         };
         let finished = capacity::capacity(&options, self.stop, self.observer)?;
         let file = written(finished.file, finished.unwritten)?;
@@ -125,38 +159,6 @@ impl Job<'_> {
         }
         rows.iter_mut().for_each(|row| row.fill(&report, &file));
         Ok(Some((rows, Some((options.out, file)))))
-    }
-
-    /// The runs of all seeds; `None` if stopped.
-    fn evolved(&self, name: &str, config: &Config) -> Result<Option<Vec<Source>>, Error> {
-        let mut sources = Vec::new();
-        for &seed in &self.plan.seeds {
-            let config = plan::scaled(config, self.options.scale);
-            let generations = config.generations;
-            let out = self.options.out.join(format!("{name}-seed{seed}"));
-            self.observer.note(&format!("{name}, seed {seed}: {generations} generations"));
-            let options = evolve::Options {
-                config: Config { seed, ..config },
-                name: name.to_string(),
-                out: out.clone(),
-                if_exists: IfExists::Resume,
-                data: self.options.data.clone(),
-                threads: self.options.threads,
-            };
-            // Only evolve has the options that its hints name.
-            let otherwise = |error: Error| match &error.hint {
-                Some(hint) if hint.contains("--force") => error
-                    .hint("reproduce with the same plan and --scale, or elsewhere with --out".to_string()),
-                _ => error,
-            };
-            let evolved = evolve::evolve(&options, self.stop, self.observer);
-            let evolved = evolved.map_err(otherwise)?;
-            if written(evolved.stopped, evolved.unwritten)? {
-                return Ok(None);
-            }
-            sources.push(Source::read(&out.join(RUN_JSON))?);
-        }
-        Ok(Some(sources))
     }
 
     /// Robots of each task, drawn at random one after the other and audited, until enough are
@@ -212,9 +214,10 @@ impl Job<'_> {
                 robots: Selection::Ids(ids),
                 seed: 0,
                 criteria: self.plan.audit.clone(),
-                data: self.options.data.clone(),
+                data: self.place.data.clone(),
                 out: source.path.with_file_name(AUDIT_JSON),
-                threads: self.options.threads,
+                threads: self.place.threads,
+                ranks: Ranks::ALONE,
             };
             let finished = audit::audit(&options, self.stop, self.observer)?;
             let file = written(finished.file, finished.unwritten)?;
@@ -242,20 +245,22 @@ impl Job<'_> {
         );
         let options = eval::Options {
             archives: sources.iter().map(|source| source.path.clone()).collect(),
-            robots: Selection::Drawn { robots: ids, about },
+            robots: Selection::Drawn { robots: ids.clone(), about },
             images: self.plan.images,
             split: HeldOut::Test,
             validation: None,
             seed: 1,
             threshold: showing::THRESHOLD,
             cycles: showing::CYCLES,
-            data: self.options.data.clone(),
+            data: self.place.data.clone(),
             dataset: None,
             out: path.to_path_buf(),
-            threads: self.options.threads,
+            threads: self.place.threads,
+            ranks: Ranks::ALONE,
         };
         if let Ok(known) = EvalFile::read(path)
             && is_of(&known, sources, &options)
+            && ids.iter().map(|(run, id)| (*run, id)).eq(known.robots.iter().map(|r| (r.run, &r.id)))
         {
             return Ok(Some(known));
         }
@@ -265,30 +270,4 @@ impl Job<'_> {
         let is_whole = !report.stopped && !self.stop.load(Ordering::Relaxed);
         Ok(is_whole.then_some(report))
     }
-}
-
-/// What later steps read from its file, which must be there.
-fn written<T>(found: T, unwritten: Option<Error>) -> Result<T, Error> {
-    match unwritten {
-        None => Ok(found),
-        Some(error) => {
-            let hint = error.hint.clone().map_or(String::new(), |hint| format!("{hint}; "));
-            Err(error.hint(format!("{hint}the same command goes on")))
-        }
-    }
-}
-
-/// Whether an evaluation is what these options would make of these runs, and whole.
-fn is_of(known: &EvalFile, sources: &[Source], options: &eval::Options) -> bool {
-    let runs: Vec<RunRef> = sources.iter().map(|source| RunRef::new(&source.run)).collect();
-    let same_robots = match &options.robots {
-        Selection::Drawn { robots, .. } => {
-            robots.iter().map(|(run, id)| (*run, id)).eq(known.robots.iter().map(|r| (r.run, &r.id)))
-        }
-        _ => false,
-    };
-    let same = (known.seed, known.split, known.images.len(), known.threshold)
-        == (options.seed, options.split, options.images, options.threshold);
-    let is_ours = known.program_version == env!("CARGO_PKG_VERSION");
-    is_ours && !known.stopped && known.trained_on.is_none() && known.runs == runs && same && same_robots
 }

@@ -2,6 +2,7 @@
 
 use crate::base::error::Error;
 use crate::commands::plan::Plan;
+use crate::commands::sweep::SweepPlan;
 use crate::config::Config;
 use crate::config::audit::Criteria;
 use crate::config::capacity::CapacityConfig;
@@ -29,8 +30,9 @@ pub struct Schema {
 }
 
 /// All schemas.
-pub const ALL: [Schema; 9] = [
+pub const ALL: [Schema; 10] = [
     of_config::<Config>("config", "config of evolve and train"),
+    of_config::<SweepPlan>("sweep", "plan of sweep"),
     of_config::<Plan>("plan", "plan of reproduce"),
     of_config::<Criteria>("audit-config", "config of audit"),
     of_config::<CapacityConfig>("capacity-config", "config of capacity"),
@@ -142,7 +144,7 @@ mod tests {
     fn an_unknown_schema_is_refused_with_those_that_there_are() {
         let error = Schema::named("rnu").unwrap_err();
         assert!(
-            error.message.contains("config, plan, audit-config, capacity-config, run, eval, audit"),
+            error.message.contains("config, sweep, plan, audit-config, capacity-config, run, eval, audit"),
             "{error}"
         );
     }

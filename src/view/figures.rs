@@ -15,6 +15,7 @@ use crate::view::console::Console;
 use crate::view::error::{PictureError, write_whole};
 use crate::view::plot;
 use crate::view::plot::{Background, Figure};
+use crate::view::sweeps;
 use std::fmt;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
@@ -148,8 +149,10 @@ pub fn make(console: &Console, wanted: &Wanted) -> Result<Vec<PathBuf>, Error> {
         different(named())?;
         let lines: Result<Vec<Progress>, Error> =
             named().map(|(path, run)| Progress::of(run, path)).collect();
-        let figure = plot::progress(&lines?);
+        let lines = lines?;
+        let figure = plot::progress(&lines);
         write(Made { figure, stem: stem(paths.first().copied(), wanted.kind, "") })?;
+        sweeps::differences(console, &lines);
     } else if wanted.kind.is_of_robot() {
         for robot in &wanted.robots {
             write(of_robot(wanted, robot)?)?;

@@ -41,6 +41,8 @@ pub mod stage;
 #[cfg(feature = "cli")]
 pub mod summary;
 #[cfg(feature = "cli")]
+pub mod sweeps;
+#[cfg(feature = "cli")]
 pub mod table;
 #[cfg(feature = "cli")]
 pub mod terminal;

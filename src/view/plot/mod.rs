@@ -17,6 +17,7 @@ mod robot;
 mod scales;
 mod snapshots;
 mod spacetime;
+mod sweep;
 
 pub use accuracy::accuracy;
 pub use archive::archive;
@@ -28,3 +29,4 @@ pub use response::response;
 pub use scales::{below, sequential};
 pub use snapshots::snapshots;
 pub use spacetime::spacetime;
+pub use sweep::sweep;

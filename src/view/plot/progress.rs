@@ -1,6 +1,6 @@
 //! The figure of a run's progress: QD score, coverage and best fitness over evaluations.
 
-use crate::commands::plot::{Moment, Progress};
+use crate::commands::plot::{Group, Moment, Progress, alike};
 use crate::view::colour;
 use crate::view::colour::Colour;
 use crate::view::plot::axes::{AXIS, Axis, MARGIN, Plot, heading, left_space};
@@ -22,22 +22,28 @@ const QUANTITIES: [Quantity; 3] = [
     ("best fitness", |moment| moment.obj_max.unwrap_or(f64::NAN), scales::VERMILLION),
 ];
 
-/// QD score, coverage and best fitness of runs over their evaluations; of several runs the median,
-/// and the band from the least to the largest, as far as the shortest of them goes.
+/// Groups that have a line of their own in the legend.
+const NAMED: usize = 24;
+
+/// QD score, coverage and best fitness of runs over their evaluations. Runs that differ in nothing
+/// but the seed are one line, their median, in a band from the least to the largest, as far as the
+/// shortest of them goes; other runs have lines and colours of their own.
 pub fn progress(runs: &[Progress]) -> Figure {
+    let (_, groups) = alike(runs);
     let mut canvas = Canvas::new();
     let of = names(runs);
-    let title = if runs.len() > 1 { "Progress: median, least and largest" } else { "Progress" };
+    let is_band = groups.iter().any(|group| group.runs.len() > 1);
+    let title = if is_band { "Progress: median, least and largest" } else { "Progress" };
     let mut top = heading(&mut canvas, title, &of, COLUMN) + 4.0;
-    let end = |run: &Progress| run.moments.last().map_or(0.0, |moment| moment.evaluations);
-    let shortest = runs.iter().map(end).fold(f64::INFINITY, f64::min);
-    let shortest = if shortest.is_finite() { shortest } else { 0.0 };
-    let x = Axis::exact(0.0, shortest.max(1.0), 4);
-    let panels: Vec<(Quantity, Vec<Band>, Axis)> = QUANTITIES
+    let ends: Vec<f64> = groups.iter().map(end).collect();
+    let x = Axis::exact(0.0, ends.iter().copied().fold(1.0, f64::max), 4);
+    let panels: Vec<(Quantity, Vec<Vec<Band>>, Axis)> = QUANTITIES
         .into_iter()
         .map(|quantity| {
-            let bands = bands(runs, quantity.1, shortest);
-            let values = || bands.iter().flat_map(|band| [band.low, band.high]).filter(|v| v.is_finite());
+            let of = |(group, end): (&Group, &f64)| bands(&group.runs, quantity.1, *end);
+            let bands: Vec<Vec<Band>> = groups.iter().zip(&ends).map(of).collect();
+            let all = || bands.iter().flatten();
+            let values = || all().flat_map(|band| [band.low, band.high]).filter(|v| v.is_finite());
             let (low, high) = (values().fold(0.0, f64::min), values().fold(f64::NEG_INFINITY, f64::max));
             (quantity, bands, Axis::nice(low, high, 4))
         })
@@ -49,19 +55,64 @@ pub fn progress(runs: &[Progress]) -> Figure {
         let size = [COLUMN - MARGIN - 8.0 - left, PANEL];
         let plot = Plot { at: [left, top], size, x: x.clone(), y };
         plot.grid(&mut canvas, true, false);
-        draw(&mut canvas, &plot, &bands, colour, runs.len() > 1);
+        for (number, (group, bands)) in groups.iter().zip(&bands).enumerate() {
+            let pen = if groups.len() > 1 { pen(number) } else { Pen::new(colour, 1.2) };
+            draw(&mut canvas, &plot, bands, pen, group.runs.len() > 1);
+        }
         plot.left_axis_beside(&mut canvas, name, labels);
         plot.lower_axis(&mut canvas, (k + 1 == count).then_some("evaluations"));
         top += PANEL + 9.0;
     }
+    let mut height = top - 9.0 + AXIS + MARGIN;
     let note = Words { size: TEXT, ..Words::end() }.colour(colour::FAINT);
-    let height = top - 9.0 + AXIS + MARGIN;
     if let Some(unit) =
         runs.first().and_then(|run| run.unit).filter(|unit| runs.iter().all(|run| run.unit == Some(unit)))
     {
         canvas.text([COLUMN - MARGIN, height - MARGIN - 2.0], &format!("fitness: {unit}"), note);
     }
+    if groups.len() > 1 {
+        height = legend(&mut canvas, &groups, height + 2.0) + MARGIN;
+    }
     Figure::new(&format!("Progress: {of}"), [COLUMN, height], canvas.finish())
+}
+
+/// Evaluations as far as all runs of a group go.
+fn end(group: &Group) -> f64 {
+    let of = |run: &&Progress| run.moments.last().map_or(0.0, |moment| moment.evaluations);
+    let shortest = group.runs.iter().map(of).fold(f64::INFINITY, f64::min);
+    if shortest.is_finite() { shortest } else { 0.0 }
+}
+
+/// The line of a group: a colour, and, when the colours are used up, other dashes.
+fn pen(number: usize) -> Pen {
+    let colour = scales::SET[number % scales::SET.len()];
+    let pen = Pen::new(colour, 1.1);
+    match number / scales::SET.len() {
+        0 => pen,
+        1 => pen.dashed(4.0, 1.6),
+        _ => pen.dashed(1.0, 1.6),
+    }
+}
+
+/// What the lines mean; the y below.
+fn legend(canvas: &mut Canvas, groups: &[Group], top: f64) -> f64 {
+    let mut y = top;
+    for (number, group) in groups.iter().enumerate().take(NAMED) {
+        y += 10.0;
+        canvas.line([MARGIN + 4.0, y - 2.6], [MARGIN + 18.0, y - 2.6], pen(number));
+        let seeds = match group.runs.len() {
+            1 => format!("seed {}", group.runs[0].seed),
+            count => format!("{count} seeds"),
+        };
+        let text = format!("{} ({seeds})", group.label);
+        canvas.fitted([MARGIN + 22.0, y], &text, COLUMN - 2.0 * MARGIN - 22.0, Words::default());
+    }
+    if groups.len() > NAMED {
+        y += 10.0;
+        let text = format!("and {} more", groups.len() - NAMED);
+        canvas.text([MARGIN + 22.0, y], &text, Words::default().colour(colour::FAINT));
+    }
+    y
 }
 
 /// The runs in a line: their name once, and their seeds.
@@ -90,15 +141,15 @@ struct Band {
 }
 
 /// The bands from the first moment that all runs have to the last.
-fn bands(runs: &[Progress], quantity: fn(&Moment) -> f64, end: f64) -> Vec<Band> {
-    let first = |run: &Progress| run.moments.first().map_or(0.0, |moment| moment.evaluations);
+fn bands(runs: &[&Progress], quantity: fn(&Moment) -> f64, end: f64) -> Vec<Band> {
+    let first = |run: &&Progress| run.moments.first().map_or(0.0, |moment| moment.evaluations);
     let start = runs.iter().map(first).fold(0.0, f64::max).min(end);
     let at = |k: usize| start + (end - start) * k as f64 / SAMPLES as f64;
     (0..=SAMPLES).filter_map(|k| band(runs, quantity, at(k))).collect()
 }
 
-fn band(runs: &[Progress], quantity: fn(&Moment) -> f64, at: f64) -> Option<Band> {
-    let value = |run: &Progress| {
+fn band(runs: &[&Progress], quantity: fn(&Moment) -> f64, at: f64) -> Option<Band> {
+    let value = |run: &&Progress| {
         let after = run.moments.partition_point(|moment| moment.evaluations <= at);
         run.moments.get(after.saturating_sub(1)).map(quantity)
     };
@@ -110,15 +161,15 @@ fn band(runs: &[Progress], quantity: fn(&Moment) -> f64, at: f64) -> Option<Band
     Some(Band { at, low, middle, high })
 }
 
-fn draw(canvas: &mut Canvas, plot: &Plot, bands: &[Band], colour: Colour, is_band: bool) {
+fn draw(canvas: &mut Canvas, plot: &Plot, bands: &[Band], pen: Pen, is_band: bool) {
     let line =
         |of: fn(&Band) -> f64| bands.iter().map(|band| plot.place([band.at, of(band)])).collect::<Vec<_>>();
     if is_band && !bands.is_empty() {
         let mut edge = line(|band| band.low);
         edge.extend(line(|band| band.high).into_iter().rev());
-        canvas.area(&path(&edge, true), colour.with_opacity(64));
+        canvas.area(&path(&edge, true), pen.colour.with_opacity(46));
     }
-    canvas.polyline(&line(|band| band.middle), Pen::new(colour, 1.2));
+    canvas.polyline(&line(|band| band.middle), pen);
 }
 
 #[cfg(test)]
@@ -138,6 +189,7 @@ mod tests {
             seed,
             unit: None,
             moments: best.iter().enumerate().map(moment).collect(),
+            settings: Default::default(),
         }
     }
 
@@ -146,10 +198,24 @@ mod tests {
         let runs =
             [run(1, &[None, Some(1.0)]), run(2, &[Some(2.0), Some(5.0)]), run(3, &[Some(4.0), Some(9.0)])];
         let best = QUANTITIES[2].1;
-        assert_eq!(band(&runs, best, 40.0), Some(Band { at: 40.0, low: 1.0, middle: 5.0, high: 9.0 }));
-        assert_eq!(band(&runs, best, 39.9).unwrap().middle, 3.0);
-        assert_eq!(band(&runs[..1], best, 20.0), None);
+        let all: Vec<&Progress> = runs.iter().collect();
+        assert_eq!(band(&all, best, 40.0), Some(Band { at: 40.0, low: 1.0, middle: 5.0, high: 9.0 }));
+        assert_eq!(band(&all, best, 39.9).unwrap().middle, 3.0);
+        assert_eq!(band(&all[..1], best, 20.0), None);
         assert_eq!(names(&runs), "toy, seeds 1, 2, 3");
+    }
+
+    #[test]
+    fn runs_of_other_settings_have_lines_and_names_of_their_own() {
+        let of = |parents: i64| {
+            let settings = [("map_elites.parents".to_string(), parents.into())].into_iter().collect();
+            Progress { settings, ..run(1, &[Some(1.0), Some(2.0)]) }
+        };
+        let runs: Vec<Progress> = (0..30).map(of).collect();
+        let svg = progress(&runs[..2]).svg();
+        assert!(svg.contains("parents=0 (seed 1)") && svg.contains("parents=1 (seed 1)"));
+        assert!(progress(&runs).svg().contains("and 6 more"));
+        assert!(!progress(&runs[..1]).svg().contains("parents"));
     }
 
     #[test]

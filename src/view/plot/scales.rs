@@ -8,6 +8,15 @@ pub const BLUE: Colour = Colour::new(0, 114, 178);
 pub const VERMILLION: Colour = Colour::new(213, 94, 0);
 /// Bluish green of Okabe & Ito's set.
 pub const GREEN: Colour = Colour::new(0, 158, 115);
+/// Colours for lines that stand for themselves: Okabe & Ito's set without its yellow.
+pub const SET: [Colour; 6] = [
+    BLUE,
+    VERMILLION,
+    GREEN,
+    Colour::new(204, 121, 167),
+    Colour::new(86, 180, 233),
+    Colour::new(230, 159, 0),
+];
 /// Lines that help the eye.
 pub const GRID: Colour = Colour::new(226, 228, 232);
 /// Lines around cells.

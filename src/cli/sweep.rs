@@ -1,0 +1,82 @@
+//! `morphcog sweep`: its words, and what it calls.
+
+use crate::base::error::Error;
+use crate::base::signals;
+use crate::cli::tasks::{Command, What, Where, asked, ended, refused};
+use crate::commands::sweep::SweepPlan;
+use crate::commands::{collect, tasks};
+use crate::store::folder::in_shell;
+use crate::view::console::Console;
+use crate::view::reporters::Reporter;
+use crate::view::sweeps;
+use clap::Args;
+use std::path::{Path, PathBuf};
+
+pub(super) const EXAMPLES: &str = "\
+plan.toml:
+  config = \"zero_one.toml\"                  # or archive = \"runs/gaits-seed1\", to train
+  seeds = [1, 2, 3]
+  set = [\"generations=1000\"]
+  [vary]
+  map_elites.parents = [10, 20, 40]
+  [audit]                                   # after each run
+  [eval]
+  robots = \"random:10\"
+  physical_only = true
+
+Examples:
+  morphcog sweep plan.toml                       all tasks here, one per core
+  morphcog sweep plan.toml --status
+  morphcog sweep plan.toml --collect             one CSV, and figures
+  morphcog sweep plan.toml --list | parallel     elsewhere: GNU parallel,
+  morphcog sweep plan.toml --slurm | sbatch      Slurm,
+  hq submit --array 1-9 -- morphcog sweep $PWD/plan.toml --out $PWD/runs/plan --threads 1 --task    HyperQueue
+
+Every combination of seeds, tasks or pairs (of classes) and varied keys is a task with a run folder of its own. Ctrl-C stops
+anywhere; the same command goes on, here or elsewhere. Exit code 0: all tasks are done; 1: some failed; 75: stopped.";
+
+#[derive(Debug, Args)]
+pub(super) struct SweepArgs {
+    /// What is swept (TOML or JSON; morphcog schema sweep says what it holds).
+    plan: PathBuf,
+    /// Change a key of the plan, as in seeds=[1,2]; without a value, it has its default again; may
+    /// be given several times.
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<String>,
+    /// Folder for all run folders (default: runs/<plan>).
+    #[arg(short, long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    #[command(flatten)]
+    what: What,
+    /// Gather what all tasks found: sweep.csv, and figures.
+    #[arg(long, conflicts_with_all = ["task", "list", "slurm", "status"])]
+    collect: bool,
+    #[command(flatten)]
+    place: Where,
+}
+
+pub(super) fn run(args: SweepArgs, console: &Console) -> Result<(), Error> {
+    let plan = SweepPlan::load(&args.plan, &args.set)?;
+    let tasks = plan.tasks(&args.plan).map_err(|errors| refused(errors, console))?;
+    let name = args.plan.file_stem().map_or("sweep".to_string(), |stem| stem.to_string_lossy().into_owned());
+    let out = args.out.unwrap_or_else(|| Path::new("runs").join(&name));
+    let place = args.place.place(&out);
+    let absolute = std::path::absolute(&args.plan).map_err(|error| Error::reading(&args.plan, &error))?;
+    let mut words = vec!["sweep".to_string(), in_shell(&absolute)];
+    words.extend(args.set.iter().flat_map(|set| ["--set".to_string(), in_shell(Path::new(set))]));
+    if asked(&args.what, &tasks, &Command { words, name: &name, place: &place }, console)? {
+        return Ok(());
+    }
+    if args.collect {
+        let status = tasks::status(&tasks, &place)?;
+        return sweeps::collected(console, &name, &collect::collect(&tasks, &status, &place)?, &status, &out);
+    }
+    tasks::check_folders(&tasks, &place).map_err(|errors| refused(errors, console))?;
+    let stop = signals::stop_flag()?;
+    let jobs = args.place.jobs.map(usize::from);
+    let summary = tasks::run_all(&tasks, &place, jobs, &stop, &Reporter::new(console))?;
+    ended(&summary, tasks.len())?;
+    console.line(&format!("{} tasks are done, in {}", tasks.len(), out.display()));
+    console.info(&format!("next: morphcog sweep {} --collect", in_shell(&args.plan)));
+    Ok(())
+}

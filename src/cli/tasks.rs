@@ -1,0 +1,208 @@
+//! What `sweep` and `reproduce` have in common: one task, all of them, lists, how far they are.
+
+use crate::base::error::Error;
+use crate::base::signals;
+use crate::commands::tasks;
+use crate::commands::tasks::{Place, Summary, Task};
+use crate::store::folder::in_shell;
+use crate::view::console::Console;
+use crate::view::reporters::Reporter;
+use crate::view::sweeps;
+use clap::Args;
+use std::path::{Path, PathBuf};
+
+/// Numbers of tasks that engines give their processes, the innermost engine first.
+const NUMBERS: [&str; 3] = ["HQ_TASK_ID", "SLURM_ARRAY_TASK_ID", "PBS_ARRAY_INDEX"];
+
+/// Without one of these, all tasks are done here.
+#[derive(Debug, Args)]
+#[group(multiple = false)]
+pub(super) struct What {
+    /// Do one task, or go on with it: its number from 1 (default: that of HQ_TASK_ID,
+    /// SLURM_ARRAY_TASK_ID or PBS_ARRAY_INDEX).
+    #[arg(long, value_name = "N", num_args = 0..=1)]
+    pub(super) task: Option<Option<usize>>,
+    /// Print one command per task, for GNU parallel, HyperQueue or xargs.
+    #[arg(long)]
+    pub(super) list: bool,
+    /// Print a job script for Slurm's sbatch.
+    #[arg(long)]
+    pub(super) slurm: bool,
+    /// Say how far every task is.
+    #[arg(long)]
+    pub(super) status: bool,
+}
+
+/// Where, and with what.
+#[derive(Debug, Args)]
+pub(super) struct Where {
+    /// Folder with the images.
+    #[arg(long, value_name = "DIR")]
+    pub(super) data: Option<PathBuf>,
+    /// Tasks at once (default: one per thread).
+    #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub(super) jobs: Option<u16>,
+    /// Threads of all tasks together (default: one per core; in --list and --slurm one per task).
+    #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub(super) threads: Option<u16>,
+}
+
+impl Where {
+    /// The place of tasks.
+    pub(super) fn place(&self, out: &Path) -> Place {
+        Place { out: out.to_path_buf(), data: self.data.clone(), threads: self.threads.map(usize::from) }
+    }
+}
+
+/// A command that does tasks, for other machines to run.
+pub(super) struct Command<'a> {
+    /// Its words after the program's name, up to the options that are the same for all such
+    /// commands.
+    pub(super) words: Vec<String>,
+    /// Name of the plan.
+    pub(super) name: &'a str,
+    /// Where.
+    pub(super) place: &'a Place,
+}
+
+impl Command<'_> {
+    /// The whole command but for its number of threads; it depends neither on the present folder
+    /// nor on variables.
+    fn line(&self) -> Result<String, Error> {
+        let absolute = |path: &Path| std::path::absolute(path).map_err(|error| Error::reading(path, &error));
+        let program = std::env::current_exe().map_err(|error| Error::other(error.to_string()))?;
+        let mut words = vec![in_shell(&program)];
+        words.extend(self.words.iter().cloned());
+        words.extend(["--out".to_string(), in_shell(&absolute(&self.place.out)?)]);
+        let environment =
+            std::env::var_os("MORPHCOG_DATA").filter(|value| !value.is_empty()).map(PathBuf::from);
+        if let Some(data) = self.place.data.clone().or(environment) {
+            words.extend(["--data".to_string(), in_shell(&absolute(&data)?)]);
+        }
+        Ok(words.join(" "))
+    }
+
+    fn list(&self, count: usize, console: &Console) -> Result<(), Error> {
+        let (line, threads) = (self.line()?, self.place.threads.unwrap_or(1));
+        (1..=count).for_each(|number| console.line(&format!("{line} --threads {threads} --task {number}")));
+        Ok(())
+    }
+
+    /// A job script for sbatch.
+    fn slurm(&self, count: usize, console: &Console) -> Result<(), Error> {
+        let out = &self.place.out;
+        std::fs::create_dir_all(out).map_err(|error| Error::writing(out, &error))?;
+        let out = std::path::absolute(out).map_err(|error| Error::reading(out, &error))?;
+        let (name, line, threads) = (self.name, self.line()?, self.place.threads.unwrap_or(1));
+        let log = out.join("slurm-%a.log");
+        console.text(&format!(
+            r#"#!/bin/bash
+#SBATCH --job-name={name}
+#SBATCH --array=1-{count}
+#SBATCH --cpus-per-task={threads}
+#SBATCH --signal=B:USR1@120
+#SBATCH --requeue
+#SBATCH --open-mode=append
+#SBATCH --output={log}
+
+# Two minutes before the time limit Slurm sends SIGUSR1. The task saves itself and ends with 75, and is queued again.
+{line} --threads "${{SLURM_CPUS_PER_TASK:-1}}" --task &
+task=$!
+again=no
+trap 'again=yes; kill -USR1 "$task"' USR1
+trap 'kill -TERM "$task"' TERM
+while true; do
+  wait "$task"
+  code=$?
+  kill -0 "$task" 2>/dev/null || break
+done
+if [ "$code" -eq 75 ] && [ "$again" = yes ]; then
+  scontrol requeue "${{SLURM_ARRAY_JOB_ID}}_${{SLURM_ARRAY_TASK_ID}}"
+fi
+exit "$code"
+"#,
+            log = in_shell(&log)
+        ));
+        Ok(())
+    }
+}
+
+/// Says every error but the last; the last one is for `main`.
+pub(super) fn refused(mut errors: Vec<Error>, console: &Console) -> Error {
+    let last = errors.pop().expect("something is refused, and it is said what");
+    errors.iter().for_each(|error| console.error(error, error.hint.as_deref()));
+    last
+}
+
+/// What is asked for but to do all tasks; whether that is all.
+pub(super) fn asked(
+    what: &What,
+    tasks: &[Task],
+    command: &Command,
+    console: &Console,
+) -> Result<bool, Error> {
+    let place = command.place;
+    if let Some(number) = what.task {
+        let number = number.map_or_else(from_engine, Ok)?;
+        let Some(task) = number.checked_sub(1).and_then(|index| tasks.get(index)) else {
+            let text = format!("--task {number}: expected a number from 1 to {}", tasks.len());
+            return Err(Error::usage(text));
+        };
+        tasks::check_folders(std::slice::from_ref(task), place).map_err(|errors| refused(errors, console))?;
+        let stop = signals::stop_flag()?;
+        tasks::run(task, place, &stop, &Reporter::new(console)).map_err(goes_on)?;
+        console.line(&format!("task {number} ({}): done", task.name));
+    } else if what.list {
+        command.list(tasks.len(), console)?;
+    } else if what.slurm {
+        command.slurm(tasks.len(), console)?;
+    } else if what.status {
+        sweeps::status(console, &tasks::status(tasks, place)?);
+    } else {
+        return Ok(false);
+    }
+    Ok(true)
+}
+
+/// The number that an engine gave to this process.
+fn from_engine() -> Result<usize, Error> {
+    let given = NUMBERS.iter().find_map(|name| Some((name, std::env::var(name).ok()?)));
+    let Some((name, value)) = given else {
+        let text = format!("--task: expected a number, or one of {} to be set", NUMBERS.join(", "));
+        return Err(Error::usage(text));
+    };
+    value.trim().parse().map_err(|_| Error::usage(format!("{name}={value}: expected the number of a task")))
+}
+
+/// What a stopped task says.
+fn goes_on(error: Error) -> Error {
+    match error.kind {
+        crate::base::error::ErrorKind::Stopped => error.hint("the same command goes on".to_string()),
+        _ => error,
+    }
+}
+
+/// Says how all tasks ended.
+///
+/// # Errors
+/// If some failed, or were stopped.
+pub(super) fn ended(summary: &Summary, count: usize) -> Result<(), Error> {
+    let Summary { done, failed, elsewhere, open } = summary;
+    if !failed.is_empty() {
+        let numbers: Vec<String> = failed.iter().map(usize::to_string).collect();
+        let (count_failed, numbers) = (failed.len(), numbers.join(", "));
+        let text =
+            format!("{count_failed} of {count} tasks failed: {numbers}; {done} are done, {open} are open");
+        return Err(Error::other(text).hint("the same command tries them again".to_string()));
+    }
+    if *open > 0 || *elsewhere > 0 {
+        let at = if *elsewhere > 0 {
+            format!(", {elsewhere} in the hands of other processes")
+        } else {
+            String::new()
+        };
+        let text = format!("stopped; {done} of {count} tasks are done{at}");
+        return Err(Error::stopped(text).hint("the same command goes on".to_string()));
+    }
+    Ok(())
+}

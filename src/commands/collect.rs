@@ -1,0 +1,212 @@
+//! What the tasks of a sweep found, in one table.
+
+use crate::base::error::Error;
+use crate::base::table;
+use crate::commands::plot::Progress;
+use crate::commands::tasks::{Place, State, Status, Task};
+use crate::store::audit::AuditFile;
+use crate::store::eval::EvalFile;
+use crate::store::images::HeldOut;
+use crate::store::names::{AUDIT_JSON, EVAL_JSON, EVAL_VALIDATION_JSON, METRICS, RUN_JSON};
+use crate::store::robots::Source;
+use crate::store::run::RunFile;
+use crate::store::validation::ranking;
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+
+/// What a task found on one of the tasks that its robots do, as 0|1.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Row {
+    /// The task's number in the sweep, from 1.
+    pub number: usize,
+    /// Its name.
+    pub name: String,
+    /// How far it is.
+    pub state: State,
+    /// Varied keys with its values.
+    pub varied: Vec<(String, Value)>,
+    /// Its run, as far as there is one.
+    pub run: Option<RunRow>,
+}
+
+/// What a run found on one task.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RunRow {
+    /// What is told apart, as "0|1".
+    pub recognises: String,
+    /// Generations done.
+    pub generations: u64,
+    /// Wall-clock time of the run \[s\].
+    pub seconds: f64,
+    /// Elites of this task.
+    pub num_elites: usize,
+    /// Largest objective of them.
+    pub obj_max: Option<f64>,
+    /// Balanced accuracy of the first robot on validation images, from 0 to 1.
+    pub validation: Option<f64>,
+    /// Robots audited, and how many of them are physical.
+    pub audited: Option<[usize; 2]>,
+    /// How robots did on held-out images.
+    pub tested: Option<Tested>,
+}
+
+/// A test.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Tested {
+    /// Which images.
+    pub split: HeldOut,
+    /// How many.
+    pub images: usize,
+    /// Robots.
+    pub robots: usize,
+    /// Their mean accuracy, from 0 to 1.
+    pub accuracy: f64,
+    /// Its 95 % interval: of one robot over images, of several over robots.
+    pub interval: Option<[f64; 2]>,
+    /// Their mean balanced accuracy.
+    pub balanced: f64,
+}
+
+/// Everything that is collected.
+#[derive(Clone, Debug)]
+pub struct Collected {
+    /// A row per task and what its robots tell apart.
+    pub rows: Vec<Row>,
+    /// How the runs that evolved came along.
+    pub progress: Vec<Progress>,
+    /// The run.json files, for commands that take several.
+    pub archives: Vec<PathBuf>,
+}
+
+/// Collects what the tasks found so far; `status` is of the same tasks.
+///
+/// # Errors
+/// If a file of a run is broken.
+pub fn collect(tasks: &[Task], status: &[Status], place: &Place) -> Result<Collected, Error> {
+    let mut all = Collected { rows: Vec::new(), progress: Vec::new(), archives: Vec::new() };
+    for (task, status) in tasks.iter().zip(status) {
+        let folder = place.out.join(&task.name);
+        let archive = folder.join(RUN_JSON);
+        let row = |run: Option<RunRow>| Row {
+            number: status.task,
+            name: task.name.clone(),
+            state: status.state,
+            varied: task.varied.clone(),
+            run,
+        };
+        if !archive.exists() {
+            all.rows.push(row(None));
+            continue;
+        }
+        let source = Source::read(&archive)?;
+        let run = &source.run;
+        let found = Found::of(&source, &folder)?;
+        let grouping = run.config.grouping()?;
+        let names = grouping.tasks().iter().filter(|split| !split.is_same_way()).map(|split| split.name());
+        for recognises in names {
+            all.rows.push(row(Some(found.of_task(run, recognises, status.seconds.unwrap_or(0.0)))));
+        }
+        if run.generations > 1 && folder.join(METRICS).exists() {
+            all.progress.push(Progress::of(run, &archive)?);
+        }
+        all.archives.push(archive);
+    }
+    Ok(all)
+}
+
+/// What lies beside a run.
+struct Found {
+    validated: Vec<crate::store::validation::Validated>,
+    audit: Option<AuditFile>,
+    eval: Option<EvalFile>,
+}
+
+impl Found {
+    fn of(source: &Source, folder: &Path) -> Result<Self, Error> {
+        let run = &source.run;
+        let existing = |name: &str| Some(folder.join(name)).filter(|path| path.exists());
+        let audit = existing(AUDIT_JSON).map(|path| AuditFile::of_run(run, &path)).transpose()?;
+        let test = existing(EVAL_JSON).or(existing(EVAL_VALIDATION_JSON));
+        let eval = test.map(|path| EvalFile::of_runs(&path, &[run])).transpose()?;
+        Ok(Found { validated: ranking(source).unwrap_or_default(), audit, eval })
+    }
+
+    fn of_task(&self, run: &RunFile, recognises: String, seconds: f64) -> RunRow {
+        let elites = || run.elites.iter().filter(|robot| robot.task == recognises);
+        let audited = self.audit.as_ref().map(|audit| {
+            let own = || audit.robots.iter().filter(|robot| robot.task == recognises);
+            [own().count(), own().filter(|robot| robot.is_physical()).count()]
+        });
+        let tested = self.eval.as_ref().and_then(|eval| {
+            let mean = eval.means.get(&recognises)?;
+            let own: Vec<_> = eval.robots.iter().filter(|robot| robot.task == recognises).collect();
+            let interval = if let [one] = own.as_slice() { Some(one.interval) } else { mean.interval };
+            Some(Tested {
+                split: eval.split,
+                images: own.first()?.images,
+                robots: mean.robots,
+                accuracy: mean.accuracy,
+                interval,
+                balanced: mean.balanced_accuracy,
+            })
+        });
+        let validated = self.validated.iter().filter(|robot| robot.task == recognises);
+        RunRow {
+            generations: run.generations,
+            seconds,
+            num_elites: elites().count(),
+            obj_max: elites().map(|robot| robot.objective).reduce(f64::max),
+            validation: validated.map(|robot| robot.balanced_accuracy).reduce(f64::max),
+            audited,
+            tested,
+            recognises,
+        }
+    }
+}
+
+/// The table as CSV: a row per task and what its robots tell apart; a column per varied key.
+pub fn csv(rows: &[Row]) -> Vec<u8> {
+    let mut keys: Vec<&String> = rows.iter().flat_map(|row| row.varied.iter().map(|(key, _)| key)).collect();
+    keys.sort_unstable();
+    keys.dedup();
+    let about = ["number", "name", "state"].map(str::to_string);
+    let varied = keys.iter().map(|key| format!("varied_{key}"));
+    let run =
+        ["recognises", "generations", "seconds", "num_elites", "obj_max", "validation_balanced_accuracy"];
+    let audit = ["audited", "physical"];
+    let test =
+        ["split", "images", "robots", "accuracy", "accuracy_low", "accuracy_high", "balanced_accuracy"];
+    let more = run.iter().chain(&audit).chain(&test).map(ToString::to_string);
+    let fields = rows.iter().map(|row| {
+        let text = |value: &Value| value.as_str().map_or_else(|| value.to_string(), str::to_string);
+        let of = |key: &&String| row.varied.iter().find(|(own, _)| own == *key).map(|(_, value)| text(value));
+        let varied: Vec<Option<String>> = keys.iter().map(of).collect();
+        let run = row.run.as_ref();
+        let audited = run.and_then(|run| run.audited);
+        let tested = run.and_then(|run| run.tested.as_ref());
+        let interval = tested.and_then(|tested| tested.interval);
+        (
+            (row.number, &row.name, row.state.name()),
+            varied,
+            (
+                run.map(|run| &run.recognises),
+                run.map(|run| run.generations),
+                run.map(|run| run.seconds),
+                run.map(|run| run.num_elites),
+                run.and_then(|run| run.obj_max),
+                run.and_then(|run| run.validation),
+            ),
+            [0, 1].map(|k| audited.map(|audited| audited[k])),
+            (
+                tested.map(|tested| tested.split.to_string()),
+                tested.map(|tested| tested.images),
+                tested.map(|tested| tested.robots),
+                tested.map(|tested| tested.accuracy),
+                interval.map(|interval| interval[0]),
+                interval.map(|interval| interval[1]),
+                tested.map(|tested| tested.balanced),
+            ),
+        )
+    });
+    table::csv(about.into_iter().chain(varied).chain(more), fields)
+}

@@ -1,0 +1,454 @@
+//! `morphcog sweep`: a plan is one config, or one archive of gaits, and what is varied; every
+//! combination is a task.
+
+use crate::base::error::Error;
+use crate::base::files::read_text;
+use crate::base::hash::sha256_hex;
+use crate::commands::tasks::{AuditStep, EvalStep, Run, Steps, Task, Training, selection};
+use crate::config::{Config, reading};
+use crate::search::train;
+use crate::store::folder::{self, run_json};
+use crate::store::robots::Source;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value};
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+
+/// Most tasks of a sweep: a slip in a list makes millions quickly.
+const MOST: usize = 100_000;
+
+/// Most characters of a varied value in a task's name; longer ones are a hash.
+const LONGEST: usize = 24;
+
+/// What is swept: every combination of `vary`, `tasks` (or `pairs`) and `seeds` is a task.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SweepPlan {
+    /// A config file, from the plan's folder on, or the name of a built-in one: the tasks evolve.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub config: Option<String>,
+    /// Instead, a run.json of gaits or its folder, from the plan's folder on: the tasks train.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub archive: Option<PathBuf>,
+    /// Which robots of `archive` are tried, as `--robots` of `morphcog train`. Default "top:4".
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub robots: Option<String>,
+    /// Seeds. Default: that of the config, or of the archive's run.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub seeds: Vec<u64>,
+    /// Keys that are the same in all tasks, as with `--set`.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub set: Vec<String>,
+    /// Two groups of classes each, as "4|9".
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub tasks: Vec<String>,
+    /// Classes: every two of them are a task, as 4|9.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub pairs: Vec<u8>,
+    /// Keys that are varied, each with a list of values.
+    #[serde(default, skip_serializing_if = "Map::is_empty")]
+    pub vary: Map<String, Value>,
+    /// After each run, an audit.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub audit: Option<AuditStep>,
+    /// After that, a test on held-out images.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub eval: Option<EvalStep>,
+}
+
+/// A value of a varied key.
+#[derive(Clone, Debug)]
+struct Setting {
+    key: String,
+    value: Value,
+    /// How it stands in a task's name.
+    word: String,
+}
+
+/// What all tasks begin with.
+enum Base {
+    /// The config's name, and what stands before the plan's changes.
+    Evolve(String, Box<Config>),
+    Train(PathBuf, Box<Source>),
+}
+
+impl SweepPlan {
+    /// Reads a plan (TOML, or JSON if its name ends in `.json`), with `overrides` set.
+    ///
+    /// # Errors
+    /// What is wrong with it, with file, line and key.
+    pub fn load(path: &Path, overrides: &[String]) -> Result<Self, Error> {
+        let text = read_text(path).map_err(|error| {
+            let error = Error::reading(path, &error);
+            error
+                .hint("morphcog schema sweep says what a plan holds; morphcog help sweep has one".to_string())
+        })?;
+        let name = path.display().to_string();
+        let format = if name.ends_with(".json") { reading::Format::Json } else { reading::Format::Toml };
+        let plan: SweepPlan = reading::read(&text, format, &name)?;
+        let check = |plan: &SweepPlan| plan.check();
+        reading::changed(plan, overrides, check, |error| reading::placed(error, &text, format, &name))
+    }
+
+    /// Checks what a type cannot, and no task.
+    fn check(&self) -> Result<(), Error> {
+        match (&self.config, &self.archive) {
+            (Some(_), Some(_)) => return Err(Error::at("archive", "expected config or archive, not both")),
+            (None, None) => {
+                return Err(Error::at("config", "expected config (to evolve) or archive (to train)"));
+            }
+            (Some(_), None) if self.robots.is_some() => {
+                return Err(Error::at("robots", "expected with archive only: these robots are trained"));
+            }
+            _ => {}
+        }
+        if let Some(robots) = &self.robots {
+            selection("robots", robots)?;
+        }
+        let distinct = |key: &str, all: usize, different: usize| match all == different {
+            true => Ok(()),
+            false => Err(Error::at(key, "expected different ones")),
+        };
+        distinct("seeds", self.seeds.len(), self.seeds.iter().collect::<BTreeSet<_>>().len())?;
+        distinct("pairs", self.pairs.len(), self.pairs.iter().collect::<BTreeSet<_>>().len())?;
+        if self.pairs.len() == 1 {
+            return Err(Error::at("pairs", "expected two or more classes"));
+        }
+        self.groups()?;
+        self.varied()?;
+        self.steps().check()
+    }
+
+    fn steps(&self) -> Steps {
+        Steps { audit: self.audit.clone(), eval: self.eval.clone() }
+    }
+
+    /// The two groups of each task, if the plan names any.
+    fn groups(&self) -> Result<Vec<[Vec<u8>; 2]>, Error> {
+        let mut all = Vec::new();
+        for (number, text) in (1..).zip(&self.tasks) {
+            all.push(train::groups(text).map_err(|error| Error::at(&format!("tasks.{number}"), error))?);
+        }
+        for (k, &a) in self.pairs.iter().enumerate() {
+            all.extend(self.pairs[k + 1..].iter().map(|&b| [vec![a.min(b)], vec![a.max(b)]]));
+        }
+        if all.iter().collect::<BTreeSet<_>>().len() < all.len() {
+            return Err(Error::at("tasks", "expected different ones, also of pairs"));
+        }
+        if self.archive.is_some() && all.is_empty() {
+            return Err(Error::at("tasks", "expected tasks or pairs, which are trained"));
+        }
+        Ok(all)
+    }
+
+    /// The varied keys, each with its values.
+    fn varied(&self) -> Result<Vec<Vec<Setting>>, Error> {
+        let mut flat = BTreeMap::new();
+        flatten("", &self.vary, &mut flat);
+        let short = |key: &str| key.rsplit('.').next().unwrap_or(key).to_string();
+        let mut all = Vec::new();
+        for (key, values) in &flat {
+            let place = format!("vary.{key}");
+            let has_own = matches!(key.as_str(), "seed" | "task.groups") || key.starts_with("task.groups.");
+            if has_own {
+                return Err(Error::at(&place, "expected in seeds, or in tasks and pairs"));
+            }
+            let Some(values) = values.as_array().filter(|values| !values.is_empty()) else {
+                return Err(Error::at(&place, "expected a list of one value or more"));
+            };
+            // Two keys may end in the same word.
+            let is_short = flat.keys().filter(|other| short(other) == short(key)).count() == 1;
+            let name = if is_short { short(key) } else { key.clone() };
+            let setting = |value: &Value| Setting {
+                key: key.clone(),
+                value: value.clone(),
+                word: format!("{name}={}", word(value)),
+            };
+            let settings: Vec<Setting> = values.iter().map(setting).collect();
+            if settings.iter().map(|s| &s.word).collect::<BTreeSet<_>>().len() < settings.len() {
+                return Err(Error::at(&place, "expected different values"));
+            }
+            all.push(settings);
+        }
+        Ok(all)
+    }
+
+    /// The tasks, numbered from 1 in this order: varied keys by their names, the last one changing
+    /// first; then tasks; then seeds.
+    ///
+    /// # Errors
+    /// What is wrong with the plan, or with some of its tasks: all of that at once.
+    pub fn tasks(&self, path: &Path) -> Result<Vec<Task>, Vec<Error>> {
+        let one = |error: Error| vec![error.within(&path.display().to_string())];
+        let base = self.base(path).map_err(one)?;
+        let (groups, varied) = (self.groups().map_err(one)?, self.varied().map_err(one)?);
+        let seeds = match (&base, self.seeds.as_slice()) {
+            (Base::Evolve(_, config), []) => vec![config.seed],
+            (Base::Train(_, source), []) => vec![source.run.config.seed],
+            (_, seeds) => seeds.to_vec(),
+        };
+        let sizes = varied.iter().map(Vec::len).chain([groups.len().max(1), seeds.len()]);
+        if sizes.clone().try_fold(1_usize, usize::checked_mul).is_none_or(|count| count > MOST) {
+            let sizes: Vec<String> = sizes.map(|size| size.to_string()).collect();
+            let text = format!("{} tasks: expected at most {MOST}", sizes.join(" × "));
+            return Err(one(Error::at("vary", text)));
+        }
+        let groups: Vec<Option<&[Vec<u8>; 2]>> =
+            if groups.is_empty() { vec![None] } else { groups.iter().map(Some).collect() };
+        let mut combinations: Vec<Vec<&Setting>> = vec![Vec::new()];
+        for settings in &varied {
+            let mut longer = Vec::new();
+            for before in &combinations {
+                longer.extend(settings.iter().map(|setting| [&before[..], &[setting]].concat()));
+            }
+            combinations = longer;
+        }
+        let (mut tasks, mut refused) = (Vec::new(), Refused::default());
+        for combination in &combinations {
+            for groups in &groups {
+                for &seed in &seeds {
+                    let name = base.name(combination, *groups, seed);
+                    match self.task(&base, &name, combination, *groups, seed) {
+                        Ok(task) => tasks.push(task),
+                        Err(error) => refused.add(tasks.len() + refused.count + 1, &name, error),
+                    }
+                }
+            }
+        }
+        if refused.count > 0 {
+            return Err(refused.errors().into_iter().flat_map(one).collect());
+        }
+        let mut names = BTreeSet::new();
+        match tasks.iter().find(|task| !names.insert(task.name.to_lowercase())) {
+            Some(task) => Err(one(Error::at("vary", format!("two tasks would be called {}", task.name)))),
+            None => Ok(tasks),
+        }
+    }
+
+    fn base(&self, path: &Path) -> Result<Base, Error> {
+        let folder = path.parent().unwrap_or(Path::new(""));
+        if let Some(archive) = &self.archive {
+            let archive = run_json(folder.join(archive));
+            let source = Source::read(&archive).map_err(|error| error.within("archive").of("archive"))?;
+            let archive = std::path::absolute(&archive).map_err(|error| Error::reading(&archive, &error))?;
+            return Ok(Base::Train(archive, Box::new(source)));
+        }
+        let config = self.config.as_deref().unwrap_or_default();
+        let name = beside(folder, config);
+        let loaded = Config::load(&name, &[]).map_err(|error| error.within("config").of("config"))?;
+        Ok(Base::Evolve(folder::name_of(&name), Box::new(loaded)))
+    }
+
+    fn task(
+        &self,
+        base: &Base,
+        name: &str,
+        combination: &[&Setting],
+        groups: Option<&[Vec<u8>; 2]>,
+        seed: u64,
+    ) -> Result<Task, Error> {
+        let settings = combination.iter().map(|setting| format!("{}={}", setting.key, setting.value));
+        let mut set: Vec<String> = self.set.iter().cloned().chain(settings).collect();
+        let run = match base {
+            Base::Evolve(config_name, config) => {
+                set.extend(groups.map(|groups| format!("task.groups={groups:?}")));
+                set.push(format!("seed={seed}"));
+                // Of a config with splits, the groups are in their place.
+                let mut config = (**config).clone();
+                if groups.is_some() {
+                    (config.task.splits, config.task.same_way_bin) = (None, false);
+                    config.task.groups = groups.cloned();
+                }
+                let config = reading::changed(config, &set, Config::validate, |error| error)?;
+                Run::Evolve(Box::new(config), config_name.clone())
+            }
+            Base::Train(archive, source) => {
+                let groups = groups.cloned().expect("a plan with an archive has tasks");
+                let config = train::config_of(&source.run.config, &groups, Some(seed), &set)?;
+                Run::Train(Box::new(Training {
+                    archive: archive.clone(),
+                    sha256: source.run.fingerprint(),
+                    robots: self.robots.clone().unwrap_or("top:4".to_string()),
+                    groups,
+                    seed,
+                    set,
+                    config,
+                }))
+            }
+        };
+        let mut varied: Vec<(String, Value)> =
+            combination.iter().map(|setting| (setting.key.clone(), setting.value.clone())).collect();
+        varied.extend(groups.map(|groups| ("task".to_string(), Value::String(written(groups, "|")))));
+        varied.push(("seed".to_string(), Value::from(seed)));
+        Ok(Task { name: name.to_string(), run, steps: self.steps(), varied })
+    }
+}
+
+impl Base {
+    /// The name of a task.
+    fn name(&self, combination: &[&Setting], groups: Option<&[Vec<u8>; 2]>, seed: u64) -> String {
+        let base = match self {
+            Base::Evolve(name, _) => name.clone(),
+            Base::Train(archive, source) => {
+                let folder = archive.parent().and_then(Path::file_name);
+                folder.map_or(source.run.name.clone(), |name| name.to_string_lossy().into_owned())
+            }
+        };
+        let words = combination.iter().map(|setting| setting.word.clone());
+        let groups = groups.map(|groups| written(groups, "v"));
+        let parts = std::iter::once(base).chain(words).chain(groups).chain([format!("seed{seed}")]);
+        parts.collect::<Vec<_>>().join("-")
+    }
+}
+
+/// A path of a plan as it is from here; a name without such a file is that of something built in.
+pub(crate) fn beside(folder: &Path, name: &str) -> String {
+    let path = folder.join(name);
+    if path.exists() { path.to_string_lossy().into_owned() } else { name.to_string() }
+}
+
+/// Two groups of classes, as 0|123.
+fn written(groups: &[Vec<u8>; 2], between: &str) -> String {
+    let group = |group: &Vec<u8>| {
+        let separator = if group.iter().any(|class| *class > 9) { "," } else { "" };
+        group.iter().map(u8::to_string).collect::<Vec<_>>().join(separator)
+    };
+    groups.each_ref().map(group).join(between)
+}
+
+/// Tables within tables as keys in dots: TOML reads `a.b = […]` as a table.
+fn flatten(name: &str, table: &Map<String, Value>, flat: &mut BTreeMap<String, Value>) {
+    for (key, value) in table {
+        let key = if name.is_empty() { key.clone() } else { format!("{name}.{key}") };
+        match value {
+            Value::Object(table) => flatten(&key, table, flat),
+            value => _ = flat.insert(key, value.clone()),
+        }
+    }
+}
+
+/// A value in a file's name: what shells and file systems take as it is.
+fn word(value: &Value) -> String {
+    let text = value.as_str().map_or_else(|| value.to_string(), str::to_string);
+    let plain = |c: char| if c.is_ascii_alphanumeric() || "._+-".contains(c) { c } else { '_' };
+    let word: String = text.chars().map(plain).collect();
+    let is_same = word == text && !word.is_empty() && word.len() <= LONGEST;
+    // Two texts that become the same word are two values all the same.
+    let hash = || sha256_hex(text.as_bytes()).chars().take(8).collect::<String>();
+    if is_same { word } else { hash() }
+}
+
+/// Tasks that cannot be, by what is wrong with them.
+#[derive(Default)]
+struct Refused {
+    count: usize,
+    /// The error, its first task, and how many more there are.
+    by_error: Vec<(Error, usize, String, usize)>,
+}
+
+impl Refused {
+    fn add(&mut self, number: usize, name: &str, error: Error) {
+        self.count += 1;
+        match self.by_error.iter_mut().find(|(known, ..)| known.message == error.message) {
+            Some((.., more)) => *more += 1,
+            None => self.by_error.push((error, number, name.to_string(), 0)),
+        }
+    }
+
+    fn errors(self) -> Vec<Error> {
+        let said = |(error, number, name, more): (Error, usize, String, usize)| {
+            let others = if more == 0 { String::new() } else { format!(" and {more} more") };
+            Error { kind: crate::base::error::ErrorKind::Input, ..error }
+                .within(&format!("task {number} ({name}){others}"))
+        };
+        self.by_error.into_iter().map(said).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn plan(text: &str) -> SweepPlan {
+        let plan: SweepPlan = toml::from_str(text).unwrap();
+        plan.check().unwrap();
+        plan
+    }
+
+    fn names(text: &str) -> Vec<String> {
+        let tasks = plan(text).tasks(Path::new("plan.toml")).unwrap();
+        tasks.into_iter().map(|task| task.name).collect()
+    }
+
+    #[test]
+    fn every_combination_is_a_task_with_a_name_of_its_own() {
+        let names = names(
+            "config = \"quickstart.toml\"\nseeds = [1, 2]\npairs = [0, 1, 4]\n\
+             [vary]\nmap_elites.parents = [10, 20]\nstimulus.encoding = [\"saturated\", \"intensity\"]",
+        );
+        assert_eq!(names.len(), 2 * 2 * 3 * 2);
+        assert_eq!(names[0], "quickstart-parents=10-encoding=saturated-0v1-seed1");
+        assert_eq!(names[1], "quickstart-parents=10-encoding=saturated-0v1-seed2");
+        assert_eq!(names[23], "quickstart-parents=20-encoding=intensity-1v4-seed2");
+    }
+
+    #[test]
+    fn a_task_has_the_config_that_its_name_says() {
+        let text = "config = \"four_digit.toml\"\nseeds = [7]\ntasks = [\"0|123\"]\nset = [\"generations=9\"]\n\
+                    [vary]\narchive.keep = [3]";
+        let tasks = plan(text).tasks(Path::new("plan.toml")).unwrap();
+        let Run::Evolve(config, _) = &tasks[0].run else { panic!("it evolves") };
+        assert_eq!((config.seed, config.generations), (7, 9));
+        assert_eq!(config.task.groups, Some([vec![0], vec![1, 2, 3]]));
+    }
+
+    #[test]
+    fn all_that_is_wrong_is_said_at_once_with_the_tasks() {
+        let text = "config = \"quickstart.toml\"\nseeds = [1, 2]\n[vary]\ngenerations = [0, 5, -1]\nbody.heihgt = [3]";
+        let errors = plan(text).tasks(Path::new("plan.toml")).unwrap_err();
+        let said: Vec<String> = errors.iter().map(ToString::to_string).collect();
+        assert_eq!(said.len(), 1, "an unknown key is the first thing wrong with every task: {said:?}");
+        assert!(said[0].contains("heihgt") && said[0].contains("and 5 more"), "{said:?}");
+        let text = text.replace("body.heihgt = [3]", "");
+        let errors = plan(&text).tasks(Path::new("plan.toml")).unwrap_err();
+        let said: Vec<String> = errors.iter().map(ToString::to_string).collect();
+        assert!(
+            said.len() == 2 && said[0].contains("task 1 (quickstart-generations=0-seed1) and 1 more"),
+            "{said:?}"
+        );
+        assert!(said[1].contains("task 5 "), "{said:?}");
+    }
+
+    #[test]
+    fn plans_that_cannot_be_are_refused_with_the_key() {
+        for (text, key) in [
+            ("seeds = [1]", "config"),
+            ("config = \"a\"\narchive = \"b\"", "archive"),
+            ("config = \"a\"\nrobots = \"top:2\"", "robots"),
+            ("archive = \"a\"\nrobots = \"some\\u003a2\"\npairs = [0, 1]", "robots"),
+            ("archive = \"a\"", "tasks"),
+            ("config = \"a\"\nseeds = [1, 1]", "seeds"),
+            ("config = \"a\"\npairs = [3]", "pairs"),
+            ("config = \"a\"\ntasks = [\"0|0\"]", "tasks.1"),
+            ("config = \"a\"\ntasks = [\"0|1\"]\npairs = [0, 1]", "tasks"),
+            ("config = \"a\"\n[vary]\nseed = [1]", "vary.seed"),
+            ("config = \"a\"\n[vary]\ngenerations = 5", "vary.generations"),
+            ("config = \"a\"\n[vary]\ngenerations = []", "vary.generations"),
+            ("config = \"a\"\n[vary]\ngenerations = [5, 5]", "vary.generations"),
+            ("config = \"a\"\n[eval]\nimages = 0", "eval.images"),
+            ("config = \"a\"\n[eval]\nphysical_only = true", "eval.physical_only"),
+        ] {
+            let plan: SweepPlan = toml::from_str(text).unwrap();
+            assert_eq!(plan.check().unwrap_err().key.as_deref(), Some(key), "{text}");
+        }
+    }
+
+    #[test]
+    fn values_that_no_file_name_takes_have_a_short_name_of_their_own() {
+        let [a, b] = [serde_json::json!([[1, 2], [3]]), serde_json::json!([[1, 2], [4]])].map(|v| word(&v));
+        assert!(a != b && a.len() == 8);
+        assert_eq!(word(&serde_json::json!(1e-3)), "0.001");
+        assert_ne!(word(&serde_json::json!("a/b")), word(&serde_json::json!("a_b")));
+    }
+}

@@ -1,0 +1,646 @@
+//! Independent tasks, each in a run folder of its own: what `sweep` and `reproduce` are made of.
+//!
+//! A task evolves or trains, and then does the steps that its plan asks for. How far it is stands
+//! in its folder, so that any process on any machine goes on with it.
+
+use crate::base::error::{Error, ErrorKind};
+use crate::base::observer::{Generation, Observer, Work};
+use crate::base::ranks::Ranks;
+use crate::commands::{audit, eval};
+use crate::config::Config;
+use crate::config::audit::Criteria;
+use crate::search::{evolve, showing, train, validation};
+use crate::store::eval::EvalFile;
+use crate::store::folder::IfExists;
+use crate::store::images::HeldOut;
+use crate::store::lock::{self, Lock, Refusal};
+use crate::store::names::{AUDIT_JSON, METRICS, RUN_JSON, TASK_JSON};
+use crate::store::robots::{Selection, Source};
+use crate::store::setting::RunRef;
+use crate::store::task::{Progress, TaskFile};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+use std::collections::BTreeMap;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+use std::sync::PoisonError;
+use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
+use std::time::Instant;
+
+/// Name of the file that says who is at a task.
+const LOCK: &str = ".task.lock";
+
+/// A task.
+#[derive(Clone, Debug)]
+pub struct Task {
+    /// Its name, which is its run folder's, too.
+    pub name: String,
+    /// What makes its run.
+    pub run: Run,
+    /// What is done with that.
+    pub steps: Steps,
+    /// Keys that are not the same in all tasks, with their values; for tables.
+    pub varied: Vec<(String, Value)>,
+}
+
+/// What makes a run.
+#[derive(Clone, Debug)]
+pub enum Run {
+    /// `evolve`, with the name of the run.
+    Evolve(Box<Config>, String),
+    /// `train`.
+    Train(Box<Training>),
+}
+
+/// A training.
+#[derive(Clone, Debug)]
+pub struct Training {
+    /// The run.json whose robots walk.
+    pub archive: PathBuf,
+    /// SHA-256 of that.
+    pub sha256: String,
+    /// Which of its robots.
+    pub robots: String,
+    /// The two groups of classes.
+    pub groups: [Vec<u8>; 2],
+    /// Seed of all chance.
+    pub seed: u64,
+    /// Keys that differ from those of the run.
+    pub set: Vec<String>,
+    /// The config that results.
+    pub config: Config,
+}
+
+/// What is done after a run.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct Steps {
+    /// An audit, as by `morphcog audit`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub audit: Option<AuditStep>,
+    /// A test on held-out images, as by `morphcog eval`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub eval: Option<EvalStep>,
+}
+
+/// An audit.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct AuditStep {
+    /// Which robots, as `--robots` of `morphcog audit`. Default "all".
+    pub robots: String,
+    /// How they are judged.
+    pub criteria: Criteria,
+}
+
+impl Default for AuditStep {
+    fn default() -> Self {
+        AuditStep { robots: "all".to_string(), criteria: Criteria::default() }
+    }
+}
+
+/// A test on held-out images.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct EvalStep {
+    /// Which robots, as `--robots` of `morphcog eval`. Default "best".
+    pub robots: String,
+    /// Images in all. Default 1000.
+    pub images: usize,
+    /// Which images. Default "test".
+    pub split: HeldOut,
+    /// Only robots that the audit found physical. Default false.
+    pub physical_only: bool,
+}
+
+impl Default for EvalStep {
+    fn default() -> Self {
+        EvalStep { robots: "best".to_string(), images: 1000, split: HeldOut::Test, physical_only: false }
+    }
+}
+
+impl Steps {
+    /// Checks what a type cannot.
+    ///
+    /// # Errors
+    /// What is wrong.
+    pub(crate) fn check(&self) -> Result<(), Error> {
+        if let Some(step) = &self.audit {
+            selection("audit.robots", &step.robots)?;
+            step.criteria.check().map_err(|error| error.of("audit.criteria"))?;
+        }
+        let Some(step) = &self.eval else { return Ok(()) };
+        selection("eval.robots", &step.robots)?;
+        match (step.images, step.physical_only && self.audit.is_none()) {
+            (0, _) => Err(Error::value("eval.images", 0, "1 or more")),
+            (_, true) => Err(Error::value("eval.physical_only", true, "it with [audit] only")),
+            _ => Ok(()),
+        }
+    }
+}
+
+/// Reads a selection of robots.
+pub(crate) fn selection(key: &str, text: &str) -> Result<Selection, Error> {
+    text.parse().map_err(|error: String| Error::at(key, error))
+}
+
+/// Where tasks are done, and with what.
+#[derive(Clone, Debug)]
+pub struct Place {
+    /// The folder that all run folders lie in.
+    pub out: PathBuf,
+    /// Where the data are, if the command line says.
+    pub data: Option<PathBuf>,
+    /// Number of threads in all; `None`: one per core.
+    pub threads: Option<usize>,
+}
+
+impl Place {
+    fn folder(&self, task: &Task) -> PathBuf {
+        self.out.join(&task.name)
+    }
+}
+
+impl Task {
+    /// Everything that its run depends on.
+    fn settings(&self) -> BTreeMap<String, Value> {
+        let json = |value: toml::Value| serde_json::to_value(value).expect("TOML without dates is JSON");
+        let (config, more) = match &self.run {
+            Run::Evolve(config, _) => (config.settings(), Vec::new()),
+            Run::Train(training) => (
+                training.config.settings(),
+                vec![("archive", training.sha256.clone()), ("robots", training.robots.clone())],
+            ),
+        };
+        let config = config.into_iter().filter(|(key, _)| key != "train.challengers");
+        let config = config.map(|(key, value)| (key, json(value)));
+        config.chain(more.into_iter().map(|(key, value)| (key.to_string(), Value::String(value)))).collect()
+    }
+
+    /// What is asked for beyond that: it may grow or change, and the task goes on.
+    fn asked(&self) -> Value {
+        let config = match &self.run {
+            Run::Evolve(config, _) => config,
+            Run::Train(training) => &training.config,
+        };
+        serde_json::json!({ "amount": self.amount(), "validation": config.validation, "steps": self.steps })
+    }
+
+    /// How much of it there is to show on a bar: generations, or challengers.
+    fn amount(&self) -> u64 {
+        match &self.run {
+            Run::Evolve(config, _) => config.generations,
+            Run::Train(training) => training.config.train.challengers as u64,
+        }
+    }
+}
+
+/// Refuses tasks whose folders hold runs of other settings, all at once.
+///
+/// # Errors
+/// Which, and the keys in which they differ.
+pub fn check_folders(tasks: &[Task], place: &Place) -> Result<(), Vec<Error>> {
+    let check = |(number, task): (usize, &Task)| {
+        let path = place.folder(task).join(TASK_JSON);
+        let differing = TaskFile::read(&path).map(|known| known.map(|known| differing(&known, task)));
+        let error = match differing {
+            Ok(None) => return None,
+            Ok(Some(keys)) if keys.is_empty() => return None,
+            Ok(Some(keys)) => {
+                let text =
+                    format!("{}: the run there differs: {}", place.folder(task).display(), keys.join("; "));
+                Error::input(text).hint("move that folder away, or name another with --out".to_string())
+            }
+            Err(error) => error,
+        };
+        Some(error.within(&format!("task {number} ({})", task.name)))
+    };
+    let refused: Vec<Error> = (1..).zip(tasks).filter_map(check).collect();
+    if refused.is_empty() { Ok(()) } else { Err(refused) }
+}
+
+/// The keys in which a folder's run differs from its task, with both values.
+fn differing(known: &TaskFile, task: &Task) -> Vec<String> {
+    let (there, now) = (&known.settings, &task.settings());
+    let value = |settings: &BTreeMap<String, Value>, key: &str| {
+        settings.get(key).map_or("not set".to_string(), ToString::to_string)
+    };
+    let mut keys: Vec<&String> = there.keys().chain(now.keys()).collect();
+    keys.sort();
+    keys.dedup();
+    let differs = |key: &&String| there.get(*key) != now.get(*key);
+    let said = |key: &String| format!("{key} = {} there, {} in the plan", value(there, key), value(now, key));
+    keys.into_iter().filter(differs).map(said).collect()
+}
+
+/// Does a task, or goes on with it.
+///
+/// # Errors
+/// Why it failed; that it was stopped; that another process is at it.
+pub fn run(task: &Task, place: &Place, stop: &AtomicBool, observer: &dyn Observer) -> Result<(), Error> {
+    let folder = place.folder(task);
+    std::fs::create_dir_all(&folder).map_err(|error| Error::writing(&folder, &error))?;
+    let lock = folder.join(LOCK);
+    let _lock = Lock::take(&lock).map_err(|refusal| match refusal {
+        Refusal::Held(holder) => {
+            let by = holder.map_or(String::new(), |holder| format!(" ({holder})"));
+            Error::occupied(format!("{}: another process is at this task{by}", folder.display()))
+                .hint("let it end, or stop it".to_string())
+        }
+        Refusal::Io(error) => Error::writing(&lock, &error),
+    })?;
+    let path = folder.join(TASK_JSON);
+    let known = TaskFile::read(&path)?;
+    if is_done(known.as_ref(), task) {
+        return Ok(());
+    }
+    let mut file = TaskFile::new(task.settings(), task.asked());
+    let before = known.map_or(0.0, |known| known.seconds);
+    file.seconds = before;
+    file.write(&path)?;
+    let began = Instant::now();
+    let ended = steps(task, place, stop, observer);
+    file.seconds = before + began.elapsed().as_secs_f64();
+    (file.progress, file.error) = match &ended {
+        Ok(()) => (Progress::Done, None),
+        Err(error) if error.kind == ErrorKind::Stopped => (Progress::Stopped, None),
+        Err(error) => (Progress::Failed, Some(error.message.clone())),
+    };
+    file.write(&path)?;
+    ended
+}
+
+/// Whether all of a task is done. More generations, or other steps, are still to do.
+fn is_done(known: Option<&TaskFile>, task: &Task) -> bool {
+    known.is_some_and(|known| {
+        known.progress == Progress::Done && known.settings == task.settings() && known.asked == task.asked()
+    })
+}
+
+/// The run, and the steps after it. What was done before is not done again.
+fn steps(task: &Task, place: &Place, stop: &AtomicBool, observer: &dyn Observer) -> Result<(), Error> {
+    let folder = place.folder(task);
+    let stopped = || Error::stopped("stopped; what is done so far is kept".to_string());
+    match &task.run {
+        Run::Evolve(config, name) => {
+            let options = evolve::Options {
+                config: (**config).clone(),
+                name: name.clone(),
+                out: folder.clone(),
+                if_exists: IfExists::Resume,
+                data: place.data.clone(),
+                threads: place.threads,
+                ranks: Ranks::ALONE,
+            };
+            let finished = evolve::evolve(&options, stop, observer).map_err(elsewhere)?;
+            if written(finished.stopped, finished.unwritten)? {
+                return Err(stopped());
+            }
+        }
+        Run::Train(training) => {
+            let options = train::Options {
+                archive: training.archive.clone(),
+                robots: selection("robots", &training.robots)?,
+                groups: training.groups.clone(),
+                seed: Some(training.seed),
+                set: training.set.clone(),
+                name: task.name.clone(),
+                out: folder.clone(),
+                if_exists: IfExists::Resume,
+                data: place.data.clone(),
+                threads: place.threads,
+            };
+            if train::train(&options, stop, observer).map_err(elsewhere)?.validated.is_none() {
+                return Err(stopped());
+            }
+        }
+    }
+    let archive = folder.join(RUN_JSON);
+    if let Some(step) = &task.steps.audit {
+        let robots = match selection("audit.robots", &step.robots)? {
+            Selection::Validated(best) => {
+                let options = validation::Options {
+                    archive: archive.clone(),
+                    best: Some(best),
+                    data: place.data.clone(),
+                    threads: place.threads,
+                };
+                let found = validation::validate(&options, stop, observer)?.ok_or_else(stopped)?;
+                Selection::Ids(found.into_iter().map(|robot| robot.id).collect())
+            }
+            robots => robots,
+        };
+        let options = audit::Options {
+            source: audit::Source::Archive(archive.clone()),
+            robots,
+            seed: 1,
+            criteria: step.criteria.clone(),
+            data: place.data.clone(),
+            out: folder.join(AUDIT_JSON),
+            threads: place.threads,
+            ranks: Ranks::ALONE,
+        };
+        let finished = audit::audit(&options, stop, observer)?;
+        if written(finished.stopped, finished.unwritten)? {
+            return Err(stopped());
+        }
+    }
+    if let Some(step) = &task.steps.eval {
+        let sources = [Source::read(&archive)?];
+        let options = eval::Options {
+            archives: vec![archive],
+            robots: selection("eval.robots", &step.robots)?.physical(step.physical_only),
+            images: step.images,
+            split: step.split,
+            validation: None,
+            seed: 1,
+            threshold: showing::THRESHOLD,
+            cycles: showing::CYCLES,
+            data: place.data.clone(),
+            dataset: None,
+            out: folder.join(eval::own_name(step.split)),
+            threads: place.threads,
+            ranks: Ranks::ALONE,
+        };
+        let known = EvalFile::read(&options.out).ok();
+        let selected = options.robots.describe();
+        if known.is_some_and(|known| is_of(&known, &sources, &options) && known.selected == selected) {
+            return Ok(());
+        }
+        let finished = eval::eval(&options, stop, observer)?;
+        if written(finished.file.stopped, finished.unwritten)? {
+            return Err(stopped());
+        }
+    }
+    Ok(())
+}
+
+/// Tasks have no options of their own, as hints of `evolve` and `train` name them.
+fn elsewhere(error: Error) -> Error {
+    match &error.hint {
+        Some(hint) if hint.contains("--force") || hint.contains("--resume") => {
+            error.hint("move that folder away, or name another with --out".to_string())
+        }
+        _ => error,
+    }
+}
+
+/// Whether an evaluation is whole, and of these runs and images; its robots are another question.
+pub(crate) fn is_of(known: &EvalFile, sources: &[Source], options: &eval::Options) -> bool {
+    let runs: Vec<RunRef> = sources.iter().map(|source| RunRef::new(&source.run)).collect();
+    let same = (known.seed, known.split, known.images.len(), known.threshold)
+        == (options.seed, options.split, options.images, options.threshold);
+    let is_ours = known.program_version == env!("CARGO_PKG_VERSION");
+    is_ours && !known.stopped && known.trained_on.is_none() && known.runs == runs && same
+}
+
+/// What later steps read from its file, which must be there.
+pub(crate) fn written<T>(found: T, unwritten: Option<Error>) -> Result<T, Error> {
+    match unwritten {
+        None => Ok(found),
+        Some(error) => {
+            let hint = error.hint.clone().map_or(String::new(), |hint| format!("{hint}; "));
+            Err(error.hint(format!("{hint}the same command goes on")))
+        }
+    }
+}
+
+/// How tasks ended.
+#[derive(Clone, Debug, Default)]
+pub struct Summary {
+    /// Tasks that are done, now or before.
+    pub done: usize,
+    /// Numbers of the tasks that failed.
+    pub failed: Vec<usize>,
+    /// Tasks that other processes are at.
+    pub elsewhere: usize,
+    /// Tasks that were stopped or did not begin.
+    pub open: usize,
+}
+
+/// Does all tasks here, `jobs` at once; `None`: one per core. One that fails does not stop others.
+///
+/// # Errors
+/// If the folder cannot be made.
+pub fn run_all(
+    tasks: &[Task],
+    place: &Place,
+    jobs: Option<usize>,
+    stop: &AtomicBool,
+    observer: &dyn Observer,
+) -> Result<Summary, Error> {
+    std::fs::create_dir_all(&place.out).map_err(|error| Error::writing(&place.out, &error))?;
+    let is_open = |task: &&Task| {
+        let known = TaskFile::read(&place.folder(task).join(TASK_JSON)).ok().flatten();
+        !is_done(known.as_ref(), task)
+    };
+    let numbered: Vec<(usize, &Task)> = (1..).zip(tasks).filter(|(_, task)| is_open(task)).collect();
+    let before = tasks.len() - numbered.len();
+    let cores = || std::thread::available_parallelism().map_or(1, usize::from);
+    let threads = place.threads.unwrap_or_else(cores);
+    let jobs = jobs.unwrap_or(threads).min(numbered.len()).max(1);
+    let place = Place { threads: Some((threads / jobs).max(1)), ..place.clone() };
+    let total = tasks.iter().map(Task::amount).sum();
+    let known: u64 = total - numbered.iter().map(|(_, task)| task.amount()).sum::<u64>();
+    if !numbered.is_empty() {
+        let label = format!("{} of {} tasks, {jobs} at once:", numbered.len(), tasks.len());
+        observer.begins(&Work { label, total, known, unit: "generations" });
+    }
+    let all = All { observer, known, parts: numbered.iter().map(|_| AtomicU64::new(0)).collect() };
+    let next = AtomicUsize::new(0);
+    let summary = Mutex::new(Summary { done: before, ..Summary::default() });
+    let worker = || {
+        while !stop.load(Ordering::Relaxed) {
+            let index = next.fetch_add(1, Ordering::Relaxed);
+            let Some((number, task)) = numbered.get(index) else { break };
+            let part = Part { all: &all, index, amount: task.amount(), name: &task.name };
+            let ended = catch_unwind(AssertUnwindSafe(|| run(task, &place, stop, &part)));
+            let ended = ended.unwrap_or_else(|_| {
+                Err(Error::other("a bug of morphcog; what it said stands above".to_string()))
+            });
+            let mut summary = summary.lock().unwrap_or_else(PoisonError::into_inner);
+            match ended {
+                Ok(()) => {
+                    summary.done += 1;
+                    part.is_at(part.amount);
+                    observer.note(&format!(
+                        "task {number} ({}): done, {} of {}",
+                        task.name,
+                        summary.done,
+                        tasks.len()
+                    ));
+                }
+                Err(error) if error.kind == ErrorKind::Stopped => {}
+                Err(error) if error.kind == ErrorKind::Occupied => summary.elsewhere += 1,
+                Err(error) => {
+                    let hint = error.hint.as_ref().map_or(String::new(), |hint| format!("; {hint}"));
+                    observer.warning(&format!("task {number} ({}) failed: {error}{hint}", task.name));
+                    summary.failed.push(*number);
+                }
+            }
+        }
+    };
+    std::thread::scope(|scope| {
+        for _ in 0..jobs {
+            scope.spawn(worker);
+        }
+    });
+    let mut summary = summary.into_inner().unwrap_or_else(PoisonError::into_inner);
+    summary.failed.sort_unstable();
+    summary.open = tasks.len() - summary.done - summary.failed.len() - summary.elsewhere;
+    Ok(summary)
+}
+
+/// One progress over all tasks.
+struct All<'o> {
+    observer: &'o dyn Observer,
+    /// Generations of tasks that were done before.
+    known: u64,
+    /// Generations done of each other task.
+    parts: Vec<AtomicU64>,
+}
+
+/// A task's part in it.
+struct Part<'a, 'o> {
+    all: &'a All<'o>,
+    index: usize,
+    amount: u64,
+    name: &'a str,
+}
+
+impl Part<'_, '_> {
+    fn is_at(&self, done: u64) {
+        let All { observer, known, parts } = self.all;
+        parts[self.index].fetch_max(done.min(self.amount), Ordering::Relaxed);
+        observer.progress(known + parts.iter().map(|part| part.load(Ordering::Relaxed)).sum::<u64>());
+    }
+}
+
+impl Observer for Part<'_, '_> {
+    fn generation(&self, generation: &Generation) {
+        self.is_at(generation.done);
+    }
+
+    fn finding(&self, _kind: &str, fields: &Value) {
+        if let Some(challenger) = fields.get("challenger").and_then(Value::as_u64) {
+            self.is_at(challenger);
+        }
+    }
+
+    fn warning(&self, text: &str) {
+        self.all.observer.warning(&format!("{}: {text}", self.name));
+    }
+}
+
+/// How far a task is, as its folder says.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Status {
+    /// Its number, from 1.
+    pub task: usize,
+    /// Its name.
+    pub name: String,
+    /// How far it is.
+    pub state: State,
+    /// Generations done, of how many; none for a training.
+    pub generations: Option<[u64; 2]>,
+    /// Wall-clock time so far \[s\]; of a running task, that of its run as far as it is written.
+    pub seconds: Option<f64>,
+    /// Time it will probably take still \[s\], as far as that is known.
+    pub seconds_left: Option<f64>,
+    /// What it failed with, or who is at it.
+    pub about: Option<String>,
+}
+
+/// How far a task is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum State {
+    /// All of it is done.
+    Done,
+    /// A process is at it.
+    Running,
+    /// It began, and nobody is at it.
+    Stopped,
+    /// It failed.
+    Failed,
+    /// It has not begun.
+    Waiting,
+}
+
+impl State {
+    /// All of them, with what they are called.
+    pub const ALL: [(State, &str); 5] = [
+        (State::Done, "done"),
+        (State::Running, "running"),
+        (State::Stopped, "stopped"),
+        (State::Failed, "failed"),
+        (State::Waiting, "waiting"),
+    ];
+
+    /// What it is called.
+    pub fn name(self) -> &'static str {
+        State::ALL.iter().find(|(state, _)| *state == self).map_or("", |(_, name)| name)
+    }
+}
+
+/// How far all tasks are.
+///
+/// # Errors
+/// If a folder cannot be read.
+pub fn status(tasks: &[Task], place: &Place) -> Result<Vec<Status>, Error> {
+    let mut all = Vec::new();
+    for (number, task) in (1..).zip(tasks) {
+        all.push(status_of(number, task, &place.folder(task))?);
+    }
+    // A task of which nothing else is known takes as long as those that are done.
+    let done: Vec<f64> = all.iter().filter(|s| s.state == State::Done).filter_map(|s| s.seconds).collect();
+    let mean = (!done.is_empty()).then(|| done.iter().sum::<f64>() / done.len() as f64);
+    for status in all.iter_mut().filter(|s| s.state != State::Done && s.seconds_left.is_none()) {
+        status.seconds_left = mean.map(|mean| (mean - status.seconds.unwrap_or(0.0)).max(0.0));
+    }
+    Ok(all)
+}
+
+fn status_of(number: usize, task: &Task, folder: &Path) -> Result<Status, Error> {
+    let known = TaskFile::read(&folder.join(TASK_JSON))?;
+    let held = lock::state(&folder.join(LOCK)).unwrap_or(lock::State::Free);
+    let (state, about) = match (&known, held) {
+        (_, lock::State::Held(holder)) => (State::Running, holder.map(|holder| holder.to_string())),
+        (None, _) => (State::Waiting, None),
+        (Some(known), _) if is_done(Some(known), task) => (State::Done, None),
+        (Some(TaskFile { progress: Progress::Failed, error, .. }), _) => (State::Failed, error.clone()),
+        (Some(TaskFile { progress: Progress::Running, .. }), lock::State::Stale(holder)) => {
+            (State::Stopped, Some(format!("{holder} was ended")))
+        }
+        (Some(_), _) => (State::Stopped, None),
+    };
+    let (generations, of_run) = match &task.run {
+        Run::Evolve(config, _) => {
+            let (done, seconds) = last_generation(&folder.join(METRICS)).unwrap_or((0, 0.0));
+            (Some([done, config.generations]), Some((done, seconds)).filter(|_| state != State::Waiting))
+        }
+        Run::Train(_) => (None, None),
+    };
+    let seconds = match (state, of_run) {
+        (State::Waiting, _) => None,
+        (State::Running, Some((_, seconds))) => Some(seconds),
+        _ => known.map(|known| known.seconds),
+    };
+    let left = |(done, seconds): (u64, f64)| {
+        let todo = task.amount().saturating_sub(done);
+        (done > 0 && todo > 0).then(|| seconds * todo as f64 / done as f64)
+    };
+    let seconds_left = if state == State::Done { Some(0.0) } else { of_run.and_then(left) };
+    Ok(Status { task: number, name: task.name.clone(), state, generations, seconds, seconds_left, about })
+}
+
+/// Generations that a metrics.csv has, and the wall-clock time they took \[s\].
+fn last_generation(path: &Path) -> Option<(u64, f64)> {
+    let text = std::fs::read(path).ok()?;
+    let text = String::from_utf8_lossy(&text);
+    let line = text.split_inclusive('\n').rfind(|line| line.ends_with('\n'))?.trim_end();
+    let generation: u64 = line.split(',').next()?.parse().ok()?;
+    Some((generation + 1, line.rsplit(',').next()?.parse().ok()?))
+}

@@ -1,0 +1,141 @@
+//! What `sweep` and `reproduce` say of their tasks.
+
+use crate::base::error::Error;
+use crate::base::files::write_atomically;
+use crate::base::number;
+use crate::base::number::percent;
+use crate::commands::collect::{Collected, Row, csv};
+use crate::commands::plot::alike;
+use crate::commands::tasks::{State, Status};
+use crate::view::console::{Console, Mode};
+use crate::view::error::write_whole;
+use crate::view::plot;
+use crate::view::plot::{Figure, PRINT};
+use crate::view::progress::duration;
+use std::path::Path;
+
+/// How far tasks are: a line per task, and how many there are of each kind.
+pub fn status(console: &Console, all: &[Status]) {
+    if console.mode() == Mode::Json {
+        return all.iter().for_each(|status| console.event("task", status));
+    }
+    let time = |seconds: Option<f64>| seconds.map_or("–".to_string(), duration);
+    let row = |status: &Status| {
+        let generations = status.generations.map(|[done, of]| format!("{done}/{of}"));
+        vec![
+            status.task.to_string(),
+            status.name.clone(),
+            status.state.name().to_string(),
+            generations.unwrap_or("–".to_string()),
+            time(status.seconds),
+            if status.state == State::Done { "–".to_string() } else { time(status.seconds_left) },
+            status.about.clone().unwrap_or_default(),
+        ]
+    };
+    let headers = ["task", "name", "state", "generations", "time", "left", ""];
+    console.table(&headers, &all.iter().map(row).collect::<Vec<_>>());
+    console.line("");
+    console.line(&in_short(all));
+}
+
+/// How many tasks are done, running, and so on, and the computing time left.
+fn in_short(all: &[Status]) -> String {
+    let count = |state: State| all.iter().filter(|status| status.state == state).count();
+    let counts = State::ALL.map(|(state, name)| (count(state), name));
+    let counts = counts.iter().filter(|(count, _)| *count > 0).map(|(count, name)| format!("{count} {name}"));
+    let counts = counts.collect::<Vec<_>>().join(", ");
+    let open = || all.iter().filter(|status| status.state != State::Done);
+    let left: Option<f64> = open().map(|status| status.seconds_left).sum();
+    let left = match left {
+        Some(left) if open().count() > 0 => format!("; about {} of task time left", duration(left)),
+        _ => String::new(),
+    };
+    format!("{} tasks: {counts}{left}", all.len())
+}
+
+/// Writes what a sweep found, and says it.
+///
+/// # Errors
+/// If a file cannot be written.
+pub fn collected(
+    console: &Console,
+    name: &str,
+    found: &Collected,
+    status: &[Status],
+    out: &Path,
+) -> Result<(), Error> {
+    let path = out.join("sweep.csv");
+    std::fs::create_dir_all(out).map_err(|error| Error::writing(out, &error))?;
+    write_atomically(&path, &csv(&found.rows)).map_err(|error| Error::writing(&path, &error))?;
+    table(console, &found.rows);
+    console.line("");
+    console.line(&format!("wrote {}", path.display()));
+    let draw = |stem: &str, figure: Figure| -> Result<(), Error> {
+        for (ending, bytes) in [("svg", figure.svg().into_bytes()), ("png", figure.png(PRINT)?)] {
+            let path = out.join(format!("{stem}.{ending}"));
+            write_whole(&path, &bytes)?;
+            console.line(&format!("wrote {}", path.display()));
+        }
+        Ok(())
+    };
+    if let Some(figure) = plot::sweep(name, &found.rows) {
+        draw("sweep-accuracy", figure)?;
+    }
+    if !found.progress.is_empty() {
+        draw("sweep-progress", plot::progress(&found.progress))?;
+        differences(console, &found.progress);
+    }
+    let open = status.iter().filter(|status| status.state != State::Done).count();
+    if open > 0 {
+        console.warning(&format!("this is not all: {}", in_short(status)));
+    }
+    Ok(())
+}
+
+fn table(console: &Console, rows: &[Row]) {
+    let row = |row: &Row| {
+        let run = row.run.as_ref();
+        let share = |share: Option<f64>| share.map_or("–".to_string(), percent);
+        let tested = run.and_then(|run| run.tested.as_ref());
+        let interval = tested.and_then(|tested| tested.interval);
+        vec![
+            row.number.to_string(),
+            row.name.clone(),
+            row.state.name().to_string(),
+            run.map_or("–".to_string(), |run| run.recognises.clone()),
+            run.and_then(|run| run.obj_max).map_or("–".to_string(), |best| number::fixed(best, 2)),
+            share(run.and_then(|run| run.validation)),
+            run.and_then(|run| run.audited)
+                .map_or("–".to_string(), |[all, good]| format!("{good} of {all}")),
+            share(tested.map(|tested| tested.accuracy)),
+            interval.map_or("–".to_string(), |[low, high]| format!("{}–{}", percent(low), percent(high))),
+        ]
+    };
+    let headers = [
+        "task",
+        "name",
+        "state",
+        "classes",
+        "fitness",
+        "validation %",
+        "physical",
+        "accuracy %",
+        "95 % interval",
+    ];
+    console.table(&headers, &rows.iter().map(row).collect::<Vec<_>>());
+}
+
+/// The keys in which runs differ, a line per group that differs in nothing but the seed.
+pub fn differences(console: &Console, runs: &[crate::commands::plot::Progress]) {
+    let (keys, groups) = alike(runs);
+    if groups.len() < 2 || console.mode() != Mode::Human {
+        return;
+    }
+    console.line("");
+    let headers: Vec<&str> = ["line", "runs"].into_iter().chain(keys.iter().map(String::as_str)).collect();
+    let row = |(number, group): (usize, &crate::commands::plot::Group)| {
+        let values = group.values.iter().map(|value| value.clone().unwrap_or("–".to_string()));
+        [number.to_string(), group.runs.len().to_string()].into_iter().chain(values).collect::<Vec<_>>()
+    };
+    console.table(&headers, &(1..).zip(&groups).map(row).collect::<Vec<_>>());
+}
