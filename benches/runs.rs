@@ -98,6 +98,7 @@ fn bookkeeping(criterion: &mut Criterion) {
         if_exists: IfExists::Refuse,
         data: None,
         threads: None,
+        ranks: morphcog::base::ranks::Ranks::ALONE,
     };
     let run: RunFile = evolve(&options, &AtomicBool::new(false), &()).expect("the run ends").run;
     let mut known_bodies = KnownBodies::default();

@@ -260,6 +260,7 @@ fn what_a_stopped_audit_was_done_with_is_kept() {
         data: None,
         out: sandbox.path("run/audit.json"),
         threads: Some(1),
+        ranks: morphcog::base::ranks::Ranks::ALONE,
     };
     let ended = morphcog::commands::audit::audit(&options, &impatient.stop, &impatient).unwrap();
     assert!(ended.stopped);

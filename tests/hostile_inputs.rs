@@ -265,6 +265,7 @@ fn run(world: &World, dice: &mut Dice, case: &mut Case) {
         dataset: None,
         out: folder.join("other.json"),
         threads: Some(1),
+        ranks: morphcog::base::ranks::Ranks::ALONE,
     };
     let stop = Arc::new(AtomicBool::new(false));
     let ended = {
@@ -359,6 +360,7 @@ fn checkpoint(world: &World, dice: &mut Dice, case: &mut Case) {
         if_exists: IfExists::Resume,
         data: None,
         threads: Some(1),
+        ranks: morphcog::base::ranks::Ranks::ALONE,
     };
     let resumed = evolve::evolve(&options, &AtomicBool::new(true), &());
     // What is wrong with the run is told with its folder.

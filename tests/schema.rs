@@ -7,8 +7,18 @@ use jsonschema::Validator;
 use serde_json::{Value, json};
 use std::path::Path;
 
-const NAMES: [&str; 9] =
-    ["config", "plan", "audit-config", "capacity-config", "run", "eval", "audit", "response", "capacity"];
+const NAMES: [&str; 10] = [
+    "config",
+    "sweep",
+    "plan",
+    "audit-config",
+    "capacity-config",
+    "run",
+    "eval",
+    "audit",
+    "response",
+    "capacity",
+];
 
 /// The schema of a name, as printed.
 fn schema(sandbox: &Sandbox, name: &str) -> Value {
@@ -40,7 +50,7 @@ fn every_schema_is_one_and_has_a_name_a_version_and_a_description_of_every_key()
         assert_eq!(schema["$id"], format!("morphcog-{name}-1.schema.json"));
         undescribed(&schema, name);
     }
-    sandbox.run("schema rnu").ended(2, &["schema rnu: expected one of config, plan"]);
+    sandbox.run("schema rnu").ended(2, &["schema rnu: expected one of config, sweep, plan"]);
 }
 
 /// Every key has a description, and none has marks of Rust's documentation.

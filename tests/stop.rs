@@ -157,6 +157,7 @@ fn a_run_stopped_at_any_moments_goes_on_to_the_same_bytes() {
             if_exists: IfExists::Resume,
             data: None,
             threads: Some(2),
+            ranks: morphcog::base::ranks::Ranks::ALONE,
         };
         let (mut random, mut stops) = (9_u64, 0);
         loop {

@@ -248,6 +248,7 @@ fn evolve_itself_chooses_robots_at_its_end_and_so_whatever_calls_it() {
         if_exists: IfExists::Refuse,
         data: None,
         threads: Some(1),
+        ranks: morphcog::base::ranks::Ranks::ALONE,
     };
     let finished = evolve(&options("library"), &AtomicBool::new(false), &Quiet(None)).unwrap();
     assert!(!finished.stopped);

@@ -15,7 +15,16 @@ pub const PROGRAM: &str = env!("CARGO_BIN_EXE_morphcog");
 /// No command of a test may take longer.
 const LIMIT: Duration = Duration::from_secs(120);
 /// What the environment of the tests must not decide.
-pub const SETTINGS: [&str; 5] = ["MORPHCOG_DATA", "MORPHCOG_ISA", "NO_COLOR", "TERM", "RAYON_NUM_THREADS"];
+pub const SETTINGS: [&str; 8] = [
+    "MORPHCOG_DATA",
+    "MORPHCOG_ISA",
+    "NO_COLOR",
+    "TERM",
+    "RAYON_NUM_THREADS",
+    "HQ_TASK_ID",
+    "SLURM_ARRAY_TASK_ID",
+    "PBS_ARRAY_INDEX",
+];
 
 /// A tiny run that still does everything: two digits, bodies of 5 × 5, a fifth of a second.
 pub const TINY: &str = r#"
@@ -153,6 +162,12 @@ pub fn said(mut command: Command) -> Said {
     assert!(!said.err.contains("panicked") && said.code != Some(101), "{said:#?}");
     assert!(said.code.is_some(), "ended by a signal: {said:#?}");
     said
+}
+
+/// Asks a program that was started to end, as Slurm does.
+pub fn terminate(child: &std::process::Child) {
+    let sent = std::process::Command::new("kill").args(["-s", "USR1", &child.id().to_string()]).status();
+    assert!(sent.unwrap().success());
 }
 
 /// All files of a folder with their content, to compare.

@@ -1,0 +1,76 @@
+# Slurm on this machine alone, as root: an array job; tasks killed; SIGUSR1 before the time limit, 75, requeue, end.
+if ! command -v sbatch > /dev/null || [ "$(id -u)" != 0 ]; then
+  echo "skipped: Slurm is not installed, or this is not root"
+else
+  mkdir -p /etc/munge /run/munge state spool
+  if [ ! -s /etc/munge/munge.key ]; then
+    head -c 1024 /dev/urandom > /etc/munge/munge.key
+  fi
+  chown -R munge /etc/munge /run/munge /var/log/munge /var/lib/munge
+  chmod 400 /etc/munge/munge.key
+  chmod 755 /run/munge
+  pgrep -x munged > /dev/null || { setpriv --reuid munge --regid munge --init-groups munged --foreground > munged.log 2>&1 & pids+=($!); }
+  name=$(hostname -s)
+  cat > slurm.conf <<EOF
+ClusterName=here
+SlurmctldHost=$name(127.0.0.1)
+AuthType=auth/munge
+ProctrackType=proctrack/linuxproc
+TaskPlugin=task/none
+SelectType=select/cons_tres
+SelectTypeParameters=CR_Core
+SlurmUser=root
+SlurmdUser=root
+ReturnToService=2
+KillWait=5
+StateSaveLocation=$PWD/state
+SlurmdSpoolDir=$PWD/spool
+SlurmctldPidFile=$PWD/slurmctld.pid
+SlurmdPidFile=$PWD/slurmd.pid
+SlurmctldLogFile=$PWD/slurmctld.log
+SlurmdLogFile=$PWD/slurmd.log
+NodeName=$name NodeAddr=127.0.0.1 CPUs=2 State=UNKNOWN
+PartitionName=all Nodes=ALL Default=YES MaxTime=INFINITE State=UP
+EOF
+  export SLURM_CONF="$PWD/slurm.conf"
+  slurmctld -D > /dev/null 2>&1 &
+  pids+=($!)
+  slurmd -D > /dev/null 2>&1 &
+  pids+=($!)
+  for _ in $(seq 60); do
+    if sinfo -h -o %T 2> /dev/null | grep -q idle; then break; fi
+    sleep 0.5
+  done
+  sinfo -h -o %T | grep -q idle || { tail -20 slurmctld.log slurmd.log; exit 1; }
+  # Waits until no job is left; those that wait for their turn after a requeue are told not to.
+  finished() {
+    for _ in $(seq "$1"); do
+      squeue -h -t PENDING -o %A | while read -r job; do scontrol update "JobId=$job" StartTime=now 2> /dev/null || true; done
+      if [ -z "$(squeue -h)" ]; then return 0; fi
+      sleep 1
+    done
+    squeue
+    return 1
+  }
+  # The page's commands.
+  while read -r command; do bash -c "$command"; done < <(commands Slurm)
+  finished 120 || { cat runs/plan/slurm-*.log; exit 1; }
+  same "$work/slurm/runs/plan" "Slurm" || { cat runs/plan/slurm-*.log; exit 1; }
+  # The signal before a time limit: of a minute, 45 seconds before its end; a run of more than a minute.
+  mkdir limit
+  plan limit 1500
+  morphcog sweep limit/plan.toml --set 'seeds=[1]' --out limit/runs --slurm > limit/job.sh
+  sbatch --time=1 --signal=B:USR1@45 limit/job.sh
+  # A task is killed, and the job is submitted again.
+  rm -r runs
+  morphcog sweep plan.toml --slurm > job.sh
+  sbatch job.sh
+  killer "$work/slurm/.*runs/plan .* --task" 3
+  finished 240 || { cat limit/runs/slurm-*.log; exit 1; }
+  sbatch job.sh
+  finished 120 || { cat runs/plan/slurm-*.log; exit 1; }
+  same "$work/slurm/runs/plan" "Slurm, tasks killed" || { cat runs/plan/slurm-*.log; exit 1; }
+  grep -q 'stopped; ' limit/runs/slurm-1.log || { cat limit/runs/slurm-1.log; exit 1; }
+  morphcog sweep limit/plan.toml --set 'seeds=[1]' --out limit/runs --status | grep -q '1 tasks: 1 done'
+  echo "Slurm: stopped before the time limit $(grep -c 'stopped; ' limit/runs/slurm-1.log) times, requeued, done ($((SECONDS - begin)) s)"
+fi

@@ -1,0 +1,325 @@
+//! Sweeps: every combination once, the same bytes however and wherever its tasks are done, and clear
+//! words on what is wrong.
+
+mod common;
+
+use common::program::{PROGRAM, SETTINGS, Sandbox, TINY, files, said};
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+const PLAN: &str = r#"
+config = "tiny.toml"
+seeds = [1, 2]
+
+[vary]
+map_elites.parents = [4, 8]
+
+[audit.criteria]
+least_walk = 0.0
+threshold = 0.0
+
+[eval]
+robots = "top:2"
+images = 20
+"#;
+
+const TASKS: [&str; 4] =
+    ["tiny-parents=4-seed1", "tiny-parents=4-seed2", "tiny-parents=8-seed1", "tiny-parents=8-seed2"];
+
+fn sandbox() -> Sandbox {
+    let sandbox = Sandbox::tiny();
+    sandbox.write("plan.toml", PLAN);
+    sandbox
+}
+
+/// What does not depend on the clock, of every task.
+fn results(sandbox: &Sandbox, out: &str) -> BTreeMap<String, Vec<u8>> {
+    let mut all = BTreeMap::new();
+    for task in TASKS {
+        for (name, content) in files(&sandbox.path(&format!("{out}/{task}"))) {
+            if ["run.json", "elites.csv", "audit.json", "eval.json"].contains(&name.as_str()) {
+                all.insert(format!("{task}/{name}"), content);
+            }
+        }
+    }
+    all
+}
+
+/// The states of all tasks.
+fn states(sandbox: &Sandbox, out: &str) -> Vec<String> {
+    let said = sandbox.run(&format!("sweep plan.toml --out {out} --status --json")).ended(0, &[]);
+    said.json_lines().iter().map(|line| line["state"].as_str().unwrap().to_string()).collect()
+}
+
+#[test]
+fn every_combination_is_run_and_a_second_call_has_nothing_left_to_do() {
+    let sandbox = sandbox();
+    assert_eq!(states(&sandbox, "all"), ["waiting"; 4]);
+    sandbox.run("sweep plan.toml --out all --jobs 2 --threads 2").ended(0, &["task 4", "4 of 4"]);
+    let all = results(&sandbox, "all");
+    assert_eq!(all.len(), 4 * 4, "{:?}", all.keys());
+    assert_eq!(states(&sandbox, "all"), ["done"; 4]);
+    let run = sandbox.run_file("all/tiny-parents=4-seed2");
+    assert_eq!((run.config.seed, run.config.map_elites.parents), (2, 4));
+    let before = files(&sandbox.path("all").join(TASKS[0]));
+    let said = sandbox.run("sweep plan.toml --out all").ended(0, &[]);
+    assert!(said.out.contains("4 tasks are done") && !said.err.contains("task 1"), "{said:?}");
+    assert_eq!(files(&sandbox.path("all").join(TASKS[0])), before);
+    // The same as a run of one's own.
+    sandbox.run("evolve -q -c tiny.toml --seed 2 --set map_elites.parents=4 -o own").ended(0, &[]);
+    assert_eq!(sandbox.read("own/run.json").as_bytes(), all["tiny-parents=4-seed2/run.json"]);
+}
+
+#[test]
+fn tasks_done_one_by_one_or_killed_at_any_moment_make_the_same_bytes() {
+    let sandbox = sandbox();
+    sandbox.run("sweep plan.toml --out all -q").ended(0, &[]);
+    let all = results(&sandbox, "all");
+    // By number, and by the numbers of engines.
+    sandbox.run("sweep plan.toml --out alone --task 2 --threads 1").ended(0, &[]);
+    for (name, number) in [("SLURM_ARRAY_TASK_ID", "1"), ("HQ_TASK_ID", "3"), ("PBS_ARRAY_INDEX", "4")] {
+        let mut command = sandbox.command("sweep plan.toml --out alone --task".split(' '));
+        command.env(name, number);
+        let ended = said(command).ended(0, &[]);
+        assert!(ended.out.contains(&format!("task {number} ")), "{ended:?}");
+    }
+    assert_eq!(results(&sandbox, "alone"), all);
+    // Killed, again and again.
+    let mut pause = Duration::from_millis(20);
+    for _ in 0..8 {
+        let mut child = sandbox.start("sweep plan.toml --out killed -q");
+        std::thread::sleep(pause);
+        child.kill().unwrap();
+        child.wait().unwrap();
+        pause += Duration::from_millis(35);
+    }
+    sandbox.run("sweep plan.toml --out killed -q").ended(0, &[]);
+    assert_eq!(results(&sandbox, "killed"), all);
+}
+
+#[test]
+fn listed_commands_do_the_tasks_from_any_folder() {
+    let sandbox = sandbox();
+    sandbox.run("sweep plan.toml --out all -q").ended(0, &[]);
+    let list = sandbox.run("sweep plan.toml --out elsewhere --list").ended(0, &[]).out;
+    assert_eq!(list.lines().count(), 4);
+    let away = tempfile::tempdir().unwrap();
+    for line in list.lines() {
+        assert!(line.starts_with(PROGRAM), "{line}");
+        let mut command = std::process::Command::new("sh");
+        command.current_dir(away.path()).args(["-c", line]);
+        SETTINGS.iter().for_each(|name| {
+            command.env_remove(name);
+        });
+        let output = command.output().unwrap();
+        assert!(output.status.success(), "{line}: {}", String::from_utf8_lossy(&output.stderr));
+    }
+    assert_eq!(results(&sandbox, "elsewhere"), results(&sandbox, "all"));
+    assert_eq!(std::fs::read_dir(away.path()).unwrap().count(), 0);
+    let script = sandbox.run("sweep plan.toml --out elsewhere --slurm").ended(0, &[]).out;
+    assert!(script.starts_with("#!/bin/bash\n") && script.contains("#SBATCH --array=1-4\n"), "{script}");
+    assert!(script.contains("--requeue") && script.contains("--task &"), "{script}");
+}
+
+#[test]
+fn what_is_wrong_is_said_all_at_once_before_anything_starts() {
+    let sandbox = sandbox();
+    sandbox.run("sweep nowhere.toml").ended(3, &["nowhere.toml", "cannot be read"]);
+    sandbox.run("sweep plan.toml --set seeds=[1,1]").ended(3, &["--set seeds=[1,1]: seeds", "different"]);
+    sandbox.write("bad.toml", PLAN.replace("[4, 8]", "[0, 8]\ngenerations = [0, 5]"));
+    let said = sandbox.run("sweep bad.toml").ended(
+        3,
+        &[
+            "task 1 (tiny-generations=0-parents=0-seed1) and 3 more: --set generations=0",
+            "task 5 (tiny-generations=5-parents=0-seed1) and 1 more: --set map_elites.parents=0",
+        ],
+    );
+    assert_eq!(said.err.matches("error:").count(), 2, "{}", said.err);
+    sandbox.write("typo.toml", PLAN.replace("seeds", "seed"));
+    sandbox.run("sweep typo.toml").ended(3, &["typo.toml:3", "seed"]);
+    sandbox.run("sweep plan.toml --task 5").ended(2, &["--task 5", "1 to 4"]);
+    sandbox.run("sweep plan.toml --task").ended(2, &["HQ_TASK_ID, SLURM_ARRAY_TASK_ID, PBS_ARRAY_INDEX"]);
+    sandbox.run("sweep plan.toml --task 1 --list").ended(2, &["--list"]);
+    assert!(!sandbox.path("runs").exists());
+}
+
+#[test]
+fn a_changed_plan_keeps_what_is_done_and_refuses_other_settings_with_their_keys() {
+    let sandbox = sandbox();
+    sandbox.run("sweep plan.toml --out all -q").ended(0, &[]);
+    let before = results(&sandbox, "all");
+    // More seeds, and another order: names stay, numbers do not.
+    sandbox.write("plan.toml", PLAN.replace("[1, 2]", "[5, 2, 1]").replace("[4, 8]", "[8, 4]"));
+    let said = sandbox.run("sweep plan.toml --out all").ended(0, &["6 of 6"]);
+    assert!(!said.err.contains("seed1)") && said.err.contains("tiny-parents=4-seed5"), "{}", said.err);
+    assert_eq!(results(&sandbox, "all"), before);
+    // More generations go on; another step is done.
+    sandbox.write("plan.toml", PLAN.replace("\nseeds", "\nset = [\"generations=20\"]\nseeds"));
+    assert_eq!(states(&sandbox, "all"), ["stopped"; 4]);
+    sandbox.run("sweep plan.toml --out all -q").ended(0, &[]);
+    assert_eq!(sandbox.run_file("all/tiny-parents=8-seed1").generations, 20);
+    // Other bodies are other runs.
+    let other = PLAN.replace("\nseeds", "\nset = [\"body.height=4\", \"task.groups=[[0],[7]]\"]\nseeds");
+    sandbox.write("plan.toml", other);
+    let before = results(&sandbox, "all");
+    let said = sandbox.run("sweep plan.toml --out all").ended(
+        3,
+        &[
+            "task 1 (tiny-parents=4-seed1): ",
+            "body.height = 5 there, 4 in the plan; task.groups = [[0],[1]] there, [[0],[7]] in the plan",
+            "task 4",
+        ],
+    );
+    assert_eq!(said.err.matches("error:").count(), 4, "{}", said.err);
+    assert_eq!(results(&sandbox, "all"), before);
+}
+
+#[test]
+fn a_task_that_fails_does_not_stop_the_others_and_is_tried_again() {
+    let sandbox = sandbox();
+    let broken = sandbox.path("all").join(TASKS[1]);
+    sandbox.write(&format!("all/{}/run.json", TASKS[1]), "{}");
+    let said =
+        sandbox.run("sweep plan.toml --out all").ended(1, &["task 2", "1 of 4 tasks failed: 2; 3 are done"]);
+    assert!(!said.err.contains("--force"), "hints are those of a sweep: {}", said.err);
+    assert_eq!(states(&sandbox, "all"), ["done", "failed", "done", "done"]);
+    let status = sandbox.run("sweep plan.toml --out all --status").ended(0, &[]).out;
+    assert!(status.contains("4 tasks: 3 done, 1 failed; about"), "{status}");
+    sandbox.run("sweep plan.toml --out all --task 2").ended(3, &[]);
+    std::fs::remove_file(broken.join("run.json")).unwrap();
+    sandbox.run("sweep plan.toml --out all -q").ended(0, &[]);
+    assert_eq!(states(&sandbox, "all"), ["done"; 4]);
+}
+
+/// Waits until a file is there.
+fn wait_for(path: &Path) {
+    let begin = Instant::now();
+    while !path.exists() {
+        assert!(begin.elapsed() < Duration::from_secs(60), "{}", path.display());
+        std::thread::sleep(Duration::from_millis(5));
+    }
+}
+
+#[test]
+fn a_task_is_one_process_s_and_a_stopped_one_says_so() {
+    let sandbox = sandbox();
+    sandbox.write("plan.toml", PLAN.replace("\nseeds", "\nset = [\"generations=1000000\"]\nseeds"));
+    let task = |number: u32| format!("sweep plan.toml --out all --task {number}");
+    let mut first = sandbox.start(&task(1));
+    wait_for(&sandbox.path("all").join(TASKS[0]).join("task.json"));
+    sandbox.run(&task(1)).ended(5, &["another process is at this task (process "]);
+    assert_eq!(states(&sandbox, "all"), ["running", "waiting", "waiting", "waiting"]);
+    first.kill().unwrap();
+    first.wait().unwrap();
+    assert_eq!(states(&sandbox, "all"), ["stopped", "waiting", "waiting", "waiting"]);
+    for number in [1, 2] {
+        let mut child = sandbox.start(&task(number));
+        wait_for(&sandbox.path("all").join(TASKS[number as usize - 1]).join("checkpoint.json"));
+        common::program::terminate(&child);
+        let ended = child.wait().unwrap();
+        assert_eq!(ended.code(), Some(75));
+    }
+    assert_eq!(states(&sandbox, "all"), ["stopped", "stopped", "waiting", "waiting"]);
+    // All of them at once, too.
+    let mut child = sandbox.start("sweep plan.toml --out all");
+    std::thread::sleep(Duration::from_millis(300));
+    common::program::terminate(&child);
+    assert_eq!(child.wait().unwrap().code(), Some(75));
+}
+
+#[test]
+fn what_was_found_is_collected_in_one_table_and_figures() {
+    let sandbox = sandbox();
+    sandbox.run("sweep plan.toml --out all -q --task 1").ended(0, &[]);
+    let said = sandbox.run("sweep plan.toml --out all --collect").ended(0, &["this is not all", "3 waiting"]);
+    assert!(said.out.contains("sweep.csv"), "{said:?}");
+    sandbox.run("sweep plan.toml --out all -q").ended(0, &[]);
+    let said = sandbox.run("sweep plan.toml --out all --collect").ended(0, &[]);
+    assert!(!said.err.contains("warning"), "{}", said.err);
+    let table = sandbox.read("all/sweep.csv");
+    let mut reader = csv::Reader::from_reader(table.as_bytes());
+    let rows: Vec<BTreeMap<String, String>> = reader.deserialize().collect::<Result<_, _>>().unwrap();
+    assert_eq!(rows.len(), 4);
+    for (row, task) in rows.iter().zip(TASKS) {
+        let eval: serde_json::Value =
+            serde_json::from_str(&sandbox.read(&format!("all/{task}/eval.json"))).unwrap();
+        assert_eq!(
+            (row["name"].as_str(), row["state"].as_str(), row["recognises"].as_str()),
+            (task, "done", "0|1")
+        );
+        let accuracy: f64 = row["accuracy"].parse().unwrap();
+        assert_eq!(accuracy, eval["means"]["0|1"]["accuracy"].as_f64().unwrap());
+        let run = sandbox.run_file(&format!("all/{task}"));
+        assert_eq!(row["varied_map_elites.parents"], run.config.map_elites.parents.to_string());
+        assert_eq!(row["varied_seed"], run.config.seed.to_string());
+        assert_eq!(row["num_elites"], run.elites.len().to_string());
+        assert_eq!(row["audited"], run.elites.len().to_string());
+    }
+    // Two settings are two lines, each of two seeds.
+    for figure in ["sweep-accuracy.svg", "sweep-progress.svg"] {
+        let text = sandbox.read(&format!("all/{figure}"));
+        assert!(text.contains("parents=4") && text.contains("parents=8"), "{figure}");
+    }
+    assert!(sandbox.read("all/sweep-progress.svg").contains("2 seeds"));
+    // So they are in plot.
+    let archives = TASKS.map(|task| format!("all/{task}")).join(" ");
+    let said = sandbox.run(&format!("plot progress -a {archives} -o together.svg")).ended(0, &[]);
+    assert!(said.out.contains("map_elites.parents"), "{}", said.out);
+    assert!(sandbox.read("together.svg").contains("parents=4 (2 seeds)"));
+}
+
+#[test]
+fn trainings_are_swept_over_pairs_of_classes() {
+    let sandbox = Sandbox::new();
+    sandbox.write("run.toml", TINY);
+    sandbox.run("evolve -q -c run.toml -o gaits/walkers").ended(0, &[]);
+    let plan = r#"
+archive = "../gaits/walkers"
+robots = "top:3"
+pairs = [3, 1, 4]
+set = ["train.random_images=40", "train.rounds=1", "train.images=10", "train.final_images=10",
+       "train.challengers=2", "validation.images=40"]
+
+[audit]
+
+[eval]
+images = 10
+split = "validation"
+"#;
+    sandbox.write("plans/pairs.toml", plan);
+    sandbox.run("sweep plans/pairs.toml --out pairs").ended(0, &["3 of 3"]);
+    for (task, name) in
+        [("1|3", "walkers-1v3-seed3"), ("3|4", "walkers-3v4-seed3"), ("1|4", "walkers-1v4-seed3")]
+    {
+        let run = sandbox.run_file(&format!("pairs/{name}"));
+        assert_eq!(run.elites[0].task, task);
+        for file in ["audit.json", "eval-validation.json", "validation.json"] {
+            assert!(sandbox.path(&format!("pairs/{name}/{file}")).exists(), "{name}/{file}");
+        }
+    }
+    let said = sandbox.run("sweep plans/pairs.toml --out pairs --collect").ended(0, &[]);
+    assert!(said.out.contains("1|3") && said.out.contains("validation"), "{}", said.out);
+    // Which classes there are, only the images tell.
+    sandbox
+        .run("sweep plans/pairs.toml --out pairs --set pairs=[1,12]")
+        .ended(1, &["task 1 (walkers-1v12-seed3) failed", "class 12", "1 of 1 tasks failed: 1"]);
+}
+
+#[test]
+fn the_runs_of_a_reproduction_are_tasks_of_the_same_kind() {
+    let sandbox = Sandbox::tiny();
+    let plan = "seeds = [1, 2]\nrobots = 3\nimages = 20\n[[experiment]]\nconfig = \"tiny.toml\"\n\
+                [audit]\nleast_walk = 0.0\nthreshold = 0.0\n[capacity]\ntrainings = 2\nsizes = [1, 3]\n";
+    sandbox.write("paper.toml", plan);
+    let reproduce = |more: &str| sandbox.run(&format!("reproduce paper.toml --scale 0.5 {more}"));
+    let list = reproduce("--out one --list").ended(0, &[]).out;
+    assert!(list.lines().count() == 2 && list.contains("--scale 0.5"), "{list}");
+    reproduce("--out one --task 2").ended(0, &[]);
+    assert!(sandbox.path("one/tiny-seed2/run.json").exists() && !sandbox.path("one/tiny-seed1").exists());
+    let status = reproduce("--out one --status").ended(0, &[]).out;
+    assert!(status.contains("2 tasks: 1 done, 1 waiting"), "{status}");
+    reproduce("--out one").ended(0, &[]);
+    reproduce("--out two").ended(0, &[]);
+    assert_eq!(sandbox.read("one/reproduction.csv"), sandbox.read("two/reproduction.csv"));
+}
