@@ -169,9 +169,9 @@ fn exchange(ranks: Ranks) {
         let walked = Outcome::Walked((0..images).map(|image| 0.1 * f64::from(image)).collect());
         let one = Evaluation { outcome: walked, simulated: 2, shared: 0, stopped: 0 };
         let own = vec![one; robots / ranks.size() + 1];
-        ranks.share(&own);
+        ranks.share(own.clone());
         let (began, times) = (Instant::now(), 200);
-        (0..times).for_each(|_| _ = ranks.share(&own));
+        (0..times).for_each(|_| _ = ranks.share(own.clone()));
         let each = began.elapsed().as_secs_f64() / f64::from(times);
         if ranks.leads() {
             println!("exchange,{} ranks,{robots} robots,{images} images,{:.1} µs", ranks.size(), 1e6 * each);

@@ -23,7 +23,7 @@ pub struct Guard {
 }
 
 /// Variables by which MPI's launchers tell a process how many there are.
-const LAUNCHED: [&str; 3] = ["OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "PMIX_SIZE"];
+const LAUNCHED: [&str; 2] = ["OMPI_COMM_WORLD_SIZE", "PMI_SIZE"];
 
 impl Ranks {
     /// A process by itself.
@@ -64,18 +64,18 @@ impl Ranks {
     ///
     /// # Panics
     /// If what a rank says cannot be read by the others: they are the same program.
-    pub fn share<T: Serialize + DeserializeOwned + Clone>(self, own: &T) -> Vec<T> {
+    pub fn share<T: Serialize + DeserializeOwned>(self, own: T) -> Vec<T> {
         const WHY: &str = "all ranks are the same program, and say numbers, texts and lists";
         if self.size == 1 {
-            return vec![own.clone()];
+            return vec![own];
         }
-        let all = gather(&serde_json::to_vec(own).expect(WHY));
+        let all = gather(&serde_json::to_vec(&own).expect(WHY));
         all.iter().map(|bytes| serde_json::from_slice(bytes).expect(WHY)).collect()
     }
 
     /// What the leading rank has to say. All ranks must call it.
-    pub fn from_lead<T: Serialize + DeserializeOwned + Clone>(self, own: Option<T>) -> Option<T> {
-        self.share(&own).swap_remove(0)
+    pub fn from_lead<T: Serialize + DeserializeOwned>(self, own: Option<T>) -> Option<T> {
+        self.share(own).swap_remove(0)
     }
 
     /// Ends all ranks at once, this one with an exit code; for what only this one may know of.
@@ -189,7 +189,7 @@ mod tests {
 
     #[test]
     fn a_process_alone_shares_with_itself() {
-        assert_eq!(Ranks::ALONE.share(&vec![1.5, -0.0]), [vec![1.5, -0.0]]);
+        assert_eq!(Ranks::ALONE.share(vec![1.5, -0.0]), [vec![1.5, -0.0]]);
         assert_eq!(Ranks::ALONE.from_lead(Some(7)), Some(7));
     }
 }

@@ -22,7 +22,7 @@ use crate::store::robots::Selection;
 use crate::store::run::{Robot, RunFile};
 use crate::store::unwritten::Unwritten;
 use crate::store::whereabouts::{Whereabouts, load_dataset_of, see};
-use crate::task::evaluation::{Job, Outcome, Savings, evaluate, fresh_rollouts};
+use crate::task::evaluation::fresh_rollouts;
 use crate::task::fitness::Fitness;
 use crate::task::grouping::Grouping;
 use crate::task::perturbation::{Perturbation, Setting};
@@ -139,7 +139,7 @@ pub fn audit(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> R
         let own = batch.par_iter().enumerate().filter(|(place, _)| place % ranks.size() == ranks.rank());
         let own: Vec<Option<RobotAudit>> =
             pool.install(|| own.map(|(_, subject)| trial.robot(subject, stop, &done, observer)).collect());
-        let mut shares: Vec<_> = ranks.share(&own).into_iter().map(Vec::into_iter).collect();
+        let mut shares: Vec<_> = ranks.share(own).into_iter().map(Vec::into_iter).collect();
         let next =
             |place: usize| shares[place % ranks.size()].next().expect("a rank audits all of its share");
         let found: Vec<Option<RobotAudit>> = (0..batch.len()).map(next).collect();
@@ -269,7 +269,8 @@ impl Trial {
             protocol: self.config.protocol.clone(),
             stimuli: self.training.stimuli.clone(),
         };
-        let plain = live(&setting, true, stop).ok()?;
+        let system = Arc::new(System::new(&setting.body, setting.physics.clone()));
+        let plain = walk(&system, &setting.protocol, &setting.stimuli, true, stop).ok()?.ok();
         count(1);
         let (displacements, energy) = plain.map_or((None, Energy::default()), |(d, e)| (Some(d), e));
         let classes: Vec<u8> = self.training.images.iter().map(|image| image.label).collect();
@@ -284,8 +285,8 @@ impl Trial {
             displacements.clone().unwrap_or(still),
         );
         let rollout = |perturbation: &Perturbation| {
-            let walked = live(&perturbation.apply(&setting), false, stop).ok()?;
-            let walked = walked.map(|(d, _)| perturbation.undo(d));
+            let walked = displacements_in(&perturbation.apply(&setting), stop).ok()?;
+            let walked = walked.map(|displacements| perturbation.undo(displacements));
             count(1);
             Some(behaviour.compare(perturbation.name(), perturbation.kind, walked))
         };
@@ -321,25 +322,15 @@ impl Trial {
     }
 }
 
-/// Displacements of a rollout, and energies if they are to be `measured`; `None` if it is unstable.
-fn live(setting: &Setting, measured: bool, stop: &AtomicBool) -> Result<Option<(Vec<f64>, Energy)>, Stopped> {
+/// Displacements in a setting; `None` if a rollout is unstable.
+fn displacements_in(setting: &Setting, stop: &AtomicBool) -> Result<Option<Vec<f64>>, Stopped> {
     let Setting { body, physics, protocol, stimuli } = setting;
-    if measured {
-        let system = Arc::new(System::new(body, physics.clone()));
-        return Ok(walk(&system, protocol, stimuli, true, stop)?.ok());
-    }
     if protocol.rollout == RolloutMode::Fresh {
         let (found, _) = fresh_rollouts(body, stimuli, &[], (physics, protocol), &|_| (), stop)?;
-        let displacements: Option<Vec<f64>> = found.into_iter().map(Result::ok).collect();
-        return Ok(displacements.map(|displacements| (displacements, Energy::default())));
+        return Ok(found.into_iter().map(Result::ok).collect());
     }
-    let job = Job { body, order: Vec::new(), may_win: Box::new(|_| true), given_up: None };
-    let savings = Savings { early_stop: false, ..Savings::default() };
-    let evaluation = evaluate(&[job], stimuli, &[], physics, protocol, savings, stop)?.pop();
-    Ok(match evaluation.map(|evaluation| evaluation.outcome) {
-        Some(Outcome::Walked(displacements)) => Some((displacements, Energy::default())),
-        Some(Outcome::Unstable(_) | Outcome::Stopped(_)) | None => None,
-    })
+    let system = Arc::new(System::new(body, physics.clone()));
+    Ok(walk(&system, protocol, stimuli, false, stop)?.ok().map(|(displacements, _)| displacements))
 }
 
 #[cfg(test)]
@@ -422,15 +413,16 @@ mod tests {
             vec![image(0.0, 0.0), image(1.0, 0.0), image(0.0, 1.0), image(1.0, 1.0), image(0.0, 0.5)];
         let Trial { config, .. } = trial(4, 6, Physics::default());
         let setting = Setting { body, physics: config.physics, protocol: config.protocol, stimuli };
-        let (displacements, _) = live(&setting, false, &NEVER).unwrap().unwrap();
-        let (all, _) = live(&setting, true, &NEVER).unwrap().unwrap();
+        let displacements = displacements_in(&setting, &NEVER).unwrap().unwrap();
+        let system = Arc::new(System::new(&setting.body, setting.physics.clone()));
+        let (all, _) = walk(&system, &setting.protocol, &setting.stimuli, true, &NEVER).unwrap().unwrap();
         assert_eq!(displacements, all);
         assert_ne!(all[0], all[1], "it sees something");
         let sequential = Setting {
             protocol: Protocol { rollout: RolloutMode::Sequential, ..setting.protocol.clone() },
             ..setting
         };
-        let (displacements, _) = live(&sequential, false, &NEVER).unwrap().unwrap();
+        let displacements = displacements_in(&sequential, &NEVER).unwrap().unwrap();
         assert_eq!(displacements.len(), 5);
         assert_ne!(displacements[0], displacements[2], "what comes later begins elsewhere");
     }

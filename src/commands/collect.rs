@@ -3,15 +3,15 @@
 use crate::base::error::Error;
 use crate::base::table;
 use crate::commands::plot::Progress;
-use crate::commands::tasks::{Place, State, Status, Task};
+use crate::commands::tasks::{Place, Status, Task};
 use crate::store::audit::AuditFile;
 use crate::store::eval::EvalFile;
 use crate::store::images::HeldOut;
 use crate::store::names::{AUDIT_JSON, EVAL_JSON, EVAL_VALIDATION_JSON, METRICS, RUN_JSON};
 use crate::store::robots::Source;
 use crate::store::run::RunFile;
+use crate::store::task::State;
 use crate::store::validation::ranking;
-use serde_json::Value;
 use std::path::{Path, PathBuf};
 
 /// What a task found on one of the tasks that its robots do, as 0|1.
@@ -24,7 +24,7 @@ pub struct Row {
     /// How far it is.
     pub state: State,
     /// Varied keys with its values.
-    pub varied: Vec<(String, Value)>,
+    pub varied: Vec<(String, String)>,
     /// Its run, as far as there is one.
     pub run: Option<RunRow>,
 }
@@ -178,9 +178,9 @@ pub fn csv(rows: &[Row]) -> Vec<u8> {
         ["split", "images", "robots", "accuracy", "accuracy_low", "accuracy_high", "balanced_accuracy"];
     let more = run.iter().chain(&audit).chain(&test).map(ToString::to_string);
     let fields = rows.iter().map(|row| {
-        let text = |value: &Value| value.as_str().map_or_else(|| value.to_string(), str::to_string);
-        let of = |key: &&String| row.varied.iter().find(|(own, _)| own == *key).map(|(_, value)| text(value));
-        let varied: Vec<Option<String>> = keys.iter().map(of).collect();
+        let of =
+            |key: &&String| row.varied.iter().find(|(own, _)| own == *key).map(|(_, value)| value.as_str());
+        let varied: Vec<Option<&str>> = keys.iter().map(of).collect();
         let run = row.run.as_ref();
         let audited = run.and_then(|run| run.audited);
         let tested = run.and_then(|run| run.tested.as_ref());

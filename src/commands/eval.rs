@@ -178,7 +178,7 @@ pub fn eval(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Re
     // One robot for each rank at a time.
     for robots in robots.chunks(ranks.size()) {
         let own = robots.get(ranks.rank()).and_then(|own| walker.rollouts(own.robot, &shown.stimuli));
-        for (Chosen { source, robot }, walked) in robots.iter().zip(ranks.share(&own)) {
+        for (Chosen { source, robot }, walked) in robots.iter().zip(ranks.share(own)) {
             let Some((displacements, simulated)) = walked else {
                 return Ok(Finished { file: report, unwritten: unwritten.error() });
             };

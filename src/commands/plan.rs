@@ -10,7 +10,7 @@ use crate::store::folder;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// The built-in plan: the paper's.
 pub const PAPER_TOML: (&str, &str) = ("paper.toml", include_str!("../../configs/paper.toml"));
@@ -33,9 +33,6 @@ pub struct Plan {
     /// The networks.
     #[serde(default)]
     pub capacity: CapacityConfig,
-    /// The plan's folder: configs are looked for from there on.
-    #[serde(skip)]
-    pub folder: PathBuf,
 }
 
 /// An experiment: a config, and what is changed in it.
@@ -77,8 +74,14 @@ impl Plan {
         let is_json = name.ends_with(".json");
         let format = if is_json { reading::Format::Json } else { reading::Format::Toml };
         let plan: Plan = reading::read(&text, format, name)?;
-        let folder = Path::new(name).parent().unwrap_or(Path::new("")).to_path_buf();
-        let placed = |plan: &Plan| Plan { folder: folder.clone(), ..plan.clone() };
+        let folder = Path::new(name).parent().unwrap_or(Path::new(""));
+        let placed = |plan: &Plan| {
+            let from_here = |experiment: &Experiment| Experiment {
+                config: beside(folder, &experiment.config),
+                set: experiment.set.clone(),
+            };
+            Plan { experiment: plan.experiment.iter().map(from_here).collect(), ..plan.clone() }
+        };
         let check = |plan: &Plan| plan.check().and_then(|()| placed(plan).experiments().map(|_| ()));
         let plan =
             reading::changed(plan, overrides, check, |error| reading::placed(error, &text, format, name))?;
@@ -114,8 +117,7 @@ impl Plan {
             if experiments.iter().any(|(other, _)| *other == name) {
                 return Err(within(Error::input(format!("config: {name}: expected once"))));
             }
-            let path = beside(&self.folder, &experiment.config);
-            let config = Config::load(&path, &experiment.set).map_err(within)?;
+            let config = Config::load(&experiment.config, &experiment.set).map_err(within)?;
             for &seed in &self.seeds {
                 let seeded = Config { seed, ..config.clone() };
                 seeded.validate().map_err(|error| error.within("seeds").of("seeds"))?;

@@ -2,10 +2,11 @@
 
 use crate::base::error::Error;
 use crate::base::files::read_text;
-use crate::config::Settings;
+use crate::config::{Settings, differing};
 use crate::store::names::METRICS;
 use crate::store::run::RunFile;
 use serde::Deserialize;
+use std::collections::BTreeSet;
 use std::path::Path;
 
 /// A line of `metrics.csv`, as far as figures show it.
@@ -59,15 +60,12 @@ pub fn alike(runs: &[Progress]) -> (Vec<String>, Vec<Group<'_>>) {
             None => groups.push(vec![run]),
         }
     }
-    let mut keys: Vec<&String> = groups.iter().flat_map(|group| group[0].settings.keys()).collect();
-    keys.sort_unstable();
-    keys.dedup();
-    let first = |key: &str| groups[0][0].settings.get(key);
-    keys.retain(|key| groups.iter().any(|group| group[0].settings.get(*key) != first(key)));
+    let from_first = |group: &Vec<&Progress>| differing(&groups[0][0].settings, &group[0].settings);
+    let keys: BTreeSet<String> = groups.iter().flat_map(from_first).map(|(key, ..)| key).collect();
     let value = |run: &Progress, key: &String| run.settings.get(key).map(spoken);
     let group = |runs: &Vec<&'_ Progress>| -> (String, Vec<Option<String>>) {
         let values: Vec<Option<String>> = keys.iter().map(|key| value(runs[0], key)).collect();
-        let word = |(key, value): (&&String, &Option<String>)| match (key.as_str(), value) {
+        let word = |(key, value): (&String, &Option<String>)| match (key.as_str(), value) {
             ("task.groups", Some(value)) => Some(value.clone()),
             (_, None) => None,
             (key, Some(value)) => Some(format!("{}={value}", key.rsplit('.').next().unwrap_or(key))),
@@ -77,7 +75,7 @@ pub fn alike(runs: &[Progress]) -> (Vec<String>, Vec<Group<'_>>) {
         (if words.is_empty() { runs[0].run.clone() } else { words.join(", ") }, values)
     };
     let described: Vec<(String, Vec<Option<String>>)> = groups.iter().map(group).collect();
-    let keys = keys.into_iter().cloned().collect();
+    let keys = keys.into_iter().collect();
     let group = |((label, values), runs)| Group { label, values, runs };
     (keys, described.into_iter().zip(groups).map(group).collect())
 }

@@ -63,7 +63,7 @@ pub fn tasks(plan: &Plan, scale: f64) -> Result<Vec<Task>, Error> {
         for &seed in &plan.seeds {
             let config = Config { seed, ..plan::scaled(&config, scale) };
             let varied =
-                vec![("experiment".to_string(), name.clone().into()), ("seed".to_string(), seed.into())];
+                vec![("experiment".to_string(), name.clone()), ("seed".to_string(), seed.to_string())];
             tasks.push(Task {
                 name: format!("{name}-seed{seed}"),
                 run: Run::Evolve(Box::new(config), name.clone()),

@@ -5,14 +5,13 @@ use crate::base::error::Error;
 use crate::base::files::read_text;
 use crate::base::hash::sha256_hex;
 use crate::commands::tasks::{AuditStep, EvalStep, Run, Steps, Task, Training, selection};
-use crate::config::{Config, reading};
+use crate::config::{Config, Settings, flatten, reading};
 use crate::search::train;
 use crate::store::folder::{self, run_json};
 use crate::store::robots::Source;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use serde_json::{Map, Value};
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 /// Most tasks of a sweep: a slip in a list makes millions quickly.
@@ -21,7 +20,7 @@ const MOST: usize = 100_000;
 /// Most characters of a varied value in a task's name; longer ones are a hash.
 const LONGEST: usize = 24;
 
-/// What is swept: every combination of `vary`, `tasks` (or `pairs`) and `seeds` is a task.
+/// What is swept: every combination of `vary`, `groups` (or `pairs`) and `seeds` is a task.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SweepPlan {
@@ -40,15 +39,16 @@ pub struct SweepPlan {
     /// Keys that are the same in all tasks, as with `--set`.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub set: Vec<String>,
-    /// Two groups of classes each, as "4|9".
+    /// What is told apart: two groups of classes each, as "4|9".
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub tasks: Vec<String>,
-    /// Classes: every two of them are a task, as 4|9.
+    pub groups: Vec<String>,
+    /// Classes: every two of them are told apart, as 4|9.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub pairs: Vec<u8>,
     /// Keys that are varied, each with a list of values.
-    #[serde(default, skip_serializing_if = "Map::is_empty")]
-    pub vary: Map<String, Value>,
+    #[serde(default, skip_serializing_if = "toml::Table::is_empty")]
+    #[schemars(with = "serde_json::Map<String, serde_json::Value>")]
+    pub vary: toml::Table,
     /// After each run, an audit.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub audit: Option<AuditStep>,
@@ -61,7 +61,7 @@ pub struct SweepPlan {
 #[derive(Clone, Debug)]
 struct Setting {
     key: String,
-    value: Value,
+    value: toml::Value,
     /// How it stands in a task's name.
     word: String,
 }
@@ -127,32 +127,33 @@ impl SweepPlan {
     /// The two groups of each task, if the plan names any.
     fn groups(&self) -> Result<Vec<[Vec<u8>; 2]>, Error> {
         let mut all = Vec::new();
-        for (number, text) in (1..).zip(&self.tasks) {
-            all.push(train::groups(text).map_err(|error| Error::at(&format!("tasks.{number}"), error))?);
+        for (number, text) in (1..).zip(&self.groups) {
+            all.push(train::groups(text).map_err(|error| Error::at(&format!("groups.{number}"), error))?);
         }
         for (k, &a) in self.pairs.iter().enumerate() {
             all.extend(self.pairs[k + 1..].iter().map(|&b| [vec![a.min(b)], vec![a.max(b)]]));
         }
         if all.iter().collect::<BTreeSet<_>>().len() < all.len() {
-            return Err(Error::at("tasks", "expected different ones, also of pairs"));
+            return Err(Error::at("groups", "expected different ones, also of pairs"));
         }
         if self.archive.is_some() && all.is_empty() {
-            return Err(Error::at("tasks", "expected tasks or pairs, which are trained"));
+            return Err(Error::at("groups", "expected groups or pairs, which are trained"));
         }
         Ok(all)
     }
 
     /// The varied keys, each with its values.
     fn varied(&self) -> Result<Vec<Vec<Setting>>, Error> {
-        let mut flat = BTreeMap::new();
-        flatten("", &self.vary, &mut flat);
+        // TOML reads `a.b = […]` as a table.
+        let mut flat = Settings::new();
+        flatten("", toml::Value::Table(self.vary.clone()), &mut flat);
         let short = |key: &str| key.rsplit('.').next().unwrap_or(key).to_string();
         let mut all = Vec::new();
         for (key, values) in &flat {
             let place = format!("vary.{key}");
             let has_own = matches!(key.as_str(), "seed" | "task.groups") || key.starts_with("task.groups.");
             if has_own {
-                return Err(Error::at(&place, "expected in seeds, or in tasks and pairs"));
+                return Err(Error::at(&place, "expected in seeds, or in groups and pairs"));
             }
             let Some(values) = values.as_array().filter(|values| !values.is_empty()) else {
                 return Err(Error::at(&place, "expected a list of one value or more"));
@@ -160,7 +161,7 @@ impl SweepPlan {
             // Two keys may end in the same word.
             let is_short = flat.keys().filter(|other| short(other) == short(key)).count() == 1;
             let name = if is_short { short(key) } else { key.clone() };
-            let setting = |value: &Value| Setting {
+            let setting = |value: &toml::Value| Setting {
                 key: key.clone(),
                 value: value.clone(),
                 word: format!("{name}={}", word(value)),
@@ -175,7 +176,7 @@ impl SweepPlan {
     }
 
     /// The tasks, numbered from 1 in this order: varied keys by their names, the last one changing
-    /// first; then tasks; then seeds.
+    /// first; then groups; then seeds.
     ///
     /// # Errors
     /// What is wrong with the plan, or with some of its tasks: all of that at once.
@@ -264,7 +265,7 @@ impl SweepPlan {
                 Run::Evolve(Box::new(config), config_name.clone())
             }
             Base::Train(archive, source) => {
-                let groups = groups.cloned().expect("a plan with an archive has tasks");
+                let groups = groups.cloned().expect("a plan with an archive has groups");
                 let config = train::config_of(&source.run.config, &groups, Some(seed), &set)?;
                 Run::Train(Box::new(Training {
                     archive: archive.clone(),
@@ -277,10 +278,10 @@ impl SweepPlan {
                 }))
             }
         };
-        let mut varied: Vec<(String, Value)> =
-            combination.iter().map(|setting| (setting.key.clone(), setting.value.clone())).collect();
-        varied.extend(groups.map(|groups| ("task".to_string(), Value::String(written(groups, "|")))));
-        varied.push(("seed".to_string(), Value::from(seed)));
+        let mut varied: Vec<(String, String)> =
+            combination.iter().map(|setting| (setting.key.clone(), text(&setting.value))).collect();
+        varied.extend(groups.map(|groups| ("groups".to_string(), written(groups, "|"))));
+        varied.push(("seed".to_string(), seed.to_string()));
         Ok(Task { name: name.to_string(), run, steps: self.steps(), varied })
     }
 }
@@ -317,20 +318,14 @@ fn written(groups: &[Vec<u8>; 2], between: &str) -> String {
     groups.each_ref().map(group).join(between)
 }
 
-/// Tables within tables as keys in dots: TOML reads `a.b = […]` as a table.
-fn flatten(name: &str, table: &Map<String, Value>, flat: &mut BTreeMap<String, Value>) {
-    for (key, value) in table {
-        let key = if name.is_empty() { key.clone() } else { format!("{name}.{key}") };
-        match value {
-            Value::Object(table) => flatten(&key, table, flat),
-            value => _ = flat.insert(key, value.clone()),
-        }
-    }
+/// A value as text: a text without its quotes.
+fn text(value: &toml::Value) -> String {
+    value.as_str().map_or_else(|| value.to_string(), str::to_string)
 }
 
 /// A value in a file's name: what shells and file systems take as it is.
-fn word(value: &Value) -> String {
-    let text = value.as_str().map_or_else(|| value.to_string(), str::to_string);
+fn word(value: &toml::Value) -> String {
+    let text = text(value);
     let plain = |c: char| if c.is_ascii_alphanumeric() || "._+-".contains(c) { c } else { '_' };
     let word: String = text.chars().map(plain).collect();
     let is_same = word == text && !word.is_empty() && word.len() <= LONGEST;
@@ -395,7 +390,7 @@ mod tests {
 
     #[test]
     fn a_task_has_the_config_that_its_name_says() {
-        let text = "config = \"four_digit.toml\"\nseeds = [7]\ntasks = [\"0|123\"]\nset = [\"generations=9\"]\n\
+        let text = "config = \"four_digit.toml\"\nseeds = [7]\ngroups = [\"0|123\"]\nset = [\"generations=9\"]\n\
                     [vary]\narchive.keep = [3]";
         let tasks = plan(text).tasks(Path::new("plan.toml")).unwrap();
         let Run::Evolve(config, _) = &tasks[0].run else { panic!("it evolves") };
@@ -427,11 +422,11 @@ mod tests {
             ("config = \"a\"\narchive = \"b\"", "archive"),
             ("config = \"a\"\nrobots = \"top:2\"", "robots"),
             ("archive = \"a\"\nrobots = \"some\\u003a2\"\npairs = [0, 1]", "robots"),
-            ("archive = \"a\"", "tasks"),
+            ("archive = \"a\"", "groups"),
             ("config = \"a\"\nseeds = [1, 1]", "seeds"),
             ("config = \"a\"\npairs = [3]", "pairs"),
-            ("config = \"a\"\ntasks = [\"0|0\"]", "tasks.1"),
-            ("config = \"a\"\ntasks = [\"0|1\"]\npairs = [0, 1]", "tasks"),
+            ("config = \"a\"\ngroups = [\"0|0\"]", "groups.1"),
+            ("config = \"a\"\ngroups = [\"0|1\"]\npairs = [0, 1]", "groups"),
             ("config = \"a\"\n[vary]\nseed = [1]", "vary.seed"),
             ("config = \"a\"\n[vary]\ngenerations = 5", "vary.generations"),
             ("config = \"a\"\n[vary]\ngenerations = []", "vary.generations"),
@@ -446,9 +441,10 @@ mod tests {
 
     #[test]
     fn values_that_no_file_name_takes_have_a_short_name_of_their_own() {
-        let [a, b] = [serde_json::json!([[1, 2], [3]]), serde_json::json!([[1, 2], [4]])].map(|v| word(&v));
+        let of = |text: &str| word(&format!("value = {text}").parse::<toml::Table>().unwrap()["value"]);
+        let [a, b] = ["[[1, 2], [3]]", "[[1, 2], [4]]"].map(of);
         assert!(a != b && a.len() == 8);
-        assert_eq!(word(&serde_json::json!(1e-3)), "0.001");
-        assert_ne!(word(&serde_json::json!("a/b")), word(&serde_json::json!("a_b")));
+        assert_eq!(of("1e-3"), "0.001");
+        assert_ne!(of("'a/b'"), of("'a_b'"));
     }
 }

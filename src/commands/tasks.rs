@@ -7,8 +7,8 @@ use crate::base::error::{Error, ErrorKind};
 use crate::base::observer::{Generation, Observer, Work};
 use crate::base::ranks::Ranks;
 use crate::commands::{audit, eval};
-use crate::config::Config;
 use crate::config::audit::Criteria;
+use crate::config::{Config, Settings, differing};
 use crate::search::{evolve, showing, train, validation};
 use crate::store::eval::EvalFile;
 use crate::store::folder::IfExists;
@@ -17,11 +17,11 @@ use crate::store::lock::{self, Lock, Refusal};
 use crate::store::names::{AUDIT_JSON, METRICS, RUN_JSON, TASK_JSON};
 use crate::store::robots::{Selection, Source};
 use crate::store::setting::RunRef;
-use crate::store::task::{Progress, TaskFile};
+use crate::store::task::{State, TaskFile};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
-use std::collections::BTreeMap;
+use std::io::{Read, Seek, SeekFrom};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
@@ -32,6 +32,9 @@ use std::time::Instant;
 /// Name of the file that says who is at a task.
 const LOCK: &str = ".task.lock";
 
+/// Bytes at the end of a metrics.csv that hold its last whole row; rows have about 150.
+const ROW: u64 = 4096;
+
 /// A task.
 #[derive(Clone, Debug)]
 pub struct Task {
@@ -41,8 +44,8 @@ pub struct Task {
     pub run: Run,
     /// What is done with that.
     pub steps: Steps,
-    /// Keys that are not the same in all tasks, with their values; for tables.
-    pub varied: Vec<(String, Value)>,
+    /// Keys that are not the same in all tasks, with their values as text; for tables.
+    pub varied: Vec<(String, String)>,
 }
 
 /// What makes a run.
@@ -165,8 +168,7 @@ impl Place {
 
 impl Task {
     /// Everything that its run depends on.
-    fn settings(&self) -> BTreeMap<String, Value> {
-        let json = |value: toml::Value| serde_json::to_value(value).expect("TOML without dates is JSON");
+    fn settings(&self) -> Settings {
         let (config, more) = match &self.run {
             Run::Evolve(config, _) => (config.settings(), Vec::new()),
             Run::Train(training) => (
@@ -175,8 +177,7 @@ impl Task {
             ),
         };
         let config = config.into_iter().filter(|(key, _)| key != "train.challengers");
-        let config = config.map(|(key, value)| (key, json(value)));
-        config.chain(more.into_iter().map(|(key, value)| (key.to_string(), Value::String(value)))).collect()
+        config.chain(more.into_iter().map(|(key, value)| (key.to_string(), value.into()))).collect()
     }
 
     /// What is asked for beyond that: it may grow or change, and the task goes on.
@@ -204,11 +205,16 @@ impl Task {
 pub fn check_folders(tasks: &[Task], place: &Place) -> Result<(), Vec<Error>> {
     let check = |(number, task): (usize, &Task)| {
         let path = place.folder(task).join(TASK_JSON);
-        let differing = TaskFile::read(&path).map(|known| known.map(|known| differing(&known, task)));
+        let of = |known: TaskFile| differing(&known.settings, &task.settings());
+        let differing = TaskFile::read(&path).map(|known| known.map(of));
         let error = match differing {
             Ok(None) => return None,
             Ok(Some(keys)) if keys.is_empty() => return None,
             Ok(Some(keys)) => {
+                let said = |(key, there, now): &(String, String, String)| {
+                    format!("{key} = {there} there, {now} in the plan")
+                };
+                let keys: Vec<String> = keys.iter().map(said).collect();
                 let text =
                     format!("{}: the run there differs: {}", place.folder(task).display(), keys.join("; "));
                 Error::input(text).hint("move that folder away, or name another with --out".to_string())
@@ -219,20 +225,6 @@ pub fn check_folders(tasks: &[Task], place: &Place) -> Result<(), Vec<Error>> {
     };
     let refused: Vec<Error> = (1..).zip(tasks).filter_map(check).collect();
     if refused.is_empty() { Ok(()) } else { Err(refused) }
-}
-
-/// The keys in which a folder's run differs from its task, with both values.
-fn differing(known: &TaskFile, task: &Task) -> Vec<String> {
-    let (there, now) = (&known.settings, &task.settings());
-    let value = |settings: &BTreeMap<String, Value>, key: &str| {
-        settings.get(key).map_or("not set".to_string(), ToString::to_string)
-    };
-    let mut keys: Vec<&String> = there.keys().chain(now.keys()).collect();
-    keys.sort();
-    keys.dedup();
-    let differs = |key: &&String| there.get(*key) != now.get(*key);
-    let said = |key: &String| format!("{key} = {} there, {} in the plan", value(there, key), value(now, key));
-    keys.into_iter().filter(differs).map(said).collect()
 }
 
 /// Does a task, or goes on with it.
@@ -263,10 +255,10 @@ pub fn run(task: &Task, place: &Place, stop: &AtomicBool, observer: &dyn Observe
     let began = Instant::now();
     let ended = steps(task, place, stop, observer);
     file.seconds = before + began.elapsed().as_secs_f64();
-    (file.progress, file.error) = match &ended {
-        Ok(()) => (Progress::Done, None),
-        Err(error) if error.kind == ErrorKind::Stopped => (Progress::Stopped, None),
-        Err(error) => (Progress::Failed, Some(error.message.clone())),
+    (file.state, file.error) = match &ended {
+        Ok(()) => (State::Done, None),
+        Err(error) if error.kind == ErrorKind::Stopped => (State::Stopped, None),
+        Err(error) => (State::Failed, Some(error.message.clone())),
     };
     file.write(&path)?;
     ended
@@ -275,7 +267,7 @@ pub fn run(task: &Task, place: &Place, stop: &AtomicBool, observer: &dyn Observe
 /// Whether all of a task is done. More generations, or other steps, are still to do.
 fn is_done(known: Option<&TaskFile>, task: &Task) -> bool {
     known.is_some_and(|known| {
-        known.progress == Progress::Done && known.settings == task.settings() && known.asked == task.asked()
+        known.state == State::Done && known.settings == task.settings() && known.asked == task.asked()
     })
 }
 
@@ -446,7 +438,9 @@ pub fn run_all(
     let known: u64 = total - numbered.iter().map(|(_, task)| task.amount()).sum::<u64>();
     if !numbered.is_empty() {
         let label = format!("{} of {} tasks, {jobs} at once:", numbered.len(), tasks.len());
-        observer.begins(&Work { label, total, known, unit: "generations" });
+        let train = tasks.iter().all(|task| matches!(task.run, Run::Train(_)));
+        let unit = if train { "challengers" } else { "generations" };
+        observer.begins(&Work { label, total, known, unit });
     }
     let all = All { observer, known, parts: numbered.iter().map(|_| AtomicU64::new(0)).collect() };
     let next = AtomicUsize::new(0);
@@ -553,38 +547,6 @@ pub struct Status {
     pub about: Option<String>,
 }
 
-/// How far a task is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum State {
-    /// All of it is done.
-    Done,
-    /// A process is at it.
-    Running,
-    /// It began, and nobody is at it.
-    Stopped,
-    /// It failed.
-    Failed,
-    /// It has not begun.
-    Waiting,
-}
-
-impl State {
-    /// All of them, with what they are called.
-    pub const ALL: [(State, &str); 5] = [
-        (State::Done, "done"),
-        (State::Running, "running"),
-        (State::Stopped, "stopped"),
-        (State::Failed, "failed"),
-        (State::Waiting, "waiting"),
-    ];
-
-    /// What it is called.
-    pub fn name(self) -> &'static str {
-        State::ALL.iter().find(|(state, _)| *state == self).map_or("", |(_, name)| name)
-    }
-}
-
 /// How far all tasks are.
 ///
 /// # Errors
@@ -610,8 +572,8 @@ fn status_of(number: usize, task: &Task, folder: &Path) -> Result<Status, Error>
         (_, lock::State::Held(holder)) => (State::Running, holder.map(|holder| holder.to_string())),
         (None, _) => (State::Waiting, None),
         (Some(known), _) if is_done(Some(known), task) => (State::Done, None),
-        (Some(TaskFile { progress: Progress::Failed, error, .. }), _) => (State::Failed, error.clone()),
-        (Some(TaskFile { progress: Progress::Running, .. }), lock::State::Stale(holder)) => {
+        (Some(TaskFile { state: State::Failed, error, .. }), _) => (State::Failed, error.clone()),
+        (Some(TaskFile { state: State::Running, .. }), lock::State::Stale(holder)) => {
             (State::Stopped, Some(format!("{holder} was ended")))
         }
         (Some(_), _) => (State::Stopped, None),
@@ -636,9 +598,14 @@ fn status_of(number: usize, task: &Task, folder: &Path) -> Result<Status, Error>
     Ok(Status { task: number, name: task.name.clone(), state, generations, seconds, seconds_left, about })
 }
 
-/// Generations that a metrics.csv has, and the wall-clock time they took \[s\].
+/// Generations that a metrics.csv has, and the wall-clock time they took \[s\]. Only the end of the
+/// file is read: a long run's has megabytes.
 fn last_generation(path: &Path) -> Option<(u64, f64)> {
-    let text = std::fs::read(path).ok()?;
+    let mut file = std::fs::File::open(path).ok()?;
+    let length = file.metadata().ok()?.len();
+    file.seek(SeekFrom::Start(length.saturating_sub(ROW))).ok()?;
+    let mut text = Vec::new();
+    file.read_to_end(&mut text).ok()?;
     let text = String::from_utf8_lossy(&text);
     let line = text.split_inclusive('\n').rfind(|line| line.ends_with('\n'))?.trim_end();
     let generation: u64 = line.split(',').next()?.parse().ok()?;

@@ -28,7 +28,7 @@ use crate::task::protocol::{MAX_COLUMN, MAX_ROW, MAX_STEPS, Protocol};
 use crate::task::stimulus::StimulusParams;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 /// Configs that are part of the program: name and text.
@@ -103,7 +103,18 @@ pub struct Config {
 /// Keys in dots, with their values.
 pub type Settings = BTreeMap<String, toml::Value>;
 
-fn flatten(name: &str, value: toml::Value, settings: &mut Settings) {
+/// The keys in which two settings differ, with both values as text, in the keys' order.
+pub(crate) fn differing(there: &Settings, now: &Settings) -> Vec<(String, String, String)> {
+    let value =
+        |settings: &Settings, key: &str| settings.get(key).map_or("not set".to_string(), ToString::to_string);
+    let keys: BTreeSet<&String> = there.keys().chain(now.keys()).collect();
+    let differs = |key: &&String| there.get(*key) != now.get(*key);
+    let with_values = |key: &String| (key.clone(), value(there, key), value(now, key));
+    keys.into_iter().filter(differs).map(with_values).collect()
+}
+
+/// Tables within tables as keys in dots, below `name`.
+pub(crate) fn flatten(name: &str, value: toml::Value, settings: &mut Settings) {
     match value {
         toml::Value::Table(table) => {
             let below = |key: String| if name.is_empty() { key } else { format!("{name}.{key}") };

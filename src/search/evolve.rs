@@ -340,7 +340,7 @@ impl<'a> Run<'a> {
         let mut owner = owners.iter();
         jobs.retain(|_| owner.next().is_some_and(|owner| *owner == ranks.rank()));
         let own = evaluate(&jobs, stimuli, conditions, physics, protocol, config.savings, stop);
-        let shares = ranks.share(&own.ok());
+        let shares = ranks.share(own.ok());
         // A generation that one rank drops is dropped by all.
         let shares: Option<Vec<Vec<Evaluation>>> = shares.into_iter().collect();
         let mut shares: Vec<_> = shares.ok_or(Stopped)?.into_iter().map(Vec::into_iter).collect();
@@ -351,7 +351,7 @@ impl<'a> Run<'a> {
     /// What this rank made, if all ranks made theirs.
     fn together<T>(&self, own: Result<T, Error>) -> Result<T, Error> {
         let is_made = own.is_ok();
-        let are_made = self.options.ranks.share(&is_made);
+        let are_made = self.options.ranks.share(is_made);
         let own = own?;
         if are_made.contains(&false) { Err(Stopped.into()) } else { Ok(own) }
     }

@@ -2,7 +2,7 @@
 //! images.
 
 use crate::base::error::Error;
-use crate::config::{Config, Settings};
+use crate::config::{Config, differing};
 use crate::search::training::Training;
 use crate::store::checkpoint;
 use crate::store::checkpoint::Checkpoint;
@@ -56,11 +56,7 @@ fn compatible(saved: &Checkpoint, config: &Config, training: &Training) -> Resul
         );
         return Err(Error::input(text).hint(format!("go on with morphcog {theirs}, or {ANEW}")));
     }
-    let (theirs, ours) = (saved.run.config.settings(), config.settings());
-    let differs = |key: &&String| theirs.get(*key) != ours.get(*key);
-    let value = |keys: &Settings, key: &str| keys.get(key).map_or("not set".to_string(), ToString::to_string);
-    if let Some(key) = theirs.keys().chain(ours.keys()).find(differs) {
-        let (theirs, ours) = (value(&theirs, key), value(&ours, key));
+    if let Some((key, theirs, ours)) = differing(&saved.run.config.settings(), &config.settings()).first() {
         let text = format!("the run in this folder has another config: {key} = {theirs} there, {ours} now");
         return Err(Error::input(text).hint(hint()));
     }

@@ -157,7 +157,7 @@ pub(crate) fn best<'a>(
 ) -> Result<Option<Vec<(&'a Robot, Validated)>>, Error> {
     let run = &source.run;
     let images = images(&[run], dataset, "--validation", wanted.images)?;
-    // Whoever asks for fewer than the run's end has found gets the first of those.
+    // With fewer asked for than the end of the run has found, the first of those.
     let searched = &Wanted { count: wanted.count.max(run.config.validation.best), ..*wanted };
     let shown = (dataset.fingerprint(Split::Train).expect("its images were drawn just now"), &images[..]);
     let key = key(run, &robots, searched, shown, walker.control_steps);

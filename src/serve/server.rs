@@ -135,7 +135,7 @@ fn simulation(service: &Service, plan: &Plan, stream: &mut TcpStream) -> Option<
     let told = begun.and_then(|()| {
         live(&slot, plan, |event| stream.write_all(stream::text(&event).as_bytes()).map_err(|_| Gone))
     });
-    // Whoever watches the connection has nothing left to do.
+    // The thread that watches the connection has nothing left to do.
     slot.control.end();
     drop(slot);
     if told.is_ok() {

@@ -190,7 +190,7 @@ impl Selection {
                 Ok((0..).zip(by_task()).flat_map(draw).collect())
             }
             Selection::Ids(ids) => {
-                // Whoever is named twice is one robot.
+                // A robot named twice is one robot.
                 let named = ids.iter().map(|id| match id == BEST {
                     true => Ok(best(&fittest, sources).into_iter().collect()),
                     false => by_id(&fittest, id),

@@ -2,10 +2,9 @@
 
 use crate::base::error::Error;
 use crate::base::files::{read_text, write_atomically};
-use crate::config::reading;
+use crate::config::{Settings, reading};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
-use std::collections::BTreeMap;
 use std::path::Path;
 
 /// What the file calls itself.
@@ -17,15 +16,33 @@ pub const FORMAT_VERSION: u32 = 1;
 /// How far a task is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Progress {
+pub enum State {
+    /// All its steps are done.
+    Done,
     /// A process began with it, and has not said that it ended.
     Running,
-    /// A signal stopped it; the same command goes on.
+    /// It began, and no process is at it; the same command goes on.
     Stopped,
     /// It failed.
     Failed,
-    /// All its steps are done.
-    Done,
+    /// It has not begun.
+    Waiting,
+}
+
+impl State {
+    /// All of them.
+    pub const ALL: [State; 5] = [State::Done, State::Running, State::Stopped, State::Failed, State::Waiting];
+
+    /// What it is called.
+    pub fn name(self) -> &'static str {
+        match self {
+            State::Done => "done",
+            State::Running => "running",
+            State::Stopped => "stopped",
+            State::Failed => "failed",
+            State::Waiting => "waiting",
+        }
+    }
 }
 
 /// The content of `task.json`.
@@ -39,12 +56,12 @@ pub struct TaskFile {
     /// Version of the program that wrote it.
     pub program_version: String,
     /// Everything that the run depends on: keys in dots, with their values.
-    pub settings: BTreeMap<String, Value>,
+    pub settings: Settings,
     /// What is asked for beyond that, and may change: generations or challengers, validation, steps
     /// after the run.
     pub asked: Value,
     /// How far it is.
-    pub progress: Progress,
+    pub state: State,
     /// What it failed with.
     pub error: Option<String>,
     /// Wall-clock time of all sessions that ended by themselves or by a signal \[s\].
@@ -53,14 +70,14 @@ pub struct TaskFile {
 
 impl TaskFile {
     /// Of a task that begins.
-    pub fn new(settings: BTreeMap<String, Value>, asked: Value) -> Self {
+    pub fn new(settings: Settings, asked: Value) -> Self {
         TaskFile {
             format: FORMAT.to_string(),
             format_version: FORMAT_VERSION,
             program_version: env!("CARGO_PKG_VERSION").to_string(),
             settings,
             asked,
-            progress: Progress::Running,
+            state: State::Running,
             error: None,
             seconds: 0.0,
         }

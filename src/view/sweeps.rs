@@ -6,7 +6,8 @@ use crate::base::number;
 use crate::base::number::percent;
 use crate::commands::collect::{Collected, Row, csv};
 use crate::commands::plot::alike;
-use crate::commands::tasks::{State, Status};
+use crate::commands::tasks::Status;
+use crate::store::task::State;
 use crate::view::console::{Console, Mode};
 use crate::view::error::write_whole;
 use crate::view::plot;
@@ -41,7 +42,7 @@ pub fn status(console: &Console, all: &[Status]) {
 /// How many tasks are done, running, and so on, and the computing time left.
 fn in_short(all: &[Status]) -> String {
     let count = |state: State| all.iter().filter(|status| status.state == state).count();
-    let counts = State::ALL.map(|(state, name)| (count(state), name));
+    let counts = State::ALL.map(|state| (count(state), state.name()));
     let counts = counts.iter().filter(|(count, _)| *count > 0).map(|(count, name)| format!("{count} {name}"));
     let counts = counts.collect::<Vec<_>>().join(", ");
     let open = || all.iter().filter(|status| status.state != State::Done);

@@ -40,7 +40,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! Many simulations of one system are faster side by side, with the same bits: [`Worlds`].
+//! Simulations of a mostly rigid body are faster side by side, with the same bits: [`Worlds`].
 //!
 //! Feature `serde` (off by default) reads and writes bodies, grids, constants and states.
 //!

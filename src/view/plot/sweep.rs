@@ -6,7 +6,6 @@ use crate::view::plot::axes::{AXIS, Axis, MARGIN, Plot, heading};
 use crate::view::plot::canvas::{Canvas, Pen, TEXT, Words};
 use crate::view::plot::figure::{COLUMN, Figure};
 use crate::view::plot::{fonts, scales};
-use serde_json::Value;
 
 /// Height of a line, points.
 const LINE: f64 = 10.5;
@@ -81,10 +80,9 @@ pub fn sweep(name: &str, rows: &[Row]) -> Option<Figure> {
 
 /// What a run is about, without its seed.
 fn about(row: &Row, recognises: &str) -> String {
-    let text = |value: &Value| value.as_str().map_or_else(|| value.to_string(), str::to_string);
-    let word = |(key, value): &(String, Value)| match key.as_str() {
-        "seed" | "task" => None,
-        key => Some(format!("{}={}", key.rsplit('.').next().unwrap_or(key), text(value))),
+    let word = |(key, value): &(String, String)| match key.as_str() {
+        "seed" | "groups" => None,
+        key => Some(format!("{}={value}", key.rsplit('.').next().unwrap_or(key))),
     };
     let words = row.varied.iter().filter_map(word);
     words.chain([recognises.to_string()]).collect::<Vec<_>>().join(", ")
