@@ -12,13 +12,13 @@ use morphcog::commands::bench;
 use morphcog::config::Config;
 use morphcog::genome::Genome;
 use morphcog::search::evolve::{Options, evolve};
-use morphcog::sim::{InstructionSet, System};
+use morphcog::sim::{InstructionSet, System, Worlds};
 use morphcog::store::checkpoint::{self, Checkpoint, KnownBodies};
 use morphcog::store::folder::IfExists;
 use morphcog::store::metrics::Totals;
 use morphcog::store::run::RunFile;
 use morphcog::task::evaluation::{Job, Savings, evaluate};
-use morphcog::task::rollout::fresh_rollout;
+use morphcog::task::rollout::{fresh_rollout, fresh_rollouts_of};
 use processor::Processor;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -50,6 +50,25 @@ fn rollouts(criterion: &mut Criterion<Processor>) {
         let stimulus = stimulus(0);
         group.bench_function(specimen.name, |bencher| {
             bencher.iter(|| fresh_rollout(&system, &config.protocol, &stimulus, &NEVER));
+        });
+    }
+}
+
+/// Eight simulations of one body, whether or not this is what the program would do with it.
+fn side_by_side(criterion: &mut Criterion<Processor>) {
+    let config = config(&OVERRIDES);
+    let stimuli: Vec<Grid<f64>> = (0..Worlds::MOST).map(stimulus).collect();
+    let mut group = criterion.benchmark_group("eight simulations of 50 control steps");
+    group.sample_size(20);
+    for specimen in bench::specimens() {
+        let system = Arc::new(System::new(&specimen.body, config.physics.clone()));
+        let by_itself =
+            |stimulus: &Grid<f64>| fresh_rollout(&system, &config.protocol, stimulus, &NEVER).is_ok();
+        group.bench_function(format!("{}, one by one", specimen.name), |bencher| {
+            bencher.iter(|| stimuli.iter().map(by_itself).collect::<Vec<bool>>());
+        });
+        group.bench_function(format!("{}, side by side", specimen.name), |bencher| {
+            bencher.iter(|| fresh_rollouts_of(&system, &config.protocol, &stimuli, &NEVER));
         });
     }
 }
@@ -123,7 +142,7 @@ fn bookkeeping(criterion: &mut Criterion) {
     });
 }
 
-criterion_group!(name = one_thread; config = Criterion::default().with_measurement(Processor); targets = rollouts);
+criterion_group!(name = one_thread; config = Criterion::default().with_measurement(Processor); targets = rollouts, side_by_side);
 // Threads that wait for each other, and files: what they take is the clock's time.
 criterion_group!(by_the_clock, evaluations, bookkeeping);
 criterion_main!(one_thread, by_the_clock);

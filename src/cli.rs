@@ -11,6 +11,7 @@ mod response;
 mod serve;
 mod sweep;
 mod tasks;
+mod team;
 mod train;
 
 use crate::analysis::gallery;
@@ -61,6 +62,7 @@ pub fn run(cli: Cli, console: &Console, ranks: Ranks) -> Result<(), Error> {
         Command::Eval(args) => run_eval(args, console, ranks),
         Command::Response(args) => response::run(args, console),
         Command::Train(args) => train::run(args, console),
+        Command::Team(args) => team::run(args, console),
         Command::Audit(args) => audit::run(args, console, ranks),
         Command::Capacity(args) => capacity::run(args, console),
         Command::Report(args) => report::run(args, console),

@@ -32,14 +32,16 @@ fn with_run() -> Sandbox {
 
 // ---- help ----
 
-const COMMANDS: [&str; 23] = [
+const COMMANDS: [&str; 25] = [
     "",
     "evolve",
     "response",
     "train",
     "eval",
+    "team",
     "audit",
     "capacity",
+    "sweep",
     "reproduce",
     "report",
     "replay",

@@ -7,7 +7,7 @@ use jsonschema::Validator;
 use serde_json::{Value, json};
 use std::path::Path;
 
-const NAMES: [&str; 10] = [
+const NAMES: [&str; 11] = [
     "config",
     "sweep",
     "plan",
@@ -17,6 +17,7 @@ const NAMES: [&str; 10] = [
     "eval",
     "audit",
     "response",
+    "team",
     "capacity",
 ];
 
@@ -134,7 +135,8 @@ fn written_results_are_valid_and_those_of_another_format_are_not() {
         .ended(0, &[]);
     sandbox.run("response -q --archive taught --images 60 --task 0|1").ended(0, &[]);
     sandbox.run("capacity -q --eval run/eval.json --set trainings=2 --set sizes=[1,3]").ended(0, &[]);
-    let files = ["run/run.json", "taught/run.json", "run/eval.json", "gallery/eval.json"];
+    sandbox.run("team -q --archive run --classes 0,1 --images 20").ended(0, &[]);
+    let files = ["run/run.json", "run/team.json", "taught/run.json", "run/eval.json", "gallery/eval.json"];
     let files = files.into_iter().chain(["taught/audit.json", "taught/response.json", "run/capacity.json"]);
     for file in files {
         let name = Path::new(file).file_stem().unwrap().to_str().unwrap();

@@ -167,7 +167,7 @@ fn a_changed_plan_keeps_what_is_done_and_refuses_other_settings_with_their_keys(
         3,
         &[
             "task 1 (tiny-parents=4-seed1): ",
-            "body.height = 5 there, 4 in the plan; task.groups = [[0],[1]] there, [[0],[7]] in the plan",
+            "body.height = 5 there, 4 in the plan; task.groups = [[0], [1]] there, [[0], [7]] in the plan",
             "task 4",
         ],
     );

@@ -1,7 +1,8 @@
-//! Networks that robots are compared with (paper, "Morphological cognition capacity"), trained on a
-//! library.
+//! What robots are compared with: networks (paper, "Morphological cognition capacity"), trained on a
+//! library; linear classifiers and the nearest neighbour.
 
 pub mod curve;
+pub mod linear;
 #[cfg(feature = "networks")]
 pub mod network;
 pub mod settings;

@@ -9,8 +9,9 @@ use crate::cli::reproduce::ReproduceArgs;
 use crate::cli::response::ResponseArgs;
 use crate::cli::serve::ServeArgs;
 use crate::cli::sweep::SweepArgs;
+use crate::cli::team::TeamArgs;
 use crate::cli::train::TrainArgs;
-use crate::cli::{audit, capacity, plot, report, reproduce, response, serve, sweep, train};
+use crate::cli::{audit, capacity, plot, report, reproduce, response, serve, sweep, team, train};
 use crate::commands::replay::Shown;
 use crate::config;
 use crate::data::dataset::BUILTIN;
@@ -89,6 +90,9 @@ Examples:
   morphcog eval --archive runs/zero_one-seed*/run.json --robots random:10 --physical-only    the paper's test
   morphcog eval --robots gallery                       the robots published with the paper")]
     Eval(EvalArgs),
+    /// Let robots of several runs answer together which class an image is of.
+    #[command(after_help = team::EXAMPLES)]
+    Team(TeamArgs),
     /// Check whether robots walk or exploit the simulator.
     #[command(after_help = audit::EXAMPLES)]
     Audit(AuditArgs),

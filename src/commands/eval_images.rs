@@ -48,11 +48,15 @@ impl<'a> HeldOutImages<'a> {
             return Err(Error::usage(text));
         }
         let (images, split) = match options.split {
-            HeldOut::Test => (test_images(config, dataset, options)?, Split::Test),
+            HeldOut::Test => {
+                let classes = config.classes();
+                (held_out::test_images(&classes, dataset, asked, options.seed)?, Split::Test)
+            }
             HeldOut::Validation => {
                 let runs: Vec<_> = sources.iter().map(|source| &source.run).collect();
                 let besides = chosen_by(config, sources, dataset, options)?;
-                (images_besides(&besides, &runs, dataset, "--images", asked)?, Split::Train)
+                let classes = config.classes();
+                (images_besides(&besides, &runs, &classes, dataset, "--images", asked)?, Split::Train)
             }
         };
         let stimuli = images.iter().map(|image| see(config, dataset, split, image.index));
@@ -146,21 +150,4 @@ fn chosen_by(
         }
     }
     Ok(all)
-}
-
-/// Test images, class after class.
-fn test_images(config: &Config, dataset: &Dataset, options: &Options) -> Result<Vec<ImageRef>, Error> {
-    let classes = config.classes();
-    let mut images = Vec::new();
-    for (place, &label) in classes.iter().enumerate() {
-        let count = options.images / classes.len() + usize::from(place < options.images % classes.len());
-        let drawn = dataset.draw(Split::Test, &[label], count, options.seed, 0);
-        let drawn = drawn.map_err(|error| {
-            let most = classes.iter().map(|&c| dataset.indices_of(Split::Test, c).len()).min().unwrap_or(0);
-            let hint = format!("ask for at most --images {}", most * classes.len());
-            Error::input(error.to_string()).hint(hint)
-        })?;
-        images.extend(drawn.into_iter().map(|index| ImageRef { index, label }));
-    }
-    Ok(images)
 }

@@ -26,3 +26,4 @@ pub mod sweep;
 #[cfg(feature = "networks")]
 pub mod table;
 pub mod tasks;
+pub mod team;

@@ -11,6 +11,7 @@ use crate::store::capacity::{self, CapacityFile};
 use crate::store::eval::{self, EvalFile};
 use crate::store::response::{self, ResponseFile};
 use crate::store::run::{self, RunFile};
+use crate::store::team::{self, TeamFile};
 use schemars::JsonSchema;
 use schemars::generate::SchemaSettings;
 use serde_json::Value;
@@ -30,7 +31,7 @@ pub struct Schema {
 }
 
 /// All schemas.
-pub const ALL: [Schema; 10] = [
+pub const ALL: [Schema; 11] = [
     of_config::<Config>("config", "config of evolve and train"),
     of_config::<SweepPlan>("sweep", "plan of sweep"),
     of_config::<Plan>("plan", "plan of reproduce"),
@@ -40,6 +41,7 @@ pub const ALL: [Schema; 10] = [
     of::<EvalFile>("eval", "eval.json", eval::FORMAT_VERSION),
     of::<AuditFile>("audit", "audit.json", audit::FORMAT_VERSION),
     of::<ResponseFile>("response", "response.json", response::FORMAT_VERSION),
+    of::<TeamFile>("team", "team.json", team::FORMAT_VERSION),
     of::<CapacityFile>("capacity", "capacity.json", capacity::FORMAT_VERSION),
 ];
 

@@ -23,13 +23,13 @@ pub(crate) fn trained_on(run: &RunFile, dataset: &Dataset) -> Result<BTreeSet<us
 }
 
 /// Of each class the images that are not among those seen.
-fn left(config: &Config, seen: &BTreeSet<usize>, dataset: &Dataset) -> Vec<Vec<ImageRef>> {
+fn left(classes: &[u8], seen: &BTreeSet<usize>, dataset: &Dataset) -> Vec<Vec<ImageRef>> {
     let of_class = |&label: &u8| {
         let all = dataset.indices_of(Split::Train, label).iter();
         let free = all.filter(|&index| !seen.contains(index));
         free.map(|&index| ImageRef { index, label }).collect()
     };
-    config.classes().iter().map(of_class).collect()
+    classes.iter().map(of_class).collect()
 }
 
 /// How many are to be taken of each class, for `count` in all; `asked` says where that many were
@@ -38,14 +38,14 @@ fn left(config: &Config, seen: &BTreeSet<usize>, dataset: &Dataset) -> Vec<Vec<I
 /// # Errors
 /// If a class has not as many.
 fn per_class(
-    config: &Config,
+    classes: &[u8],
     left: &[Vec<ImageRef>],
     asked: &str,
     count: usize,
     or: &str,
 ) -> Result<usize, Error> {
     let per_class = count.div_ceil(left.len().max(1));
-    match config.classes().iter().zip(left).min_by_key(|(_, left)| left.len()) {
+    match classes.iter().zip(left).min_by_key(|(_, left)| left.len()) {
         Some((label, scarcest)) if scarcest.len() < per_class => {
             let text = format!(
                 "{asked} {count}: expected {per_class} images of class {label} that the run is not trained on, found {}",
@@ -70,7 +70,8 @@ pub(crate) fn check(config: &Config, dataset: &Dataset) -> Result<(), Error> {
     }
     let or = ", train on fewer (images_per_class), or choose none (validation.best = 0)";
     let seen = Training::indices(config, dataset)?.into_iter().collect();
-    per_class(config, &left(config, &seen, dataset), "validation.images =", images, or).map(|_| ())
+    let classes = config.classes();
+    per_class(&classes, &left(&classes, &seen, dataset), "validation.images =", images, or).map(|_| ())
 }
 
 /// `count` validation images of some runs of one experiment together, evenly divided between the
@@ -86,16 +87,18 @@ pub fn images(
     asked: &str,
     count: usize,
 ) -> Result<Vec<ImageRef>, Error> {
-    images_besides(&BTreeSet::new(), runs, dataset, asked, count)
+    let classes = runs.first().map_or(Vec::new(), |run| run.config.classes());
+    images_besides(&BTreeSet::new(), runs, &classes, dataset, asked, count)
 }
 
-/// The same, none of these among them.
+/// The same of these classes, none of these images among them.
 ///
 /// # Errors
 /// As of [`images`].
 pub(crate) fn images_besides(
     besides: &BTreeSet<usize>,
     runs: &[&RunFile],
+    classes: &[u8],
     dataset: &Dataset,
     asked: &str,
     count: usize,
@@ -106,14 +109,39 @@ pub(crate) fn images_besides(
     for run in runs {
         seen.extend(trained_on(run, dataset)?);
     }
-    let left = left(config, &seen, dataset);
-    let per_class = per_class(config, &left, asked, count, "")?;
+    let left = left(classes, &seen, dataset);
+    let per_class = per_class(classes, &left, asked, count, "")?;
     let draw = |(&label, free): (&u8, Vec<ImageRef>)| -> Vec<ImageRef> {
         let mut random = stream(config.seed, Purpose::Validation, 0, u64::from(label));
         random.sample(free.len(), per_class).into_iter().map(|i| free[i]).collect()
     };
-    let drawn: Vec<Vec<ImageRef>> = config.classes().iter().zip(left).map(draw).collect();
+    let drawn: Vec<Vec<ImageRef>> = classes.iter().zip(left).map(draw).collect();
     let turns =
         (0..per_class).flat_map(|turn| drawn.iter().filter_map(move |class| class.get(turn).copied()));
     Ok(turns.take(count).collect())
+}
+
+/// `count` test images of these classes, class after class, evenly divided between them; the first
+/// classes get what is left over.
+///
+/// # Errors
+/// If a class has too few.
+pub(crate) fn test_images(
+    classes: &[u8],
+    dataset: &Dataset,
+    count: usize,
+    seed: u64,
+) -> Result<Vec<ImageRef>, Error> {
+    let mut images = Vec::new();
+    for (place, &label) in classes.iter().enumerate() {
+        let share = count / classes.len() + usize::from(place < count % classes.len());
+        let drawn = dataset.draw(Split::Test, &[label], share, seed, 0);
+        let drawn = drawn.map_err(|error| {
+            let most = classes.iter().map(|&c| dataset.indices_of(Split::Test, c).len()).min().unwrap_or(0);
+            let hint = format!("ask for at most --images {}", most * classes.len());
+            Error::input(error.to_string()).hint(hint)
+        })?;
+        images.extend(drawn.into_iter().map(|index| ImageRef { index, label }));
+    }
+    Ok(images)
 }

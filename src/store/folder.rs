@@ -5,7 +5,7 @@ use crate::base::files::{check_writable, remove_half_written};
 use crate::store::lock::{Lock, Refusal};
 use crate::store::names::{
     AUDIT_JSON, CAPACITY_JSON, CHECKPOINTS, CONFIG, DATA_FOLDER, ELITES, EVAL_JSON, EVAL_VALIDATION_JSON,
-    METRICS, RESPONSE_JSON, RUN_JSON, TRAINING_JSON, VALIDATION_JSON,
+    METRICS, RESPONSE_JSON, RUN_JSON, TEAM_JSON, TRAINING_JSON, VALIDATION_JSON,
 };
 use crate::store::run::RunFile;
 use std::ffi::OsStr;
@@ -16,8 +16,8 @@ const LOCK: &str = ".lock";
 const OF_RUN: &str = "expected another name: this would overwrite a file of a run";
 
 /// What commands find, beside a run.
-const RESULTS: [&str; 6] =
-    [AUDIT_JSON, CAPACITY_JSON, EVAL_JSON, EVAL_VALIDATION_JSON, RESPONSE_JSON, VALIDATION_JSON];
+const RESULTS: [&str; 7] =
+    [AUDIT_JSON, CAPACITY_JSON, EVAL_JSON, EVAL_VALIDATION_JSON, RESPONSE_JSON, TEAM_JSON, VALIDATION_JSON];
 
 /// What to do with a folder that holds a run already.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

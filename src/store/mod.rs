@@ -17,6 +17,7 @@ pub mod run;
 pub(crate) mod samples;
 pub mod setting;
 pub mod task;
+pub mod team;
 pub mod training;
 #[cfg(feature = "networks")]
 pub mod trainings;

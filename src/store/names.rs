@@ -15,6 +15,9 @@ pub const EVAL_VALIDATION_JSON: &str = "eval-validation.json";
 /// What `response` found, beside `run.json`.
 pub const RESPONSE_JSON: &str = "response.json";
 
+/// What `team` found.
+pub const TEAM_JSON: &str = "team.json";
+
 /// What a training keeps of its rollouts, beside `run.json`.
 pub const TRAINING_JSON: &str = "training.json";
 

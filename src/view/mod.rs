@@ -45,6 +45,8 @@ pub mod sweeps;
 #[cfg(feature = "cli")]
 pub mod table;
 #[cfg(feature = "cli")]
+pub mod teams;
+#[cfg(feature = "cli")]
 pub mod terminal;
 #[cfg(feature = "cli")]
 pub mod verdicts;

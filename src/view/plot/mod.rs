@@ -18,6 +18,7 @@ mod scales;
 mod snapshots;
 mod spacetime;
 mod sweep;
+mod team;
 
 pub use accuracy::accuracy;
 pub use archive::archive;
@@ -30,3 +31,4 @@ pub use scales::{below, sequential};
 pub use snapshots::snapshots;
 pub use spacetime::spacetime;
 pub use sweep::sweep;
+pub use team::{confusion, poster};

@@ -1,0 +1,175 @@
+//! Classifiers without a body, on the pixels that robots see: least squares, and the nearest
+//! training image. What they answer depends on the images alone, to the bit.
+
+use crate::base::Grid;
+use nalgebra::{Cholesky, DMatrix, DVector};
+use rayon::prelude::*;
+use std::collections::BTreeMap;
+
+/// An image as robots see it, with its class.
+pub type Labelled<'a> = (&'a Grid<f64>, u8);
+
+/// Weight of the penalty on the size of the weights, as a share of the mean square of a pixel over
+/// the images: enough for pixels that are always dark.
+const RIDGE: f64 = 1e-3;
+
+/// Sums over the training images of each class: all that least squares need.
+#[derive(Clone, Debug)]
+pub struct Moments {
+    /// Pixels of an image, and one more that is always 1.
+    size: usize,
+    /// Sum of *x xᵀ* over a class's images; its last column is the sum of *x*.
+    by_class: BTreeMap<u8, DMatrix<f64>>,
+}
+
+/// A linear function of the pixels.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Linear {
+    weights: DVector<f64>,
+}
+
+/// The pixels that are not 0, by their places, and the constant 1 behind them.
+fn sparse(stimulus: &Grid<f64>) -> Vec<(usize, f64)> {
+    let pixels = stimulus.cells();
+    let lit = pixels.iter().copied().enumerate().filter(|(_, value)| *value != 0.0);
+    lit.chain([(pixels.len(), 1.0)]).collect()
+}
+
+impl Moments {
+    /// Those of training images, all of one size.
+    pub fn new(images: &[Labelled]) -> Self {
+        let size = images.first().map_or(0, |(stimulus, _)| stimulus.cells().len()) + 1;
+        let mut classes: Vec<u8> = images.iter().map(|(_, class)| *class).collect();
+        classes.sort_unstable();
+        classes.dedup();
+        let of_class = |class: u8| {
+            let mut sum = DMatrix::zeros(size, size);
+            for (stimulus, _) in images.iter().filter(|(_, other)| *other == class) {
+                let lit = sparse(stimulus);
+                for (place, &(column, b)) in lit.iter().enumerate() {
+                    for &(row, a) in &lit[..=place] {
+                        sum[(row, column)] += a * b;
+                    }
+                }
+            }
+            sum.fill_lower_triangle_with_upper_triangle();
+            (class, sum)
+        };
+        Moments { size, by_class: classes.into_par_iter().map(of_class).collect() }
+    }
+
+    /// The linear function with the least squared distance from 1 under images of the classes of
+    /// one group, and from −1 under those of the other; with a small penalty on its weights.
+    pub fn apart(&self, first: &[u8], second: &[u8]) -> Linear {
+        let mut square = DMatrix::zeros(self.size, self.size);
+        let mut towards = DVector::zeros(self.size);
+        for (classes, sign) in [(first, 1.0), (second, -1.0)] {
+            for sum in classes.iter().filter_map(|class| self.by_class.get(class)) {
+                square += sum;
+                towards += sum.column(self.size - 1) * sign;
+            }
+        }
+        let penalty = RIDGE * square.trace() / self.size as f64;
+        // Of no images at all, every function is as good.
+        let penalty = if penalty > 0.0 { penalty } else { 1.0 };
+        for place in 0..self.size {
+            square[(place, place)] += penalty;
+        }
+        let solved = Cholesky::new(square).expect("a sum of squares with a penalty is positive definite");
+        Linear { weights: solved.solve(&towards) }
+    }
+}
+
+impl Linear {
+    /// Its value for an image: about 1 for the first group, −1 for the second.
+    pub fn value(&self, stimulus: &Grid<f64>) -> f64 {
+        sparse(stimulus).into_iter().map(|(place, value)| self.weights[place] * value).sum()
+    }
+}
+
+/// The class of the training image nearest to each image (squared differences of pixels; the first
+/// of several that are as near).
+pub fn nearest_neighbours(training: &[Labelled], images: &[&Grid<f64>]) -> Vec<Option<u8>> {
+    let nearest = |image: &&Grid<f64>| {
+        let mut best: Option<(f64, u8)> = None;
+        for (known, class) in training {
+            let distance = squared_distance(image.cells(), known.cells());
+            if best.is_none_or(|(least, _)| distance < least) {
+                best = Some((distance, *class));
+            }
+        }
+        best.map(|(_, class)| class)
+    };
+    images.par_iter().map(nearest).collect()
+}
+
+/// In eight sums, which the processor does at once; always in the same order.
+fn squared_distance(a: &[f64], b: &[f64]) -> f64 {
+    const LANES: usize = 8;
+    let mut sums = [0.0; LANES];
+    let (a, b) = (a.chunks(LANES), b.chunks(LANES));
+    for (a, b) in a.zip(b) {
+        for (sum, (x, y)) in sums.iter_mut().zip(a.iter().zip(b)) {
+            *sum += (x - y) * (x - y);
+        }
+    }
+    sums.iter().sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Class 0: the left of two pixels is brighter; class 1: the right one.
+    fn images() -> Vec<(Grid<f64>, u8)> {
+        let of = |k: usize| {
+            let (a, b) = ((k % 7) as f64 / 10.0, (k % 5) as f64 / 10.0);
+            let class = u8::from(k % 2 == 1);
+            let pixels = if class == 0 { [a + 0.35, b] } else { [a, b + 0.65] };
+            (Grid::from_fn(1, 2, |_, column| pixels[column]), class)
+        };
+        (0..140).map(of).collect()
+    }
+
+    fn labelled(images: &[(Grid<f64>, u8)]) -> Vec<Labelled<'_>> {
+        images.iter().map(|(stimulus, class)| (stimulus, *class)).collect()
+    }
+
+    #[test]
+    fn least_squares_recover_a_planted_plane() {
+        // The mean of ±1 over equally many images of pixels that say nothing is the plane itself.
+        let images = images();
+        let linear = Moments::new(&labelled(&images)).apart(&[0], &[1]);
+        let right =
+            images.iter().filter(|(image, class)| (linear.value(image) > 0.0) == (*class == 0)).count();
+        assert!(right >= 120, "{right} of 140");
+        // Normal equations: what is left over is orthogonal to every pixel, but for the penalty.
+        for pixel in [0, 1] {
+            let residual = |(image, class): &(Grid<f64>, u8)| {
+                (linear.value(image) - if *class == 0 { 1.0 } else { -1.0 }) * image.cells()[pixel]
+            };
+            let sum: f64 = images.iter().map(residual).sum();
+            assert!(sum.abs() < 0.5, "{sum}");
+        }
+    }
+
+    #[test]
+    fn pixels_that_are_always_dark_do_no_harm() {
+        let dark: Vec<(Grid<f64>, u8)> = (0..4).map(|k| (Grid::filled(2, 2, 0.0), k % 2)).collect();
+        let value = Moments::new(&labelled(&dark)).apart(&[0], &[1]).value(&dark[0].0);
+        assert!(value.abs() < 1e-12);
+    }
+
+    #[test]
+    fn the_nearest_image_is_the_image_itself_and_the_first_of_equals() {
+        let images = images();
+        let known = labelled(&images);
+        let shown: Vec<&Grid<f64>> = images.iter().map(|(image, _)| image).collect();
+        let found = nearest_neighbours(&known, &shown);
+        for (answer, (image, _)) in found.iter().zip(&images) {
+            let first = images.iter().find(|(other, _)| other == image).unwrap();
+            assert_eq!(*answer, Some(first.1));
+        }
+        assert_eq!(nearest_neighbours(&[], &shown[..1]), [None]);
+    }
+}

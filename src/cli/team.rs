@@ -1,0 +1,89 @@
+//! `morphcog team`: its words, and what it calls.
+
+use crate::base::error::Error;
+use crate::base::signals;
+use crate::cli::choice::{Archives, ROBOTS, selected};
+use crate::commands::team;
+use crate::commands::team::Options;
+use crate::store::folder;
+use crate::store::images::HeldOut;
+use crate::store::names::TEAM_JSON;
+use crate::store::robots::{BEST, Selection};
+use crate::view::console::Console;
+use crate::view::reporters::Reporter;
+use crate::view::teams;
+use clap::Args;
+use std::path::PathBuf;
+
+pub(super) const EXAMPLES: &str = "\
+Examples:
+  morphcog team --archive runs/pairs/*                     a robot of each run
+  morphcog team --archive runs/0v1 runs/0v2 runs/1v2 --classes 0,1,2
+  morphcog team --archive runs/pairs/* --split validation --images 400
+
+A robot votes for the classes of the side it walks to, if it walks farther than 3 voxel lengths;
+most votes win, and of classes with as many votes the one that all robots together walked farthest
+towards. A second answer is that sum of walks alone. Nothing is trained. team.json keeps every walk:
+the same command goes on after Ctrl-C, and with more runs.";
+
+#[derive(Debug, Args)]
+pub(super) struct TeamArgs {
+    #[command(flatten)]
+    archives: Archives,
+    #[arg(short, long, visible_aliases = ["robot", "select"], help = format!("{ROBOTS}; of each archive by itself, but for ids [default: best]"))]
+    robots: Vec<Selection>,
+    /// Classes to tell apart, as 0,1,2 (default: all of the dataset).
+    #[arg(long, value_delimiter = ',')]
+    classes: Vec<u8>,
+    /// Images in all, evenly divided between the classes.
+    #[arg(short = 'n', long, default_value_t = 1000, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    images: u32,
+    /// Which images: test, or validation (of the training split, neither trained on nor chosen
+    /// from).
+    #[arg(long, default_value_t = HeldOut::Test, value_name = "SPLIT")]
+    split: HeldOut,
+    /// Seed of what is drawn: images, and robots with random:N.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Folder with the images.
+    #[arg(long, value_name = "DIR")]
+    data: Option<PathBuf>,
+    /// Result file; a CSV and the pictures go beside it (default: team.json in the folder above all
+    /// runs).
+    #[arg(short, long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Threads (default: one per core); the result does not depend on it.
+    #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    threads: Option<u16>,
+}
+
+pub(super) fn run(args: TeamArgs, console: &Console) -> Result<(), Error> {
+    let archives = args.archives.archive;
+    if archives.is_empty() {
+        let text = "--archive: expected the runs whose robots are the team";
+        let hint = "no team is published with the program yet; morphcog help team has examples";
+        return Err(Error::input(text.to_string()).hint(hint.to_string()));
+    }
+    let options = Options {
+        robots: selected(args.robots)?.unwrap_or(Selection::Ids(vec![BEST.to_string()])),
+        classes: (!args.classes.is_empty()).then_some(args.classes),
+        images: args.images as usize,
+        split: args.split,
+        seed: args.seed,
+        data: args.data,
+        out: args.out.unwrap_or_else(|| folder::above(&archives).join(TEAM_JSON)),
+        threads: args.threads.map(usize::from),
+        archives,
+    };
+    let stop = signals::stop_flag()?;
+    let team::Finished { file, unwritten } = team::team(&options, &stop, &Reporter::new(console))?;
+    teams::team(console, &file, unwritten.is_none().then_some(options.out.as_path()))?;
+    if let Some(error) = unwritten {
+        return Err(error);
+    }
+    if file.answers.is_none() {
+        let text = format!("stopped after {} of {} robots; those are saved", file.members.len(), file.size);
+        return Err(Error::stopped(text).hint("the same command goes on".to_string()));
+    }
+    Ok(())
+}

@@ -1,0 +1,342 @@
+//! `morphcog team`: robots of several runs, each with two groups of classes of its own, answer
+//! together which class an image is of.
+
+use crate::base::Grid;
+use crate::base::error::Error;
+use crate::base::observer::{Observer, Work};
+use crate::base::threads::pool;
+use crate::baseline::linear::{Linear, Moments, nearest_neighbours};
+use crate::config::Config;
+use crate::data::dataset::{Dataset, Split};
+use crate::search::held_out::{self, images_besides, test_images};
+use crate::search::showing::{CYCLES, THRESHOLD, Walker, control_steps, task_of};
+use crate::store::folder::check_out;
+use crate::store::images::{HeldOut, ImageRef};
+use crate::store::names::TEAM_JSON;
+use crate::store::robots::{BEST, Chosen, Selection, Source};
+use crate::store::run::different;
+use crate::store::team::{FORMAT, FORMAT_VERSION, Member, TeamBaselines, TeamFile};
+use crate::store::unwritten::Unwritten;
+use crate::store::validation::shown as shown_for_validation;
+use crate::store::whereabouts::{Whereabouts, load_dataset_of, see};
+use crate::task::direction::Assignment;
+use crate::task::grouping::Group;
+use crate::task::judge::{Accuracy, Ballot, CLIP, Sides};
+use std::collections::BTreeSet;
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+
+/// Who is in the team, and what it is shown.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// The run.json files.
+    pub archives: Vec<PathBuf>,
+    /// Which of their robots: ids are looked for in all of them together, all else in each by
+    /// itself.
+    pub robots: Selection,
+    /// The classes to tell apart; `None`: all of the dataset.
+    pub classes: Option<Vec<u8>>,
+    /// Images in all, evenly divided between the classes.
+    pub images: usize,
+    /// Which images.
+    pub split: HeldOut,
+    /// Seed of what is drawn: images, and robots with `random:N`.
+    pub seed: u64,
+    /// Where the data are, if the command line says.
+    pub data: Option<PathBuf>,
+    /// Where the results go (team.json; team.csv beside it).
+    pub out: PathBuf,
+    /// Number of threads; `None`: one per core.
+    pub threads: Option<usize>,
+}
+
+/// A test's end.
+#[derive(Clone, Debug)]
+pub struct Finished {
+    /// The content of team.json.
+    pub file: TeamFile,
+    /// Why that is not, or not as a whole, in its file, if so.
+    pub unwritten: Option<Error>,
+}
+
+/// Shows images to a team. The file is written after every robot, and the same command goes on from
+/// there.
+///
+/// # Errors
+/// If robots and classes do not go together; what is wrong with archive, data or selection.
+pub fn team(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Result<Finished, Error> {
+    let archives = options.archives.iter();
+    let sources = archives.map(|path| Source::read(path)).collect::<Result<Vec<Source>, Error>>()?;
+    let Some(first) = sources.first() else {
+        let text = "--archive: expected the runs whose robots are the team";
+        return Err(Error::input(text.to_string()));
+    };
+    for source in &sources {
+        check_out(&options.out, &source.path, TEAM_JSON)?;
+        same_data(first, source)?;
+    }
+    different(sources.iter().map(|source| (source.path.as_path(), &source.run)))?;
+    let robots = chosen(options, &sources)?;
+    let mut whereabouts = Whereabouts::given(options.data.as_deref());
+    for archive in &options.archives {
+        whereabouts = whereabouts.and_of(archive);
+    }
+    let config = &first.run.config;
+    let dataset = load_dataset_of(Some(&first.run.dataset), config, &whereabouts, &Split::ALL)?;
+    let classes = classes(options, &dataset)?;
+    let members = robots.iter().map(|chosen| member(&sources[chosen.source], chosen));
+    let members = members.collect::<Result<Vec<Member>, Error>>()?;
+    covered(&members, &classes)?;
+    let (images, split) = match options.split {
+        HeldOut::Test => (test_images(&classes, &dataset, options.images, options.seed)?, Split::Test),
+        HeldOut::Validation => (validation_images(options, &sources, &classes, &dataset)?, Split::Train),
+    };
+    let mut file = TeamFile {
+        format: FORMAT.to_string(),
+        format_version: FORMAT_VERSION,
+        program_version: env!("CARGO_PKG_VERSION").to_string(),
+        classes,
+        dataset: dataset.name().to_string(),
+        test_sha256: dataset.fingerprint(Split::Test).unwrap_or_default(),
+        split: options.split,
+        seed: options.seed,
+        threshold: THRESHOLD,
+        clip: CLIP,
+        cycles: CYCLES,
+        images,
+        members: Vec::new(),
+        size: members.len(),
+        answers: None,
+        baselines: None,
+    };
+    let known = Known::read(options, &file);
+    let pool = pool(options.threads)?;
+    let (done, open) =
+        (AtomicU64::new(0), members.iter().filter(|member| known.of(member).is_none()).count());
+    let label = format!("showing {} images to {open} robots:", file.images.len());
+    observer.begins(&Work::new(label, (open * file.images.len()) as u64, "rollouts"));
+    let mut unwritten = Unwritten::default();
+    for (member, chosen) in members.into_iter().zip(&robots) {
+        let displacements = match known.of(&member) {
+            Some(displacements) => displacements,
+            None => {
+                let config = &sources[chosen.source].run.config;
+                let stimuli = seen(config, &dataset, split, &file.images)?;
+                let steps = control_steps(config, CYCLES);
+                let before = AtomicU64::new(done.load(Ordering::Relaxed));
+                let walker =
+                    Walker { config, control_steps: steps, pool: &pool, stop, observer, done: before };
+                let Some((displacements, _)) = walker.rollouts(chosen.robot, &stimuli) else {
+                    return Ok(Finished { file, unwritten: unwritten.error() });
+                };
+                done.fetch_add(file.images.len() as u64, Ordering::Relaxed);
+                displacements
+            }
+        };
+        file.members.push(member.walked(displacements, &file.images, THRESHOLD));
+        unwritten.tried(file.write(&options.out), |text| observer.warning(text));
+    }
+    file.baselines = pool.install(|| baselines(&file, config, &dataset, split))?;
+    file.answers = Some(file.decided());
+    unwritten.tried(file.write(&options.out), |text| observer.warning(text));
+    Ok(Finished { file, unwritten: unwritten.error() })
+}
+
+/// Whether robots of two runs were trained on the same data.
+fn same_data(first: &Source, other: &Source) -> Result<(), Error> {
+    let (a, b) = (&first.run, &other.run);
+    if a.dataset == b.dataset && a.config.data.builtin == b.config.data.builtin {
+        return Ok(());
+    }
+    let (path, first) = (other.path.display(), first.path.display());
+    let text = format!("{path}: expected robots of the same data ({}) as in {first}", a.dataset.name);
+    Err(Error::input(text).hint(format!("these are of {}: leave them out", b.dataset.name)))
+}
+
+/// The robots of the team: those that are named from all runs together, else of each run by itself.
+fn chosen<'a>(options: &Options, sources: &'a [Source]) -> Result<Vec<Chosen<'a>>, Error> {
+    if matches!(&options.robots, Selection::Ids(ids) if !ids.iter().any(|id| id == BEST)) {
+        return options.robots.of(sources, options.seed);
+    }
+    let mut all = Vec::new();
+    for (number, source) in sources.iter().enumerate() {
+        let of_one = options.robots.of(std::slice::from_ref(source), options.seed);
+        let of_one = of_one.map_err(|error| error.within(&source.path.display().to_string()))?;
+        all.extend(of_one.into_iter().map(|chosen| Chosen { source: number, ..chosen }));
+    }
+    Ok(all)
+}
+
+/// The classes to tell apart, in order.
+fn classes(options: &Options, dataset: &Dataset) -> Result<Vec<u8>, Error> {
+    let all = dataset.classes(Split::Train);
+    let mut classes = options.classes.clone().unwrap_or_else(|| all.clone());
+    classes.sort_unstable();
+    classes.dedup();
+    if let Some(class) = classes.iter().find(|class| !all.contains(class)) {
+        return Err(Error::usage(format!("--classes: {} has no class {class}", dataset.name())));
+    }
+    if classes.len() < 2 {
+        return Err(Error::usage("--classes: expected two or more".to_string()));
+    }
+    if options.images < classes.len() {
+        let (asked, least) = (options.images, classes.len());
+        return Err(Error::usage(format!("--images {asked}: expected {least} or more, one of each class")));
+    }
+    Ok(classes)
+}
+
+/// A robot of the team, not shown anything yet.
+fn member(source: &Source, chosen: &Chosen) -> Result<Member, Error> {
+    let (run, robot) = (&source.run, chosen.robot);
+    let grouping = run.config.grouping()?;
+    let Some(split) = task_of(&grouping, robot) else {
+        let text =
+            format!("{}: robot {} walks the same way for every class", source.path.display(), robot.id);
+        return Err(Error::input(text).hint("name others with --robots".to_string()));
+    };
+    let assignment = Assignment::from_training(split, run.fitness(), &run.answers(robot));
+    Ok(Member {
+        id: robot.id.clone(),
+        run: run.name.clone(),
+        run_sha256: run.fingerprint(),
+        task: robot.task.clone(),
+        groups: [Group::A, Group::B].map(|group| split.classes(group).to_vec()),
+        first_group_walks: Member::way(assignment).to_string(),
+        body: robot.body.clone(),
+        own: Accuracy::of::<()>([]),
+        not_moved: 0.0,
+        displacements: Vec::new(),
+    })
+}
+
+/// Whether every class has a robot, and every robot classes of the team.
+fn covered(members: &[Member], classes: &[u8]) -> Result<(), Error> {
+    let knows = |member: &Member, class: &u8| member.groups.iter().any(|group| group.contains(class));
+    let missing: Vec<String> = classes
+        .iter()
+        .filter(|class| !members.iter().any(|member| knows(member, class)))
+        .map(u8::to_string)
+        .collect();
+    if !missing.is_empty() {
+        let text = format!("no robot of the team knows class {}", missing.join(", "));
+        let hint = "add runs whose tasks have it with --archive, or name the classes with --classes";
+        return Err(Error::input(text).hint(hint.to_string()));
+    }
+    let is_foreign = |member: &&Member| member.groups.iter().flatten().any(|class| !classes.contains(class));
+    match members.iter().find(is_foreign) {
+        None => Ok(()),
+        Some(member) => {
+            let (id, task) = (&member.id, &member.task);
+            let text = format!("robot {id} tells {task} apart: expected classes of the team only");
+            Err(Error::input(text).hint("leave it out, or name its classes with --classes".to_string()))
+        }
+    }
+}
+
+/// Images of the training split that no run was trained on and no robot was chosen by.
+fn validation_images(
+    options: &Options,
+    sources: &[Source],
+    classes: &[u8],
+    dataset: &Dataset,
+) -> Result<Vec<ImageRef>, Error> {
+    let mut besides = BTreeSet::new();
+    for source in sources {
+        if let Some(count) = shown_for_validation(source) {
+            let of_run = held_out::images(&[&source.run], dataset, "--split validation", count)?;
+            besides.extend(of_run.into_iter().map(|image| image.index));
+        }
+    }
+    let runs: Vec<_> = sources.iter().map(|source| &source.run).collect();
+    images_besides(&besides, &runs, classes, dataset, "--images", options.images)
+}
+
+/// Images as robots of a config see them.
+fn seen(
+    config: &Config,
+    dataset: &Dataset,
+    split: Split,
+    images: &[ImageRef],
+) -> Result<Vec<Grid<f64>>, Error> {
+    images.iter().map(|image| see(config, dataset, split, image.index)).collect()
+}
+
+/// What an earlier test that was stopped, or that had other members too, found on the same images.
+struct Known(Option<TeamFile>);
+
+impl Known {
+    fn read(options: &Options, now: &TeamFile) -> Self {
+        let same = |known: &TeamFile| {
+            let about = |file: &TeamFile| {
+                let TeamFile { program_version, test_sha256, images, cycles, .. } = file;
+                (program_version.clone(), test_sha256.clone(), images.clone(), *cycles, file.split)
+            };
+            about(known) == about(now)
+        };
+        Known(TeamFile::read(&options.out).ok().filter(same))
+    }
+
+    fn of(&self, member: &Member) -> Option<Vec<Option<f64>>> {
+        let same = |known: &&Member| (&known.id, &known.run_sha256) == (&member.id, &member.run_sha256);
+        let known = self.0.as_ref()?.members.iter().find(same)?;
+        Some(known.displacements.clone())
+    }
+}
+
+/// What answers the same images without bodies, on the pixels that the first robot sees.
+fn baselines(
+    file: &TeamFile,
+    config: &Config,
+    dataset: &Dataset,
+    split: Split,
+) -> Result<Option<TeamBaselines>, Error> {
+    let Some((place, best_body)) = file.best_body() else { return Ok(None) };
+    let classes = &file.classes;
+    let shown: BTreeSet<usize> = match split {
+        Split::Test => BTreeSet::new(),
+        Split::Train => file.images.iter().map(|image| image.index).collect(),
+    };
+    let mut training = Vec::new();
+    for &class in classes {
+        for &index in dataset.indices_of(Split::Train, class).iter().filter(|index| !shown.contains(index)) {
+            training.push((see(config, dataset, Split::Train, index)?, class));
+        }
+    }
+    let known: Vec<(&Grid<f64>, u8)> = training.iter().map(|(stimulus, class)| (stimulus, *class)).collect();
+    let stimuli = seen(config, dataset, split, &file.images)?;
+    let labels = || file.images.iter().map(|image| image.label);
+    let moments = Moments::new(&known);
+    let against_rest = |class: &u8| {
+        let rest: Vec<u8> = classes.iter().copied().filter(|other| other != class).collect();
+        moments.apart(&[*class], &rest)
+    };
+    let against_rest: Vec<Linear> = classes.iter().map(against_rest).collect();
+    let largest = |stimulus: &Grid<f64>| {
+        let values: Vec<f64> = against_rest.iter().map(|linear| linear.value(stimulus)).collect();
+        // The first of several that are as large.
+        let best =
+            (1..values.len()).fold(0, |best, next| if values[next] > values[best] { next } else { best });
+        classes[best]
+    };
+    let mut pairs = Vec::new();
+    for (number, &a) in classes.iter().enumerate() {
+        for &b in &classes[number + 1..] {
+            // A positive value is a walk to the right.
+            pairs.push((Sides { left: vec![b], right: vec![a] }, moments.apart(&[a], &[b])));
+        }
+    }
+    let voted = |stimulus: &Grid<f64>| {
+        let walks = pairs.iter().map(|(sides, linear)| (sides, Some(linear.value(stimulus))));
+        classes[Ballot::count(classes, walks, 0.0, 1.0).by_votes().0]
+    };
+    let nearest = nearest_neighbours(&known, &stimuli.iter().collect::<Vec<_>>());
+    Ok(Some(TeamBaselines {
+        training_images: known.len(),
+        linear_one_against_rest: Accuracy::of(stimuli.iter().map(largest).zip(labels())),
+        linear_pairs: Accuracy::of(stimuli.iter().map(voted).zip(labels())),
+        nearest_neighbour: Accuracy::of(nearest.into_iter().zip(labels().map(Some))),
+        best_body,
+        best_body_id: file.members[place].id.clone(),
+    }))
+}

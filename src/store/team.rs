@@ -1,0 +1,281 @@
+//! `team.json` and `team.csv`: what robots of several runs answer together.
+
+use crate::base::error::Error;
+use crate::base::files::{read_text, write_atomically};
+use crate::base::table;
+use crate::body::Body;
+use crate::config::reading;
+use crate::store::images::{HeldOut, ImageRef};
+use crate::task::direction::{Assignment, Direction};
+use crate::task::grouping::Group;
+use crate::task::judge::{Accuracy, Ballot, CLIP, Sides};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// What `team.json` calls itself.
+pub const FORMAT: &str = "morphcog-team";
+/// Version of its schema.
+pub const FORMAT_VERSION: u32 = 1;
+
+/// The content of `team.json`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct TeamFile {
+    /// "morphcog-team".
+    #[schemars(extend("const" = FORMAT))]
+    pub format: String,
+    /// Version of this schema.
+    #[schemars(range(min = 1, max = FORMAT_VERSION))]
+    pub format_version: u32,
+    /// Version of morphcog that wrote it.
+    pub program_version: String,
+    /// The classes that are told apart, in order.
+    pub classes: Vec<u8>,
+    /// Name of the dataset.
+    pub dataset: String,
+    /// SHA-256 of its test split.
+    pub test_sha256: String,
+    /// Which images: those of the test split, or validation images.
+    pub split: HeldOut,
+    /// Seed by which they were drawn.
+    pub seed: u64,
+    /// Walks up to this give no vote \[voxel lengths\].
+    pub threshold: f64,
+    /// Walks count up to this in sums \[voxel lengths\].
+    pub clip: f64,
+    /// Actuation cycles per image, each image a fresh rollout.
+    pub cycles: u32,
+    /// The images.
+    pub images: Vec<ImageRef>,
+    /// Robots of the team, those that have been shown the images.
+    pub members: Vec<Member>,
+    /// How many robots the team has; more than `members` if it was stopped.
+    pub size: usize,
+    /// What they answer together; none if it was stopped.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub answers: Option<Answers>,
+    /// What answers the same images without bodies, or with one; none if it was stopped.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub baselines: Option<TeamBaselines>,
+}
+
+/// A robot of a team.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Member {
+    /// Its id.
+    pub id: String,
+    /// Name of its run.
+    pub run: String,
+    /// SHA-256 of its run.json.
+    pub run_sha256: String,
+    /// Its task.
+    pub task: String,
+    /// Classes of the two groups.
+    pub groups: [Vec<u8>; 2],
+    /// Which way the first group is to walk: "left" or "right", as on the training images.
+    pub first_group_walks: String,
+    /// Its body.
+    pub body: Body,
+    /// How it answers the images of its own classes.
+    pub own: Accuracy,
+    /// Share of all images under which it moved no farther than the threshold.
+    pub not_moved: f64,
+    /// Displacement under each image \[voxel lengths\]; none if unstable.
+    pub displacements: Vec<Option<f64>>,
+}
+
+/// What a team answers, by both decoders.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Answers {
+    /// Most votes.
+    pub votes: Decoded,
+    /// The largest sum of walks.
+    pub walks: Decoded,
+    /// Share of images for which several classes had most votes.
+    pub ties: f64,
+    /// Mean over images: of the robots that know the answered class, the share that voted for it.
+    pub agreement: f64,
+    /// Mean number of robots that moved no farther than the threshold.
+    pub not_moved: f64,
+}
+
+/// The answers of one decoder.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Decoded {
+    /// How many are right.
+    pub accuracy: Accuracy,
+    /// Share answered right, by class.
+    pub per_class: BTreeMap<u8, f64>,
+    /// Images by their class (rows) and by the answer (columns), both in the order of `classes`.
+    pub confusion: Vec<Vec<usize>>,
+    /// The answer to each image.
+    pub answers: Vec<u8>,
+}
+
+/// Accuracies on the same images and pixels.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct TeamBaselines {
+    /// Training images that linear classifiers and the nearest neighbour know.
+    pub training_images: usize,
+    /// A linear function for each class against all others; the largest wins.
+    pub linear_one_against_rest: Accuracy,
+    /// A linear function for each pair of classes, with votes as the team's.
+    pub linear_pairs: Accuracy,
+    /// The class of the nearest training image.
+    pub nearest_neighbour: Accuracy,
+    /// The best robot of the team by itself, with votes as the team's.
+    pub best_body: Accuracy,
+    /// Its id.
+    pub best_body_id: String,
+}
+
+impl Member {
+    /// What a walk of this robot to either side speaks for.
+    pub fn sides(&self) -> Sides {
+        let [a, b] = self.groups.clone();
+        if self.first_group_walks == "left" {
+            Sides { left: a, right: b }
+        } else {
+            Sides { left: b, right: a }
+        }
+    }
+
+    /// Its figures, once its displacements are known.
+    pub(crate) fn walked(self, displacements: Vec<Option<f64>>, images: &[ImageRef], threshold: f64) -> Self {
+        let sides = self.sides();
+        let direction = |walk: &Option<f64>| walk.and_then(|walk| Direction::of(walk, threshold));
+        let expected = |class: u8| match (sides.left.contains(&class), sides.right.contains(&class)) {
+            (true, _) => Some(Direction::Left),
+            (_, true) => Some(Direction::Right),
+            _ => None,
+        };
+        let of_own = images.iter().zip(&displacements);
+        let of_own = of_own.filter_map(|(image, walk)| Some((direction(walk), Some(expected(image.label)?))));
+        let still = displacements.iter().filter(|walk| direction(walk).is_none()).count();
+        let (own, not_moved) = (Accuracy::of(of_own), still as f64 / images.len().max(1) as f64);
+        Member { own, not_moved, displacements, ..self }
+    }
+
+    /// The name of a direction, as `first_group_walks` has it.
+    pub(crate) fn way(assignment: Assignment) -> &'static str {
+        match assignment.expected(Group::A) {
+            Direction::Left => "left",
+            Direction::Right => "right",
+        }
+    }
+}
+
+impl Decoded {
+    fn new(classes: &[u8], images: &[ImageRef], places: &[usize]) -> Self {
+        let place_of = |class: u8| classes.iter().position(|other| *other == class).unwrap_or(0);
+        let mut confusion = vec![vec![0; classes.len()]; classes.len()];
+        for (image, answer) in images.iter().zip(places) {
+            confusion[place_of(image.label)][*answer] += 1;
+        }
+        let share = |(place, class): (usize, &u8)| {
+            let all: usize = confusion[place].iter().sum();
+            (*class, confusion[place][place] as f64 / all.max(1) as f64)
+        };
+        let answers: Vec<u8> = places.iter().map(|place| classes[*place]).collect();
+        Decoded {
+            accuracy: Accuracy::of(answers.iter().copied().zip(images.iter().map(|image| image.label))),
+            per_class: classes.iter().enumerate().map(share).collect(),
+            confusion,
+            answers,
+        }
+    }
+}
+
+impl TeamFile {
+    /// What all walks under an image come to.
+    fn ballot(&self, sides: &[Sides], image: usize) -> Ballot {
+        let walks =
+            sides.iter().zip(&self.members).map(|(sides, member)| (sides, member.displacements[image]));
+        Ballot::count(&self.classes, walks, self.threshold, self.clip)
+    }
+
+    /// What the members answer together, of all images.
+    pub(crate) fn decided(&self) -> Answers {
+        let sides: Vec<Sides> = self.members.iter().map(Member::sides).collect();
+        let ballots: Vec<Ballot> = (0..self.images.len()).map(|image| self.ballot(&sides, image)).collect();
+        let knows = |class: &u8| {
+            sides.iter().filter(|sides| sides.left.contains(class) || sides.right.contains(class)).count()
+        };
+        let known: Vec<usize> = self.classes.iter().map(knows).collect();
+        let by_votes: Vec<(usize, bool)> = ballots.iter().map(Ballot::by_votes).collect();
+        let by_walks: Vec<usize> = ballots.iter().map(Ballot::by_walks).collect();
+        let places: Vec<usize> = by_votes.iter().map(|(place, _)| *place).collect();
+        let count = self.images.len().max(1) as f64;
+        let agreement = ballots.iter().zip(&places);
+        let agreement =
+            agreement.map(|(ballot, place)| ballot.votes[*place] as f64 / known[*place].max(1) as f64);
+        Answers {
+            votes: Decoded::new(&self.classes, &self.images, &places),
+            walks: Decoded::new(&self.classes, &self.images, &by_walks),
+            ties: by_votes.iter().filter(|(_, tied)| *tied).count() as f64 / count,
+            agreement: agreement.sum::<f64>() / count,
+            not_moved: ballots.iter().map(|ballot| ballot.silent as f64).sum::<f64>() / count,
+        }
+    }
+
+    /// The best robot by itself, with votes as the team's: its place, and how it does.
+    pub(crate) fn best_body(&self) -> Option<(usize, Accuracy)> {
+        let alone = |(place, member): (usize, &Member)| {
+            let sides = member.sides();
+            let answer = |(image, walk): (&ImageRef, &Option<f64>)| {
+                let ballot = Ballot::count(&self.classes, [(&sides, *walk)], self.threshold, CLIP);
+                (self.classes[ballot.by_votes().0], image.label)
+            };
+            (place, Accuracy::of(self.images.iter().zip(&member.displacements).map(answer)))
+        };
+        // The first of several that are as good.
+        self.members
+            .iter()
+            .enumerate()
+            .map(alone)
+            .reduce(|best, next| if next.1.right > best.1.right { next } else { best })
+    }
+
+    /// Reads a team.json.
+    ///
+    /// # Errors
+    /// What is wrong with it.
+    pub fn read(path: &Path) -> Result<Self, Error> {
+        let text = read_text(path).map_err(|error| Error::reading(path, &error))?;
+        reading::read_versioned(&text, &path.display().to_string(), FORMAT, FORMAT_VERSION)
+    }
+
+    /// Writes it, and its table beside it.
+    ///
+    /// # Errors
+    /// If a file cannot be written.
+    pub fn write(&self, path: &Path) -> Result<(), Error> {
+        let json = serde_json::to_string(self).expect("keys are text and numbers are finite") + "\n";
+        let csv_path = path.with_extension("csv");
+        for (path, content) in [(path, json.into_bytes()), (&csv_path, self.to_csv())] {
+            write_atomically(path, &content).map_err(|error| Error::writing(path, &error))?;
+        }
+        Ok(())
+    }
+
+    /// A row per image: its class, both answers, and how far each robot walked.
+    fn to_csv(&self) -> Vec<u8> {
+        let columns = ["index", "label", "by_votes", "by_walks"].map(str::to_string).into_iter();
+        let columns =
+            columns.chain(self.members.iter().map(|member| format!("{} {}", member.task, member.id)));
+        let rows = self.images.iter().enumerate().map(|(place, image)| {
+            let answer =
+                |of: fn(&Answers) -> &Decoded| self.answers.as_ref().map(|all| of(all).answers[place]);
+            let walks: Vec<Option<f64>> =
+                self.members.iter().map(|member| member.displacements[place]).collect();
+            (image.index, image.label, answer(|all| &all.votes), answer(|all| &all.walks), walks)
+        });
+        table::csv(columns, rows)
+    }
+}

@@ -1,0 +1,146 @@
+//! The figures of a team: its confusion matrix, and all its bodies.
+
+use crate::base::number::percent;
+use crate::body::{Body, Material};
+use crate::store::team::{Member, TeamFile};
+use crate::view::colour;
+use crate::view::colour::Colour;
+use crate::view::plot::axes::{MARGIN, heading};
+use crate::view::plot::canvas::{Canvas, Pen, TEXT, Words};
+use crate::view::plot::figure::{COLUMN, Figure, PAGE};
+use crate::view::plot::{robot, scales};
+
+/// Space between bodies, points.
+const GAP: f64 = 4.0;
+
+/// Space for what stands below a body, points.
+const CAPTION: f64 = 17.0;
+
+/// Images by their class and by the team's answer, most votes; none while there are no answers.
+pub fn confusion(file: &TeamFile) -> Option<Figure> {
+    let votes = &file.answers.as_ref()?.votes;
+    let count = file.classes.len();
+    let mut canvas = Canvas::new();
+    let of = format!(
+        "{} robots, most votes: {} % of {} {} images",
+        file.members.len(),
+        percent(votes.accuracy.accuracy),
+        file.images.len(),
+        file.split
+    );
+    let top = heading(&mut canvas, "Answers of the team", &of, COLUMN) + 4.0 + 2.0 * TEXT;
+    let left = MARGIN + 3.0 * TEXT;
+    let side = (COLUMN - MARGIN - left) / count as f64;
+    let middle = left + side * count as f64 / 2.0;
+    canvas.text([middle, top - 1.3 * TEXT], "answer", Words::middle());
+    let at = [MARGIN + TEXT, top + side * count as f64 / 2.0];
+    canvas.text(at, "class", Words { upwards: true, ..Words::middle() });
+    for (row, class) in file.classes.iter().enumerate() {
+        let of_class: usize = votes.confusion[row].iter().sum();
+        let name = class.to_string();
+        let y = top + side * row as f64;
+        canvas.text([left - 3.0, y + side / 2.0 + 0.36 * TEXT], &name, Words::end());
+        canvas.text([left + side * (row as f64 + 0.5), top - 3.0], &name, Words::middle());
+        for (column, images) in votes.confusion[row].iter().enumerate() {
+            let x = left + side * column as f64;
+            let share = *images as f64 / of_class.max(1) as f64;
+            let size = [side - 0.5, side - 0.5];
+            canvas.rectangle(
+                [x, y],
+                size,
+                if *images == 0 { Colour::gray(0.97) } else { scales::sequential(share) },
+            );
+            if *images > 0 {
+                let ink = if share > 0.6 { colour::INK } else { colour::PAPER };
+                let words = Words { size: TEXT.min(0.42 * side), ..Words::middle() }.colour(ink);
+                canvas.text([x + side / 2.0, y + side / 2.0 + 0.36 * words.size], &images.to_string(), words);
+            }
+        }
+    }
+    let height = top + side * count as f64 + MARGIN;
+    Some(Figure::new(&format!("Answers: {of}"), [COLUMN, height], canvas.finish()))
+}
+
+/// All bodies, with what each tells apart and how well: where every task is a pair of classes, as a
+/// triangle with the lower class from top to bottom and the higher from left to right. None without
+/// robots.
+pub fn poster(file: &TeamFile) -> Option<Figure> {
+    if file.members.is_empty() {
+        return None;
+    }
+    let places = triangle(file).unwrap_or_else(|| rows(file.members.len()));
+    let columns = places.iter().map(|[column, _]| column + 1).max()?;
+    let lines = places.iter().map(|[_, line]| line + 1).max()?;
+    let mut canvas = Canvas::new();
+    let of = match &file.answers {
+        Some(answers) => {
+            let accuracy = percent(answers.votes.accuracy.accuracy);
+            format!("together they answer {accuracy} % of {} {} images", file.images.len(), file.split)
+        }
+        None => file.dataset.clone(),
+    };
+    let count = file.members.len();
+    let top = heading(&mut canvas, &format!("A team of {count} bodies"), &of, PAGE) + 4.0;
+    let side = ((PAGE - 2.0 * MARGIN) / columns as f64 - GAP).min(110.0);
+    for (member, [column, line]) in file.members.iter().zip(&places) {
+        let at = [MARGIN + (side + GAP) * *column as f64, top + (side + CAPTION) * *line as f64];
+        drawn(&mut canvas, at, side, &member.body);
+        caption(&mut canvas, [at[0] + side / 2.0, at[1] + side], side, member);
+    }
+    // The lower left of the triangle is free.
+    let bottom = top + (side + CAPTION) * lines as f64;
+    let materials: Vec<Material> =
+        Material::ALL.into_iter().filter(|material| !material.is_empty()).collect();
+    let names: Vec<(Colour, &str)> =
+        materials.iter().map(|material| (robot::plain(*material), material.name())).collect();
+    let is_free =
+        columns > 3 && lines > 3 && places.iter().all(|[column, line]| *column >= 3 || *line < lines - 2);
+    let start = if is_free { bottom - 11.0 * names.len() as f64 } else { bottom };
+    let below = robot::legend(&mut canvas, [MARGIN, start], names, PAGE / 3.0);
+    Some(Figure::new(&format!("Team: {of}"), [PAGE, bottom.max(below) + MARGIN], canvas.finish()))
+}
+
+/// Column and line of each robot, if every task is a pair of classes and every pair has one robot.
+fn triangle(file: &TeamFile) -> Option<Vec<[usize; 2]>> {
+    let place = |class: u8| file.classes.iter().position(|other| *other == class);
+    let of = |member: &Member| match &member.groups {
+        [a, b] if a.len() == 1 && b.len() == 1 => {
+            let (a, b) = (place(a[0])?, place(b[0])?);
+            Some([a.max(b) - 1, a.min(b)])
+        }
+        _ => None,
+    };
+    let places = file.members.iter().map(of).collect::<Option<Vec<_>>>()?;
+    let mut different = places.clone();
+    different.sort_unstable();
+    different.dedup();
+    (different.len() == places.len() && file.classes.len() > 2).then_some(places)
+}
+
+/// Column and line of each of so many, about as many lines as columns.
+fn rows(count: usize) -> Vec<[usize; 2]> {
+    let columns = (count as f64).sqrt().ceil().max(4.0) as usize;
+    (0..count).map(|number| [number % columns, number / columns]).collect()
+}
+
+fn drawn(canvas: &mut Canvas, at: [f64; 2], side: f64, body: &Body) {
+    let cell = side / body.height().max(body.width()).max(1) as f64;
+    let there = body.voxels().iter().filter(|(_, material)| !material.is_empty());
+    robot::squares(canvas, at, cell, 0.0, there.map(|(place, material)| (place, robot::plain(*material))));
+    robot::body_outline(canvas, at, cell, body, Pen::new(colour::INK, 0.4));
+}
+
+fn caption(canvas: &mut Canvas, [middle, y]: [f64; 2], most: f64, member: &Member) {
+    // An arrow says which way the classes before the bar walk.
+    let (a, b) = if member.first_group_walks == "left" { (0, 1) } else { (1, 0) };
+    let group = |k: usize| member.groups[k].iter().map(u8::to_string).collect::<Vec<_>>().join(" ");
+    let text = format!("← {}   {} →", group(a), group(b));
+    canvas.fitted([middle, y + 7.5], &text, most + GAP, Words::middle());
+    let accuracy = format!("{} %", percent(member.own.accuracy));
+    canvas.fitted(
+        [middle, y + 15.0],
+        &accuracy,
+        most,
+        Words { size: 6.2, ..Words::middle() }.colour(colour::FAINT),
+    );
+}

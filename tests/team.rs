@@ -1,0 +1,143 @@
+//! A team: robots that tell pairs apart answer together, by rules that a few lines here repeat; it
+//! goes on after a stop, and says clearly who or what is missing.
+
+mod common;
+
+use common::program::{Sandbox, TINY, files};
+use morphcog::store::team::TeamFile;
+use serde_json::Value;
+use std::collections::BTreeMap;
+
+/// Runs of all pairs of three digits, in `pairs/`.
+fn pairs() -> Sandbox {
+    let sandbox = Sandbox::new();
+    for [a, b] in [[0, 1], [0, 4], [1, 4]] {
+        let task = format!("groups = [[{a}], [{b}]]");
+        let config = TINY.replace("groups = [[0], [1]]", &task).replace("train_images = [0, 1]", "");
+        sandbox.write("run.toml", config);
+        sandbox.run(&format!("evolve -q -c run.toml -o pairs/{a}v{b}")).ended(0, &[]);
+    }
+    sandbox
+}
+
+const TEAM: &str = "team --archive pairs/0v1 pairs/0v4 pairs/1v4 --classes 0,1,4";
+
+fn read(sandbox: &Sandbox, name: &str) -> TeamFile {
+    TeamFile::read(&sandbox.path(name)).unwrap()
+}
+
+#[test]
+fn the_answers_are_those_of_the_rules_in_the_documentation() {
+    let sandbox = pairs();
+    let said = sandbox.run(&format!("{TEAM} --images 60")).ended(0, &[]);
+    for word in ["most votes", "sum of walks", "linear, pairs", "nearest neighbour", "best body"] {
+        assert!(said.out.contains(word), "{word} in:\n{}", said.out);
+    }
+    let team = read(&sandbox, "pairs/team.json");
+    let answers = team.answers.as_ref().unwrap();
+    assert_eq!((team.images.len(), team.members.len(), team.size), (60, 3, 3));
+    for (place, image) in team.images.iter().enumerate() {
+        let (mut votes, mut sums) = (BTreeMap::<u8, i32>::new(), BTreeMap::<u8, f64>::new());
+        for member in &team.members {
+            let walk = member.displacements[place].unwrap_or(0.0);
+            let [a, b] = [member.groups[0][0], member.groups[1][0]];
+            let (left, right) = if member.first_group_walks == "left" { (a, b) } else { (b, a) };
+            let (towards, away) = if walk > 0.0 { (right, left) } else { (left, right) };
+            *votes.entry(towards).or_default() += i32::from(walk.abs() > 3.0);
+            *sums.entry(towards).or_default() += walk.abs().min(10.0);
+            *sums.entry(away).or_default() -= walk.abs().min(10.0);
+        }
+        let most = [0, 1, 4].map(|class| votes.get(&class).copied().unwrap_or(0)).into_iter().max().unwrap();
+        let best = |among: &dyn Fn(u8) -> bool| {
+            let candidates = [0_u8, 1, 4].into_iter().filter(|class| among(*class));
+            candidates.reduce(|best, next| if sums[&next] > sums[&best] { next } else { best }).unwrap()
+        };
+        let by_votes = best(&|class| votes.get(&class).copied().unwrap_or(0) == most);
+        let found = (answers.votes.answers[place], answers.walks.answers[place]);
+        assert_eq!(found, (by_votes, best(&|_| true)), "image {place} of class {}", image.label);
+    }
+    let right =
+        |of: &[u8]| team.images.iter().zip(of).filter(|(image, answer)| image.label == **answer).count();
+    assert_eq!(answers.votes.accuracy.right, right(&answers.votes.answers));
+    let diagonal: usize = (0..3).map(|class| answers.votes.confusion[class][class]).sum();
+    assert_eq!(answers.votes.accuracy.right, diagonal);
+    assert_eq!(answers.votes.confusion.iter().flatten().sum::<usize>(), 60);
+    // What needs no body reads drawn digits well; the table and the pictures are there.
+    let baselines = team.baselines.unwrap();
+    assert!(
+        baselines.linear_pairs.accuracy > 0.9 && baselines.nearest_neighbour.accuracy > 0.9,
+        "{baselines:?}"
+    );
+    assert_eq!(sandbox.read("pairs/team.csv").lines().count(), 61);
+    for picture in ["confusion.svg", "confusion.png", "bodies.svg", "bodies.png"] {
+        assert!(sandbox.path(&format!("pairs/team-{picture}")).exists(), "{picture}");
+    }
+}
+
+#[test]
+fn a_team_shows_the_same_walks_as_eval() {
+    let sandbox = pairs();
+    sandbox.run("eval -q -a pairs/0v1 --robots best --images 40 -o eval.json").ended(0, &[]);
+    sandbox.run("team -q --archive pairs/0v1 --classes 0,1 --images 40 -o team.json").ended(0, &[]);
+    let eval: Value = serde_json::from_str(&sandbox.read("eval.json")).unwrap();
+    let member = &read(&sandbox, "team.json").members[0];
+    let walks: Vec<Option<f64>> = serde_json::from_value(eval["robots"][0]["displacements"].clone()).unwrap();
+    assert_eq!(member.displacements, walks);
+    assert_eq!(Value::from(member.own.accuracy), eval["robots"][0]["accuracy"]);
+    assert_eq!(Value::from(member.first_group_walks.as_str()), eval["robots"][0]["first_group_walks"]);
+}
+
+#[test]
+fn a_test_that_was_stopped_goes_on_and_ends_with_the_same_bytes_on_any_threads() {
+    let sandbox = pairs();
+    std::fs::create_dir(sandbox.path("whole")).unwrap();
+    std::fs::create_dir(sandbox.path("parts")).unwrap();
+    sandbox.run(&format!("{TEAM} -q --images 30 -o whole/team.json --threads 1")).ended(0, &[]);
+    // As if it was stopped after the first robot.
+    let mut part = read(&sandbox, "whole/team.json");
+    part.members.truncate(1);
+    (part.answers, part.baselines) = (None, None);
+    part.write(&sandbox.path("parts/team.json")).unwrap();
+    let said = sandbox.run(&format!("{TEAM} --images 30 -o parts/team.json --threads 3")).ended(0, &[]);
+    assert!(said.err.contains("30 images to 2 robots"), "{}", said.err);
+    assert!(files(&sandbox.path("whole")) == files(&sandbox.path("parts")));
+    // Other images are shown to all.
+    let said = sandbox.run(&format!("{TEAM} --images 30 --seed 2 -o parts/team.json")).ended(0, &[]);
+    assert!(said.err.contains("30 images to 3 robots"), "{}", said.err);
+}
+
+#[test]
+fn validation_images_are_none_that_a_run_was_trained_on() {
+    let sandbox = pairs();
+    sandbox.run(&format!("{TEAM} -q --split validation --images 30")).ended(0, &[]);
+    let team = read(&sandbox, "pairs/team.json");
+    for run in ["pairs/0v1", "pairs/0v4", "pairs/1v4"] {
+        let trained = sandbox.run_file(run).training_images;
+        assert!(!trained.is_empty() && team.images.iter().all(|image| !trained.contains(image)), "{run}");
+    }
+}
+
+#[test]
+fn what_is_missing_or_does_not_go_together_is_said_with_exit_code_3() {
+    let sandbox = pairs();
+    let all = sandbox.run("team --archive pairs/0v1 pairs/0v4");
+    all.ended(3, &["no robot of the team knows class 2, 3, 5, 6, 7, 8, 9", "--classes"]);
+    sandbox
+        .run("team --archive pairs/0v1 pairs/0v4 --classes 0,1")
+        .ended(3, &["tells 0|4 apart", "classes of the team only"]);
+    sandbox.run("team").ended(3, &["--archive"]);
+    sandbox.run("team --archive nowhere").ended(3, &["nowhere"]);
+    sandbox.run("team --archive pairs/0v1 pairs/0v1 --classes 0,1").ended(2, &["expected different runs"]);
+    sandbox.run("team --archive pairs/0v1 --classes 0,77").ended(2, &["builtin has no class 77"]);
+    sandbox.run("team --archive pairs/0v1 --classes 0,1 --images 1").ended(2, &["expected 2 or more"]);
+    sandbox.run("team --archive pairs/0v1 --classes 0,1 --images 99999").ended(3, &["ask for at most"]);
+    sandbox.run(&format!("{TEAM} --robots none")).ended(3, &["no robot none"]);
+    sandbox.run(&format!("{TEAM} --out pairs/0v1/run.json")).ended(2, &["--out"]);
+    let other = TINY.replace("dataset = \"builtin\"", "dataset = \"builtin\"\nbuiltin = { seed = 9 }");
+    sandbox.write("run.toml", other);
+    sandbox.run("evolve -q -c run.toml -o other").ended(0, &[]);
+    sandbox
+        .run("team --archive pairs/0v4 other --classes 0,1,4")
+        .ended(3, &["expected robots of the same data"]);
+    assert!(!sandbox.path("pairs/team.json").exists());
+}
