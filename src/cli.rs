@@ -5,6 +5,7 @@ mod audit;
 mod capacity;
 mod choice;
 mod plot;
+mod process;
 mod report;
 mod reproduce;
 mod response;
@@ -44,6 +45,7 @@ pub use args::Cli;
 use args::{Command, DataCommand, DatasetArgs, EvalArgs, EvolveArgs, ReplayArgs, SimulateArgs};
 use choice::selected;
 use clap::CommandFactory;
+pub use process::{called, main};
 use std::path::Path;
 
 /// Runs a command.
@@ -278,7 +280,7 @@ fn the_one(search: &one_by_one::Options, console: &Console) -> Result<Named, Err
 
 fn run_simulate(args: &SimulateArgs, console: &Console) -> Result<(), Error> {
     match &args.out {
-        Some(path) => simulate::to_file(&args.scenario, path),
+        Some(path) => simulate::to_file(&args.scenario, args.points, path),
         None => {
             let scenario = simulate::Scenario::read(&args.scenario)?;
             let written = |row: String| {
@@ -291,7 +293,7 @@ fn run_simulate(args: &SimulateArgs, console: &Console) -> Result<(), Error> {
                 }
             };
             // Why it was closed is known to the console, and to `main` if results were lost.
-            simulate::simulate(&scenario, written)
+            simulate::simulate(&scenario, args.points, written)
                 .or_else(|error| if console.is_closed() { Ok(()) } else { Err(error) })
         }
     }

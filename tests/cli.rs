@@ -465,6 +465,33 @@ fn simulate_agrees_with_a_reference_trajectory() {
 }
 
 #[test]
+fn simulate_reads_standard_input_and_writes_every_point_and_pixel() {
+    let sandbox = Sandbox::new();
+    let scenario = "{\"body\": [[3, 6], [4, 0]], \"stimuli\": [[[0, 0.5], [0, 0]], [[1, 1], [1, 1]]], \"switch_every\": 3}";
+    let mut command = sandbox.command(["simulate", "-", "--points"]);
+    command.write_stdin(scenario);
+    let said = common::program::said(command).ended(0, &[]);
+    let table: Vec<Vec<&str>> = said.out.lines().map(|line| line.split(',').collect()).collect();
+    let names = "step,com_x,com_y,x_0,y_0,x_1,y_1,x_2,y_2,x_3,y_3,x_4,y_4,x_5,y_5,x_6,y_6,x_7,y_7,pixel_0_0,pixel_0_1,pixel_1_0,pixel_1_1";
+    assert_eq!((table[0].join(",").as_str(), table.len()), (names, 8));
+    for row in &table[1..] {
+        let numbers: Vec<f64> = row.iter().map(|text| text.parse().unwrap()).collect();
+        let mean = |axis: usize| (0..8).map(|point| numbers[3 + 2 * point + axis]).sum::<f64>() / 8.0;
+        assert!((mean(0) - numbers[1]).abs() < 1e-9 && (mean(1) - numbers[2]).abs() < 1e-9, "{row:?}");
+    }
+    let pixels: Vec<String> = table[1..].iter().map(|row| row[19..].join(" ")).collect();
+    assert_eq!(pixels, ["0 0 0 0", "0 0.5 0 0", "0 0.5 0 0", "0 0.5 0 0", "1 1 1 1", "1 1 1 1", "1 1 1 1"]);
+    // The centre is the same without them.
+    sandbox.write("s.json", scenario);
+    let plain = sandbox.run("simulate s.json").ended(0, &[]).out;
+    let centres = table.iter().map(|row| row[..3].join(",") + "\n").collect::<String>();
+    assert_eq!(plain, centres);
+    let mut command = sandbox.command(["simulate", "-"]);
+    command.write_stdin("{\"body\": [[9]]}");
+    common::program::said(command).ended(3, &["standard input", "body"]);
+}
+
+#[test]
 fn an_unstable_rollout_ends_with_4_after_its_rows_and_says_when() {
     let sandbox = Sandbox::new();
     let rollout = scenario(&sandbox, "unstable_comb");

@@ -243,7 +243,7 @@ fn scenario(world: &World, dice: &mut Dice, case: &mut Case) {
         rows += 1;
         if rows < 50 && begin.elapsed() < PATIENCE { Ok(()) } else { Err(gone()) }
     };
-    let simulated = simulate(&scenario, row).map_err(|error| error.within("scenario.json"));
+    let simulated = simulate(&scenario, false, row).map_err(|error| error.within("scenario.json"));
     case.check(simulated, "scenario.json");
 }
 

@@ -37,8 +37,7 @@ pub struct Cli {
     /// Results, warnings and errors only.
     #[arg(short, long, global = true, conflicts_with = "json")]
     pub(super) quiet: bool,
-    /// For programs: one JSON object per line on stdout (but for what config, schema, simulate,
-    /// completions and man print).
+    /// One JSON object per line on stdout, for programs.
     #[arg(long, global = true)]
     pub(super) json: bool,
 }
@@ -123,8 +122,9 @@ Examples:
     Plot(PlotArgs),
     /// Simulate any body under any stimuli.
     #[command(after_help = "\
-Example:
+Examples:
   morphcog simulate scenario.json --out traj.csv
+  jq '.control_steps = 50' scenario.json | morphcog simulate - --points > points.csv
 
 scenario.json:
   {\"body\": [[3, 3, 6], [4, 0, 5]],         rows from the top; 0 empty, 1 rigid, 2 soft, 3 and 4 muscle (in phase,
@@ -132,7 +132,7 @@ scenario.json:
    \"stimulus\": [[0, 0.5, 1], [0, 0, 1]],   one pixel per voxel, 0 to 1; or \"stimuli\": [...] with \"switch_every\": 500
    \"control_steps\": 500, \"start_row\": 2, \"start_column\": 493, \"reset_between\": false}
 
-Output: step,com_x,com_y in world units (a voxel is 0.1). Exit code 4 if the rollout becomes unstable.")]
+Output: step,com_x,com_y in world units (a voxel is 0.1); with --points also x_0,y_0,… and pixel_0_0,…. Exit code 4 if the rollout becomes unstable.")]
     Simulate(SimulateArgs),
     /// Draw a digit and watch robots walk, in the browser.
     #[command(after_help = serve::EXAMPLES)]
@@ -322,11 +322,14 @@ pub(super) struct ReplayArgs {
 
 #[derive(Debug, Args)]
 pub(super) struct SimulateArgs {
-    /// The scenario (JSON).
+    /// The scenario (JSON); - reads it from standard input.
     pub(super) scenario: PathBuf,
     /// CSV file (default: standard output).
     #[arg(short, long, value_name = "FILE")]
     pub(super) out: Option<PathBuf>,
+    /// Write every point and every pixel, too.
+    #[arg(long)]
+    pub(super) points: bool,
 }
 
 #[derive(Debug, Subcommand)]

@@ -2,6 +2,7 @@
 
 use crate::base::error::Error;
 use crate::base::signals;
+use crate::cli::process;
 use crate::commands::tasks;
 use crate::commands::tasks::{Place, Summary, Task};
 use crate::store::folder::in_shell;
@@ -70,8 +71,11 @@ impl Command<'_> {
     /// nor on variables.
     fn line(&self) -> Result<String, Error> {
         let absolute = |path: &Path| std::path::absolute(path).map_err(|error| Error::reading(path, &error));
-        let program = std::env::current_exe().map_err(|error| Error::other(error.to_string()))?;
-        let mut words = vec![in_shell(&program)];
+        let own = || std::env::current_exe().map_err(|error| Error::other(error.to_string()));
+        let mut words = vec![match process::program() {
+            Some(words) => words.to_string(),
+            None => in_shell(&own()?),
+        }];
         words.extend(self.words.iter().cloned());
         words.extend(["--out".to_string(), in_shell(&absolute(&self.place.out)?)]);
         let environment =

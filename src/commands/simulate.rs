@@ -112,11 +112,16 @@ fn paper_column() -> i64 {
 const CONTROL_STEPS: u64 = 500;
 
 impl Scenario {
-    /// Reads a scenario.
+    /// Reads a scenario; of the path `-`, from standard input.
     ///
     /// # Errors
     /// What is wrong with the file, with its line and key.
     pub fn read(path: &Path) -> Result<Self, Error> {
+        if path == Path::new("-") {
+            let text = std::io::read_to_string(std::io::stdin());
+            let text = text.map_err(|error| Error::reading(Path::new("standard input"), &error))?;
+            return Scenario::parse(&text, "standard input");
+        }
         let text = read_text(path).map_err(|error| Error::reading(path, &error))?;
         Scenario::parse(&text, &path.display().to_string())
     }
@@ -201,30 +206,47 @@ impl Scenario {
     }
 }
 
-/// Simulations the scenario; `line` gets the CSV's lines: `step,com_x,com_y`, then the centre of
-/// mass \[world units\] before the first and after every control step.
+/// Simulates the scenario; `line` gets the CSV's lines: `step,com_x,com_y`, then the centre of mass
+/// \[world units\] before the first and after every control step. With `points` also every point
+/// (`x_0,y_0`, …, in the order of EvoGym) and every pixel (`pixel_ROW_COLUMN`) of that step.
 ///
 /// # Errors
 /// [`crate::base::error::ErrorKind::Unstable`] if the simulation ends early, and what `line` says.
-pub fn simulate(scenario: &Scenario, mut line: impl FnMut(String) -> Result<(), Error>) -> Result<(), Error> {
-    line("step,com_x,com_y\n".to_string())?;
-    let mut row = |step: u64, [x, y]: [f64; 2]| line(format!("{step},{},{}\n", digits17(x), digits17(y)));
+pub fn simulate(
+    scenario: &Scenario,
+    points: bool,
+    mut line: impl FnMut(String) -> Result<(), Error>,
+) -> Result<(), Error> {
     let physics = &scenario.physics;
     let start_row = scenario.start_row.unwrap_or(physics.ground_row);
     let start = Start { column: scenario.start_column, row: start_row };
     let mut world = World::new(System::new(&scenario.body, physics.clone()), start);
     let offset = scenario.start_column as f64 * physics.cell_size;
-    let place = |world: &World| {
-        let [x, y] = world.centre_of_mass();
-        [x + offset, y]
-    };
     let stimuli = scenario.stimuli();
-    row(0, place(&world))?;
+    let dark = Grid::filled(scenario.body.height(), scenario.body.width(), 0.0);
+    let mut header = "step,com_x,com_y".to_string();
+    if points {
+        (0..world.points().count()).for_each(|number| header += &format!(",x_{number},y_{number}"));
+        dark.iter().for_each(|((row, column), _)| header += &format!(",pixel_{row}_{column}"));
+    }
+    line(header + "\n")?;
+    let mut row = |step: u64, world: &World, shown: &Grid<f64>| {
+        let [x, y] = world.centre_of_mass();
+        let mut text = format!("{step},{},{}", digits17(x + offset), digits17(y));
+        if points {
+            world.points().for_each(|[x, y]| text += &format!(",{},{}", digits17(x + offset), digits17(y)));
+            shown.cells().iter().for_each(|pixel| text += &format!(",{pixel}"));
+        }
+        line(text + "\n")
+    };
+    let mut shown = &dark;
+    row(0, &world, shown)?;
     for step in 0..scenario.control_steps() {
         let every = scenario.switch_every.unwrap_or(u64::MAX);
         if step % every == 0 && !stimuli.is_empty() {
             let index = (step / every) % stimuli.len() as u64;
-            world.set_stimulus(&stimuli[index as usize]);
+            shown = &stimuli[index as usize];
+            world.set_stimulus(shown);
             if scenario.reset_between {
                 world.reset();
             }
@@ -235,7 +257,7 @@ pub fn simulate(scenario: &Scenario, mut line: impl FnMut(String) -> Result<(), 
             let unstable = crate::sim::Unstable { control_step: step, ..unstable };
             Error::unstable(unstable.to_string())
         })?;
-        row(step + 1, place(&world))?;
+        row(step + 1, &world, shown)?;
     }
     Ok(())
 }
@@ -245,7 +267,7 @@ pub fn simulate(scenario: &Scenario, mut line: impl FnMut(String) -> Result<(), 
 ///
 /// # Errors
 /// As [`Scenario::read`] and [`simulate`], and if the file cannot be written, or is the scenario's.
-pub fn to_file(from: &Path, path: &Path) -> Result<(), Error> {
+pub fn to_file(from: &Path, points: bool, path: &Path) -> Result<(), Error> {
     let scenario = &Scenario::read(from)?;
     if path.exists() && path.canonicalize().ok() == from.canonicalize().ok() {
         let text =
@@ -254,7 +276,7 @@ pub fn to_file(from: &Path, path: &Path) -> Result<(), Error> {
     }
     folder::writable(path)?;
     let mut text = String::new();
-    let outcome = simulate(scenario, |line| {
+    let outcome = simulate(scenario, points, |line| {
         text.push_str(&line);
         Ok(())
     });

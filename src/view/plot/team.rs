@@ -126,7 +126,7 @@ fn rows(count: usize) -> Vec<[usize; 2]> {
 fn drawn(canvas: &mut Canvas, at: [f64; 2], side: f64, body: &Body) {
     let cell = side / body.height().max(body.width()).max(1) as f64;
     let there = body.voxels().iter().filter(|(_, material)| !material.is_empty());
-    robot::squares(canvas, at, cell, 0.0, there.map(|(place, material)| (place, robot::plain(*material))));
+    robot::squares(canvas, at, cell, -0.05, there.map(|(place, material)| (place, robot::plain(*material))));
     robot::body_outline(canvas, at, cell, body, Pen::new(colour::INK, 0.4));
 }
 

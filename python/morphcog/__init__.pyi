@@ -1,0 +1,93 @@
+import os
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, Literal
+
+import numpy as np
+import numpy.typing as npt
+import pandas as pd
+
+Path = str | os.PathLike[str]
+Body = npt.NDArray[np.uint8]
+Floats = npt.NDArray[np.float64]
+
+__version__: str
+
+class Error(Exception): ...
+class Unstable(Error): ...
+
+class Config:
+    def __new__(cls, config: Path, set: Sequence[str] = ...) -> Config: ...
+    def to_toml(self) -> str: ...
+    def to_json(self) -> str: ...
+
+class Robot:
+    id: str
+    task: str
+    objective: float
+    body: Body
+    run: Run
+    def displacements(self, stimuli: npt.ArrayLike, **options: Any) -> Floats: ...
+    def page(self) -> str: ...
+
+class Run:
+    def __init__(self, folder: Path) -> None: ...
+    @property
+    def path(self) -> os.PathLike[str]: ...
+    @property
+    def config(self) -> Config: ...
+    @property
+    def generations(self) -> int: ...
+    @property
+    def elites(self) -> pd.DataFrame: ...
+    def __getitem__(self, robot: str) -> Robot: ...
+    def evaluate(
+        self,
+        robots: str = "top:10",
+        images: int = 1000,
+        split: Literal["test", "validation"] = "test",
+        data: Path | None = None,
+    ) -> pd.DataFrame: ...
+    def audit(self, robots: str = "all", data: Path | None = None) -> pd.DataFrame: ...
+
+class World:
+    stimulus: Floats
+    def __init__(
+        self, body: npt.ArrayLike, *, start_row: int | None = None, config: Config | Path | None = None
+    ) -> None: ...
+    def step(self, count: int = 1) -> None: ...
+    def reset(self) -> None: ...
+    @property
+    def control_step(self) -> int: ...
+    @property
+    def points(self) -> Floats: ...
+    @property
+    def voxels(self) -> npt.NDArray[np.uintp]: ...
+    @property
+    def centre(self) -> Floats: ...
+
+def load_run(folder: Path) -> Run: ...
+def evolve(
+    config: Path,
+    *,
+    generations: int | None = None,
+    seed: int | None = None,
+    set: Iterable[str] | Mapping[str, Any] = (),
+    out: Path | None = None,
+    resume: bool = False,
+    force: bool = False,
+    data: Path | None = None,
+    threads: int | None = None,
+) -> Run: ...
+def images(
+    dataset: str = "builtin", split: Literal["train", "test"] = "train", data: Path | None = None
+) -> tuple[npt.NDArray[np.uint8], npt.NDArray[np.uint8]]: ...
+def stimuli(images: npt.ArrayLike, config: Config | Path) -> Floats: ...
+def displacements(
+    bodies: Iterable[npt.ArrayLike],
+    stimuli: npt.ArrayLike,
+    *,
+    control_steps: int | None = None,
+    config: Config | Path | None = None,
+    threads: int | None = None,
+) -> Floats: ...
+def from_evogym(structure: npt.ArrayLike, *, driven: bool = False) -> Body: ...

@@ -1,0 +1,5 @@
+"""python -m morphcog: the command."""
+
+from ._command import main
+
+main()

@@ -1,0 +1,95 @@
+//! The command line as a process: arguments in, exit code out.
+
+use crate::base::error::{Error, ErrorKind};
+use crate::base::ranks::Ranks;
+use crate::base::text::is_unseen;
+use crate::cli::{Cli, run};
+use crate::view::console::{Console, Mode};
+use clap::Parser;
+use std::ffi::OsString;
+use std::io;
+use std::sync::OnceLock;
+use std::time::Duration;
+
+/// How this process is called from a shell, if not by its own file.
+static PROGRAM: OnceLock<String> = OnceLock::new();
+
+/// Says how this process is called from a shell, if not by its own file: commands that it prints for
+/// other processes begin so. Only the first call counts.
+pub fn called(words: String) {
+    PROGRAM.get_or_init(|| words);
+}
+
+/// How this process is called from a shell, if not by its own file.
+pub(super) fn program() -> Option<&'static str> {
+    PROGRAM.get().map(String::as_str)
+}
+
+/// How long the leading rank has to say what is wrong before another one that failed does.
+const LEAD_SPEAKS: Duration = Duration::from_secs(2);
+
+/// Runs the command line with these arguments, the program's name first; the exit code. Whatever there
+/// is to say is said by then.
+pub fn main(arguments: impl IntoIterator<Item = OsString>) -> u8 {
+    let arguments: Vec<OsString> = arguments.into_iter().collect();
+    let cli = match Cli::try_parse_from(&arguments) {
+        Ok(cli) => cli,
+        Err(help) => return say(&help, &arguments),
+    };
+    let joined = Ranks::join();
+    let (ranks, _guard) = match joined {
+        Ok(joined) => joined,
+        Err(error) => {
+            Console::new(cli.mode()).error(&error, error.hint.as_deref());
+            return error.kind.exit_code();
+        }
+    };
+    let console = match ranks.leads() {
+        true => Console::new(cli.mode()),
+        false => Console::with_writers(Mode::Quiet, Box::new(io::sink()), Box::new(io::sink())),
+    };
+    match run(cli, &console, ranks) {
+        Ok(()) => u8::from(console.has_lost_results()),
+        Err(error) => {
+            // To stop is what the user asked for, and no error.
+            if error.kind == ErrorKind::Stopped {
+                let next = error.hint.as_ref().map_or(String::new(), |hint| format!("; {hint}"));
+                console.info(&format!("{}{next}", error.message));
+            } else {
+                console.error(&error, error.hint.as_deref());
+                if ranks.size() > 1 {
+                    failed_among(ranks, &error);
+                }
+            }
+            error.kind.exit_code()
+        }
+    }
+}
+
+/// Ends all ranks when one has failed. What all of them find wrong, the leading one says.
+fn failed_among(ranks: Ranks, error: &Error) -> ! {
+    if !ranks.leads() {
+        std::thread::sleep(LEAD_SPEAKS);
+        Console::new(Mode::Human).error(&error.clone().within(&format!("rank {}", ranks.rank())), None);
+    }
+    ranks.abort(error.kind.exit_code())
+}
+
+/// Help, the version, or what is wrong with the command line.
+fn say(help: &clap::Error, arguments: &[OsString]) -> u8 {
+    let code = u8::try_from(help.exit_code()).unwrap_or(2);
+    // As names of files that a shell put into the command line.
+    let hides_any = arguments.iter().any(|argument| argument.to_string_lossy().contains(is_unseen));
+    if help.use_stderr() && hides_any {
+        let text = help.to_string();
+        Console::new(Mode::Human).error(&io::Error::other(text.trim_start_matches("error: ").trim()), None);
+        return code;
+    }
+    match help.print() {
+        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
+            Console::new(Mode::Human).error(&error, None);
+            1
+        }
+        _ => code,
+    }
+}
