@@ -121,7 +121,7 @@ def test_a_controller_can_drive_every_sensor_at_every_step():
         (lambda: mc.evolve("nothing.toml"), ["no built-in config"]),
         (lambda: mc.evolve("quickstart.toml", set={"map_elites.parents": 0}), ["map_elites.parents"]),
         (lambda: mc.images("builtin", "validation"), ['expected "train" or "test"']),
-        (lambda: mc.images("nowhere"), ["nowhere"]),
+        (lambda: mc.images("nowhere", data="no-folder"), ["no-folder"]),
     ],
 )
 def test_what_cannot_be_is_refused_with_what_was_expected(call, words):
