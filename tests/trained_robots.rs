@@ -1,0 +1,78 @@
+//! The trained robots in `data/trained` walk as their files say, and are what the documentation
+//! says of them.
+#![allow(clippy::disallowed_methods)]
+
+use morphcog::base::Grid;
+use morphcog::base::stop::NEVER;
+use morphcog::data::dataset::{Dataset, Split};
+use morphcog::data::files::places;
+use morphcog::search::showing::CYCLES;
+use morphcog::store::audit::AuditFile;
+use morphcog::store::eval::EvalFile;
+use morphcog::store::run::RunFile;
+use morphcog::store::whereabouts::see;
+use morphcog::task::evaluation::fresh_rollouts;
+use morphcog::task::protocol::{Protocol, RolloutMode};
+use std::path::{Path, PathBuf};
+
+/// Images of each class that are shown again.
+const SHOWN: usize = 10;
+
+fn folders() -> Vec<PathBuf> {
+    let trained = Path::new(env!("CARGO_MANIFEST_DIR")).join("data/trained");
+    let mut all: Vec<PathBuf> =
+        std::fs::read_dir(trained).unwrap().map(|entry| entry.unwrap().path()).collect();
+    all.sort();
+    all.retain(|path| path.is_dir());
+    assert!(!all.is_empty());
+    all
+}
+
+#[test]
+fn every_trained_robot_is_physical_and_was_tested_on_1000_images() {
+    for folder in folders() {
+        let run = RunFile::read(&folder.join("run.json")).unwrap();
+        let eval = EvalFile::read(&folder.join("eval.json")).unwrap();
+        let audit = AuditFile::read(&folder.join("audit.json")).unwrap();
+        let [robot] = &run.elites[..] else { panic!("{}: {} robots", folder.display(), run.elites.len()) };
+        let [tested] = &eval.robots[..] else { panic!("{}", folder.display()) };
+        assert_eq!((&tested.id, eval.images.len()), (&robot.id, 1000), "{}", folder.display());
+        assert_eq!(eval.runs[0].sha256, run.fingerprint(), "{}", folder.display());
+        assert_eq!(audit.run_sha256, run.fingerprint(), "{}", folder.display());
+        assert!(audit.robot(&robot.id).unwrap().is_physical(), "{}", folder.display());
+        assert!(run.origin.is_some(), "{}", folder.display());
+    }
+}
+
+#[test]
+fn they_walk_to_the_bit_as_in_their_test() {
+    let Some(data) = std::env::var_os("MORPHCOG_DATA").filter(|value| !value.is_empty()) else {
+        use std::io::Write;
+        let text = "SKIPPED: MORPHCOG_DATA does not name a folder with MNIST; trained robots not tested\n";
+        std::io::stderr().write_all(text.as_bytes()).unwrap();
+        return;
+    };
+    let mnist = Dataset::load("mnist", &places(None, Some(data), None), &Split::ALL).unwrap();
+    for folder in folders() {
+        let run = RunFile::read(&folder.join("run.json")).unwrap();
+        let eval = EvalFile::read(&folder.join("eval.json")).unwrap();
+        let (robot, tested) = (&run.elites[0], &eval.robots[0]);
+        let mut seen = [0; 256];
+        let is_first = |label: u8, seen: &mut [usize; 256]| {
+            seen[usize::from(label)] += 1;
+            seen[usize::from(label)] <= SHOWN
+        };
+        let shown: Vec<usize> =
+            (0..eval.images.len()).filter(|place| is_first(eval.images[*place].label, &mut seen)).collect();
+        let stimulus =
+            |place: &usize| see(&run.config, &mnist, Split::Test, eval.images[*place].index).unwrap();
+        let stimuli: Vec<Grid<f64>> = shown.iter().map(stimulus).collect();
+        let control_steps = CYCLES * run.config.physics.cycle_steps;
+        let protocol = Protocol { rollout: RolloutMode::Fresh, control_steps, ..run.config.protocol.clone() };
+        let setting = (&run.config.physics, &protocol);
+        let (walks, _) = fresh_rollouts(&robot.body, &stimuli, &[], setting, &|_| (), &NEVER).unwrap();
+        let walks: Vec<Option<f64>> = walks.into_iter().map(Result::ok).collect();
+        let known: Vec<Option<f64>> = shown.iter().map(|place| tested.displacements[*place]).collect();
+        assert_eq!(walks, known, "{}", folder.display());
+    }
+}
