@@ -12,7 +12,8 @@ use std::collections::BTreeSet;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 /// What tiny robots in short rollouts can be held to, so that some are physical and some are not.
-const MILD: &str = "--set threshold=0 --set least_walk=0 --set least_kept=0.5 --set least_distance=0 --set perturbations.time_step=[2] --set perturbations.start=[] --set perturbations.least_sensors=1";
+const MILD: &str = "--set threshold=0 --set least_walk=0 --set least_kept=0.5 --set least_distance=0 --set \
+ perturbations.time_step=[2] --set perturbations.start=[] --set perturbations.least_sensors=1";
 
 /// A sandbox with a tiny run in `run`, whose rollouts last three cycles.
 fn evolved() -> Sandbox {

@@ -467,7 +467,8 @@ fn simulate_agrees_with_a_reference_trajectory() {
 #[test]
 fn simulate_reads_standard_input_and_writes_every_point_and_pixel() {
     let sandbox = Sandbox::new();
-    let scenario = "{\"body\": [[3, 6], [4, 0]], \"stimuli\": [[[0, 0.5], [0, 0]], [[1, 1], [1, 1]]], \"switch_every\": 3}";
+    let scenario = "{\"body\": [[3, 6], [4, 0]], \"stimuli\": [[[0, 0.5], [0, 0]], [[1, 1], [1, 1]]], \
+     \"switch_every\": 3}";
     let mut command = sandbox.command(["simulate", "-", "--points"]);
     command.write_stdin(scenario);
     let said = common::program::said(command).ended(0, &[]);

@@ -154,7 +154,8 @@ impl World {
             "physics": serde_json::to_value(morphcog::sim::Physics::default()).unwrap(),
         });
         let request = format!(
-            "POST /api/simulations HTTP/1.1\r\nHost: 127.0.0.1:PORT\r\nOrigin: http://127.0.0.1:PORT\r\nContent-Length: LENGTH\r\n\r\n{}",
+            "POST /api/simulations HTTP/1.1\r\nHost: 127.0.0.1:PORT\r\nOrigin: \
+             http://127.0.0.1:PORT\r\nContent-Length: LENGTH\r\n\r\n{}",
             json!({ "subject": { "archive": 1, "robot": "ROBOT" }, "control_steps": 40, "speed": 0.0,
                     "shown": { "stimulus": [[0, 1, 0.5, 0], [1, 0, 0, 1], [0, 0, 1, 0]] } })
         );

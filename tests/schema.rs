@@ -130,7 +130,8 @@ fn written_results_are_valid_and_those_of_another_format_are_not() {
         .run("eval -q --robots gallery --dataset builtin --images 4 --cycles 1 --out gallery/eval.json")
         .ended(0, &[]);
     sandbox.run("train -q --archive run --task 0|1 --out taught --set train.random_images=20 --set train.rounds=1 \
-                 --set train.images=4 --set train.final_images=4 --set train.challengers=1 --set protocol.control_steps=50 \
+                 --set train.images=4 --set train.final_images=4 --set train.challengers=1 --set \
+                  protocol.control_steps=50 \
                  --set validation.images=40")
         .ended(0, &[]);
     sandbox.run("response -q --archive taught --images 60 --task 0|1").ended(0, &[]);

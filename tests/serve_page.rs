@@ -118,7 +118,8 @@ fn a_drawn_zero_and_a_drawn_one_are_told_apart_and_the_page_fits_everywhere() {
         let wide = tab.eval("document.documentElement.scrollWidth").as_u64().unwrap();
         assert!(wide <= u64::from(width), "{wide} pixels wide");
         // Nothing that can be used sticks out, and all of it has a name.
-        let nameless = "[...document.querySelectorAll('button, select, input, canvas')].filter((e) => e.offsetParent && \
+        let nameless = "[...document.querySelectorAll('button, select, input, canvas')].filter((e) => \
+         e.offsetParent && \
              !(e.textContent.trim() || e.ariaLabel || e.title || e.labels?.length || e.closest('button'))).length";
         assert_eq!(tab.eval(nameless), 0);
         let shot = tab.screenshot();

@@ -101,6 +101,14 @@ fn a_test_that_was_stopped_goes_on_and_ends_with_the_same_bytes_on_any_threads()
     let said = sandbox.run(&format!("{TEAM} --images 30 -o parts/team.json --threads 3")).ended(0, &[]);
     assert!(said.err.contains("30 images to 2 robots"), "{}", said.err);
     assert!(files(&sandbox.path("whole")) == files(&sandbox.path("parts")));
+    // With a run more, before the others: only its robot is shown the images, and what is known of the
+    // others is in the file from then on.
+    let fewer = TEAM.replace("pairs/0v1 ", "");
+    std::fs::create_dir(sandbox.path("more")).unwrap();
+    sandbox.run(&format!("{fewer} -q --images 30 -o more/team.json")).ended(0, &[]);
+    let said = sandbox.run(&format!("{TEAM} --images 30 -o more/team.json")).ended(0, &[]);
+    assert!(said.err.contains("30 images to 1 robots"), "{}", said.err);
+    assert!(files(&sandbox.path("whole")) == files(&sandbox.path("more")));
     // Other images are shown to all.
     let said = sandbox.run(&format!("{TEAM} --images 30 --seed 2 -o parts/team.json")).ended(0, &[]);
     assert!(said.err.contains("30 images to 3 robots"), "{}", said.err);
@@ -132,6 +140,9 @@ fn what_is_missing_or_does_not_go_together_is_said_with_exit_code_3() {
     sandbox.run("team --archive pairs/0v1 --classes 0,1 --images 1").ended(2, &["expected 2 or more"]);
     sandbox.run("team --archive pairs/0v1 --classes 0,1 --images 99999").ended(3, &["ask for at most"]);
     sandbox.run(&format!("{TEAM} --robots none")).ended(3, &["no robot none"]);
+    sandbox
+        .run(&format!("{TEAM} --robots best-validation:1"))
+        .ended(2, &["best-validation", "best is the first"]);
     sandbox.run(&format!("{TEAM} --out pairs/0v1/run.json")).ended(2, &["--out"]);
     let other = TINY.replace("dataset = \"builtin\"", "dataset = \"builtin\"\nbuiltin = { seed = 9 }");
     sandbox.write("run.toml", other);

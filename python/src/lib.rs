@@ -16,7 +16,6 @@ use morphcog::store::folder::{self, IfExists};
 use morphcog::store::run::RunFile;
 use morphcog::task::evaluation::fresh_rollouts;
 use morphcog::task::protocol::{MAX_ROW, MAX_STEPS, Protocol, RolloutMode};
-use morphcog::task::rollout::record;
 use morphcog::task::stimulus::stimulus;
 use morphcog::view::html;
 use numpy::{PyArray1, PyArray2, PyArray3, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
@@ -42,6 +41,9 @@ type Labelled<'py> = (Bound<'py, PyArray3<u8>>, Bound<'py, PyArray1<u8>>);
 
 /// How often Ctrl-C is looked for.
 const WATCH: Duration = Duration::from_millis(50);
+
+/// Control steps of a world from one look for Ctrl-C to the next.
+const STEPS: u64 = 20;
 
 /// An error with what to do about it.
 fn raised(error: &Error) -> PyErr {
@@ -224,28 +226,6 @@ impl RunData {
     }
 }
 
-/// A page on which a body walks under stimuli, each with a label.
-#[pyfunction]
-fn player(
-    py: Python,
-    voxels: PyReadonlyArray2<u8>,
-    stimuli: PyReadonlyArray3<f64>,
-    labels: Vec<String>,
-    config: Option<&Config>,
-) -> PyResult<String> {
-    let body = body(&voxels)?;
-    let (physics, protocol) = setting(config);
-    let mut images = Vec::new();
-    for (label, pixels) in labels.into_iter().zip(stimuli.as_array().outer_iter()) {
-        images.push((label, seen(pixels, &body)?));
-    }
-    let page = watched(py, |_| {
-        let recording = record("body", &body, &physics, &protocol, true, &images);
-        html::page(&recording, "morphcog", &[]).map_err(Error::from)
-    })?;
-    page.map_err(|error| raised(&error))
-}
-
 fn setting(config: Option<&Config>) -> (Physics, Protocol) {
     match config {
         Some(config) => (config.inner.physics.clone(), config.inner.protocol.clone()),
@@ -361,19 +341,23 @@ fn displacements<'py>(
         return Err(refused(format!("control_steps={control_steps}: expected 1 to {MAX_STEPS}")));
     }
     let protocol = Protocol { rollout: RolloutMode::Fresh, control_steps, ..protocol };
-    let mut images = Vec::new();
-    for (number, pixels) in stimuli.as_array().outer_iter().enumerate() {
-        let of_one = |body: &Body| seen(pixels, body).map_err(|error| error.value(py).to_string());
-        // All bodies are of one size, or an image does not go with one of them.
-        for (place, body) in bodies.iter().enumerate() {
-            let checked =
-                of_one(body).map_err(|text| refused(format!("image {number}, body {place}: {text}")))?;
-            if place == 0 {
-                images.push(checked);
-            }
-        }
-    }
+    let view = stimuli.as_array();
+    let seen_by = |number: usize, place: usize| {
+        let pixels = view.index_axis(numpy::ndarray::Axis(0), number);
+        seen(pixels, &bodies[place])
+            .map_err(|error| refused(format!("image {number}, body {place}: {}", error.value(py))))
+    };
     let (count, shown) = (bodies.len(), stimuli.shape()[0]);
+    // All bodies must be of one size: what the first one sees is what all see.
+    let size = |body: &Body| (body.height(), body.width());
+    if let Some(place) = bodies.iter().position(|body| size(body) != size(&bodies[0]))
+        && shown > 0
+    {
+        seen_by(0, 0)?;
+        seen_by(0, place)?;
+    }
+    let shown_to_any = if bodies.is_empty() { 0 } else { shown };
+    let images = (0..shown_to_any).map(|number| seen_by(number, 0)).collect::<PyResult<Vec<Grid<f64>>>>()?;
     let pool = pool(threads).map_err(|error| raised(&error))?;
     let walked = watched(py, |stop| {
         let walk = |body: &Body| -> Result<Vec<f64>, Stopped> {
@@ -421,27 +405,20 @@ impl WorldData {
         if let Some(text) = &self.unstable {
             return Err(Unstable::new_err(format!("{text}; begin anew with reset()")));
         }
-        let world = &mut self.world;
-        let mut copy = world.clone();
-        let stepped = watched(py, move |stop| {
-            for _ in 0..count {
-                match copy.step_unless(stop) {
-                    Ok(Ok(())) => {}
-                    Ok(Err(unstable)) => return (copy, Some(unstable)),
-                    Err(Stopped) => break,
-                }
+        // A part at a time, so that Ctrl-C is seen; a control step takes milliseconds at most.
+        let mut left = count;
+        while left > 0 {
+            let steps = left.min(STEPS);
+            let world = &mut self.world;
+            let stepped = py.detach(|| (0..steps).try_for_each(|_| world.step()));
+            if let Err(unstable) = stepped {
+                self.unstable = Some(unstable.to_string());
+                return Err(Unstable::new_err(unstable.to_string()));
             }
-            (copy, None)
-        })?;
-        self.world = stepped.0;
-        match stepped.1 {
-            None => Ok(()),
-            Some(unstable) => {
-                let text = unstable.to_string();
-                self.unstable = Some(text.clone());
-                Err(Unstable::new_err(text))
-            }
+            py.check_signals()?;
+            left -= steps;
         }
+        Ok(())
     }
 
     fn reset(&mut self) {
@@ -502,7 +479,6 @@ fn _morphcog(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<Config>()?;
     module.add_class::<RunData>()?;
     module.add_class::<WorldData>()?;
-    module.add_function(wrap_pyfunction!(player, module)?)?;
     module.add_function(wrap_pyfunction!(evolve_run, module)?)?;
     module.add_function(wrap_pyfunction!(images, module)?)?;
     module.add_function(wrap_pyfunction!(stimuli, module)?)?;

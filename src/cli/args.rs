@@ -43,12 +43,13 @@ pub struct Cli {
 }
 
 /// What is said of a robot where one is shown: as of several.
-const ROBOT: &str = "Which robot: best (first on validation images if the run ranked robots by them, else the fittest), an id or the beginning of one; top:1, random:1 or best-validation:1 (of each task) if that is one \
+const ROBOT: &str = "Which robot: best (first on validation images if the run ranked robots by them, else \
+the fittest), an id or the beginning of one; top:1, random:1 or best-validation:1 (of each task) if that is one \
 robot; without --archive also the name of a published robot";
 
 /// What is said of `--set`.
-pub(super) const SET: &str = "Change a key, as in map_elites.parents=10 or task.groups.2=[1,2] (items are counted from 1); \
-without a value, as in data.train_images=, it has its default again; may be given several times";
+pub(super) const SET: &str = "Change a key, as in map_elites.parents=10 or task.groups.2=[1,2] (items are counted \
+from 1); without a value, as in data.train_images=, it has its default again; may be given several times";
 
 const EXAMPLES: &str = "\
 Examples:
@@ -132,7 +133,8 @@ scenario.json:
    \"stimulus\": [[0, 0.5, 1], [0, 0, 1]],   one pixel per voxel, 0 to 1; or \"stimuli\": [...] with \"switch_every\": 500
    \"control_steps\": 500, \"start_row\": 2, \"start_column\": 493, \"reset_between\": false}
 
-Output: step,com_x,com_y in world units (a voxel is 0.1); with --points also x_0,y_0,… and pixel_0_0,…. Exit code 4 if the rollout becomes unstable.")]
+Output: step,com_x,com_y in world units (a voxel is 0.1); with --points also x_0,y_0,… and pixel_0_0,….
+Exit code 4 if the rollout becomes unstable.")]
     Simulate(SimulateArgs),
     /// Draw a digit and watch robots walk, in the browser.
     #[command(after_help = serve::EXAMPLES)]

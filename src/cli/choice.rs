@@ -25,8 +25,9 @@ pub(super) struct Archives {
 
 /// What is said of robots, wherever some are chosen.
 pub(super) const ROBOTS: &str = "Which robots: all, top:N or random:N (of each task; of several archives together), \
-best-validation:N (the best of each run and task on validation images), or, separated by commas, ids or beginnings of ids and best (first on \
-validation images if the run ranked robots by them, else the fittest); without --archive also gallery, or names of published robots";
+best-validation:N (the best of each run and task on validation images), or, separated by commas, ids or \
+beginnings of ids and best (first on validation images if the run ranked robots by them, else the fittest); \
+without --archive also gallery, or names of published robots";
 
 /// The one selection that is meant by those that were given: robots may be named by several.
 pub(super) fn selected(mut given: Vec<Selection>) -> Result<Option<Selection>, Error> {

@@ -17,8 +17,8 @@ Examples:
   morphcog report --archive runs/zero_one-seed* -o seeds.html
   morphcog report --archive runs/zero_one-seed1 --rollouts 20 --open
 
-What lies beside a run.json is part of its report: metrics.csv, eval.json, audit.json, capacity.json. Of several runs, those of
-them together are looked for above their folders.";
+What lies beside a run.json is part of its report: metrics.csv, eval.json, audit.json,
+capacity.json. Of several runs, those of them together are looked for above their folders.";
 
 #[derive(Debug, Args)]
 pub(super) struct ReportArgs {

@@ -19,8 +19,9 @@ Examples:
   morphcog reproduce paper.toml                   all of it
   morphcog reproduce mine.toml --set seeds=[1,2] --out mine
 
-Evolves every experiment from every seed, audits robots until enough are found physical, tests them on held-out images, finds
-the networks they are worth, and prints the paper's table. Ctrl-C stops it anywhere; the same command goes on.";
+Evolves every experiment from every seed, audits robots until enough are found physical, tests them
+on held-out images, finds the networks they are worth, and prints the paper's table. Ctrl-C stops it
+anywhere; the same command goes on.";
 
 #[derive(Debug, Args)]
 pub(super) struct ReproduceArgs {

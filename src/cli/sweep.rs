@@ -32,8 +32,9 @@ Examples:
   morphcog sweep plan.toml --slurm | sbatch      Slurm,
   hq submit --array 1-9 -- morphcog sweep $PWD/plan.toml --out $PWD/runs/plan --threads 1 --task    HyperQueue
 
-Every combination of seeds, groups or pairs (of classes) and varied keys is a task with a run folder of its own. Ctrl-C stops
-anywhere; the same command goes on, here or elsewhere. Exit code 0: all tasks are done; 1: some failed; 75: stopped.";
+Every combination of seeds, groups or pairs (of classes) and varied keys is a task with a run folder
+of its own. Ctrl-C stops anywhere; the same command goes on, here or elsewhere. Exit code 0: all
+tasks are done; 1: some failed; 75: stopped.";
 
 #[derive(Debug, Args)]
 pub(super) struct SweepArgs {

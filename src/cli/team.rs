@@ -2,7 +2,7 @@
 
 use crate::base::error::Error;
 use crate::base::signals;
-use crate::cli::choice::{Archives, ROBOTS, selected};
+use crate::cli::choice::{Archives, selected};
 use crate::commands::team;
 use crate::commands::team::Options;
 use crate::store::folder;
@@ -30,7 +30,10 @@ the same command goes on after Ctrl-C, and with more runs.";
 pub(super) struct TeamArgs {
     #[command(flatten)]
     archives: Archives,
-    #[arg(short, long, visible_aliases = ["robot", "select"], help = format!("{ROBOTS}; of each archive by itself, but for ids [default: best]"))]
+    /// Which robots: all, top:N or random:N (of each archive and task), best (of each archive the
+    /// first on validation images if the run ranked robots by them, else the fittest), or ids or
+    /// their beginnings, separated by commas (of all archives) [default: best].
+    #[arg(short, long, visible_aliases = ["robot", "select"])]
     robots: Vec<Selection>,
     /// Classes to tell apart, as 0,1,2 (default: all of the dataset).
     #[arg(long, value_delimiter = ',')]

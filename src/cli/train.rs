@@ -27,10 +27,10 @@ Examples:
 then
   morphcog eval --archive runs/gaits-seed1-4v9 --robots best
 
-The response of each gait is measured under random images. The gait that can be taught most is taught
-with many training images, and the body is refined: challengers that answer better replace it. The
-robot is validated on images that it was not trained on, and audited. Ctrl-C stops it; --resume goes
-on, also after its end with more challengers (--set train.challengers=240).";
+The response of each gait is measured under random images. The gait that can be taught most is
+taught with many training images, and the body is refined: challengers that answer better replace
+it. The robot is validated on images that it was not trained on, and audited. Ctrl-C stops it;
+--resume goes on, also after its end with more challengers (--set train.challengers=240).";
 
 /// Two groups of classes.
 type Groups = [Vec<u8>; 2];

@@ -73,7 +73,8 @@ pub fn capacity(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -
     }
     if let Some(own) = &report.trained_on {
         let text = format!(
-            "{name}: expected an evaluation on images of the data that the robots were trained on ({}), found one on {}",
+            "{name}: expected an evaluation on images of the data that the robots were trained on ({}), found one \
+             on {}",
             own.name, report.dataset
         );
         return Err(Error::input(text).hint("morphcog eval without --dataset".to_string()));

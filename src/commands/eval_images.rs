@@ -54,7 +54,12 @@ impl<'a> HeldOutImages<'a> {
             }
             HeldOut::Validation => {
                 let runs: Vec<_> = sources.iter().map(|source| &source.run).collect();
-                let besides = chosen_by(config, sources, dataset, options)?;
+                // Now or before: a robot that is named may be one of the best of `validation.json`.
+                let count = |source: &Source| match options.robots.validated() {
+                    Some(_) => Some(options.validation.unwrap_or(config.validation.images)),
+                    None => options.robots.names_any().then(|| shown_for_validation(source)).flatten(),
+                };
+                let besides = chosen_by(sources, dataset, count)?;
                 let classes = config.classes();
                 (images_besides(&besides, &runs, &classes, dataset, "--images", asked)?, Split::Train)
             }
@@ -130,21 +135,15 @@ fn labelled(list: &[(Grid<f64>, u8)]) -> Vec<Labelled<'_>> {
     list.iter().map(|(stimulus, class)| Labelled { stimulus, class: *class }).collect()
 }
 
-/// Validation images that robots of each run are chosen by, now or before: a robot that is named
-/// may be one of the best of `validation.json`.
-fn chosen_by(
-    config: &Config,
+/// Validation images that robots of each run are chosen by, as many of them as `count` says of each.
+pub(crate) fn chosen_by(
     sources: &[Source],
     dataset: &Dataset,
-    options: &Options,
+    count: impl Fn(&Source) -> Option<usize>,
 ) -> Result<BTreeSet<usize>, Error> {
     let mut all = BTreeSet::new();
     for source in sources {
-        let count = match options.robots.validated() {
-            Some(_) => Some(options.validation.unwrap_or(config.validation.images)),
-            None => options.robots.names_any().then(|| shown_for_validation(source)).flatten(),
-        };
-        if let Some(count) = count {
+        if let Some(count) = count(source) {
             let of_run = held_out::images(&[&source.run], dataset, "--validation", count)?;
             all.extend(of_run.into_iter().map(|image| image.index));
         }

@@ -9,6 +9,7 @@ use crate::config::{Config, Settings, flatten, reading};
 use crate::search::train;
 use crate::store::folder::{self, run_json};
 use crate::store::robots::Source;
+use crate::task::grouping::Grouping;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
@@ -235,7 +236,8 @@ impl SweepPlan {
             let archive = std::path::absolute(&archive).map_err(|error| Error::reading(&archive, &error))?;
             return Ok(Base::Train(archive, Box::new(source)));
         }
-        let config = self.config.as_deref().unwrap_or_default();
+        let config =
+            self.config.as_deref().expect("a plan without an archive has a config, which is checked");
         let name = beside(folder, config);
         let loaded = Config::load(&name, &[]).map_err(|error| error.within("config").of("config"))?;
         Ok(Base::Evolve(folder::name_of(&name), Box::new(loaded)))
@@ -311,11 +313,9 @@ pub(crate) fn beside(folder: &Path, name: &str) -> String {
 
 /// Two groups of classes, as 0|123.
 fn written(groups: &[Vec<u8>; 2], between: &str) -> String {
-    let group = |group: &Vec<u8>| {
-        let separator = if group.iter().any(|class| *class > 9) { "," } else { "" };
-        group.iter().map(u8::to_string).collect::<Vec<_>>().join(separator)
-    };
-    groups.each_ref().map(group).join(between)
+    let [a, b] = groups;
+    let grouping = Grouping::two_groups(a, b).expect("groups are read as a task's");
+    grouping.tasks()[0].name().replace('|', between)
 }
 
 /// A value as text: a text without its quotes.

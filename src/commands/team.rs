@@ -6,10 +6,12 @@ use crate::base::error::Error;
 use crate::base::observer::{Observer, Work};
 use crate::base::threads::pool;
 use crate::baseline::linear::{Linear, Moments, nearest_neighbours};
+use crate::commands::eval_images::chosen_by;
 use crate::config::Config;
 use crate::data::dataset::{Dataset, Split};
-use crate::search::held_out::{self, images_besides, test_images};
+use crate::search::held_out::{images_besides, test_images};
 use crate::search::showing::{CYCLES, THRESHOLD, Walker, control_steps, task_of};
+use crate::store::eval::Trial;
 use crate::store::folder::check_out;
 use crate::store::images::{HeldOut, ImageRef};
 use crate::store::names::TEAM_JSON;
@@ -19,12 +21,11 @@ use crate::store::team::{FORMAT, FORMAT_VERSION, Member, TeamBaselines, TeamFile
 use crate::store::unwritten::Unwritten;
 use crate::store::validation::shown as shown_for_validation;
 use crate::store::whereabouts::{Whereabouts, load_dataset_of, see};
-use crate::task::direction::Assignment;
-use crate::task::grouping::Group;
-use crate::task::judge::{Accuracy, Ballot, CLIP, Sides};
+use crate::task::grouping::{self, Group};
+use crate::task::voting::{Accuracy, Ballot, CLIP, Sides};
 use std::collections::BTreeSet;
 use std::path::PathBuf;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64};
 
 /// Who is in the team, and what it is shown.
 #[derive(Clone, Debug)]
@@ -84,9 +85,9 @@ pub fn team(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Re
     let config = &first.run.config;
     let dataset = load_dataset_of(Some(&first.run.dataset), config, &whereabouts, &Split::ALL)?;
     let classes = classes(options, &dataset)?;
-    let members = robots.iter().map(|chosen| member(&sources[chosen.source], chosen));
-    let members = members.collect::<Result<Vec<Member>, Error>>()?;
-    covered(&members, &classes)?;
+    let splits = robots.iter().map(|chosen| split_of(&sources[chosen.source], chosen));
+    let splits = splits.collect::<Result<Vec<grouping::Split>, Error>>()?;
+    covered(&robots, &splits, &classes)?;
     let (images, split) = match options.split {
         HeldOut::Test => (test_images(&classes, &dataset, options.images, options.seed)?, Split::Test),
         HeldOut::Validation => (validation_images(options, &sources, &classes, &dataset)?, Split::Train),
@@ -97,7 +98,7 @@ pub fn team(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Re
         program_version: env!("CARGO_PKG_VERSION").to_string(),
         classes,
         dataset: dataset.name().to_string(),
-        test_sha256: dataset.fingerprint(Split::Test).unwrap_or_default(),
+        test_sha256: dataset.fingerprint(Split::Test).expect("both splits are loaded"),
         split: options.split,
         seed: options.seed,
         threshold: THRESHOLD,
@@ -105,37 +106,48 @@ pub fn team(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Re
         cycles: CYCLES,
         images,
         members: Vec::new(),
-        size: members.len(),
+        size: robots.len(),
         answers: None,
         baselines: None,
     };
-    let known = Known::read(options, &file);
-    let pool = pool(options.threads)?;
-    let (done, open) =
-        (AtomicU64::new(0), members.iter().filter(|member| known.of(member).is_none()).count());
-    let label = format!("showing {} images to {open} robots:", file.images.len());
-    observer.begins(&Work::new(label, (open * file.images.len()) as u64, "rollouts"));
-    let mut unwritten = Unwritten::default();
-    for (member, chosen) in members.into_iter().zip(&robots) {
-        let displacements = match known.of(&member) {
-            Some(displacements) => displacements,
-            None => {
-                let config = &sources[chosen.source].run.config;
-                let stimuli = seen(config, &dataset, split, &file.images)?;
-                let steps = control_steps(config, CYCLES);
-                let before = AtomicU64::new(done.load(Ordering::Relaxed));
-                let walker =
-                    Walker { config, control_steps: steps, pool: &pool, stop, observer, done: before };
-                let Some((displacements, _)) = walker.rollouts(chosen.robot, &stimuli) else {
-                    return Ok(Finished { file, unwritten: unwritten.error() });
-                };
-                done.fetch_add(file.images.len() as u64, Ordering::Relaxed);
-                displacements
-            }
+    let images = file.images.clone();
+    let hashes: Vec<String> = sources.iter().map(|source| source.run.fingerprint()).collect();
+    // Those that are known stay in the file from the beginning, in the team's order.
+    let known = known(options, &file);
+    let mut members: Vec<Option<Member>> = robots
+        .iter()
+        .map(|chosen| {
+            let is_it = |member: &&Member| {
+                (&member.id, &member.run_sha256) == (&chosen.robot.id, &hashes[chosen.source])
+            };
+            known.iter().find(is_it).cloned()
+        })
+        .collect();
+    let open = members.iter().filter(|member| member.is_none()).count();
+    let label = format!("showing {} images to {open} robots:", images.len());
+    observer.begins(&Work::new(label, (open * images.len()) as u64, "rollouts"));
+    let (pool, mut done, mut unwritten) = (pool(options.threads)?, 0, Unwritten::default());
+    for (place, (chosen, of_robot)) in robots.iter().zip(&splits).enumerate() {
+        if members[place].is_some() {
+            continue;
+        }
+        let run = &sources[chosen.source].run;
+        let stimuli = seen(&run.config, &dataset, split, &images)?;
+        let control_steps = control_steps(&run.config, CYCLES);
+        let (config, done_before) = (&run.config, AtomicU64::new(done));
+        let walker = Walker { config, control_steps, pool: &pool, stop, observer, done: done_before };
+        let Some((displacements, _)) = walker.rollouts(chosen.robot, &stimuli) else {
+            file.members = members.into_iter().flatten().collect();
+            return Ok(Finished { file, unwritten: unwritten.error() });
         };
-        file.members.push(member.walked(displacements, &file.images, THRESHOLD));
+        done += images.len() as u64;
+        let trial =
+            Trial { run, robot: chosen.robot, split: of_robot, images: &images, threshold: THRESHOLD };
+        members[place] = Some(Member::new(&trial, &hashes[chosen.source], displacements));
+        file.members = members.iter().flatten().cloned().collect();
         unwritten.tried(file.write(&options.out), |text| observer.warning(text));
     }
+    file.members = members.into_iter().flatten().collect();
     file.baselines = pool.install(|| baselines(&file, config, &dataset, split))?;
     file.answers = Some(file.decided());
     unwritten.tried(file.write(&options.out), |text| observer.warning(text));
@@ -155,6 +167,11 @@ fn same_data(first: &Source, other: &Source) -> Result<(), Error> {
 
 /// The robots of the team: those that are named from all runs together, else of each run by itself.
 fn chosen<'a>(options: &Options, sources: &'a [Source]) -> Result<Vec<Chosen<'a>>, Error> {
+    if options.robots.validated().is_some() {
+        let text = "--robots best-validation: expected another selection: a team does not choose by images";
+        return Err(Error::usage(text.to_string())
+            .hint("best is the first on validation images of a run that ranked its robots".to_string()));
+    }
     if matches!(&options.robots, Selection::Ids(ids) if !ids.iter().any(|id| id == BEST)) {
         return options.robots.of(sources, options.seed);
     }
@@ -186,48 +203,31 @@ fn classes(options: &Options, dataset: &Dataset) -> Result<Vec<u8>, Error> {
     Ok(classes)
 }
 
-/// A robot of the team, not shown anything yet.
-fn member(source: &Source, chosen: &Chosen) -> Result<Member, Error> {
-    let (run, robot) = (&source.run, chosen.robot);
-    let grouping = run.config.grouping()?;
-    let Some(split) = task_of(&grouping, robot) else {
-        let text =
-            format!("{}: robot {} walks the same way for every class", source.path.display(), robot.id);
-        return Err(Error::input(text).hint("name others with --robots".to_string()));
-    };
-    let assignment = Assignment::from_training(split, run.fitness(), &run.answers(robot));
-    Ok(Member {
-        id: robot.id.clone(),
-        run: run.name.clone(),
-        run_sha256: run.fingerprint(),
-        task: robot.task.clone(),
-        groups: [Group::A, Group::B].map(|group| split.classes(group).to_vec()),
-        first_group_walks: Member::way(assignment).to_string(),
-        body: robot.body.clone(),
-        own: Accuracy::of::<()>([]),
-        not_moved: 0.0,
-        displacements: Vec::new(),
-    })
+/// The two groups that a robot tells apart.
+fn split_of(source: &Source, chosen: &Chosen) -> Result<grouping::Split, Error> {
+    let grouping = source.run.config.grouping()?;
+    let text =
+        || format!("{}: robot {} walks the same way for every class", source.path.display(), chosen.robot.id);
+    let of_robot = task_of(&grouping, chosen.robot).cloned();
+    of_robot.ok_or_else(|| Error::input(text()).hint("name others with --robots".to_string()))
 }
 
 /// Whether every class has a robot, and every robot classes of the team.
-fn covered(members: &[Member], classes: &[u8]) -> Result<(), Error> {
-    let knows = |member: &Member, class: &u8| member.groups.iter().any(|group| group.contains(class));
-    let missing: Vec<String> = classes
-        .iter()
-        .filter(|class| !members.iter().any(|member| knows(member, class)))
-        .map(u8::to_string)
-        .collect();
+fn covered(robots: &[Chosen], splits: &[grouping::Split], classes: &[u8]) -> Result<(), Error> {
+    let is_unknown = |class: &&u8| splits.iter().all(|split| split.group(**class).is_none());
+    let missing: Vec<String> = classes.iter().filter(is_unknown).map(u8::to_string).collect();
     if !missing.is_empty() {
         let text = format!("no robot of the team knows class {}", missing.join(", "));
         let hint = "add runs whose tasks have it with --archive, or name the classes with --classes";
         return Err(Error::input(text).hint(hint.to_string()));
     }
-    let is_foreign = |member: &&Member| member.groups.iter().flatten().any(|class| !classes.contains(class));
-    match members.iter().find(is_foreign) {
+    let is_foreign = |split: &grouping::Split| {
+        [Group::A, Group::B].into_iter().flat_map(|g| split.classes(g)).any(|class| !classes.contains(class))
+    };
+    match robots.iter().zip(splits).find(|(_, split)| is_foreign(split)) {
         None => Ok(()),
-        Some(member) => {
-            let (id, task) = (&member.id, &member.task);
+        Some((chosen, split)) => {
+            let (id, task) = (&chosen.robot.id, split.name());
             let text = format!("robot {id} tells {task} apart: expected classes of the team only");
             Err(Error::input(text).hint("leave it out, or name its classes with --classes".to_string()))
         }
@@ -241,13 +241,7 @@ fn validation_images(
     classes: &[u8],
     dataset: &Dataset,
 ) -> Result<Vec<ImageRef>, Error> {
-    let mut besides = BTreeSet::new();
-    for source in sources {
-        if let Some(count) = shown_for_validation(source) {
-            let of_run = held_out::images(&[&source.run], dataset, "--split validation", count)?;
-            besides.extend(of_run.into_iter().map(|image| image.index));
-        }
-    }
+    let besides = chosen_by(sources, dataset, shown_for_validation)?;
     let runs: Vec<_> = sources.iter().map(|source| &source.run).collect();
     images_besides(&besides, &runs, classes, dataset, "--images", options.images)
 }
@@ -262,26 +256,14 @@ fn seen(
     images.iter().map(|image| see(config, dataset, split, image.index)).collect()
 }
 
-/// What an earlier test that was stopped, or that had other members too, found on the same images.
-struct Known(Option<TeamFile>);
-
-impl Known {
-    fn read(options: &Options, now: &TeamFile) -> Self {
-        let same = |known: &TeamFile| {
-            let about = |file: &TeamFile| {
-                let TeamFile { program_version, test_sha256, images, cycles, .. } = file;
-                (program_version.clone(), test_sha256.clone(), images.clone(), *cycles, file.split)
-            };
-            about(known) == about(now)
-        };
-        Known(TeamFile::read(&options.out).ok().filter(same))
-    }
-
-    fn of(&self, member: &Member) -> Option<Vec<Option<f64>>> {
-        let same = |known: &&Member| (&known.id, &known.run_sha256) == (&member.id, &member.run_sha256);
-        let known = self.0.as_ref()?.members.iter().find(same)?;
-        Some(known.displacements.clone())
-    }
+/// Robots that an earlier test on the same images, stopped or with fewer of them, has shown these.
+fn known(options: &Options, now: &TeamFile) -> Vec<Member> {
+    let about = |file: &TeamFile| {
+        let TeamFile { program_version, test_sha256, images, cycles, split, .. } = file;
+        (program_version.clone(), test_sha256.clone(), images.clone(), *cycles, *split)
+    };
+    let earlier = TeamFile::read(&options.out).ok().filter(|file| about(file) == about(now));
+    earlier.map_or(Vec::new(), |file| file.members)
 }
 
 /// What answers the same images without bodies, on the pixels that the first robot sees.

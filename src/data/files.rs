@@ -262,7 +262,9 @@ fn file_names(folder: &Path) -> io::Result<BTreeSet<String>> {
 /// What to do about files that are missing or (`replace`) wrong.
 fn advice(name: &str, place: &Place, replace: bool) -> String {
     if !FETCHABLE.contains(&name) {
-        return "put its IDX files there or name their folder with --data; dataset \"builtin\" needs no files".to_string();
+        return "put its IDX files there or name their folder with --data; dataset \"builtin\" needs no \
+         files"
+            .to_string();
     }
     let to = match place.path == default_folder(name) {
         true => String::new(),

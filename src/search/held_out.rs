@@ -48,7 +48,8 @@ fn per_class(
     match classes.iter().zip(left).min_by_key(|(_, left)| left.len()) {
         Some((label, scarcest)) if scarcest.len() < per_class => {
             let text = format!(
-                "{asked} {count}: expected {per_class} images of class {label} that the run is not trained on, found {}",
+                "{asked} {count}: expected {per_class} images of class {label} that the run is not trained on, \
+                 found {}",
                 scarcest.len()
             );
             let most = scarcest.len() * left.len();

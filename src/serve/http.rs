@@ -130,7 +130,8 @@ fn head(status: u16, content_type: &str, more: &str) -> String {
         _ => "Internal Server Error",
     };
     format!(
-        "HTTP/1.1 {status} {reason}\r\nContent-Type: {content_type}\r\n{more}Connection: close\r\nCache-Control: no-store\r\n\
+        "HTTP/1.1 {status} {reason}\r\nContent-Type: {content_type}\r\n{more}Connection: close\r\nCache-Control: \
+         no-store\r\n\
          Content-Security-Policy: default-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'; \
          object-src 'none'\r\n\
          X-Content-Type-Options: nosniff\r\nX-Frame-Options: DENY\r\nReferrer-Policy: no-referrer\r\n\

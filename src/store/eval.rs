@@ -185,7 +185,7 @@ impl RobotReport {
             run: 0,
             task: robot.task.clone(),
             objective: robot.objective,
-            first_group_walks: format!("{:?}", assignment.expected(Group::A)).to_lowercase(),
+            first_group_walks: assignment.expected(Group::A).name().to_string(),
             right,
             images: images.len(),
             accuracy,
@@ -246,7 +246,8 @@ impl EvalFile {
     pub(crate) fn transfer(&mut self, name: &str, dataset: &Dataset) {
         self.dataset = name.to_string();
         if let Some(setting) = &mut self.setting {
-            let train_sha256 = dataset.fingerprint(dataset::Split::Train).unwrap_or_default();
+            let train_sha256 =
+                dataset.fingerprint(dataset::Split::Train).expect("an evaluation loads both splits");
             let train_sha256 = replace(&mut setting.train_sha256, train_sha256);
             let shown = setting.data.of(name);
             let own = replace(&mut setting.data, shown).dataset;
@@ -292,7 +293,8 @@ impl EvalFile {
             None => Ok(file),
             Some(run) => {
                 let text = format!(
-                    "{}: stale: it is about another run, or another state of this one ({}, generation {}, SHA-256 of its \
+                    "{}: stale: it is about another run, or another state of this one ({}, generation {}, SHA-256 \
+                     of its \
                     content {}…)",
                     path.display(),
                     run.name,

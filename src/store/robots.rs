@@ -66,7 +66,8 @@ pub enum Selection {
 }
 
 /// What can be read as a selection.
-const EXPECTED: &str = "expected all, top:N, random:N, best-validation:N, or, separated by commas, ids or their beginnings, best, \
+const EXPECTED: &str = "expected all, top:N, random:N, best-validation:N, or, separated by commas, ids or their \
+ beginnings, best, \
 names of published robots or gallery";
 
 impl FromStr for Selection {

@@ -5,10 +5,11 @@ use crate::base::files::{read_text, write_atomically};
 use crate::base::table;
 use crate::body::Body;
 use crate::config::reading;
+use crate::store::eval::Trial;
 use crate::store::images::{HeldOut, ImageRef};
 use crate::task::direction::{Assignment, Direction};
 use crate::task::grouping::Group;
-use crate::task::judge::{Accuracy, Ballot, CLIP, Sides};
+use crate::task::voting::{Accuracy, Ballot, Sides};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -117,7 +118,7 @@ pub struct Decoded {
     pub answers: Vec<u8>,
 }
 
-/// Accuracies on the same images and pixels.
+/// Accuracies on the same images, and on the pixels that the first robot sees.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TeamBaselines {
@@ -139,34 +140,37 @@ impl Member {
     /// What a walk of this robot to either side speaks for.
     pub fn sides(&self) -> Sides {
         let [a, b] = self.groups.clone();
-        if self.first_group_walks == "left" {
+        if self.first_group_walks == Direction::Left.name() {
             Sides { left: a, right: b }
         } else {
             Sides { left: b, right: a }
         }
     }
 
-    /// Its figures, once its displacements are known.
-    pub(crate) fn walked(self, displacements: Vec<Option<f64>>, images: &[ImageRef], threshold: f64) -> Self {
-        let sides = self.sides();
-        let direction = |walk: &Option<f64>| walk.and_then(|walk| Direction::of(walk, threshold));
-        let expected = |class: u8| match (sides.left.contains(&class), sides.right.contains(&class)) {
-            (true, _) => Some(Direction::Left),
-            (_, true) => Some(Direction::Right),
-            _ => None,
+    /// A robot of a run that performs a task, with its displacements under images and what these
+    /// come to.
+    pub(crate) fn new(trial: &Trial, run_sha256: &str, displacements: Vec<Option<f64>>) -> Self {
+        let Trial { run, robot, split, images, threshold } = *trial;
+        let assignment = Assignment::from_training(split, run.fitness(), &run.answers(robot));
+        let is_right = |(image, walk): (&ImageRef, &Option<f64>)| {
+            let group = split.group(image.label)?;
+            Some(walk.is_some_and(|walk| assignment.is_right(group, walk, threshold)))
         };
-        let of_own = images.iter().zip(&displacements);
-        let of_own = of_own.filter_map(|(image, walk)| Some((direction(walk), Some(expected(image.label)?))));
-        let still = displacements.iter().filter(|walk| direction(walk).is_none()).count();
-        let (own, not_moved) = (Accuracy::of(of_own), still as f64 / images.len().max(1) as f64);
-        Member { own, not_moved, displacements, ..self }
-    }
-
-    /// The name of a direction, as `first_group_walks` has it.
-    pub(crate) fn way(assignment: Assignment) -> &'static str {
-        match assignment.expected(Group::A) {
-            Direction::Left => "left",
-            Direction::Right => "right",
+        let own = images.iter().zip(&displacements).filter_map(is_right).map(|is_right| (is_right, true));
+        let own = Accuracy::of(own);
+        let is_still = |walk: &&Option<f64>| walk.is_none_or(|walk| Direction::of(walk, threshold).is_none());
+        let still = displacements.iter().filter(is_still).count();
+        Member {
+            id: robot.id.clone(),
+            run: run.name.clone(),
+            run_sha256: run_sha256.to_string(),
+            task: robot.task.clone(),
+            groups: [Group::A, Group::B].map(|group| split.classes(group).to_vec()),
+            first_group_walks: assignment.expected(Group::A).name().to_string(),
+            body: robot.body.clone(),
+            own,
+            not_moved: still as f64 / images.len().max(1) as f64,
+            displacements,
         }
     }
 }
@@ -229,7 +233,7 @@ impl TeamFile {
         let alone = |(place, member): (usize, &Member)| {
             let sides = member.sides();
             let answer = |(image, walk): (&ImageRef, &Option<f64>)| {
-                let ballot = Ballot::count(&self.classes, [(&sides, *walk)], self.threshold, CLIP);
+                let ballot = Ballot::count(&self.classes, [(&sides, *walk)], self.threshold, self.clip);
                 (self.classes[ballot.by_votes().0], image.label)
             };
             (place, Accuracy::of(self.images.iter().zip(&member.displacements).map(answer)))

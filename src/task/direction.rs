@@ -21,6 +21,14 @@ impl Direction {
         let direction = if displacement > 0.0 { Direction::Right } else { Direction::Left };
         (displacement.abs() > threshold).then_some(direction)
     }
+
+    /// Its name in files: "left" or "right".
+    pub fn name(self) -> &'static str {
+        match self {
+            Direction::Left => "left",
+            Direction::Right => "right",
+        }
+    }
 }
 
 /// Which way group A is to walk; group B is to walk the other. Fixed by the training answers before

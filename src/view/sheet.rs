@@ -24,7 +24,8 @@ pub enum SheetError {
     Dataset(#[from] DatasetError),
     /// Nothing to show, or too much.
     #[error(
-        "a sheet of {classes} classes with {samples} images each has no sensible size; ask for 1 to {MAX_SIDE} pixels in each direction"
+        "a sheet of {classes} classes with {samples} images each has no sensible size; ask for 1 to {MAX_SIDE} \
+         pixels in each direction"
     )]
     Size {
         /// Number of rows of the sheet.

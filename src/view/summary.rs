@@ -66,7 +66,8 @@ pub fn evolution(console: &Console, finished: &Finished, out: &Path) {
     let showings = (totals.simulated + totals.saved()).max(1) as f64;
     let share = |count: u64| percent(count as f64 / showings);
     console.line(&format!(
-        "{} evaluations; of the images shown, simulated {} %, saved {} % (known bodies {} %, early stop {} %, shared rollouts {} %)",
+        "{} evaluations; of the images shown, simulated {} %, saved {} % (known bodies {} %, early stop {} %, \
+         shared rollouts {} %)",
         totals.evaluations,
         share(totals.simulated),
         share(totals.saved()),
@@ -226,7 +227,8 @@ pub fn speeds(console: &Console, speeds: &[Speed]) {
     console.table(&headers, &rows.collect::<Vec<_>>());
     console.line(match CLOCK {
         "processor" => "processor time of one thread: other work on the machine does not count",
-        _ => "wall-clock time, since this system does not tell a thread's processor time: measure on a machine without other work",
+        _ => "wall-clock time, since this system does not tell a thread's processor time: measure on a machine \
+         without other work",
     });
 }
 

@@ -4,7 +4,7 @@ use crate::base::error::Error;
 use crate::base::number;
 use crate::base::number::percent;
 use crate::store::team::{Decoded, Member, TeamFile};
-use crate::task::judge::Accuracy;
+use crate::task::voting::Accuracy;
 use crate::view::console::{Console, Mode};
 use crate::view::error::write_whole;
 use crate::view::plot;
@@ -12,8 +12,8 @@ use crate::view::plot::PRINT;
 use std::path::Path;
 
 /// What others did with the ten digits of MNIST in mechanics.
-const LITERATURE: &str = "mechanics elsewhere: an oscillating plate with trained weights around it, 87 % of MNIST's test \
-images (Wright et al. 2022, Nature 601, 549)";
+const LITERATURE: &str = "mechanics elsewhere: an oscillating plate with trained weights around it, 87 % of \
+                          MNIST's test images (Wright et al. 2022, Nature 601, 549)";
 
 /// After a test: a line per robot, the answers of the team, what answers the same images without
 /// bodies, and pictures beside `out`, if that was written.
@@ -97,7 +97,7 @@ fn answers(console: &Console, file: &TeamFile) {
         number::fixed(answers.not_moved, 1)
     ));
     console.line(&format!(
-        "linear classifiers and nearest neighbour: {} training images, the pixels that robots see",
+        "linear classifiers and nearest neighbour: {} training images, the pixels that the first robot sees",
         baselines.training_images
     ));
     if file.dataset == "mnist" && file.classes.len() == 10 {
@@ -113,7 +113,7 @@ fn figures(accuracy: &Accuracy) -> [String; 2] {
 
 /// Writes the confusion matrix and the poster of all bodies; their paths.
 fn pictures(file: &TeamFile, out: &Path) -> Result<Vec<String>, Error> {
-    let stem = out.file_stem().unwrap_or_default().to_string_lossy();
+    let stem = out.file_stem().expect("its file has been written").to_string_lossy();
     let mut written = Vec::new();
     for (name, figure) in [("confusion", plot::confusion(file)), ("bodies", plot::poster(file))] {
         let Some(figure) = figure else { continue };

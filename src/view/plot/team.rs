@@ -3,6 +3,7 @@
 use crate::base::number::percent;
 use crate::body::{Body, Material};
 use crate::store::team::{Member, TeamFile};
+use crate::task::direction::Direction;
 use crate::view::colour;
 use crate::view::colour::Colour;
 use crate::view::plot::axes::{MARGIN, heading};
@@ -132,7 +133,7 @@ fn drawn(canvas: &mut Canvas, at: [f64; 2], side: f64, body: &Body) {
 
 fn caption(canvas: &mut Canvas, [middle, y]: [f64; 2], most: f64, member: &Member) {
     // An arrow says which way the classes before the bar walk.
-    let (a, b) = if member.first_group_walks == "left" { (0, 1) } else { (1, 0) };
+    let (a, b) = if member.first_group_walks == Direction::Left.name() { (0, 1) } else { (1, 0) };
     let group = |k: usize| member.groups[k].iter().map(u8::to_string).collect::<Vec<_>>().join(" ");
     let text = format!("← {}   {} →", group(a), group(b));
     canvas.fitted([middle, y + 7.5], &text, most + GAP, Words::middle());

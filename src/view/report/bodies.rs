@@ -27,7 +27,8 @@ pub(super) fn button(
     let rollout = rollouts.id(run, &robot.id).unwrap_or_default();
     let command = format!("morphcog replay --robot {} --archive {}", robot.id, dossier.path.display());
     format!(
-        "<button type=\"button\" style=\"{style}\" data-robot=\"{}\" data-rollout=\"{}\" data-about=\"{}\" data-command=\"{}\" \
+        "<button type=\"button\" style=\"{style}\" data-robot=\"{}\" data-rollout=\"{}\" data-about=\"{}\" \
+         data-command=\"{}\" \
          aria-pressed=\"false\" aria-label=\"{}\" title=\"{}\"{}>{content}</button>",
         escape(&robot.id),
         escape(&rollout),

@@ -96,9 +96,11 @@ pub(super) fn archive(number: usize, dossier: &Dossier, rollouts: &Rollouts) -> 
         true => below(0.7).hex(),
         false => sequential(if highest > 0.0 { objective / highest } else { 0.0 }).hex(),
     };
-    let mut out = "<p>A square is a cell of the archive: how many muscle voxels (right) and sensor voxels (up) a body has, one map for each \
+    let mut out =
+        "<p>A square is a cell of the archive: how many muscle voxels (right) and sensor voxels (up) a \
+     body has, one map for each \
         range of voxels in all. Press one to watch its robot; hatched cells are empty.</p>\n"
-        .to_string();
+            .to_string();
     if tasks.len() > 1 {
         let options: String = tasks
             .iter()
@@ -109,7 +111,8 @@ pub(super) fn archive(number: usize, dossier: &Dossier, rollouts: &Rollouts) -> 
     }
     let stops: Vec<String> = (0..=8).map(|k| sequential(f64::from(k) / 8.0).hex()).collect();
     out += &format!(
-        "<div class=\"scale\">fitness 0 <i style=\"background:linear-gradient(90deg,{})\"></i> {}; gray: below 0</div>\n",
+        "<div class=\"scale\">fitness 0 <i style=\"background:linear-gradient(90deg,{})\"></i> {}; gray: below \
+         0</div>\n",
         stops.join(","),
         run.in_units(highest)
     );
@@ -155,6 +158,7 @@ pub(super) fn archive(number: usize, dossier: &Dossier, rollouts: &Rollouts) -> 
         }
         out += "</div>\n";
     }
-    out += "</div>\n<div>\n<p class=\"about\" aria-live=\"polite\"></p>\n<iframe title=\"The chosen robot\"></iframe>\n</div>\n</div>\n";
+    out += "</div>\n<div>\n<p class=\"about\" aria-live=\"polite\"></p>\n<iframe title=\"The chosen \
+     robot\"></iframe>\n</div>\n</div>\n";
     out
 }

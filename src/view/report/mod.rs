@@ -84,7 +84,8 @@ fn run(number: usize, dossier: &Dossier, rollouts: &Rollouts, is_one_of_several:
     out += &heading("Archive");
     out += &maps::archive(number, dossier, rollouts);
     out += &heading("The fittest, and the most different");
-    out += "<p>The fittest robots, then those whose bodies differ most from each other. Press one to watch it above.</p>\n";
+    out += "<p>The fittest robots, then those whose bodies differ most from each other. Press one to watch it \
+     above.</p>\n";
     out += &bodies::bodies(number, dossier, rollouts);
     let mut figures = String::new();
     if let Some(progress) = &dossier.progress {

@@ -63,11 +63,14 @@ pub(super) fn methods(dossier: &Dossier) -> String {
             "the smallest distance walked towards the right side, or minus the largest one towards the wrong side"
         }
         Fitness::MeanClipped => {
-            "the mean distance walked towards the right side, clipped at ten voxel lengths, both groups weighing the same"
+            "the mean distance walked towards the right side, clipped at ten voxel lengths, both groups weighing \
+             the same"
         }
         Fitness::Response => {
-            "how far apart the two images of a pair, opposites of each other, move the body with all soft voxels and sensors \
-             made expanding sensors, less what it walks anyway; every second pair with a start one voxel higher and without \
+            "how far apart the two images of a pair, opposites of each other, move the body with all soft voxels \
+             and sensors \
+             made expanding sensors, less what it walks anyway; every second pair with a start one voxel higher \
+              and without \
              length limits"
         }
     };
@@ -75,11 +78,15 @@ pub(super) fn methods(dossier: &Dossier) -> String {
     let images: Vec<String> =
         config.classes().into_iter().map(|class| format!("{} of class {class}", counts(class))).collect();
     let mut text = format!(
-        "Bodies of at most {height} × {width} voxels (rigid, soft, two phases of muscle, shrinking and expanding sensors) were encoded by compositional \
-         pattern-producing networks and evolved with MAP-Elites for {} generations{evaluations}, seed {}, using morphcog {}. \
-         The archive's dimensions are the numbers of muscle, sensor and all voxels in seven bins each{}; {} of its {} cells can be filled. \
+        "Bodies of at most {height} × {width} voxels (rigid, soft, two phases of muscle, shrinking and expanding \
+         sensors) were encoded by compositional \
+         pattern-producing networks and evolved with MAP-Elites for {} generations{evaluations}, seed {}, using \
+          morphcog {}. \
+         The archive's dimensions are the numbers of muscle, sensor and all voxels in seven bins each{}; {} of its \
+          {} cells can be filled. \
          Each generation mutated up to {} elites; an offspring replaced an elite only if it was strictly fitter. \
-         Robots were trained on {} images of {} ({}); each image was shown for {steps} control steps ({cycles} actuation cycles) in {rollout}, \
+         Robots were trained on {} images of {} ({}); each image was shown for {steps} control steps ({cycles} \
+          actuation cycles) in {rollout}, \
          a sensor's stimulus being {encoding}. Fitness is {fitness}.",
         run.generations,
         config.seed,
@@ -101,7 +108,8 @@ pub(super) fn methods(dossier: &Dossier) -> String {
         };
         let means: Vec<String> = report.means.iter().map(mean).collect();
         text += &format!(
-            " On {} held-out {}{} images, with displacements up to {} voxel lengths counted as wrong, {} robots ({}) reached a mean accuracy of {}.",
+            " On {} held-out {}{} images, with displacements up to {} voxel lengths counted as wrong, {} robots \
+             ({}) reached a mean accuracy of {}.",
             report.images.len(),
             report.trained_on.as_ref().map_or(String::new(), |_| format!("{} ", report.dataset)),
             report.split,
@@ -114,7 +122,8 @@ pub(super) fn methods(dossier: &Dossier) -> String {
     if let Some(audit) = &dossier.findings.audit {
         let physical = audit.robots.iter().filter(|robot| robot.is_physical()).count();
         text += &format!(
-            " Of {} robots audited under changes of start, time step, material and stimulus, {physical} kept their behaviour.",
+            " Of {} robots audited under changes of start, time step, material and stimulus, {physical} kept their \
+             behaviour.",
             audit.robots.len()
         );
     }
