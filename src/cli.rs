@@ -140,6 +140,22 @@ fn run_evolve(args: EvolveArgs, console: &Console, ranks: Ranks) -> Result<(), E
     let threads = args.threads.map(usize::from);
     let (data, place) = (args.data.clone(), out.clone());
     let options = evolve::Options { config, name, out: place, if_exists, data, threads, ranks };
+    let training = match (args.train, &options.config.task.groups) {
+        (false, _) => None,
+        (true, _) if ranks.size() > 1 => {
+            let text = "--train: expected one process: several cannot share a training".to_string();
+            return Err(
+                Error::usage(text).hint("evolve first, then morphcog train without mpirun".to_string())
+            );
+        }
+        (true, Some(groups)) => {
+            Some(train::after_evolution(&out, groups, (if_exists, args.data.clone(), threads)))
+        }
+        (true, None) => {
+            let text = "--train: expected a config with task.groups, two groups of classes".to_string();
+            return Err(Error::usage(text).hint("evolve first, then morphcog train --task".to_string()));
+        }
+    };
     let stop = signals::stop_flag()?;
     let finished = {
         let reporter = Reporter::new(console);
@@ -163,6 +179,10 @@ fn run_evolve(args: EvolveArgs, console: &Console, ranks: Ranks) -> Result<(), E
     if finished.run.elites.is_empty() {
         return Ok(());
     }
+    if let Some(training) = &training {
+        train::trained(training, &stop, console)?;
+    }
+    let out = training.map_or(out, |training| training.out);
     // Nothing is left to be saved: from here on a signal ends the process.
     drop(stop);
     if args.replay && ranks.leads() {
@@ -188,6 +208,9 @@ fn run_eval(args: EvalArgs, console: &Console, ranks: Ranks) -> Result<(), Error
         true => vec![folder::newest_run()?],
         false => archives,
     };
+    if !of_gallery {
+        choice::say_unfinished(&archives, console);
+    }
     let name = eval::own_name(args.split);
     let beside = || match of_gallery {
         true => Path::new(&format!("gallery-{name}")).to_path_buf(),

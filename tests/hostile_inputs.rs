@@ -156,7 +156,7 @@ impl World {
         let request = format!(
             "POST /api/simulations HTTP/1.1\r\nHost: 127.0.0.1:PORT\r\nOrigin: \
              http://127.0.0.1:PORT\r\nContent-Length: LENGTH\r\n\r\n{}",
-            json!({ "subject": { "archive": 1, "robot": "ROBOT" }, "control_steps": 40, "speed": 0.0,
+            json!({ "subject": { "archive": 2, "robot": "ROBOT" }, "control_steps": 40, "speed": 0.0,
                     "shown": { "stimulus": [[0, 1, 0.5, 0], [1, 0, 0, 1], [0, 0, 1, 0]] } })
         );
         let id = sandbox.run_file("run").elites[0].id.clone();
@@ -176,7 +176,7 @@ impl World {
             seeds.insert(kind, std::fs::read(sandbox.path(name)).unwrap());
         }
         let archives = vec![sandbox.path("run/run.json")];
-        let (service, _) = Service::open(&serve::Options { archives, data: None }).unwrap();
+        let (service, _) = Service::open(&serve::Options { archives, ..serve::Options::default() }).unwrap();
         let server = Server::bind(service, 0).unwrap();
         let port = server.url().rsplit(':').next().unwrap().trim_end_matches('/').parse().unwrap();
         static NEVER: AtomicBool = AtomicBool::new(false);
@@ -285,7 +285,10 @@ fn run(world: &World, dice: &mut Dice, case: &mut Case) {
     if substeps < 1e5 {
         world.plot(case, Kind::Spacetime, &archive, "run.json");
     }
-    case.check(Service::open(&serve::Options { archives: vec![archive.clone()], data: None }), "run.json");
+    case.check(
+        Service::open(&serve::Options { archives: vec![archive.clone()], ..serve::Options::default() }),
+        "run.json",
+    );
 }
 
 fn config(world: &World, dice: &mut Dice, case: &mut Case) {
@@ -386,7 +389,7 @@ fn request(world: &World, dice: &mut Dice, case: &mut Case) {
         "stimulus",
         "scenario",
         "rollouts/1",
-        "archives/1",
+        "archives/2",
         "images?set=builtin&class=1",
     ];
     let mut head = head.replace("/api/simulations", &format!("/api/{}", dice.pick(&paths)));

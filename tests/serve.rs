@@ -71,11 +71,13 @@ fn the_page_its_headers_and_what_there_is() {
     assert_eq!((head.status, head.body.as_str()), (200, ""));
     assert_eq!(head.header("content-length"), page.header("content-length"));
 
-    // The newest run is offered without being named, after the published robots.
+    // The newest run is offered without being named, after the trained and the published robots.
     let archives = json_of(&server.get("/api/archives"));
-    assert_eq!((archives.as_array().unwrap().len(), &archives[0]["robots"]), (2, &json!(5)));
+    assert_eq!((archives.as_array().unwrap().len(), &archives[1]["robots"]), (3, &json!(5)));
+    let trained = json_of(&server.get("/api/archives/0"));
+    assert_eq!(trained["robots"][0]["audit"]["verdict"], "physical");
     let run = sandbox.run_file("runs/one");
-    let listed = json_of(&server.get("/api/archives/1"));
+    let listed = json_of(&server.get("/api/archives/2"));
     assert_eq!(listed["robots"].as_array().unwrap().len(), run.elites.len());
     let best = &listed["robots"][0];
     let robot = run.elites.iter().find(|robot| best["id"] == robot.id.as_str()).unwrap();
@@ -98,7 +100,7 @@ fn an_audit_beside_the_archive_is_shown() {
     sandbox.run("evolve --config tiny.toml --out runs/one --quiet").ended(0, &[]);
     sandbox.run("audit --archive runs/one/run.json --robots top:1 --quiet").ended(0, &[]);
     let server = Server::start(&sandbox, "--archive runs/one/run.json");
-    let robots = json_of(&server.get("/api/archives/1"))["robots"].clone();
+    let robots = json_of(&server.get("/api/archives/2"))["robots"].clone();
     assert!(robots[0]["audit"]["verdict"].is_string(), "{}", robots[0]);
     assert_eq!(robots[1]["audit"], Value::Null);
 }
@@ -154,7 +156,7 @@ fn what_is_wrong_is_refused_with_one_line_and_hurts_nothing() {
         format!("POST /api/body HTTP/1.1\r\n{own}Content-Length: 99999999\r\n\r\n{}", "x".repeat(100_000));
     refused(&server.send(long), 413, "262144");
 
-    let robot = json!({ "archive": 0, "robot": "QMAXD" });
+    let robot = json!({ "archive": 1, "robot": "QMAXD" });
     let wide = vec![vec![0u8; 200]; 2];
     for (request, words) in [
         (json!({}), "subject"),
@@ -164,7 +166,7 @@ fn what_is_wrong_is_refused_with_one_line_and_hurts_nothing() {
         (json!({ "subject": robot, "control_steps": 0 }), "control_steps"),
         (json!({ "subject": robot, "control_steps": 1_000_000 }), "control_steps"),
         (json!({ "subject": robot, "colour": "red" }), "colour"),
-        (json!({ "subject": { "archive": 0 } }), "subject"),
+        (json!({ "subject": { "archive": 1 } }), "subject"),
         (json!({ "subject": { "body": [[3, 0, 3]] } }), "hanging together"),
         (json!({ "subject": { "body": [[0]] } }), "at least one voxel"),
         (json!({ "subject": { "body": [[9]] } }), "9"),
@@ -182,7 +184,7 @@ fn what_is_wrong_is_refused_with_one_line_and_hurts_nothing() {
     refused(&server.post_text("/api/simulations", "{\"subject\": "), 400, "request:1");
     refused(&server.post_bytes("/api/simulations", &[0xff, 0xfe]), 400, "UTF-8");
     refused(
-        &server.post("/api/simulations", &json!({ "subject": { "archive": 0, "robot": "x" } })),
+        &server.post("/api/simulations", &json!({ "subject": { "archive": 1, "robot": "x" } })),
         404,
         "no robot",
     );
@@ -228,7 +230,7 @@ fn bodies_and_scenarios_are_checked_and_pictures_reduced_as_runs_do() {
     };
     let config = gallery::config().unwrap();
     let expected = stimulus(&drawing(), 14, 14, &config.stimulus).unwrap();
-    assert_eq!(see(json!({ "archive": 0, "robot": "XFJPI" })), expected);
+    assert_eq!(see(json!({ "archive": 1, "robot": "XFJPI" })), expected);
     let own = StimulusParams { reduction: Reduction::Area, encoding: Encoding::Intensity, level: 0.5 };
     let expected = stimulus(&drawing(), 2, 3, &own).unwrap();
     assert_eq!(see(json!({ "body": [[3, 3, 6], [4, 4, 5]], "encoding": own })), expected);
@@ -252,7 +254,7 @@ fn a_simulation_is_what_the_engine_computes() {
     let sandbox = Sandbox::new();
     let server = Server::start(&sandbox, "");
     let request = json!({
-        "subject": { "archive": 0, "robot": "QMAXD" }, "shown": { "drawing": drawing() },
+        "subject": { "archive": 1, "robot": "QMAXD" }, "shown": { "drawing": drawing() },
         "control_steps": 120, "speed": 0,
     });
     let events: Vec<(String, Value)> = server.events("/api/simulations", &request).collect();

@@ -6,8 +6,10 @@
 mod common;
 
 use common::browser::{Browser, Tab, found};
-use common::program::Sandbox;
+use common::hostile::Dice;
+use common::program::{Sandbox, TINY, terminate};
 use common::server::Server;
+use morphcog::analysis::gallery;
 use serde_json::Value;
 use std::f64::consts::TAU;
 use std::io::Write;
@@ -51,6 +53,21 @@ fn one() -> Vec<[f64; 2]> {
     (0..=12).map(|k| f64::from(k) / 12.0).map(|t| [16.0 - 4.0 * t, 5.0 + 18.0 * t]).collect()
 }
 
+/// The robot that the page begins with.
+fn best() -> String {
+    let trained = gallery::trained().unwrap();
+    trained[0].0.elites[0].id.clone()
+}
+
+/// Chooses an archive by its number.
+fn choose(tab: &mut Tab, archive: &str) {
+    let first = tab.text("#who");
+    tab.eval(&format!(
+        "(() => {{ const s = document.getElementById('archive'); s.value = '{archive}'; s.onchange(); }})()"
+    ));
+    tab.wait(&format!("document.getElementById('who').textContent !== '{first}'"));
+}
+
 /// Waits for the end of the simulation under the picture that was chosen last.
 fn at_end(tab: &mut Tab) {
     tab.wait("document.documentElement.dataset.state === 'over'");
@@ -71,6 +88,9 @@ fn a_drawn_zero_and_a_drawn_one_are_told_apart_and_the_page_fits_everywhere() {
 
     let mut tab = browser.tab(1280, 900, false);
     open(&mut tab, &server);
+    // It begins with the best of the trained robots; the published ones are a choice away.
+    assert_eq!(tab.text("#who"), best());
+    choose(&mut tab, "1");
     assert_eq!(tab.text("#who"), "QMAXD");
     tab.eval("(() => { const s = document.getElementById('speed'); s.value = '0'; s.onchange(); })()");
     // QMAXD walks right under a zero, left under a one.
@@ -129,6 +149,126 @@ fn a_drawn_zero_and_a_drawn_one_are_told_apart_and_the_page_fits_everywhere() {
         }
         assert_eq!(tab.complaints(), Vec::<String>::new());
         tab.close();
+    }
+}
+
+/// A digit as somebody may draw it: of any size, anywhere on the pad, slanted, with an unsteady hand.
+/// Not the strokes of the built-in digits.
+fn by_hand(digit: u8, dice: &mut Dice) -> Vec<[f64; 2]> {
+    let mut within = |low: f64, high: f64| low + (high - low) * dice.below(1001) as f64 / 1000.0;
+    let (height, slant, wobble) = (within(9.0, 23.0), within(-0.15, 0.4), within(0.0, 0.03));
+    let wave = [within(0.0, TAU), within(2.0, 4.0)];
+    let mut line: Vec<[f64; 2]> = match digit {
+        0 => {
+            // Begun anywhere, in either direction, not quite closed or a little further.
+            let (width, begin, turn) = (within(0.5, 0.95), within(0.0, TAU), within(0.94, 1.06));
+            let way = if within(0.0, 1.0) < 0.5 { 1.0 } else { -1.0 };
+            let at = |k: u32| begin + way * turn * TAU * f64::from(k) / 18.0;
+            (0..=18).map(|k| [0.5 * width * at(k).sin(), -0.5 * at(k).cos()]).collect()
+        }
+        _ => {
+            // With a flag or without.
+            let (flag, bend) = (within(-0.2, 0.25), within(-0.04, 0.04));
+            let stem = (0..=6).map(|k| f64::from(k) / 6.0).map(|t| [bend * (TAU * t / 2.0).sin(), t - 0.5]);
+            let begin = if flag > 0.0 { vec![[-flag, -0.5 + 0.8 * flag]] } else { Vec::new() };
+            begin.into_iter().chain(stem).collect()
+        }
+    };
+    for (k, place) in line.iter_mut().enumerate() {
+        place[0] += wobble * (wave[0] + wave[1] * k as f64 / 3.0).sin() - slant * place[1];
+        *place = place.map(|v| height * v);
+    }
+    // Anywhere, as far as all of it is on the pad.
+    for axis in [0, 1] {
+        let [low, high] =
+            [f64::min, f64::max].map(|of| line.iter().map(|place| place[axis]).reduce(of).unwrap());
+        let shift = within(1.0 - low, 27.0 - high);
+        line.iter_mut().for_each(|place| place[axis] += shift);
+    }
+    line
+}
+
+#[test]
+fn digits_drawn_in_any_size_place_and_slant_are_read_by_the_robot_that_the_page_begins_with() {
+    let sandbox = Sandbox::new();
+    let Some(mut browser) = browser(&sandbox) else { return };
+    let server = Server::start(&sandbox, "");
+    let mut tab = browser.tab(1280, 900, false);
+    open(&mut tab, &server);
+    tab.eval("(() => { const s = document.getElementById('speed'); s.value = '0'; s.onchange(); })()");
+    if let Some(folder) = std::env::var_os("MORPHCOG_SCREENSHOTS") {
+        answer(&mut tab, &zero());
+        tab.eval("window.scrollTo(0, 0)");
+        std::fs::write(std::path::Path::new(&folder).join("serve.png"), tab.screenshot()).unwrap();
+    }
+    let mut wrong = Vec::new();
+    for seed in 1..=3 {
+        let mut dice = Dice::new(77, seed);
+        for number in 0..40 {
+            let digit = number % 2;
+            tab.pointer = if dice.below(2) == 0 { "mouse" } else { "pen" };
+            let (says, moved) = answer(&mut tab, &by_hand(digit, &mut dice));
+            if says != digit.to_string() {
+                wrong.push(format!("seed {seed}, drawing {number}: a {digit} is {says:?}, {moved}"));
+            }
+        }
+    }
+    assert!(wrong.len() <= 6, "{} of 120 wrong:\n{}", wrong.len(), wrong.join("\n"));
+    // As drawn, it is another picture.
+    let small: Vec<[f64; 2]> = zero().iter().map(|place| place.map(|v| 2.0 + v / 4.0)).collect();
+    draw(&mut tab, &small);
+    at_end(&mut tab);
+    let lit = "JSON.stringify([...document.getElementById('stimulus').getContext('2d').getImageData(0, 0, 300, 300).data])";
+    let fitted = tab.eval(lit);
+    tab.click("#fit");
+    at_end(&mut tab);
+    assert_ne!(tab.eval(lit), fitted);
+    assert_eq!(tab.complaints(), Vec::<String>::new());
+}
+
+#[test]
+fn a_run_that_begins_while_the_page_is_open_appears_grows_and_ends_on_it() {
+    let sandbox = Sandbox::new();
+    let Some(mut browser) = browser(&sandbox) else { return };
+    let server = Server::start(&sandbox, "");
+    let mut tab = browser.tab(1280, 800, false);
+    open(&mut tab, &server);
+    sandbox.write("long.toml", TINY.replace("generations = 12", "generations = 10000000"));
+    let mut child = sandbox.start("evolve -q -c long.toml -o runs/live --set checkpoint.seconds=0.1");
+    let text = "document.getElementById('archive').textContent";
+    tab.wait(&format!("{text}.includes('of 10000000')"));
+    choose(&mut tab, "2");
+    tab.wait("!document.getElementById('progress').hidden");
+    tab.wait("document.querySelectorAll('#curves svg').length === 3");
+    tab.wait("document.getElementById('course').textContent.includes('left')");
+    let first = tab.text("#course");
+    tab.wait(&format!("document.getElementById('course').textContent !== '{first}'"));
+    if let Some(folder) = std::env::var_os("MORPHCOG_SCREENSHOTS") {
+        tab.eval("document.getElementById('progress').scrollIntoView()");
+        std::fs::write(std::path::Path::new(&folder).join("serve-live.png"), tab.screenshot()).unwrap();
+    }
+    terminate(&child);
+    child.wait().unwrap();
+    tab.wait("document.getElementById('course').textContent.includes('not running now')");
+    assert_eq!(tab.complaints(), Vec::<String>::new());
+}
+
+#[test]
+fn a_body_that_is_built_and_the_robot_it_makes_are_in_sight_together() {
+    let sandbox = Sandbox::new();
+    let Some(mut browser) = browser(&sandbox) else { return };
+    let server = Server::start(&sandbox, "");
+    let mut tab = browser.tab(1280, 800, false);
+    open(&mut tab, &server);
+    tab.click("#tab-editor");
+    tab.wait("!document.getElementById('editor').hidden");
+    tab.eval("window.scrollTo(0, 0)");
+    for id in ["grid", "world", "verdict"] {
+        let bottom = tab.eval(&format!("document.getElementById('{id}').getBoundingClientRect().bottom"));
+        assert!((1.0..=800.0).contains(&bottom.as_f64().unwrap()), "{id} ends at {bottom}");
+    }
+    if let Some(folder) = std::env::var_os("MORPHCOG_SCREENSHOTS") {
+        std::fs::write(std::path::Path::new(&folder).join("serve-editor.png"), tab.screenshot()).unwrap();
     }
 }
 

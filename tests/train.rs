@@ -3,7 +3,7 @@
 
 mod common;
 
-use common::program::{Sandbox, TINY, files};
+use common::program::{Sandbox, TINY, files, gaits};
 use morphcog::config::Config;
 
 /// A little of everything: seconds in place of minutes.
@@ -137,4 +137,26 @@ fn what_cannot_be_trained_is_one_clear_error_and_writes_nothing() {
     assert_eq!(files(&sandbox.path("walkers")), before);
     std::fs::write(sandbox.path("walkers").join("training.json"), "{}").unwrap();
     sandbox.run("evolve -q -c run.toml -o walkers --resume").ended(5, &["is a training", "train --resume"]);
+}
+
+#[test]
+fn evolve_with_train_ends_with_the_robot_that_train_makes_of_its_gaits() {
+    let sandbox = Sandbox::new();
+    let little = "[train]\nrandom_images = 40\nrounds = 2\nimages = 24\nfinal_images = 20\nchallengers = 6\n";
+    sandbox.write("gaits.toml", format!("{}\n{little}", gaits()));
+    sandbox.write("four.toml", TINY.replace("groups = [[0], [1]]", "splits = [0, 1, 2]"));
+    sandbox.run("evolve -q -c four.toml --train -o refused").ended(2, &["--train", "task.groups"]);
+    assert!(!sandbox.path("refused").exists());
+    let said = sandbox.run("evolve -c gaits.toml --train --replay -o runs/one").ended(0, &["training in"]);
+    let robot = sandbox.run_file("runs/one-0v1").elites[0].clone();
+    assert!(said.out.contains(&robot.id), "{said:?}");
+    assert!(sandbox.path(&format!("runs/one-0v1/replay-{}.gif", robot.id)).exists());
+    assert!(sandbox.path("runs/one-0v1/audit.json").exists());
+    sandbox.run("train -q -a runs/one --task 0|1 -o by_hand").ended(0, &[]);
+    assert_eq!(sandbox.run_file("by_hand").elites[0], robot);
+    // What is done is not done again; nothing is replaced unasked.
+    let before = files(&sandbox.path("runs/one-0v1"))["run.json"].clone();
+    sandbox.run("evolve -q -c gaits.toml --train -o runs/one").ended(5, &["runs/one"]);
+    sandbox.run("evolve -q -c gaits.toml --train -o runs/one --resume").ended(0, &[]);
+    assert_eq!(files(&sandbox.path("runs/one-0v1"))["run.json"], before);
 }

@@ -1,4 +1,5 @@
-//! `morphcog gallery`: the zero-one robots that the paper's authors published.
+//! `morphcog gallery`: the zero-one robots that the paper's authors published; and robots that were
+//! trained here.
 
 use crate::base::error::Error;
 use crate::body::Body;
@@ -7,6 +8,7 @@ use crate::data::catalogue;
 use crate::genome::Genome;
 use crate::qd::Archive;
 use crate::search::training::Training;
+use crate::store::audit::AuditFile;
 use crate::store::images::{DatasetRef, ImageRef};
 use crate::store::robots::{Selection, Source};
 use crate::store::run::{Dimensions, FORMAT, FORMAT_VERSION, Robot, RunFile};
@@ -22,6 +24,30 @@ pub const ALL: &str = "gallery";
 
 /// The list of them.
 pub(crate) const TEXT: &str = include_str!("../../data/gallery.json");
+
+/// Runs of trained zero-one robots and their audits, the best on validation images first.
+const TRAINED: [[&str; 2]; 2] = [
+    [
+        include_str!("../../data/trained/zero-one-1/run.json"),
+        include_str!("../../data/trained/zero-one-1/audit.json"),
+    ],
+    [
+        include_str!("../../data/trained/zero-one-2/run.json"),
+        include_str!("../../data/trained/zero-one-2/audit.json"),
+    ],
+];
+
+/// Runs whose robots were trained to tell zeros from ones, each with its audit; the best on
+/// validation images first.
+///
+/// # Errors
+/// If what is built in is damaged (which a test excludes).
+pub fn trained() -> Result<Vec<(RunFile, AuditFile)>, Error> {
+    let read = |[run, audit]: &[&str; 2]| {
+        Ok((RunFile::parse(run, "data/trained")?, AuditFile::parse(audit, "data/trained")?))
+    };
+    TRAINED.iter().map(read).collect()
+}
 
 /// A published robot.
 #[derive(Clone, Debug, PartialEq)]
@@ -169,5 +195,16 @@ mod tests {
         assert_eq!(find("xfjpi").unwrap().unwrap().fitness, 17.316384958834874);
         assert_eq!(find("nobody").unwrap(), None);
         assert_eq!(config().unwrap().classes(), [0, 1]);
+    }
+
+    #[test]
+    fn the_trained_robots_are_physical_and_see_and_walk_alike() {
+        let trained = trained().unwrap();
+        let like = |run: &RunFile| (run.config.body_spec(), run.config.stimulus, run.config.classes());
+        for (run, audit) in &trained {
+            assert_eq!(like(run), like(&trained[0].0));
+            assert_eq!(audit.run_sha256, run.fingerprint());
+            assert!(run.elites.iter().all(|robot| audit.robot(&robot.id).unwrap().is_physical()));
+        }
     }
 }

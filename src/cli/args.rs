@@ -227,7 +227,10 @@ pub(super) struct EvolveArgs {
     /// Replace the run in the folder.
     #[arg(long)]
     pub(super) force: bool,
-    /// At the end, replay the best robot into the run folder.
+    /// Then train the fittest gaits to tell the config's two groups apart, as morphcog train does.
+    #[arg(long)]
+    pub(super) train: bool,
+    /// At the end, replay the best robot into its run folder.
     #[arg(long)]
     pub(super) replay: bool,
 }

@@ -4,6 +4,7 @@ use crate::analysis::gallery;
 use crate::base::error::Error;
 use crate::base::ranks::Ranks;
 use crate::base::signals;
+use crate::cli::choice;
 use crate::cli::choice::{Archives, ROBOTS, selected};
 use crate::commands::audit;
 use crate::commands::audit::{Options, Source};
@@ -65,6 +66,14 @@ pub(super) fn run(args: AuditArgs, console: &Console, ranks: Ranks) -> Result<()
     let (archives, chosen) = (&args.archives.archive, selected(args.robots.clone())?);
     let chosen = chosen.unwrap_or(Selection::All);
     let sources = sources(archives, &chosen)?;
+    let of_archives = sources.iter().filter_map(|source| match source {
+        Source::Archive(path) => Some(path),
+        Source::Gallery => None,
+    });
+    let of_archives: Vec<&PathBuf> = of_archives.collect();
+    if !of_archives.is_empty() {
+        choice::say_unfinished(of_archives, console);
+    }
     // Which robots to audit is known for all runs before the first rollout.
     let asked = match archives.is_empty() {
         true => vec![Some(chosen)],

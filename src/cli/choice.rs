@@ -1,6 +1,7 @@
 //! What commands have in common that take archives, or robots of them: one rule, and the same words
 //! of help.
 
+use crate::analysis::gallery;
 use crate::base::error::Error;
 use crate::base::signals;
 use crate::base::stop::NEVER;
@@ -8,6 +9,7 @@ use crate::commands::one_by_one;
 use crate::commands::one_by_one::Named;
 use crate::store::folder;
 use crate::store::robots::Selection;
+use crate::store::run::RunFile;
 use crate::view::console::Console;
 use crate::view::reporters::Reporter;
 use clap::Args;
@@ -49,12 +51,32 @@ pub(super) fn selected(mut given: Vec<Selection>) -> Result<Option<Selection>, E
 
 /// The robots of a selection, for a command that looks at them one by one.
 pub(super) fn one_by_one(search: &one_by_one::Options, console: &Console) -> Result<Vec<Named>, Error> {
+    if !(search.archives.is_empty() && gallery::is_meant(&search.robots)?) {
+        say_unfinished(&search.archives, console);
+    }
     // Only a search on validation images is stopped in an orderly way: signals end all else at
     // once.
     let observer = Reporter::new(console);
     match search.robots.validated() {
         Some(_) => one_by_one::named(search, &*signals::stop_flag()?, &observer),
         None => one_by_one::named(search, &NEVER, &observer),
+    }
+}
+
+/// Says of which archives a command reads the robots that there are so far: those whose runs have not
+/// reached their end. Without archives it is the newest run that is meant.
+pub(super) fn say_unfinished<'a>(archives: impl IntoIterator<Item = &'a PathBuf>, console: &Console) {
+    let mut archives: Vec<PathBuf> = archives.into_iter().cloned().collect();
+    if archives.is_empty() {
+        archives.extend(folder::newest_run());
+    }
+    for path in archives {
+        if let Some((done, asked)) = RunFile::progress(&path).filter(|(done, asked)| done < asked) {
+            console.info(&format!(
+                "{}: generation {done} of {asked}: the run is not at its end",
+                path.display()
+            ));
+        }
     }
 }
 

@@ -78,7 +78,10 @@ pub(super) fn run(args: PlotArgs, console: &Console) -> Result<(), Error> {
     figures::endings(args.out.as_deref())?;
     let robots: Vec<Named> = match selected(args.robot)? {
         Some(_) if !kind.is_of_robot() => return Err(figures::no_robot(kind)),
-        None if !kind.is_of_robot() => Vec::new(),
+        None if !kind.is_of_robot() => {
+            choice::say_unfinished(&archives, console);
+            Vec::new()
+        }
         robots => {
             let robots = robots.unwrap_or(Selection::Ids(vec![BEST.to_string()]));
             let (archives, data) = (archives.clone(), data.clone());

@@ -2,6 +2,7 @@
 
 use crate::base::error::Error;
 use crate::base::number;
+use crate::cli::choice;
 use crate::cli::choice::{Archives, run_json};
 use crate::commands::report;
 use crate::store::folder;
@@ -48,6 +49,7 @@ pub(super) fn run(args: ReportArgs, console: &Console) -> Result<(), Error> {
     if archives.is_empty() {
         archives.push(folder::newest_run()?);
     }
+    choice::say_unfinished(&archives, console);
     let out = args.out.unwrap_or_else(|| folder::above(&archives).join("report.html"));
     folder::writable(&out)?;
     let gathered =

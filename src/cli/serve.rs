@@ -12,11 +12,12 @@ use std::path::PathBuf;
 
 pub(super) const EXAMPLES: &str = "\
 Examples:
-  morphcog serve                                    the published robots, and the newest run if there is one
+  morphcog serve                                    trained and published robots, and the newest run if there is one
   morphcog serve --archive runs/zero_one-seed1 runs/four_digit-seed1
   morphcog serve --port 8080 --no-open              then open http://127.0.0.1:8080/
 
-Only this machine can reach the page. Ctrl-C ends it.";
+Runs under runs/ that begin or go on meanwhile appear by themselves. Only this machine can reach
+the page. Ctrl-C ends it.";
 
 #[derive(Debug, Args)]
 pub(super) struct ServeArgs {
@@ -40,7 +41,7 @@ pub(super) fn run(args: ServeArgs, console: &Console) -> Result<(), Error> {
         given => given,
     };
     let stop = signals::stop_flag()?;
-    let (service, notes) = Service::open(&Options { archives, data: args.data })?;
+    let (service, notes) = Service::open(&Options { archives, data: args.data, runs: folder::RUNS.into() })?;
     let server = Server::bind(service, args.port)?;
     for note in notes {
         console.info(&format!("note: {note}"));

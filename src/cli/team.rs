@@ -2,6 +2,7 @@
 
 use crate::base::error::Error;
 use crate::base::signals;
+use crate::cli::choice;
 use crate::cli::choice::{Archives, selected};
 use crate::commands::team;
 use crate::commands::team::Options;
@@ -67,6 +68,7 @@ pub(super) fn run(args: TeamArgs, console: &Console) -> Result<(), Error> {
         let hint = "no team is published with the program yet; morphcog help team has examples";
         return Err(Error::input(text.to_string()).hint(hint.to_string()));
     }
+    choice::say_unfinished(&archives, console);
     let options = Options {
         robots: selected(args.robots)?.unwrap_or(Selection::Ids(vec![BEST.to_string()])),
         classes: (!args.classes.is_empty()).then_some(args.classes),

@@ -3,6 +3,7 @@
 use crate::base::error::Error;
 use crate::base::ranks::Ranks;
 use crate::base::signals;
+use crate::cli::choice;
 use crate::cli::choice::{ROBOTS, run_json, selected};
 use crate::commands::audit;
 use crate::config;
@@ -17,7 +18,8 @@ use crate::view::console::Console;
 use crate::view::reporters::Reporter;
 use crate::view::{summary, verdicts};
 use clap::Args;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
 
 pub(super) const EXAMPLES: &str = "\
 Examples:
@@ -71,16 +73,8 @@ pub(super) struct TrainArgs {
 
 pub(super) fn run(args: TrainArgs, console: &Console) -> Result<(), Error> {
     let archive = args.archive.map_or_else(folder::newest_run, Ok)?;
-    let robots = selected(args.robots)?.unwrap_or(Selection::Top(4));
-    let suffix = args.task.each_ref().map(|group| {
-        let separator = if group.iter().any(|class| *class > 9) { "," } else { "" };
-        group.iter().map(u8::to_string).collect::<Vec<_>>().join(separator)
-    });
-    let suffix = suffix.join("v");
-    let of = archive.parent().unwrap_or(std::path::Path::new(""));
-    let of = of.file_name().map_or("run".to_string(), |name| name.to_string_lossy().into_owned());
-    let seed = args.seed.map_or(String::new(), |seed| format!("-seed{seed}"));
-    let name = format!("{of}-{suffix}{seed}");
+    let robots = selected(args.robots)?.unwrap_or(Selection::Top(GAITS));
+    let name = name(&archive, &args.task, args.seed);
     let beside = archive.parent().and_then(|folder| folder.parent()).map(|folder| folder.join(&name));
     let out = args.out.or(beside).unwrap_or_else(|| PathBuf::from(&name));
     let if_exists = match (args.resume, args.force) {
@@ -88,7 +82,6 @@ pub(super) fn run(args: TrainArgs, console: &Console) -> Result<(), Error> {
         (_, true) => IfExists::Overwrite,
         _ => IfExists::Refuse,
     };
-    let threads = args.threads.map(usize::from);
     let options = Options {
         archive,
         robots,
@@ -96,15 +89,58 @@ pub(super) fn run(args: TrainArgs, console: &Console) -> Result<(), Error> {
         seed: args.seed,
         set: args.set,
         name,
-        out: out.clone(),
+        out,
         if_exists,
-        data: args.data.clone(),
-        threads,
+        data: args.data,
+        threads: args.threads.map(usize::from),
     };
     let stop = signals::stop_flag()?;
-    let finished = train::train(&options, &stop, &Reporter::new(console))?;
+    trained(&options, &stop, console)
+}
+
+/// Gaits that are tried if nothing else is said.
+const GAITS: usize = 4;
+
+/// How a training of an archive's gaits is called: after the archive's folder and the task.
+fn name(archive: &Path, task: &Groups, seed: Option<u64>) -> String {
+    let suffix = task.each_ref().map(|group| {
+        let separator = if group.iter().any(|class| *class > 9) { "," } else { "" };
+        group.iter().map(u8::to_string).collect::<Vec<_>>().join(separator)
+    });
+    let of = archive.parent().unwrap_or(Path::new(""));
+    let of = of.file_name().map_or("run".to_string(), |name| name.to_string_lossy().into_owned());
+    let seed = seed.map_or(String::new(), |seed| format!("-seed{seed}"));
+    format!("{of}-{}{seed}", suffix.join("v"))
+}
+
+/// The training that `evolve --train` does when the gaits of the run in `out` have evolved.
+pub(super) fn after_evolution(
+    out: &Path,
+    groups: &Groups,
+    (if_exists, data, threads): (IfExists, Option<PathBuf>, Option<usize>),
+) -> Options {
+    let archive = out.join(RUN_JSON);
+    let name = name(&archive, groups, None);
+    Options {
+        out: out.with_file_name(&name),
+        archive,
+        robots: Selection::Top(GAITS),
+        groups: groups.clone(),
+        seed: None,
+        set: Vec::new(),
+        name,
+        if_exists,
+        data,
+        threads,
+    }
+}
+
+/// Trains, validates and audits, and says how it went.
+pub(super) fn trained(options: &Options, stop: &AtomicBool, console: &Console) -> Result<(), Error> {
+    choice::say_unfinished([&options.archive], console);
+    let finished = train::train(options, stop, &Reporter::new(console))?;
     let Finished { validated, .. } = &finished;
-    summary::training(console, &finished, &out);
+    summary::training(console, &finished, &options.out);
     let goes_on = || "the same command with --resume goes on".to_string();
     let Some(validated) = validated else {
         let text = "stopped while validating; the run is saved".to_string();
@@ -113,18 +149,18 @@ pub(super) fn run(args: TrainArgs, console: &Console) -> Result<(), Error> {
     if !validated.is_empty() {
         summary::validation(console, validated);
     }
-    let archive = out.join(RUN_JSON);
+    let archive = options.out.join(RUN_JSON);
     let options = audit::Options {
         robots: Selection::All,
         seed: 1,
         criteria: Criteria::load(None, &[])?,
-        data: args.data,
+        data: options.data.clone(),
         out: archive.with_file_name(AUDIT_JSON),
-        threads,
+        threads: options.threads,
         ranks: Ranks::ALONE,
         source: audit::Source::Archive(archive),
     };
-    let audited = audit::audit(&options, &stop, &Reporter::new(console))?;
+    let audited = audit::audit(&options, stop, &Reporter::new(console))?;
     verdicts::audit(console, &audited, &options.out);
     if let Some(error) = audited.unwritten {
         return Err(error);

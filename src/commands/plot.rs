@@ -98,15 +98,24 @@ impl Progress {
     /// # Errors
     /// What is missing or wrong, with its line.
     pub fn of(run: &RunFile, archive: &Path) -> Result<Self, Error> {
-        let path = archive.with_file_name(METRICS);
-        let text = read_text(&path).map_err(|error| Error::reading(&path, &error))?;
-        let within = |error: Error| error.within(&path.display().to_string());
-        let moments = moments(&text).map_err(within)?;
+        let moments = moments_of(archive)?;
         let unit = run.fitness().unit();
         let mut settings = run.config.settings();
         settings.remove("seed");
         Ok(Progress { run: run.name.clone(), seed: run.config.seed, unit, moments, settings })
     }
+}
+
+/// The lines of the metrics.csv beside a run.json.
+///
+/// # Errors
+/// What is missing or wrong, with its line.
+pub(crate) fn moments_of(archive: &Path) -> Result<Vec<Moment>, Error> {
+    let path = archive.with_file_name(METRICS);
+    let text = read_text(&path).map_err(|error| Error::reading(&path, &error))?;
+    // A run under way may be writing the last line.
+    let whole = text.rfind('\n').map_or(text.as_str(), |end| &text[..=end]);
+    moments(whole).map_err(|error| error.within(&path.display().to_string()))
 }
 
 fn moments(text: &str) -> Result<Vec<Moment>, Error> {

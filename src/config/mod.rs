@@ -208,13 +208,14 @@ pub struct ArchiveConfig {
 pub struct CheckpointConfig {
     /// Generations between two checkpoints. Default 1000; larger values lose more at a power cut.
     pub generations: u64,
-    /// Seconds between two checkpoints. Default 60.
+    /// Seconds between two checkpoints; more where writing one takes more than a fiftieth of that.
+    /// Default 10.
     pub seconds: f64,
 }
 
 impl Default for CheckpointConfig {
     fn default() -> Self {
-        CheckpointConfig { generations: 1000, seconds: 60.0 }
+        CheckpointConfig { generations: 1000, seconds: 10.0 }
     }
 }
 

@@ -168,6 +168,13 @@ fn metrics(folder: &RunFolder, generation: u64, observer: &dyn Observer) -> Resu
     Ok(metrics)
 }
 
+/// How often lines of `metrics.csv` are handed to the system, for those who watch.
+const FLUSH_EVERY: Duration = Duration::from_secs(1);
+
+/// A checkpoint that is due by time waits until so many times what the last one cost has passed: a
+/// long run, whose checkpoints are large, spends at most two percent of its time on them.
+const MOST_SHARE: u32 = 50;
+
 /// Where a run is written.
 struct Files {
     folder: RunFolder,
@@ -250,7 +257,12 @@ impl<'a> Run<'a> {
         observer.note(&format!("{verb} {out}; images from {dataset}: {}", self.training.listed()));
         observer.generation(&self.progress());
         let every = Duration::try_from_secs_f64(config.checkpoint.seconds).unwrap_or(Duration::MAX);
-        let mut saved = Instant::now();
+        if let Some(files) = files.as_mut().filter(|_| self.generation == 0) {
+            // Whoever watches the folder sees at once what has begun.
+            files.save(self)?;
+        }
+        let [mut saved, mut flushed] = [Instant::now(); 2];
+        let mut cost = Duration::ZERO;
         while self.generation < config.generations {
             match self.next_generation(mutations, stop) {
                 Err(error) if error.kind == ErrorKind::Stopped => break,
@@ -261,9 +273,15 @@ impl<'a> Run<'a> {
             }
             observer.generation(&self.progress());
             let Some(files) = files else { continue };
-            if self.generation.is_multiple_of(config.checkpoint.generations) || saved.elapsed() >= every {
+            let is_due = saved.elapsed() >= every.max(cost * MOST_SHARE);
+            if is_due || self.generation.is_multiple_of(config.checkpoint.generations) {
+                let began = Instant::now();
                 files.save(self)?;
-                saved = Instant::now();
+                cost = began.elapsed();
+                [saved, flushed] = [Instant::now(); 2];
+            } else if flushed.elapsed() >= FLUSH_EVERY {
+                files.metrics.flush()?;
+                flushed = Instant::now();
             }
         }
         Ok(())

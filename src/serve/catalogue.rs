@@ -3,16 +3,20 @@
 use crate::analysis::gallery;
 use crate::base::error::Error;
 use crate::body::{Body, VoxelCounts};
+use crate::commands::plot::{Moment, moments_of};
 use crate::config::Config;
 use crate::serve::judge::Judge;
 use crate::serve::refusal::Refusal;
 use crate::store::audit::AuditFile;
+use crate::store::folder;
 use crate::store::images::DatasetRef;
-use crate::store::names::AUDIT_JSON;
+use crate::store::names::{AUDIT_JSON, RUN_JSON};
 use crate::store::run::{Robot, RunFile};
 use crate::task::direction::Assignment;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant, SystemTime};
 
 /// Robots from one source, all with the same config.
 pub struct Collection {
@@ -24,7 +28,7 @@ pub struct Collection {
     pub config: Config,
     /// On which data; none: published ones.
     pub dataset: Option<DatasetRef>,
-    /// Generations of the run.
+    /// Generations of the run that are done.
     pub generations: Option<u64>,
     /// Bins of the archive's dimensions muscle, sensor and total.
     pub bins: Vec<usize>,
@@ -81,60 +85,227 @@ pub struct Summary {
     pub tasks: Vec<String>,
     /// The dataset its robots were evolved on.
     pub dataset: String,
-    /// Generations of the run.
+    /// Generations of the run that are done.
     pub generations: Option<u64>,
+    /// Generations that it was asked for.
+    pub asked: Option<u64>,
+    /// How often it has changed since it was read first.
+    pub changes: u64,
     /// Largest fitness.
     pub best: Option<f64>,
 }
 
-/// All that can be watched; the gallery comes first.
+/// How a run went so far: `metrics.csv`, thinned.
+#[derive(Clone, Debug, Serialize)]
+pub struct Course {
+    /// Generations done.
+    pub done: usize,
+    /// Generations that it was asked for.
+    pub asked: u64,
+    /// Whether a process is at work on it.
+    pub under_way: bool,
+    /// Seconds that the rest will take, if it goes on as in its last fifth.
+    pub seconds_left: Option<f64>,
+    /// Generations of which the curves tell.
+    pub generation: Vec<usize>,
+    /// QD score.
+    pub qd_score: Vec<f64>,
+    /// Share of cells that are filled.
+    pub coverage: Vec<f64>,
+    /// Largest fitness; none before the first elite.
+    pub obj_max: Vec<Option<f64>>,
+}
+
+/// Most points of a curve: more than the page has pixels for.
+const POINTS: usize = 240;
+
+/// An archive whose file is looked at again and again.
+struct Watched {
+    path: PathBuf,
+    stamp: Option<Stamp>,
+    changes: u64,
+    collection: Arc<Collection>,
+}
+
+/// By what a file that was written anew is known: when, and how long it is.
+type Stamp = (SystemTime, u64);
+
+fn stamp(path: &Path) -> Option<Stamp> {
+    let about = path.metadata().ok()?;
+    Some((about.modified().ok()?, about.len()))
+}
+
+/// How often files are looked at, however often the page asks.
+const LOOK_EVERY: Duration = Duration::from_millis(500);
+
+/// All that can be watched; what is built in comes first, and of that the trained robots. Archives
+/// are read anew when they have changed, and runs that begin or go on meanwhile are added.
 pub struct Catalogue {
-    collections: Vec<Collection>,
+    built_in: Vec<Arc<Collection>>,
+    archives: Mutex<Archives>,
+    /// Where new runs appear.
+    runs: PathBuf,
+    opened: SystemTime,
+}
+
+struct Archives {
+    watched: Vec<Watched>,
+    looked: Option<Instant>,
 }
 
 impl Catalogue {
     /// Reads the archives, and the audits beside them; an audit that cannot be used is told in a
-    /// note.
+    /// note. `runs` is the folder whose runs are added when they change.
     ///
     /// # Errors
     /// What is wrong with an archive.
-    pub fn open(archives: &[PathBuf]) -> Result<(Self, Vec<String>), Error> {
+    pub fn open(archives: &[PathBuf], runs: &Path) -> Result<(Self, Vec<String>), Error> {
         let mut notes = Vec::new();
-        let mut collections = vec![published()?];
+        let built_in = vec![Arc::new(trained()?), Arc::new(published()?)];
+        let opened = SystemTime::now();
+        let mut watched = Vec::new();
         for path in archives {
-            collections.push(archive(path, &mut notes)?);
+            watched.push(Watched::read(path, &mut notes)?);
         }
-        Ok((Catalogue { collections }, notes))
+        let archives = Mutex::new(Archives { watched, looked: None });
+        Ok((Catalogue { built_in, archives, runs: runs.to_path_buf(), opened }, notes))
+    }
+
+    /// The archives as they are now.
+    fn archives(&self) -> MutexGuard<'_, Archives> {
+        let mut archives = self.archives.lock().unwrap_or_else(PoisonError::into_inner);
+        if archives.looked.is_none_or(|looked| looked.elapsed() >= LOOK_EVERY) {
+            archives.watched.iter_mut().for_each(Watched::look);
+            for path in self.begun() {
+                if archives.watched.iter().all(|watched| !is_same(&watched.path, &path)) {
+                    // One that cannot be read, perhaps not yet, is no reason to stop.
+                    archives.watched.extend(Watched::read(&path, &mut Vec::new()));
+                }
+            }
+            archives.looked = Some(Instant::now());
+        }
+        archives
+    }
+
+    /// Runs that were written since the page was opened, by name.
+    fn begun(&self) -> Vec<PathBuf> {
+        let folders = std::fs::read_dir(&self.runs).into_iter().flatten().flatten();
+        let files = folders.map(|folder| folder.path().join(RUN_JSON));
+        let is_new = |path: &PathBuf| stamp(path).is_some_and(|(modified, _)| modified >= self.opened);
+        let mut begun: Vec<PathBuf> = files.filter(is_new).collect();
+        begun.sort();
+        begun
     }
 
     /// All collections in short.
     pub fn list(&self) -> Vec<Summary> {
-        let short = |(index, from): (usize, &Collection)| Summary {
-            index,
+        let short = |(from, asked, changes): (&Collection, Option<u64>, u64)| Summary {
+            index: 0,
             name: from.name.clone(),
             path: from.path.as_ref().map(|path| path.display().to_string()),
             robots: from.robots.len(),
             tasks: from.tasks.clone(),
             dataset: from.config.data.dataset.clone(),
             generations: from.generations,
+            asked,
+            changes,
             best: from.robots.first().map(|robot| robot.fitness),
         };
-        self.collections.iter().enumerate().map(short).collect()
+        let archives = self.archives();
+        let built_in = self.built_in.iter().map(|from| (&**from, None, 0));
+        let read = archives.watched.iter().map(|Watched { collection, changes, .. }| {
+            (&**collection, Some(collection.config.generations), *changes)
+        });
+        let list = built_in.chain(read).map(short).enumerate();
+        list.map(|(index, summary)| Summary { index, ..summary }).collect()
     }
 
     /// The collections.
-    pub fn collections(&self) -> &[Collection] {
-        &self.collections
+    pub fn collections(&self) -> Vec<Arc<Collection>> {
+        let archives = self.archives();
+        self.built_in
+            .iter()
+            .chain(archives.watched.iter().map(|watched| &watched.collection))
+            .cloned()
+            .collect()
     }
 
     /// A collection by its number.
     ///
     /// # Errors
     /// If there is none.
-    pub fn collection(&self, index: usize) -> Result<&Collection, Refusal> {
+    pub fn collection(&self, index: usize) -> Result<Arc<Collection>, Refusal> {
+        let collections = self.collections();
         let unknown =
-            || Refusal::Unknown(format!("there is no archive {index}: there are {}", self.collections.len()));
-        self.collections.get(index).ok_or_else(unknown)
+            || Refusal::Unknown(format!("there is no archive {index}: there are {}", collections.len()));
+        collections.get(index).cloned().ok_or_else(unknown)
+    }
+
+    /// How the run of a collection went so far.
+    ///
+    /// # Errors
+    /// If there is no such run, or its `metrics.csv` cannot be read.
+    pub fn course(&self, index: usize) -> Result<Course, Refusal> {
+        let collection = self.collection(index)?;
+        let Some(path) = &collection.path else {
+            return Err(Refusal::Unknown(format!("{}: it is no run", collection.name)));
+        };
+        let moments = moments_of(path).map_err(|error| Refusal::Unknown(error.message))?;
+        let asked = collection.config.generations;
+        let done = moments.len();
+        let left = asked.saturating_sub(done as u64);
+        let (last, before) = (moments.last(), moments.len().checked_sub(1 + (moments.len() / 5).max(1)));
+        let pace = last
+            .zip(before.and_then(|before| moments.get(before)))
+            .map(|(last, before)| (last.seconds - before.seconds) / (moments.len() / 5).max(1) as f64);
+        let chosen: Vec<usize> = thinned(done);
+        let of = |value: fn(&Moment) -> f64| chosen.iter().map(|k| value(&moments[*k])).collect();
+        let folder = path.parent().unwrap_or(Path::new(""));
+        Ok(Course {
+            done,
+            asked,
+            under_way: folder::is_in_use(folder),
+            seconds_left: pace.filter(|_| left > 0).map(|pace| pace * left as f64),
+            qd_score: of(|moment| moment.qd_score),
+            coverage: of(|moment| moment.coverage),
+            obj_max: chosen.iter().map(|k| moments[*k].obj_max).collect(),
+            generation: chosen,
+        })
+    }
+}
+
+/// So many of the generations, evenly, the last always.
+fn thinned(done: usize) -> Vec<usize> {
+    match done {
+        0 => Vec::new(),
+        done if done <= POINTS => (0..done).collect(),
+        done => (0..POINTS).map(|k| k * (done - 1) / (POINTS - 1)).collect(),
+    }
+}
+
+/// Whether two paths name one file.
+fn is_same(a: &Path, b: &Path) -> bool {
+    let real = |path: &Path| path.canonicalize().unwrap_or_else(|_| path.to_path_buf());
+    a == b || real(a) == real(b)
+}
+
+impl Watched {
+    fn read(path: &Path, notes: &mut Vec<String>) -> Result<Self, Error> {
+        let stamp = stamp(path);
+        let collection = Arc::new(archive(path, notes)?);
+        Ok(Watched { path: path.to_path_buf(), stamp, changes: 0, collection })
+    }
+
+    /// Reads it anew if it has changed; one that cannot be read, perhaps for the moment, stays as it
+    /// was.
+    fn look(&mut self) {
+        let now = stamp(&self.path);
+        if now != self.stamp
+            && let Ok(collection) = archive(&self.path, &mut Vec::new())
+        {
+            (self.stamp, self.collection) = (now, Arc::new(collection));
+            self.changes += 1;
+        }
     }
 }
 
@@ -182,6 +353,18 @@ fn published() -> Result<Collection, Error> {
     })
 }
 
+fn trained() -> Result<Collection, Error> {
+    let mut all = Vec::new();
+    for (run, audit) in gallery::trained()? {
+        all.push(of_run(run, Some(&audit))?);
+    }
+    let robots = all.iter_mut().flat_map(|one| std::mem::take(&mut one.robots)).collect();
+    let first = all.swap_remove(0);
+    let name = "Trained on thousands of images".to_string();
+    // Cells are of one run.
+    Ok(Collection { name, generations: None, dataset: None, bins: Vec::new(), robots, ..first })
+}
+
 fn archive(path: &Path, notes: &mut Vec<String>) -> Result<Collection, Error> {
     let run = RunFile::read(path)?;
     let beside = path.with_file_name(AUDIT_JSON);
@@ -189,13 +372,17 @@ fn archive(path: &Path, notes: &mut Vec<String>) -> Result<Collection, Error> {
         true => AuditFile::of_run(&run, &beside).map_err(|error| notes.push(error.message)).ok(),
         false => None,
     };
+    Ok(Collection { path: Some(path.to_path_buf()), ..of_run(run, audit.as_ref())? })
+}
+
+fn of_run(run: RunFile, audit: Option<&AuditFile>) -> Result<Collection, Error> {
     let grouping = run.config.grouping()?;
     let judge = |robot: &Robot| {
         let split = grouping.tasks().iter().find(|split| split.name() == robot.task)?;
         Judge::of(split, Assignment::from_training(split, run.fitness(), &run.answers(robot)))
     };
     let audited = |robot: &Robot| {
-        let found = audit.as_ref()?.robot(&robot.id)?;
+        let found = audit?.robot(&robot.id)?;
         Some(Audited { verdict: found.verdict.name(), conclusion: found.conclusion() })
     };
     let entry = |robot: &Robot| Entry {
@@ -213,7 +400,7 @@ fn archive(path: &Path, notes: &mut Vec<String>) -> Result<Collection, Error> {
     robots.sort_by(|a, b| b.fitness.total_cmp(&a.fitness));
     Ok(Collection {
         name: format!("{}, seed {}", run.name, run.config.seed),
-        path: Some(path.to_path_buf()),
+        path: None,
         generations: Some(run.generations),
         bins: run.dimensions.bins.iter().take(3).copied().collect(),
         tasks: run.dimensions.tasks.clone(),

@@ -33,6 +33,8 @@ pub struct Options {
     pub archives: Vec<PathBuf>,
     /// Where the data are, if the command line says.
     pub data: Option<PathBuf>,
+    /// The folder whose runs appear on the page when they change.
+    pub runs: PathBuf,
 }
 
 /// Everything a page can ask for.
@@ -95,7 +97,7 @@ impl Service {
     /// # Errors
     /// What is wrong with an archive.
     pub fn open(options: &Options) -> Result<(Self, Vec<String>), Error> {
-        let (catalogue, mut notes) = Catalogue::open(&options.archives)?;
+        let (catalogue, mut notes) = Catalogue::open(&options.archives, &options.runs)?;
         let (images, missing) = ImageSets::open(&catalogue, options.data.as_deref())?;
         notes.extend(missing);
         Ok((Service { catalogue, images, simulations: Simulations::default() }, notes))

@@ -38,6 +38,9 @@ pub fn reply(service: &Service, port: u16, request: &Request) -> Reply {
         ["api", "materials"] => reading(&|| Ok(Response::json(&stream::materials()))),
         ["api", "archives"] => reading(&|| Ok(Response::json(&service.catalogue.list()))),
         ["api", "archives", index] => reading(&|| archive(service, index)),
+        ["api", "archives", index, "progress"] => {
+            reading(&|| Ok(Response::json(&service.catalogue.course(number(index, "archive")?)?)))
+        }
         ["api", "images"] => reading(&|| images(service, request)),
         ["api", "body"] => posting(&|| {
             #[derive(Deserialize)]

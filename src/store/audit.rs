@@ -103,7 +103,15 @@ impl AuditFile {
     /// What is wrong with the file, with its line and key.
     pub fn read(path: &Path) -> Result<Self, Error> {
         let text = read_text(path).map_err(|error| Error::reading(path, &error))?;
-        reading::read_versioned(&text, &path.display().to_string(), FORMAT, FORMAT_VERSION)
+        AuditFile::parse(&text, &path.display().to_string())
+    }
+
+    /// Reads its text; `name` stands in messages.
+    ///
+    /// # Errors
+    /// If it is no verdicts.
+    pub fn parse(text: &str, name: &str) -> Result<Self, Error> {
+        reading::read_versioned(text, name, FORMAT, FORMAT_VERSION)
     }
 
     /// The verdicts on a run, from its file.

@@ -2,6 +2,7 @@
 
 use crate::base::error::Error;
 use crate::base::files::{check_writable, remove_half_written};
+use crate::store::lock;
 use crate::store::lock::{Lock, Refusal};
 use crate::store::names::{
     AUDIT_JSON, CAPACITY_JSON, CHECKPOINTS, CONFIG, DATA_FOLDER, ELITES, EVAL_JSON, EVAL_VALIDATION_JSON,
@@ -12,6 +13,9 @@ use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
 const LOCK: &str = ".lock";
+
+/// The folder in the present one that runs go to if nothing else is said.
+pub const RUNS: &str = "runs";
 
 const OF_RUN: &str = "expected another name: this would overwrite a file of a run";
 
@@ -35,6 +39,11 @@ pub enum IfExists {
 pub struct RunFolder {
     path: PathBuf,
     _lock: Lock,
+}
+
+/// Whether a process is at work on the run in a folder.
+pub fn is_in_use(folder: &Path) -> bool {
+    matches!(lock::state(&folder.join(LOCK)), Ok(lock::State::Held(_)))
 }
 
 impl RunFolder {
@@ -202,7 +211,7 @@ pub fn above(archives: &[PathBuf]) -> PathBuf {
 /// # Errors
 /// If there is none.
 pub fn newest_run() -> Result<PathBuf, Error> {
-    let runs = std::fs::read_dir("runs").into_iter().flatten().flatten();
+    let runs = std::fs::read_dir(RUNS).into_iter().flatten().flatten();
     let files = runs.map(|entry| entry.path().join(RUN_JSON));
     let dated = files.filter_map(|file| Some((file.metadata().ok()?.modified().ok()?, file)));
     dated.max().map(|(_, file)| file).ok_or_else(|| {

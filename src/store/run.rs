@@ -141,6 +141,21 @@ impl RunFile {
         RunFile::parse(&text, &path.display().to_string())
     }
 
+    /// Generations done and asked for, if the file says them; nothing else of it is read.
+    pub fn progress(path: &Path) -> Option<(u64, u64)> {
+        #[derive(Deserialize)]
+        struct Whole {
+            generations: u64,
+            config: Asked,
+        }
+        #[derive(Deserialize)]
+        struct Asked {
+            generations: u64,
+        }
+        let run: Whole = serde_json::from_str(&read_text(path).ok()?).ok()?;
+        Some((run.generations, run.config.generations))
+    }
+
     /// Reads its text; `name` stands in messages.
     ///
     /// # Errors

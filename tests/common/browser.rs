@@ -112,7 +112,7 @@ impl Browser {
         let id = target["targetId"].clone();
         let attached = self.call(None, "Target.attachToTarget", json!({ "targetId": id, "flatten": true }));
         let session = attached["sessionId"].as_str().unwrap().to_string();
-        let mut tab = Tab { browser: self, session, id };
+        let mut tab = Tab { browser: self, session, id, pointer: "mouse" };
         for domain in ["Page.enable", "Runtime.enable", "Log.enable"] {
             tab.call(domain, json!({}));
         }
@@ -143,6 +143,8 @@ pub struct Tab<'a> {
     browser: &'a mut Browser,
     session: String,
     id: Value,
+    /// What points: "mouse" or "pen".
+    pub pointer: &'static str,
 }
 
 impl Tab<'_> {
@@ -184,8 +186,9 @@ impl Tab<'_> {
 
     fn mouse(&mut self, kind: &str, [x, y]: [f64; 2], buttons: u32) {
         let button = if kind == "mouseMoved" { "none" } else { "left" };
-        let params =
+        let mut params =
             json!({ "type": kind, "x": x, "y": y, "button": button, "buttons": buttons, "clickCount": 1 });
+        params["pointerType"] = self.pointer.into();
         self.call("Input.dispatchMouseEvent", params);
     }
 

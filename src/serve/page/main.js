@@ -9,7 +9,7 @@ import { Robots, rows, signed } from "./robots.js";
 import { Stage, drawStimulus } from "./stage.js";
 
 // Strokes may follow each other that fast without a simulation for each.
-const AFTER_STROKE = 450, WHILE_DRAWING = 60;
+const AFTER_STROKE = 300, WHILE_DRAWING = 60;
 
 const materials = await get("/api/materials");
 let simulation = null, timer = 0, seen = null, previous = 0, drawn = null, looked = 0;
@@ -191,10 +191,17 @@ const status = async () => {
     $("status").textContent = "morphcog has ended";
   }
 };
-setInterval(() => { if (!document.hidden) status(); }, 2000);
+setInterval(() => {
+  if (document.hidden) return;
+  status();
+  if (robots.from) robots.refresh().catch(() => { /* status says that the program has ended */ });
+}, 2000);
 
 tabs(["draw", "test"], (id) => { if (id === "draw") pad.draw(); else images.draw(); });
-tabs(["robots", "editor"], (id) => { if (id === "editor") editor.draw(); });
+tabs(["robots", "editor"], (id) => {
+  document.querySelector("main").dataset.tab = id;
+  if (id === "editor") editor.draw();
+});
 for (const material of materials.list.slice(1)) {
   const swatch = element("div");
   for (const tone of material.tones) { const i = element("i"); i.style.background = `rgb(${tone.join(",")})`; swatch.append(i); }

@@ -4,12 +4,45 @@ import { $ } from "./api.js";
 
 const { css } = Drawing;
 const SIDE = 28, RADIUS = 1.15;
+// MNIST's digits fill a box of 20 × 20 pixels. A dot is not blown up to that size.
+const BOX = 20, MOST = 6;
+
+// Ink where a line is nearer than the pen's radius, fading over a pixel.
+const mark = (ink, [ax, ay], [bx, by], erasing) => {
+  const dx = bx - ax, dy = by - ay, long = dx * dx + dy * dy, wide = erasing ? 2 * RADIUS : RADIUS;
+  for (let r = 0; r < SIDE; r++) for (let c = 0; c < SIDE; c++) {
+    const x = c + 0.5 - ax, y = r + 0.5 - ay;
+    const t = long > 0 ? Math.min(1, Math.max(0, (x * dx + y * dy) / long)) : 0;
+    const value = Math.min(1, Math.max(0, wide + 0.5 - Math.hypot(x - t * dx, y - t * dy)));
+    const at = r * SIDE + c;
+    ink[at] = erasing ? Math.min(ink[at], 1 - value) : Math.max(ink[at], value);
+  }
+};
+
+// Strokes, moved and scaled about a point; the pen stays as wide as it is.
+const render = (strokes, [cx, cy], scale) => {
+  const ink = new Float64Array(SIDE * SIDE), to = ([x, y]) => [(x - cx) * scale + SIDE / 2, (y - cy) * scale + SIDE / 2];
+  for (const { erasing, points } of strokes) points.forEach((point, k) => mark(ink, to(points[Math.max(0, k - 1)]), to(point), erasing));
+  return ink;
+};
+
+// As MNIST's digits were made: the longer side 20 pixels, the centre of mass in the middle of 28 × 28.
+const fitted = (strokes, ink) => {
+  const all = [...ink.keys()].filter((k) => ink[k] > 0.5);
+  if (!all.length) return ink;
+  const xs = all.map((k) => k % SIDE), ys = all.map((k) => Math.floor(k / SIDE)), pen = 2 * RADIUS;
+  const [left, right, top, bottom] = [Math.min(...xs), Math.max(...xs) + 1, Math.min(...ys), Math.max(...ys) + 1];
+  const scale = Math.min(MOST, (BOX - pen) / Math.max(right - left - pen, bottom - top - pen, 1)), middle = [(left + right) / 2, (top + bottom) / 2];
+  const once = render(strokes, middle, scale), mass = once.reduce((sum, v) => sum + v, 0);
+  const off = (of) => once.reduce((sum, v, k) => sum + v * (of(k) + 0.5 - SIDE / 2), 0) / mass / scale;
+  return render(strokes, [middle[0] + off((k) => k % SIDE), middle[1] + off((k) => Math.floor(k / SIDE))], scale);
+};
 
 export class Pad {
   // `changed(done)` is called with every change; `done` at the end of a stroke.
   constructor(canvas, changed) {
     this.canvas = canvas; this.changed = changed;
-    this.ink = new Float64Array(SIDE * SIDE); this.before = []; this.erasing = false;
+    this.strokes = []; this.ink = new Float64Array(SIDE * SIDE); this.before = []; this.erasing = false;
     this.cursor = null; this.down = false; this.drawing = null;
     canvas.addEventListener("pointerdown", (e) => this.begin(e));
     canvas.addEventListener("pointermove", (e) => this.move(e));
@@ -19,15 +52,16 @@ export class Pad {
     canvas.addEventListener("blur", () => { this.cursor = null; this.lift(); this.draw(); });
     $("pen").onclick = () => this.erase(false);
     $("rubber").onclick = () => this.erase(true);
-    $("undo").onclick = () => { if (this.before.length) { this.ink = this.before.pop(); this.changed(true); this.draw(); } };
-    $("clear").onclick = () => { this.remember(); this.ink.fill(0); this.changed(true); this.draw(); };
-    $("fit").onclick = () => { if (!this.empty) { this.remember(); this.fit(); this.changed(true); this.draw(); } };
+    $("undo").onclick = () => { if (this.before.length) this.set(this.before.pop()); };
+    $("clear").onclick = () => { this.remember(); this.set([]); };
+    $("fit").onchange = () => { if (!this.empty) this.changed(true); };
     new ResizeObserver(() => this.draw()).observe(canvas);
   }
 
-  // Rows of 0 (paper) … 255 (ink).
+  // The drawing as it is shown to robots: rows of 0 (paper) … 255 (ink).
   get rows() {
-    return Array.from({ length: SIDE }, (_, r) => Array.from(this.ink.slice(r * SIDE, (r + 1) * SIDE), (v) => Math.round(255 * v)));
+    const ink = $("fit").checked ? fitted(this.strokes, this.ink) : this.ink;
+    return Array.from({ length: SIDE }, (_, r) => Array.from(ink.slice(r * SIDE, (r + 1) * SIDE), (v) => Math.round(255 * v)));
   }
   get empty() { return this.ink.every((v) => v === 0); }
 
@@ -37,7 +71,16 @@ export class Pad {
     $("rubber").setAttribute("aria-pressed", String(on));
   }
 
-  remember() { this.before.push(this.ink.slice()); if (this.before.length > 50) this.before.shift(); }
+  remember() {
+    this.before.push(this.strokes.map(({ erasing, points }) => ({ erasing, points: [...points] })));
+    if (this.before.length > 50) this.before.shift();
+  }
+
+  set(strokes) {
+    this.strokes = strokes;
+    this.ink = render(strokes, [SIDE / 2, SIDE / 2], 1);
+    this.changed(true); this.draw();
+  }
 
   place(e) {
     const box = this.canvas.getBoundingClientRect();
@@ -65,35 +108,14 @@ export class Pad {
 
   finish() { if (this.drawing) { this.drawing = null; this.changed(true); } }
 
-  // Ink where the line is nearer than the pen's radius, fading over a pixel.
-  stroke([ax, ay], [bx, by]) {
-    const dx = bx - ax, dy = by - ay, long = dx * dx + dy * dy, wide = this.erasing ? 2 * RADIUS : RADIUS;
-    for (let r = 0; r < SIDE; r++) for (let c = 0; c < SIDE; c++) {
-      const x = c + 0.5 - ax, y = r + 0.5 - ay;
-      const t = long > 0 ? Math.min(1, Math.max(0, (x * dx + y * dy) / long)) : 0;
-      const value = Math.min(1, Math.max(0, wide + 0.5 - Math.hypot(x - t * dx, y - t * dy)));
-      const at = r * SIDE + c;
-      this.ink[at] = this.erasing ? Math.min(this.ink[at], 1 - value) : Math.max(this.ink[at], value);
-    }
+  // A line; one that begins where none has ended begins a stroke.
+  stroke(from, to) {
+    const last = this.strokes.at(-1), end = last?.points.at(-1);
+    if (last && last.erasing === this.erasing && from !== to && end[0] === from[0] && end[1] === from[1]) last.points.push(to);
+    else this.strokes.push({ erasing: this.erasing, points: from === to ? [to] : [from, to] });
+    mark(this.ink, from, to, this.erasing);
     this.changed(false);
     this.draw();
-  }
-
-  // As MNIST's digits were made: the longer side of the ink scaled to 20 pixels, its centre of mass put in the middle.
-  fit() {
-    const old = this.ink, all = [...old.keys()].filter((k) => old[k] > 0);
-    const xs = all.map((k) => k % SIDE), ys = all.map((k) => Math.floor(k / SIDE));
-    const long = Math.max(Math.max(...xs) - Math.min(...xs), Math.max(...ys) - Math.min(...ys)) + 1;
-    const mass = all.reduce((sum, k) => sum + old[k], 0), mean = (of) => all.reduce((sum, k, i) => sum + old[k] * of[i], 0) / mass;
-    const [cx, cy, scale] = [mean(xs), mean(ys), 20 / long];
-    const at = (r, c) => (r < 0 || c < 0 || r >= SIDE || c >= SIDE ? 0 : old[r * SIDE + c]);
-    this.ink = old.map((_, k) => {
-      const x = (k % SIDE + 0.5 - SIDE / 2) / scale + cx, y = (Math.floor(k / SIDE) + 0.5 - SIDE / 2) / scale + cy;
-      const [c, r] = [Math.floor(x), Math.floor(y)], [u, v] = [x - c, y - r];
-      const value = (1 - v) * ((1 - u) * at(r, c) + u * at(r, c + 1)) + v * ((1 - u) * at(r + 1, c) + u * at(r + 1, c + 1));
-      // Enlarged, edges would be wide; they stay a pixel's.
-      return Math.min(1, Math.max(0, 0.5 + (value - 0.5) * Math.max(1, scale)));
-    });
   }
 
   lift() { if (this.down) { this.down = false; this.changed(true); } }

@@ -16,8 +16,48 @@ export class Robots {
 
   async load() {
     this.list = await get("/api/archives");
-    for (const { index, name, robots } of this.list) $("archive").add(new Option(`${name} (${robots} robots)`, index));
+    this.names();
     await this.open(0);
+  }
+
+  names() {
+    const wanted = this.list.map(({ name, robots, generations, asked }) =>
+      `${name} (${robots} robots${asked && generations < asked ? `, generation ${generations} of ${asked}` : ""})`);
+    const select = $("archive");
+    wanted.forEach((text, k) => { if (k < select.length) select.options[k].textContent = text; else select.add(new Option(text, k)); });
+  }
+
+  // What has changed meanwhile: runs that began, elites of a run that goes on. The chosen robot stays.
+  async refresh() {
+    const before = this.list?.[this.index]?.changes;
+    this.list = await get("/api/archives");
+    this.names();
+    const now = this.list[this.index];
+    if (!now || !this.from) return;
+    if (now.changes !== before) {
+      const index = this.index, from = { index, ...await get("/api/archives/" + index) };
+      if (this.index !== index) return;
+      this.from = from;
+      this.show();
+      if (!this.robot && from.robots[0]) this.choose(from.robots[0]);
+    }
+    await this.progress();
+  }
+
+  // The curves of a run, and how long it will go on.
+  async progress() {
+    const { index } = this, now = this.list[index];
+    if (!now?.asked) { $("progress").hidden = true; return; }
+    const course = await get(`/api/archives/${index}/progress`).catch(() => null);
+    if (this.index !== index) return;
+    $("progress").hidden = !course || course.done < 2;
+    if ($("progress").hidden) return;
+    const left = course.seconds_left, at = `Generation ${course.done} of ${course.asked}`;
+    const rest = !course.under_way ? (course.done < course.asked ? ", not running now" : "") : left === null ? "" : `, about ${duration(left)} left`;
+    $("course").textContent = at + rest;
+    $("curves").replaceChildren(...[
+      ["best fitness", course.obj_max, "obj_max"], ["QD score", course.qd_score, "qd_score"], ["coverage [%]", course.coverage.map((v) => 100 * v), "coverage"],
+    ].map(([name, values, key]) => curve(name, course.generation, values, key)));
   }
 
   async open(index) {
@@ -34,8 +74,10 @@ export class Robots {
     const verdicts = [...new Set(this.from.robots.map((robot) => robot.audit?.verdict).filter(Boolean))].sort();
     choices("audit", "all verdicts", verdicts);
     this.show();
+    $("progress").hidden = true;
     const first = this.from.robots[0];
     if (first) this.choose(first);
+    await this.progress();
   }
 
   show() {
@@ -87,7 +129,9 @@ export class Robots {
         const text = `${robot.id}: fitness ${signed(robot.fitness, 2)}; ${robot.voxels.muscle} muscle, ${robot.voxels.sensor} sensor of ${robot.voxels.total} voxels`;
         const button = element("button", { type: "button", title: text });
         button.setAttribute("aria-label", text);
-        button.style.background = `color-mix(in oklab, var(--map-low), var(--map-high) ${share.toFixed(0)}%)`;
+        // One that fails differs from a cell that is empty.
+        if (robot.fitness <= 0) button.className = "fails";
+        else button.style.background = `color-mix(in oklab, var(--map-low), var(--map-high) ${share.toFixed(0)}%)`;
         button.dataset.robot = robot.id;
         button.onclick = () => this.choose(robot);
         cells.append(button);
@@ -95,7 +139,7 @@ export class Robots {
       return element("figure", {}, cells, element("figcaption", { textContent: `size ${t + 1}` }));
     });
     const ends = element("span", { className: "ends" }, element("span", { textContent: (least < low ? "≤ " : "") + signed(low, 1) }), element("span", { textContent: signed(high, 1) }));
-    const key = element("p", { className: "key" }, "Cells of the archive: muscle voxels upwards, sensors to the right, a panel per size of the body. Fitness:", element("span", { className: "scale" }), ends);
+    const key = element("p", { className: "key" }, "Cells of the archive: muscle voxels upwards, sensors to the right, a panel per size of the body. Fitness:", element("span", { className: "scale" }), ends, robots.some((robot) => robot.fitness <= 0) ? element("span", { className: "failing" }, element("i"), "0 or less") : "");
     $("map").replaceChildren(...(robots.length ? panels : []), key);
   }
 
@@ -116,3 +160,20 @@ export const signed = (value, digits) => {
 
 // A body's rows as text, as the drawing functions take them.
 export const rows = (robot) => robot.body.map((row) => row.join(""));
+
+const duration = (seconds) => {
+  const minutes = Math.round(seconds / 60);
+  return seconds < 90 ? `${Math.max(1, Math.round(seconds))} s` : minutes < 90 ? `${minutes} min` : `${(minutes / 60).toFixed(1)} h`;
+};
+
+// A small curve over generations; what is not a number is left out.
+const curve = (name, at, values, key) => {
+  const known = at.map((x, k) => [x, values[k]]).filter(([, y]) => y !== null);
+  const ys = known.map(([, y]) => y), low = Math.min(0, ...ys), high = Math.max(...ys, low + 1e-9), last = ys.at(-1);
+  const X = (x) => (at.at(-1) > 0 ? 200 * x / at.at(-1) : 0), Y = (y) => 47 - 44 * (y - low) / (high - low);
+  const path = known.map(([x, y], k) => `${k ? "L" : "M"}${X(x).toFixed(1)} ${Y(y).toFixed(1)}`).join("");
+  const figure = element("figure", {}, element("figcaption", {}, name, element("b", { textContent: last === undefined ? "–" : signed(last, 2) })));
+  figure.dataset.curve = key;
+  figure.insertAdjacentHTML("beforeend", `<svg viewBox="0 0 200 50" preserveAspectRatio="none" role="img" aria-label="${name} over generations"><path d="M0 ${Y(0).toFixed(1)}H200"/><path d="${path}"/></svg>`);
+  return figure;
+};
