@@ -118,6 +118,17 @@ fn ctrl_c_ends_a_film_and_the_terminal_is_as_it_was() {
 }
 
 #[test]
+fn a_table_that_is_wider_than_the_terminal_is_one_robot_below_the_other() {
+    let sandbox = Sandbox::tiny();
+    sandbox.run("evolve -q -c tiny.toml -o run").ended(0, &[]);
+    let mut table = Session::new(&sandbox, "eval -q -a run --images 4 --cycles 1 --robots best");
+    // The table of robots has ten columns, and 130 characters of them.
+    table.shows("\r\nfitness ");
+    table.shows("\r\nbalanced %");
+    table.shows("as before, code=0");
+}
+
+#[test]
 fn ctrl_c_saves_a_run_that_shows_its_progress() {
     let sandbox = Sandbox::tiny();
     let mut run = Session::new(&sandbox, "evolve -c tiny.toml --generations 9999 -o run");

@@ -8,7 +8,7 @@ use crate::serve::judge::THRESHOLD;
 use crate::serve::request::{Plan, Seen};
 use crate::serve::simulation::{Event, STEPS_PER_SECOND};
 use crate::task::recording::{Frame, VoxelCorners};
-use crate::view::colour::{TONE_AREAS, tones};
+use crate::view::colour::{TONE_AREAS, mark, tones};
 use crate::view::html::{STEPS, quantised};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD as BASE64;
@@ -16,7 +16,7 @@ use serde_json::{Value, json};
 
 /// What a page has to know of materials to draw them.
 pub fn materials() -> Value {
-    let material = |m: Material| json!({ "name": m.name(), "tones": tones(m), "sensor": m.is_sensor(), "muscle": m.is_muscle() });
+    let material = |m: Material| json!({ "name": m.name(), "tones": tones(m), "mark": mark(m), "sensor": m.is_sensor(), "muscle": m.is_muscle() });
     json!({ "areas": TONE_AREAS, "list": Material::ALL.map(material) })
 }
 

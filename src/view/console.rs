@@ -34,6 +34,8 @@ pub struct Console {
     /// What is known of stdout and stderr: whether they are terminals that can move the cursor.
     terminals: [bool; 2],
     colour: bool,
+    /// Columns of stdout, if it is a terminal.
+    width: Option<usize>,
     streams: Mutex<Streams>,
     /// The progress line on the terminal, which must step aside for other lines.
     line: Mutex<Option<ProgressBar>>,
@@ -46,6 +48,11 @@ struct Streams {
     closed: bool,
     /// Results were lost for another reason than a closed pipe: a full disk.
     lost: bool,
+}
+
+/// Columns of the terminal, if it tells.
+fn columns() -> Option<usize> {
+    crossterm::terminal::size().ok().map(|(columns, _)| usize::from(columns)).filter(|columns| *columns > 0)
 }
 
 pub(super) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
@@ -63,6 +70,7 @@ impl Console {
         Console {
             terminals,
             colour: set("NO_COLOR").is_none(),
+            width: io::stdout().is_terminal().then(columns).flatten(),
             ..Console::with_writers(mode, Box::new(io::stdout()), Box::new(io::stderr()))
         }
     }
@@ -70,7 +78,7 @@ impl Console {
     /// A console onto any two writers, taken for files: no colours, no moving lines.
     pub fn with_writers(mode: Mode, out: Box<dyn Write + Send>, err: Box<dyn Write + Send>) -> Self {
         let streams = Mutex::new(Streams { out, err, closed: false, lost: false });
-        Console { mode, terminals: [false; 2], colour: false, streams, line: Mutex::new(None) }
+        Console { mode, terminals: [false; 2], colour: false, width: None, streams, line: Mutex::new(None) }
     }
 
     /// For whom it writes.
@@ -107,7 +115,8 @@ impl Console {
         self.out(text);
     }
 
-    /// A table of results, to stdout; columns of numbers are aligned to the right.
+    /// A table of results, to stdout; columns of numbers are aligned to the right. Where it is wider
+    /// than the terminal, its rows stand one below the other.
     pub fn table(&self, headers: &[&str], rows: &[Vec<String>]) {
         #[derive(Serialize)]
         struct Table<'a> {
@@ -121,7 +130,8 @@ impl Console {
                 let headers: Vec<&str> = headers.iter().map(String::as_str).collect();
                 let cells = |row: &Vec<String>| row.iter().map(|text| shortened(text, CELL)).collect();
                 let rows: Vec<Vec<String>> = rows.iter().map(cells).collect();
-                self.out(&(table::align(&headers, &rows).join("\n") + "\n"));
+                let width = self.width.unwrap_or(usize::MAX);
+                self.out(&(table::fitted(&headers, &rows, width).join("\n") + "\n"));
             }
         }
     }

@@ -19,7 +19,27 @@ const Drawing = (() => {
   const shade = ([a, b, c], [dark, rest, light], area) => {
     const [from, to, t] = area < b ? [dark, rest, (area - a) / (b - a)] : [rest, light, (area - b) / (c - b)];
     const u = Math.min(Math.max(t, 0), 1);
-    return "rgb(" + from.map((v, k) => Math.round(v + u * (to[k] - v))).join(",") + ")";
+    return from.map((v, k) => Math.round(v + u * (to[k] - v)));
+  };
+  const rgb = (colour) => `rgb(${colour.join(",")})`;
+
+  // A material's mark in a voxel of some colour; its corners in pixels, clockwise from the top left. Smaller, it would be a speck.
+  const MARKED = 9;
+  const onto = (tones, [r, g, b]) => (0.2126 * r + 0.7152 * g + 0.0722 * b > 105 ? tones[0].map((v) => v >> 1) : tones[2].map((v) => 128 + (v >> 1)));
+  const mark = (ctx, { tones, mark: lines }, [a, b, c, d], fill, scale) => {
+    if (!lines.length || scale < MARKED) return;
+    const place = ([x, y]) => [0, 1].map((k) => (a[k] + b[k] + c[k] + d[k]) / 4 + x * (b[k] + c[k] - a[k] - d[k]) / 2 + y * (a[k] + b[k] - c[k] - d[k]) / 2);
+    ctx.strokeStyle = rgb(onto(tones, fill));
+    ctx.lineWidth = Math.max(1, 0.09 * scale);
+    ctx.beginPath();
+    for (const line of lines) line.forEach((point, k) => ctx[k ? "lineTo" : "moveTo"](...place(point)));
+    ctx.stroke();
+  };
+  // A voxel of a body at rest.
+  const voxel = (ctx, material, [x, y], width, height) => {
+    const fill = material.tones[1];
+    ctx.fillStyle = rgb(fill); ctx.fillRect(x, y, width, height);
+    mark(ctx, material, [[x, y], [x + width, y], [x + width, y + height], [x, y + height]], fill, width);
   };
 
   // How many voxels each side belongs to; a side's key is made of its two points, of `count` in all.
@@ -54,11 +74,13 @@ const Drawing = (() => {
       const [a, b, c, d] = corners.map((i) => points[i]);
       if (!(a && b && c && d)) continue;
       const area = ((c[0] - a[0]) * (b[1] - d[1]) - (b[0] - d[0]) * (c[1] - a[1])) / 2;
-      ctx.fillStyle = ctx.strokeStyle = shade(areas, materials[material].tones, area);
+      const fill = shade(areas, materials[material].tones, area), at = [a, b, c, d].map((q) => [X(q[0]), Y(q[1])]);
+      ctx.fillStyle = ctx.strokeStyle = rgb(fill);
       ctx.lineWidth = 0.6;
       ctx.beginPath();
-      for (const q of [a, b, c, d]) ctx.lineTo(X(q[0]), Y(q[1]));
+      for (const q of at) ctx.lineTo(...q);
       ctx.closePath(); ctx.fill(); ctx.stroke();
+      mark(ctx, materials[material], at, fill, scale);
     }
     for (const outer of [false, true]) {
       if (!outer && scale < 5) continue;
@@ -111,5 +133,14 @@ const Drawing = (() => {
     }
   };
 
-  return { css, fit, sidesOf, ruler, robot, path, stimulus };
+  // A material's colours (small, at rest, large) with its mark, for a legend.
+  const swatch = ({ tones, mark: lines }, shown = [0, 1, 2]) => {
+    const made = document.createElement("span"), middle = shown.indexOf(1);
+    const boxes = shown.map((tone, k) => `<rect x="${14 * k}" width="14" height="14" fill="${rgb(tones[tone])}"/>`).join("");
+    const d = lines.map((line) => "M" + line.map(([x, y]) => `${14 * middle + 7 + 14 * x} ${7 - 14 * y}`).join("L")).join("");
+    made.innerHTML = `<svg width="${14 * shown.length}" height="14" aria-hidden="true">${boxes}<path d="${d}" fill="none" stroke="${rgb(onto(tones, tones[1]))}" stroke-width="1.6"/></svg>`;
+    return made.firstChild;
+  };
+
+  return { css, fit, sidesOf, ruler, robot, voxel, swatch, path, stimulus };
 })();

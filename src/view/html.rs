@@ -6,7 +6,7 @@
 
 use crate::body::Material;
 use crate::task::recording::Recording;
-use crate::view::colour::{TONE_AREAS, tones};
+use crate::view::colour::{TONE_AREAS, mark, tones};
 use crate::view::error::{PictureError, write_whole};
 use crate::view::gif;
 use crate::view::walk::Walk;
@@ -143,7 +143,7 @@ fn rollout(walk: &Walk, most: usize) -> serde_json::Value {
         "unit": STEPS,
         "origins": BASE64.encode(bytes(origins.iter().flatten().map(|v| v.to_le_bytes()))),
         "positions": BASE64.encode(bytes(positions.map(i16::to_le_bytes))),
-        "materials": Material::ALL.map(|m| json!({ "name": m.name(), "tones": tones(m), "sensor": m.is_sensor() })),
+        "materials": Material::ALL.map(|m| json!({ "name": m.name(), "tones": tones(m), "mark": mark(m), "sensor": m.is_sensor() })),
         "areas": TONE_AREAS,
     })
 }

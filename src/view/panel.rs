@@ -144,12 +144,24 @@ pub fn present(body: &Body) -> impl Iterator<Item = Material> {
 fn legend(walk: &Walk, [x, y]: [f64; 2], z: f64, out: &mut Vec<Primitive>) {
     for (k, material) in present(&walk.recording().body).enumerate() {
         let top = y + 14.0 * k as f64 * z;
-        // Small, at rest and large.
-        for (tone, rgb) in colour::tones(material).into_iter().enumerate() {
-            let left = x + 5.0 * tone as f64 * z;
-            let fill = Colour { rgb, opacity: 255 };
-            out.push(Primitive::rectangle([left, top], [left + 5.0 * z, top + 9.0 * z], fill));
+        // Small, at rest with its mark, and large.
+        let (low, high) = (top + 9.0 * z, [x + 4.0 * z, x + 13.0 * z]);
+        for (rgb, left, right) in [
+            (colour::tones(material)[0], x, high[0]),
+            (colour::tones(material)[1], high[0], high[1]),
+            (colour::tones(material)[2], high[1], x + 17.0 * z),
+        ] {
+            out.push(Primitive::rectangle([left, top], [right, low], Colour { rgb, opacity: 255 }));
         }
+        let [_, rgb, _] = colour::tones(material);
+        let corners = [[high[0], top], [high[1], top], [high[1], low], [high[0], low]];
+        let colour = colour::mark_colour(material, Colour { rgb, opacity: 255 });
+        out.extend(colour::mark(material).iter().map(|line| Primitive::Line {
+            points: line.iter().map(|point| colour::placed(*point, corners)).collect(),
+            width: z,
+            colour,
+            smooth: true,
+        }));
         out.extend(font::text(material.name(), [x + 20.0 * z, top + z], z, colour::INK));
     }
 }

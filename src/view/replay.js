@@ -187,9 +187,8 @@
   const used = new Set(rollout.voxels.map(([m]) => m));
   rollout.materials.forEach((m, k) => {
     if (!used.has(k)) return;
-    const item = document.createElement("li"), swatch = document.createElement("div");
-    for (const tone of m.tones) { const i = document.createElement("i"); i.style.background = `rgb(${tone.join(",")})`; swatch.append(i); }
-    item.append(swatch, m.name); $("legend").append(item);
+    const item = document.createElement("li");
+    item.append(Drawing.swatch(m), m.name); $("legend").append(item);
   });
   const drag = (e) => {
     if (e.type === "pointermove" && !e.buttons) return;

@@ -60,6 +60,9 @@ pub enum Primitive {
     },
 }
 
+/// Pixels per voxel length from which on materials are marked: smaller marks would be specks.
+const MARKED: f64 = 9.0;
+
 impl Primitive {
     /// A filled axis-parallel rectangle between two opposite corners.
     pub fn rectangle(a: [f64; 2], b: [f64; 2], fill: Colour) -> Self {
@@ -165,12 +168,26 @@ fn grid(window: &Window, out: &mut Vec<Primitive>) {
 
 fn body(walk: &Walk, frame: usize, window: &Window) -> Vec<Primitive> {
     let smooth = !window.crisp;
-    let voxels = walk.voxels(frame).filter(|(_, corners)| window.shows(corners));
+    let voxels = || walk.voxels(frame).filter(|(_, corners)| window.shows(corners));
     let quad = |(material, corners)| {
         let fill = colour::shade(material, area(&corners));
         Primitive::Quad { corners, fill, smooth }
     };
-    let mut out: Vec<Primitive> = voxels.map(quad).collect();
+    let mut out: Vec<Primitive> = voxels().map(quad).collect();
+    // The paper's pictures have none.
+    if window.scale >= MARKED && window.look == Look::Plain {
+        out.extend(voxels().flat_map(|(material, corners)| {
+            let colour = colour::mark_colour(material, colour::shade(material, area(&corners)));
+            let width = (colour::MARK_WIDTH * window.scale).max(1.0);
+            let line = move |points: &&[[f64; 2]]| Primitive::Line {
+                points: points.iter().map(|point| colour::placed(*point, corners)).collect(),
+                width,
+                colour,
+                smooth,
+            };
+            colour::mark(material).iter().map(line)
+        }));
+    }
     let seam = if window.crisp { colour::SEAM } else { colour::PAPER.with_opacity(120) };
     // At small scales the lines would hide the voxels.
     if window.scale >= 5.0 {

@@ -1,5 +1,27 @@
 //! Tables as aligned text.
 
+/// The lines of a table as [`align`] makes them, or, where they are wider than so many columns, its
+/// rows one below the other.
+pub fn fitted(headers: &[&str], rows: &[Vec<String>], width: usize) -> Vec<String> {
+    let lines = align(headers, rows);
+    let is_wide = lines.iter().any(|line| line.chars().count() > width);
+    if is_wide && !rows.is_empty() { stacked(headers, rows) } else { lines }
+}
+
+/// Rows one below the other, a cell a line behind its header; an empty line between two rows. Empty
+/// cells are left out.
+fn stacked(headers: &[&str], rows: &[Vec<String>]) -> Vec<String> {
+    let widest = headers.iter().map(|header| header.chars().count()).max().unwrap_or(0);
+    let line = |(header, text): (&&str, &String)| {
+        let gap = " ".repeat(widest - header.chars().count());
+        format!("{header}{gap}  {text}")
+    };
+    let row = |row: &Vec<String>| -> Vec<String> {
+        headers.iter().zip(row).filter(|(_, text)| !text.is_empty()).map(line).collect()
+    };
+    rows.iter().map(row).collect::<Vec<_>>().join(&String::new())
+}
+
 /// The lines of a table: headers, a rule, rows; two spaces between columns, numbers to the right.
 /// Short rows are filled up with empty cells; cells without a header are left out.
 pub fn align(headers: &[&str], rows: &[Vec<String>]) -> Vec<String> {
@@ -57,6 +79,23 @@ mod tests {
             "bb",
         ];
         assert_eq!(lines, expected);
+    }
+
+    #[test]
+    fn what_is_wider_than_the_terminal_is_one_row_below_the_other() {
+        let rows = rows(&[&["XFJPI", "76.5 %", "zeros and ones"], &["a", "", "x"]]);
+        let headers = ["robot", "accuracy", "task"];
+        assert_eq!(fitted(&headers, &rows, 31), align(&headers, &rows));
+        let expected = [
+            "robot     XFJPI",
+            "accuracy  76.5 %",
+            "task      zeros and ones",
+            "",
+            "robot     a",
+            "task      x",
+        ];
+        assert_eq!(fitted(&headers, &rows, 28), expected);
+        assert_eq!(fitted(&headers, &[], 3), align(&headers, &[]));
     }
 
     #[test]

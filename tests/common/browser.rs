@@ -195,8 +195,11 @@ impl Tab<'_> {
     /// Left, top, width, height of an element that is in sight.
     #[track_caller]
     pub fn place(&mut self, selector: &str) -> [f64; 4] {
+        // What was scrolled is where it is to the mouse only after the next picture.
         let expression = format!(
-            "(() => {{ const e = document.querySelector('{selector}'); e.scrollIntoView({{ block: 'center' }}); \
+            "(async () => {{ const e = document.querySelector('{selector}'), y = scrollY; \
+             e.scrollIntoView({{ block: 'center', behavior: 'instant' }}); \
+             if (scrollY !== y) await new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done))); \
              const b = e.getBoundingClientRect(); return [b.left, b.top, b.width, b.height]; }})()"
         );
         serde_json::from_value(self.eval(&expression)).unwrap()

@@ -39,8 +39,7 @@ export class Editor {
 
   swatches() {
     $("palette").replaceChildren(...this.materials.list.map((material, k) => {
-      const swatch = element("i"), button = element("button", { type: "button" }, swatch, `${k} ${material.name}`);
-      swatch.style.background = k === 0 ? "transparent" : `rgb(${material.tones[1].join(",")})`;
+      const swatch = k === 0 ? element("i") : Drawing.swatch(material, [1]), button = element("button", { type: "button" }, swatch, `${k} ${material.name}`);
       button.setAttribute("role", "radio");
       button.onclick = () => this.take(k);
       button.addEventListener("keydown", (e) => {
@@ -140,8 +139,7 @@ export class Editor {
     ctx.fillStyle = css("sky"); ctx.fillRect(0, 0, cell * width, cell * height);
     this.cells.forEach((row, r) => row.forEach((material, c) => {
       if (material === 0) return;
-      ctx.fillStyle = `rgb(${this.materials.list[material].tones[1].join(",")})`;
-      ctx.fillRect(c * cell, r * cell, cell, cell);
+      Drawing.voxel(ctx, this.materials.list[material], [c * cell, r * cell], cell, cell);
     }));
     ctx.strokeStyle = css("line"); ctx.lineWidth = 1;
     ctx.beginPath();

@@ -203,9 +203,7 @@ tabs(["robots", "editor"], (id) => {
   if (id === "editor") editor.draw();
 });
 for (const material of materials.list.slice(1)) {
-  const swatch = element("div");
-  for (const tone of material.tones) { const i = element("i"); i.style.background = `rgb(${tone.join(",")})`; swatch.append(i); }
-  $("legend").append(element("li", {}, swatch, material.name));
+  $("legend").append(element("li", {}, Drawing.swatch(material), material.name));
 }
 const redraw = () => { drawn = null; look(); pad.draw(); editor.draw(); };
 window.addEventListener("resize", redraw);

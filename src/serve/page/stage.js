@@ -101,7 +101,7 @@ export const drawBody = (canvas, rows, materials, size) => {
   const edge = (k) => Math.round(k * cell);
   rows.forEach((row, r) => [...row].forEach((m, c) => {
     if (Number(m) === 0) return;
-    ctx.fillStyle = `rgb(${materials.list[Number(m)].tones[1].join(",")})`;
-    ctx.fillRect(edge(c + left), edge(r + top), edge(c + left + 1) - edge(c + left), edge(r + top + 1) - edge(r + top));
+    const [x, y] = [edge(c + left), edge(r + top)];
+    Drawing.voxel(ctx, materials.list[Number(m)], [x, y], edge(c + left + 1) - x, edge(r + top + 1) - y);
   }));
 };

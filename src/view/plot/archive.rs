@@ -3,6 +3,7 @@
 //! A map has a square for every pair of muscle and sensor bins, and in it a strip for every bin of
 //! the total. A cell that could have an elite is framed; where no body can be there is nothing.
 
+use crate::body::Material;
 use crate::qd::descriptor::{COUNT_BINS, DescriptorSpace, count_bin, possible_cells};
 use crate::store::run::RunFile;
 use crate::view::colour;
@@ -201,7 +202,7 @@ fn legend(canvas: &mut Canvas, [x, y]: [f64; 2], width: f64, scale: &Scale, is_a
     if scale.is_open {
         lines.push((colour::PAPER, "no elite".to_string()));
     }
-    let lines = lines.iter().map(|(fill, text)| (*fill, text.as_str()));
+    let lines = lines.iter().map(|(fill, text)| (Material::Empty, *fill, text.as_str()));
     let below = robot::legend(canvas, [x, y + 26.0], lines, width);
     if scale.lowest.is_some() {
         canvas.path(&stroke([x, y + 26.0], [7.0, 7.0]), STROKE);

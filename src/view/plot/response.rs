@@ -32,13 +32,14 @@ pub fn response(found: &RobotResponse, task: Option<&str>, of: &str) -> Figure {
     let largest = if largest > 0.0 { largest } else { 1.0 };
     let shade = |slope: f64| scales::diverging(slope / largest);
     let is_place = |material: &Material| *material == Material::Soft || material.is_sensor();
-    let others = body.voxels().iter().filter(|(_, material)| !is_place(material));
+    let others = || body.voxels().iter().filter(|(_, material)| !is_place(material));
     let fill = |material: &Material| match material {
         Material::Empty => Colour::gray(0.985),
         material => faded(robot::plain(*material)),
     };
     let seam = (0.05 * cell).min(0.5);
-    robot::squares(&mut canvas, at, cell, seam, others.map(|(place, material)| (place, fill(material))));
+    robot::squares(&mut canvas, at, cell, seam, others().map(|(place, material)| (place, fill(material))));
+    robot::marks(&mut canvas, at, cell, others().map(|(place, material)| (place, *material)), |m| fill(&m));
     let places = found.places.iter().map(|place| ((place.row, place.column), shade(place.slope)));
     robot::squares(&mut canvas, at, cell, seam, places);
     let crosses: String = found
@@ -56,7 +57,8 @@ pub fn response(found: &RobotResponse, task: Option<&str>, of: &str) -> Figure {
     let x = at[0] + MAP + 10.0;
     let room = COLUMN - MARGIN - x;
     let materials = present(body).filter(|material| !is_place(material));
-    let lines: Vec<(Colour, &str)> = materials.map(|m| (faded(robot::plain(m)), m.name())).collect();
+    let lines: Vec<(Material, Colour, &str)> =
+        materials.map(|m| (m, faded(robot::plain(m)), m.name())).collect();
     let mut y = robot::legend(&mut canvas, [x, top], lines, room);
     canvas.frame([x, y], [7.0, 7.0], Pen::new(scales::CELL, 0.4));
     canvas.path(&cross([x, y], 7.0), uncertain);

@@ -39,6 +39,43 @@ pub fn squares(
     }
 }
 
+/// Side of a cell from which on materials are marked, points.
+const MARKED: f64 = 4.5;
+
+/// The marks of the materials of a body's cells, over squares of these colours.
+pub fn marks(
+    canvas: &mut Canvas,
+    [left, top]: [f64; 2],
+    cell: f64,
+    cells: impl Iterator<Item = ((usize, usize), Material)>,
+    fill: impl Fn(Material) -> Colour,
+) {
+    if cell < MARKED {
+        return;
+    }
+    let corners = |(row, column): (usize, usize)| {
+        let (x, y) = (left + column as f64 * cell, top + row as f64 * cell);
+        [[x, y], [x + cell, y], [x + cell, y + cell], [x, y + cell]]
+    };
+    stroked(canvas, cell, cells.map(|(place, material)| (material, corners(place), fill(material))));
+}
+
+/// The marks of voxels, `cell` points wide, as one path for each colour.
+fn stroked(canvas: &mut Canvas, cell: f64, voxels: impl Iterator<Item = (Material, [[f64; 2]; 4], Colour)>) {
+    let mut paths = BTreeMap::<([u8; 3], u8), String>::new();
+    for (material, corners, fill) in voxels {
+        let colour = Colour { opacity: fill.opacity, ..colour::mark_colour(material, fill) };
+        let data = paths.entry((colour.rgb, colour.opacity)).or_default();
+        for line in colour::mark(material) {
+            let points: Vec<[f64; 2]> = line.iter().map(|point| colour::placed(*point, corners)).collect();
+            data.push_str(&path(&points, false));
+        }
+    }
+    for ((rgb, opacity), data) in paths.iter().filter(|(_, data)| !data.is_empty()) {
+        canvas.path(data, Pen::new(Colour { rgb: *rgb, opacity: *opacity }, colour::MARK_WIDTH * cell));
+    }
+}
+
 /// The outline of the cells of a grid for which something holds.
 pub fn outline(
     canvas: &mut Canvas,
@@ -103,6 +140,14 @@ pub fn pose(canvas: &mut Canvas, walk: &Walk, frame: usize, place: impl Fn([f64;
     for (rgb, data) in paths {
         canvas.area(&data, Colour { rgb, opacity: 255 });
     }
+    let cell = place([1.0, 0.0])[0] - place([0.0, 0.0])[0];
+    if cell >= MARKED {
+        let voxels = walk.voxels(frame);
+        let on_page = voxels.map(|(material, corners)| {
+            (material, corners.map(&place), colour::shade(material, area(&corners)))
+        });
+        stroked(canvas, cell, on_page);
+    }
     let rim: String = walk.outline(frame).map(|side| path(&side.map(&place), false)).collect();
     if !rim.is_empty() {
         canvas.path(&rim, Pen::new(colour::INK, 0.5));
@@ -117,13 +162,14 @@ fn quad(corners: [[f64; 2]; 4]) -> String {
 pub fn legend<'a>(
     canvas: &mut Canvas,
     [x, y]: [f64; 2],
-    lines: impl IntoIterator<Item = (Colour, &'a str)>,
+    lines: impl IntoIterator<Item = (Material, Colour, &'a str)>,
     most: f64,
 ) -> f64 {
     const LINE: f64 = 11.0;
     let mut top = y;
-    for (fill, text) in lines {
+    for (material, fill, text) in lines {
         canvas.rectangle([x, top], [7.0, 7.0], fill);
+        marks(canvas, [x, top], 7.0, std::iter::once(((0, 0), material)), |_| fill);
         canvas.frame([x, top], [7.0, 7.0], Pen::new(scales::CELL, 0.4));
         canvas.fitted([x + 10.5, top + 6.2], text, most - 10.5, Words::default());
         top += LINE;

@@ -92,8 +92,8 @@ pub fn poster(file: &TeamFile) -> Option<Figure> {
     let bottom = top + (side + CAPTION) * lines as f64;
     let materials: Vec<Material> =
         Material::ALL.into_iter().filter(|material| !material.is_empty()).collect();
-    let names: Vec<(Colour, &str)> =
-        materials.iter().map(|material| (robot::plain(*material), material.name())).collect();
+    let names: Vec<(Material, Colour, &str)> =
+        materials.iter().map(|material| (*material, robot::plain(*material), material.name())).collect();
     let is_free =
         columns > 3 && lines > 3 && places.iter().all(|[column, line]| *column >= 3 || *line < lines - 2);
     let start = if is_free { bottom - 11.0 * names.len() as f64 } else { bottom };
@@ -128,6 +128,13 @@ fn drawn(canvas: &mut Canvas, at: [f64; 2], side: f64, body: &Body) {
     let cell = side / body.height().max(body.width()).max(1) as f64;
     let there = body.voxels().iter().filter(|(_, material)| !material.is_empty());
     robot::squares(canvas, at, cell, -0.05, there.map(|(place, material)| (place, robot::plain(*material))));
+    robot::marks(
+        canvas,
+        at,
+        cell,
+        body.voxels().iter().map(|(place, material)| (place, *material)),
+        robot::plain,
+    );
     robot::body_outline(canvas, at, cell, body, Pen::new(colour::INK, 0.4));
 }
 

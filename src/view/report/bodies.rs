@@ -4,7 +4,7 @@ use crate::base::number;
 use crate::body::{Body, Material};
 use crate::commands::report::Dossier;
 use crate::store::run::Robot;
-use crate::view::colour::tones;
+use crate::view::colour::{Colour, MARK_WIDTH, mark, mark_colour, placed, tones};
 use crate::view::html::escape;
 use crate::view::report::maps::Rollouts;
 use std::collections::BTreeSet;
@@ -95,7 +95,32 @@ fn picture(body: &Body) -> String {
         if !path.is_empty() {
             let [_, [red, green, blue], _] = tones(material);
             let _ = write!(out, "<path fill=\"#{red:02x}{green:02x}{blue:02x}\" d=\"{path}\"/>");
+            out += &marks(body, material);
         }
     }
     out + "</svg>"
+}
+
+/// The marks on a body's voxels of a material, as one path.
+fn marks(body: &Body, material: Material) -> String {
+    let mut data = String::new();
+    for ((row, column), _) in body.voxels().iter().filter(|(_, found)| **found == material) {
+        let (x, y) = (column as f64, row as f64);
+        let corners = [[x, y], [x + 1.0, y], [x + 1.0, y + 1.0], [x, y + 1.0]];
+        for line in mark(material) {
+            for (k, point) in line.iter().enumerate() {
+                let [x, y] = placed(*point, corners);
+                // Text is written to memory, which takes it all.
+                let _ = write!(data, "{}{x:.2} {y:.2}", if k == 0 { "M" } else { "L" });
+            }
+        }
+    }
+    if data.is_empty() {
+        return data;
+    }
+    let [_, [red, green, blue], _] = tones(material);
+    let colour = mark_colour(material, Colour::new(red, green, blue)).hex();
+    format!(
+        "<path fill=\"none\" stroke=\"{colour}\" stroke-width=\"{MARK_WIDTH}\" shape-rendering=\"auto\" d=\"{data}\"/>"
+    )
 }

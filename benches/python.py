@@ -1,0 +1,59 @@
+"""What a batch costs through Python, beside `morphcog eval`: the same robot, the same images, processor time of one thread.
+
+    python benches/python.py MORPHCOG [ARCHIVE [IMAGES [REPEATS]]]
+
+MORPHCOG is the program; the module is the one that Python finds. Both have the same threads (RAYON_NUM_THREADS=1) and take turns.
+Prints CSV: a line for each turn, and the median of the ratios.
+"""
+
+import json
+import os
+import resource
+import statistics
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+os.environ["RAYON_NUM_THREADS"] = "1"
+import morphcog as mc  # noqa: E402
+
+program = sys.argv[1]
+archive = sys.argv[2] if len(sys.argv) > 2 else "data/trained/zero-one-1"
+images = int(sys.argv[3]) if len(sys.argv) > 3 else 200
+repeats = int(sys.argv[4]) if len(sys.argv) > 4 else 5
+
+
+def of_program(count: int, out: Path) -> float:
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    command = [program, "eval", "--quiet", "--archive", archive, "--robots", "best", "--dataset", "builtin"]
+    subprocess.run([*command, "--images", str(count), "--threads", "1", "--out", str(out)], check=True, stdout=subprocess.DEVNULL)
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+
+
+def of_module(body, stimuli, config) -> tuple[float, list[float]]:
+    before = resource.getrusage(resource.RUSAGE_SELF)
+    found = mc.displacements([body], stimuli, config=config)
+    after = resource.getrusage(resource.RUSAGE_SELF)
+    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime, list(found[0])
+
+
+run = mc.load_run(archive)
+pixels, _ = mc.images("builtin", "test")
+ratios = []
+print("turn,images,eval_s,start_s,python_s,ratio")
+with tempfile.TemporaryDirectory() as folder:
+    out = Path(folder) / "eval.json"
+    for turn in range(repeats):
+        # What eval does besides (reading, baselines, writing) is that of an evaluation of two images, less those two.
+        start = of_program(2, out)
+        whole = of_program(images, out)
+        tested = json.loads(out.read_text())
+        shown = [image["index"] for image in tested["images"]]
+        seconds, found = of_module(run["best"].body, mc.stimuli(pixels[shown], run.config), run.config)
+        assert found == tested["robots"][0]["displacements"], "the same images, other numbers"
+        simulated = (whole - start) * images / (images - 2)
+        ratios.append(seconds / simulated)
+        print(f"{turn},{images},{whole:.3f},{start:.3f},{seconds:.3f},{ratios[-1]:.4f}", flush=True)
+print(f"median,{images},,,,{statistics.median(ratios):.4f}")
