@@ -39,7 +39,9 @@ pub fn response(found: &RobotResponse, task: Option<&str>, of: &str) -> Figure {
     };
     let seam = (0.05 * cell).min(0.5);
     robot::squares(&mut canvas, at, cell, seam, others().map(|(place, material)| (place, fill(material))));
-    robot::marks(&mut canvas, at, cell, others().map(|(place, material)| (place, *material)), |m| fill(&m));
+    robot::marks(&mut canvas, at, cell, others().map(|(place, material)| (place, *material)), |m| {
+        fill(&m).with_opacity(90)
+    });
     let places = found.places.iter().map(|place| ((place.row, place.column), shade(place.slope)));
     robot::squares(&mut canvas, at, cell, seam, places);
     let crosses: String = found

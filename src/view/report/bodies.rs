@@ -109,9 +109,9 @@ fn marks(body: &Body, material: Material) -> String {
         let corners = [[x, y], [x + 1.0, y], [x + 1.0, y + 1.0], [x, y + 1.0]];
         for line in mark(material) {
             for (k, point) in line.iter().enumerate() {
-                let [x, y] = placed(*point, corners);
+                let [x, y] = placed(*point, corners).map(|at| number::fixed(at, 2));
                 // Text is written to memory, which takes it all.
-                let _ = write!(data, "{}{x:.2} {y:.2}", if k == 0 { "M" } else { "L" });
+                let _ = write!(data, "{}{x} {y}", if k == 0 { "M" } else { "L" });
             }
         }
     }
