@@ -162,8 +162,10 @@ def test_other_threads_go_on_while_bodies_are_simulated():
 
 
 def test_ctrl_c_ends_a_batch_within_0_3_seconds():
+    # In a process that a shell began in the background, Ctrl-C is ignored unless it is asked for.
     code = """
-import time, numpy as np, morphcog as mc
+import signal, time, numpy as np, morphcog as mc
+signal.signal(signal.SIGINT, signal.default_int_handler)
 body = np.full((14, 14), 3, np.uint8); body[:7] = 4
 print("begins", flush=True)
 try:
