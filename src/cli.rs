@@ -131,7 +131,7 @@ fn run_evolve(args: EvolveArgs, console: &Console, ranks: Ranks) -> Result<(), E
     set.extend(args.generations.map(|generations| format!("generations={generations}")));
     let config = Config::load(&args.config, &set)?;
     let name = folder::name_of(&args.config);
-    let out = args.out.unwrap_or_else(|| Path::new("runs").join(format!("{name}-seed{}", config.seed)));
+    let out = args.out.unwrap_or_else(|| Path::new(folder::RUNS).join(format!("{name}-seed{}", config.seed)));
     let if_exists = match (args.resume, args.force) {
         (true, _) => IfExists::Resume,
         (_, true) => IfExists::Overwrite,
@@ -140,22 +140,7 @@ fn run_evolve(args: EvolveArgs, console: &Console, ranks: Ranks) -> Result<(), E
     let threads = args.threads.map(usize::from);
     let (data, place) = (args.data.clone(), out.clone());
     let options = evolve::Options { config, name, out: place, if_exists, data, threads, ranks };
-    let training = match (args.train, &options.config.task.groups) {
-        (false, _) => None,
-        (true, _) if ranks.size() > 1 => {
-            let text = "--train: expected one process: several cannot share a training".to_string();
-            return Err(
-                Error::usage(text).hint("evolve first, then morphcog train without mpirun".to_string())
-            );
-        }
-        (true, Some(groups)) => {
-            Some(train::after_evolution(&out, groups, (if_exists, args.data.clone(), threads)))
-        }
-        (true, None) => {
-            let text = "--train: expected a config with task.groups, two groups of classes".to_string();
-            return Err(Error::usage(text).hint("evolve first, then morphcog train --task".to_string()));
-        }
-    };
+    let training = args.train.then(|| train::after_evolution(&options)).transpose()?;
     let stop = signals::stop_flag()?;
     let finished = {
         let reporter = Reporter::new(console);

@@ -7,7 +7,7 @@ mod common;
 
 use common::browser::{Browser, Tab, found};
 use common::hostile::Dice;
-use common::program::{Sandbox, TINY, terminate};
+use common::program::{Sandbox, terminate};
 use common::server::Server;
 use morphcog::analysis::gallery;
 use serde_json::Value;
@@ -51,6 +51,13 @@ fn zero() -> Vec<[f64; 2]> {
 
 fn one() -> Vec<[f64; 2]> {
     (0..=12).map(|k| f64::from(k) / 12.0).map(|t| [16.0 - 4.0 * t, 5.0 + 18.0 * t]).collect()
+}
+
+/// Writes what is in sight into the folder that MORPHCOG_SCREENSHOTS names, if it does.
+fn keep_picture(name: &str, shot: &[u8]) {
+    if let Some(folder) = std::env::var_os("MORPHCOG_SCREENSHOTS") {
+        std::fs::write(std::path::Path::new(&folder).join(name), shot).unwrap();
+    }
 }
 
 /// The robot that the page begins with.
@@ -144,9 +151,7 @@ fn a_drawn_zero_and_a_drawn_one_are_told_apart_and_the_page_fits_everywhere() {
         assert_eq!(tab.eval(nameless), 0);
         let shot = tab.screenshot();
         assert!(shot.len() > 20_000, "{} bytes", shot.len());
-        if let Some(folder) = std::env::var_os("MORPHCOG_SCREENSHOTS") {
-            std::fs::write(std::path::Path::new(&folder).join(format!("serve-{width}.png")), shot).unwrap();
-        }
+        keep_picture(&format!("serve-{width}.png"), &shot);
         assert_eq!(tab.complaints(), Vec::<String>::new());
         tab.close();
     }
@@ -196,11 +201,9 @@ fn digits_drawn_in_any_size_place_and_slant_are_read_by_the_robot_that_the_page_
     let mut tab = browser.tab(1280, 900, false);
     open(&mut tab, &server);
     tab.eval("(() => { const s = document.getElementById('speed'); s.value = '0'; s.onchange(); })()");
-    if let Some(folder) = std::env::var_os("MORPHCOG_SCREENSHOTS") {
-        answer(&mut tab, &zero());
-        tab.eval("window.scrollTo(0, 0)");
-        std::fs::write(std::path::Path::new(&folder).join("serve.png"), tab.screenshot()).unwrap();
-    }
+    answer(&mut tab, &zero());
+    tab.eval("window.scrollTo(0, 0)");
+    keep_picture("serve.png", &tab.screenshot());
     let mut wrong = Vec::new();
     for seed in 1..=3 {
         let mut dice = Dice::new(77, seed);
@@ -233,8 +236,7 @@ fn a_run_that_begins_while_the_page_is_open_appears_grows_and_ends_on_it() {
     let server = Server::start(&sandbox, "");
     let mut tab = browser.tab(1280, 800, false);
     open(&mut tab, &server);
-    sandbox.write("long.toml", TINY.replace("generations = 12", "generations = 10000000"));
-    let mut child = sandbox.start("evolve -q -c long.toml -o runs/live --set checkpoint.seconds=0.1");
+    let mut child = sandbox.endless("runs/live");
     let text = "document.getElementById('archive').textContent";
     tab.wait(&format!("{text}.includes('of 10000000')"));
     choose(&mut tab, "2");
@@ -243,10 +245,8 @@ fn a_run_that_begins_while_the_page_is_open_appears_grows_and_ends_on_it() {
     tab.wait("document.getElementById('course').textContent.includes('left')");
     let first = tab.text("#course");
     tab.wait(&format!("document.getElementById('course').textContent !== '{first}'"));
-    if let Some(folder) = std::env::var_os("MORPHCOG_SCREENSHOTS") {
-        tab.eval("document.getElementById('progress').scrollIntoView()");
-        std::fs::write(std::path::Path::new(&folder).join("serve-live.png"), tab.screenshot()).unwrap();
-    }
+    tab.eval("document.getElementById('progress').scrollIntoView()");
+    keep_picture("serve-live.png", &tab.screenshot());
     terminate(&child);
     child.wait().unwrap();
     tab.wait("document.getElementById('course').textContent.includes('not running now')");
@@ -267,9 +267,7 @@ fn a_body_that_is_built_and_the_robot_it_makes_are_in_sight_together() {
         let bottom = tab.eval(&format!("document.getElementById('{id}').getBoundingClientRect().bottom"));
         assert!((1.0..=800.0).contains(&bottom.as_f64().unwrap()), "{id} ends at {bottom}");
     }
-    if let Some(folder) = std::env::var_os("MORPHCOG_SCREENSHOTS") {
-        std::fs::write(std::path::Path::new(&folder).join("serve-editor.png"), tab.screenshot()).unwrap();
-    }
+    keep_picture("serve-editor.png", &tab.screenshot());
 }
 
 #[test]

@@ -23,8 +23,7 @@ fn until(what: &str, mut is_so: impl FnMut() -> bool) {
 #[test]
 fn a_run_under_way_can_be_shown_plotted_tested_and_reported_and_all_say_that_it_is() {
     let sandbox = Sandbox::new();
-    sandbox.write("long.toml", TINY.replace("generations = 12", "generations = 10000000"));
-    let mut child = sandbox.start("evolve -q -c long.toml -o runs/long --set checkpoint.seconds=0.1");
+    let mut child = sandbox.endless("runs/long");
     let path = sandbox.path("runs/long/run.json");
     until("run.json exists", || path.exists());
     until("there are robots", || !sandbox.run_file("runs/long").elites.is_empty());
@@ -51,8 +50,7 @@ fn the_server_shows_runs_that_begin_how_far_they_are_and_that_they_have_ended() 
     let server = Server::start(&sandbox, "");
     let read = |path: &str| -> Value { serde_json::from_str(&server.get(path).body).unwrap() };
     let built_in = read("/api/archives").as_array().unwrap().len();
-    sandbox.write("long.toml", TINY.replace("generations = 12", "generations = 10000000"));
-    let mut child = sandbox.start("evolve -q -c long.toml -o runs/live --set checkpoint.seconds=0.1");
+    let mut child = sandbox.endless("runs/live");
     until("the run appears", || read("/api/archives").as_array().unwrap().len() > built_in);
     until("it is read anew", || read("/api/archives")[built_in]["changes"].as_u64().unwrap() > 1);
     let progress = format!("/api/archives/{built_in}/progress");

@@ -5,6 +5,7 @@ use crate::base::signals;
 use crate::cli::tasks::{Command, What, Where, asked, ended, refused};
 use crate::commands::sweep::SweepPlan;
 use crate::commands::{collect, tasks};
+use crate::store::folder;
 use crate::store::folder::in_shell;
 use crate::view::console::Console;
 use crate::view::reporters::Reporter;
@@ -60,7 +61,7 @@ pub(super) fn run(args: SweepArgs, console: &Console) -> Result<(), Error> {
     let plan = SweepPlan::load(&args.plan, &args.set)?;
     let tasks = plan.tasks(&args.plan).map_err(|errors| refused(errors, console))?;
     let name = args.plan.file_stem().map_or("sweep".to_string(), |stem| stem.to_string_lossy().into_owned());
-    let out = args.out.unwrap_or_else(|| Path::new("runs").join(&name));
+    let out = args.out.unwrap_or_else(|| Path::new(folder::RUNS).join(&name));
     let place = args.place.place(&out);
     let absolute = std::path::absolute(&args.plan).map_err(|error| Error::reading(&args.plan, &error))?;
     let mut words = vec!["sweep".to_string(), in_shell(&absolute)];

@@ -8,8 +8,8 @@ use crate::cli::choice::{ROBOTS, run_json, selected};
 use crate::commands::audit;
 use crate::config;
 use crate::config::audit::Criteria;
-use crate::search::train;
 use crate::search::train::{Finished, Options, groups};
+use crate::search::{evolve, train};
 use crate::store::folder;
 use crate::store::folder::IfExists;
 use crate::store::names::{AUDIT_JSON, RUN_JSON};
@@ -113,15 +113,23 @@ fn name(archive: &Path, task: &Groups, seed: Option<u64>) -> String {
     format!("{of}-{}{seed}", suffix.join("v"))
 }
 
-/// The training that `evolve --train` does when the gaits of the run in `out` have evolved.
-pub(super) fn after_evolution(
-    out: &Path,
-    groups: &Groups,
-    (if_exists, data, threads): (IfExists, Option<PathBuf>, Option<usize>),
-) -> Options {
+/// The training that `evolve --train` does when the gaits of its run have evolved.
+///
+/// # Errors
+/// If the config has not two groups, or several processes were to share it.
+pub(super) fn after_evolution(evolution: &evolve::Options) -> Result<Options, Error> {
+    let evolve::Options { config, out, if_exists, data, threads, ranks, .. } = evolution;
+    if ranks.size() > 1 {
+        let text = "--train: expected one process: several cannot share a training".to_string();
+        return Err(Error::usage(text).hint("evolve first, then morphcog train without mpirun".to_string()));
+    }
+    let Some(groups) = &config.task.groups else {
+        let text = "--train: expected a config with task.groups, two groups of classes".to_string();
+        return Err(Error::usage(text).hint("evolve first, then morphcog train --task".to_string()));
+    };
     let archive = out.join(RUN_JSON);
     let name = name(&archive, groups, None);
-    Options {
+    Ok(Options {
         out: out.with_file_name(&name),
         archive,
         robots: Selection::Top(GAITS),
@@ -129,10 +137,10 @@ pub(super) fn after_evolution(
         seed: None,
         set: Vec::new(),
         name,
-        if_exists,
-        data,
-        threads,
-    }
+        if_exists: *if_exists,
+        data: data.clone(),
+        threads: *threads,
+    })
 }
 
 /// Trains, validates and audits, and says how it went.

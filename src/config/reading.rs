@@ -50,7 +50,7 @@ fn json<T: DeserializeOwned>(text: &str, name: &str) -> Result<T, Error> {
         let line = Some(error.inner().line()).filter(|&line| line > 0);
         let message = error.inner().to_string();
         // serde_json ends its messages with the place, which is said already.
-        let message = message.split(" at line ").next().unwrap_or_default();
+        let message = message.split(" at line ").next().expect("a split text has a first piece");
         refused(name, line, &error.path().to_string(), message)
     })?;
     let tail = reader.end().map_err(|error| refused(name, Some(error.line()), "", "text after the end"));

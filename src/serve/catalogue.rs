@@ -3,12 +3,11 @@
 use crate::analysis::gallery;
 use crate::base::error::Error;
 use crate::body::{Body, VoxelCounts};
-use crate::commands::plot::{Moment, moments_of};
 use crate::config::Config;
+use crate::serve::course::Course;
 use crate::serve::judge::Judge;
 use crate::serve::refusal::Refusal;
 use crate::store::audit::AuditFile;
-use crate::store::folder;
 use crate::store::images::DatasetRef;
 use crate::store::names::{AUDIT_JSON, RUN_JSON};
 use crate::store::run::{Robot, RunFile};
@@ -94,30 +93,6 @@ pub struct Summary {
     /// Largest fitness.
     pub best: Option<f64>,
 }
-
-/// How a run went so far: `metrics.csv`, thinned.
-#[derive(Clone, Debug, Serialize)]
-pub struct Course {
-    /// Generations done.
-    pub done: usize,
-    /// Generations that it was asked for.
-    pub asked: u64,
-    /// Whether a process is at work on it.
-    pub under_way: bool,
-    /// Seconds that the rest will take, if it goes on as in its last fifth.
-    pub seconds_left: Option<f64>,
-    /// Generations of which the curves tell.
-    pub generation: Vec<usize>,
-    /// QD score.
-    pub qd_score: Vec<f64>,
-    /// Share of cells that are filled.
-    pub coverage: Vec<f64>,
-    /// Largest fitness; none before the first elite.
-    pub obj_max: Vec<Option<f64>>,
-}
-
-/// Most points of a curve: more than the page has pixels for.
-const POINTS: usize = 240;
 
 /// An archive whose file is looked at again and again.
 struct Watched {
@@ -250,36 +225,7 @@ impl Catalogue {
         let Some(path) = &collection.path else {
             return Err(Refusal::Unknown(format!("{}: it is no run", collection.name)));
         };
-        let moments = moments_of(path).map_err(|error| Refusal::Unknown(error.message))?;
-        let asked = collection.config.generations;
-        let done = moments.len();
-        let left = asked.saturating_sub(done as u64);
-        let (last, before) = (moments.last(), moments.len().checked_sub(1 + (moments.len() / 5).max(1)));
-        let pace = last
-            .zip(before.and_then(|before| moments.get(before)))
-            .map(|(last, before)| (last.seconds - before.seconds) / (moments.len() / 5).max(1) as f64);
-        let chosen: Vec<usize> = thinned(done);
-        let of = |value: fn(&Moment) -> f64| chosen.iter().map(|k| value(&moments[*k])).collect();
-        let folder = path.parent().unwrap_or(Path::new(""));
-        Ok(Course {
-            done,
-            asked,
-            under_way: folder::is_in_use(folder),
-            seconds_left: pace.filter(|_| left > 0).map(|pace| pace * left as f64),
-            qd_score: of(|moment| moment.qd_score),
-            coverage: of(|moment| moment.coverage),
-            obj_max: chosen.iter().map(|k| moments[*k].obj_max).collect(),
-            generation: chosen,
-        })
-    }
-}
-
-/// So many of the generations, evenly, the last always.
-fn thinned(done: usize) -> Vec<usize> {
-    match done {
-        0 => Vec::new(),
-        done if done <= POINTS => (0..done).collect(),
-        done => (0..POINTS).map(|k| k * (done - 1) / (POINTS - 1)).collect(),
+        Course::of(path, collection.config.generations).map_err(|error| Refusal::Unknown(error.message))
     }
 }
 

@@ -3,6 +3,7 @@
 
 pub mod assets;
 pub mod catalogue;
+pub mod course;
 pub mod http;
 pub mod images;
 pub mod judge;

@@ -1,8 +1,9 @@
 //! `metrics.csv`: a line per generation, with pyribs' names.
 
 use crate::base::error::Error;
-use crate::base::files::write_atomically;
+use crate::base::files::{read_text, write_atomically};
 use crate::qd::ArchiveStats;
+use crate::store::names::METRICS;
 use crate::task::evaluation::Evaluation;
 use serde::{Deserialize, Serialize};
 use std::fs::File;
@@ -62,7 +63,7 @@ impl Metrics {
     /// # Errors
     /// If it cannot be read or written.
     pub fn open(folder: &Path, generations: u64) -> Result<Self, Error> {
-        let path = folder.join("metrics.csv");
+        let path = folder.join(METRICS);
         let old = match std::fs::read(&path) {
             _ if generations == 0 => String::new(),
             // What is no text is no whole line, and left out as such.
@@ -109,6 +110,47 @@ impl Metrics {
     /// If it cannot be written.
     pub fn flush(&mut self) -> Result<(), Error> {
         self.file.flush().map_err(|error| Error::writing(&self.path, &error))
+    }
+}
+
+/// A line of `metrics.csv`, as far as figures show it.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+pub struct Moment {
+    /// Offspring made so far.
+    pub evaluations: f64,
+    /// Elites per possible cell.
+    pub coverage: f64,
+    /// Sum of the objectives, each less the offset.
+    pub qd_score: f64,
+    /// Largest objective; none without elites.
+    pub obj_max: Option<f64>,
+    /// Wall-clock time so far \[s\].
+    #[serde(default)]
+    pub seconds: f64,
+}
+
+/// The lines of the metrics.csv beside a run.json.
+///
+/// # Errors
+/// What is missing or wrong, with its line.
+pub fn moments(archive: &Path) -> Result<Vec<Moment>, Error> {
+    let path = archive.with_file_name(METRICS);
+    let text = read_text(&path).map_err(|error| Error::reading(&path, &error))?;
+    // A run under way may be writing the last line.
+    let whole = text.rfind('\n').map_or(text.as_str(), |end| &text[..=end]);
+    parsed(whole).map_err(|error| error.within(&path.display().to_string()))
+}
+
+fn parsed(text: &str) -> Result<Vec<Moment>, Error> {
+    let hint = || "morphcog evolve writes this file beside run.json".to_string();
+    let mut moments = Vec::new();
+    for line in csv::Reader::from_reader(text.as_bytes()).deserialize() {
+        let moment: Moment = line.map_err(|error| Error::input(error.to_string()).hint(hint()))?;
+        moments.push(moment);
+    }
+    match moments.is_empty() {
+        true => Err(Error::input("expected a line per generation, found none".to_string()).hint(hint())),
+        false => Ok(moments),
     }
 }
 
@@ -191,5 +233,21 @@ mod tests {
         write(folder.path(), 4, 5, 1);
         assert_eq!(lines(folder.path()).len(), 2, "a lost file is no reason not to go on");
         assert_eq!([5, 4].map(|from| Metrics::open(folder.path(), from).unwrap().missing), [4, 4]);
+    }
+
+    #[test]
+    fn metrics_are_read_by_the_names_of_their_columns() {
+        let text = "generation,coverage,qd_score,obj_max,evaluations\n0,0.1,2,,20\n1,0.2,3,1.5,40\n";
+        let moments = parsed(text).unwrap();
+        assert_eq!((moments[0].obj_max, moments[1].obj_max), (None, Some(1.5)));
+        assert_eq!((moments[1].evaluations, moments[1].coverage, moments[1].qd_score), (40.0, 0.2, 3.0));
+    }
+
+    #[test]
+    fn broken_metrics_are_refused_with_their_line() {
+        let broken = |text: &str| parsed(text).unwrap_err().message;
+        assert!(broken("generation,coverage\n").contains("found none"));
+        assert!(broken("a,b\n1,2\n").contains("evaluations"));
+        assert!(broken("coverage,qd_score,obj_max,evaluations\n1,2,3,4\n1,x,3,4\n").contains("line: 3"));
     }
 }

@@ -107,6 +107,12 @@ impl Sandbox {
         sandbox
     }
 
+    /// Starts a run that does not end by itself, and writes checkpoints all the time.
+    pub fn endless(&self, out: &str) -> std::process::Child {
+        self.write("long.toml", TINY.replace("generations = 12", "generations = 10000000"));
+        self.start(&format!("evolve -q -c long.toml -o {out} --set checkpoint.seconds=0.1"))
+    }
+
     pub fn path(&self, name: &str) -> PathBuf {
         self.0.path().join(name)
     }

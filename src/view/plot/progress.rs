@@ -1,6 +1,7 @@
 //! The figure of a run's progress: QD score, coverage and best fitness over evaluations.
 
-use crate::commands::plot::{Group, Moment, Progress, alike};
+use crate::commands::plot::{Group, Progress, alike};
+use crate::store::metrics::Moment;
 use crate::view::colour;
 use crate::view::colour::Colour;
 use crate::view::plot::axes::{AXIS, Axis, MARGIN, Plot, heading, left_space};

@@ -187,7 +187,7 @@ fn stimuli(canvas: &mut Canvas, walk: &Walk, rollout: &Range<usize>, plot: &Plot
                 robot::stimulus(canvas, at, STIMULUS, &phase.stimulus);
             }
             if room >= STIMULUS + 18.0 {
-                let name = phase.label.split(' ').next().unwrap_or_default();
+                let name = phase.label.split(' ').next().expect("a split text has a first piece");
                 canvas.fitted([at[0], at[1] + STIMULUS + 8.0], name, STIMULUS, Words::default().bold());
                 canvas.fitted(
                     [at[0], at[1] + STIMULUS + 17.0],

@@ -4,8 +4,10 @@ use crate::base::number;
 use crate::body::{Body, Material};
 use crate::commands::report::Dossier;
 use crate::store::run::Robot;
-use crate::view::colour::{Colour, MARK_WIDTH, mark, mark_colour, placed, tones};
+use crate::view::colour::{MARK_WIDTH, mark, mark_colour, placed};
 use crate::view::html::escape;
+use crate::view::plot::canvas::path;
+use crate::view::plot::robot;
 use crate::view::report::maps::Rollouts;
 use std::collections::BTreeSet;
 use std::fmt::Write;
@@ -93,8 +95,7 @@ fn picture(body: &Body) -> String {
             let _ = write!(path, "M{column} {row}h1v1h-1z");
         }
         if !path.is_empty() {
-            let [_, [red, green, blue], _] = tones(material);
-            let _ = write!(out, "<path fill=\"#{red:02x}{green:02x}{blue:02x}\" d=\"{path}\"/>");
+            let _ = write!(out, "<path fill=\"{}\" d=\"{path}\"/>", robot::plain(material).hex());
             out += &marks(body, material);
         }
     }
@@ -108,18 +109,14 @@ fn marks(body: &Body, material: Material) -> String {
         let (x, y) = (column as f64, row as f64);
         let corners = [[x, y], [x + 1.0, y], [x + 1.0, y + 1.0], [x, y + 1.0]];
         for line in mark(material) {
-            for (k, point) in line.iter().enumerate() {
-                let [x, y] = placed(*point, corners).map(|at| number::fixed(at, 2));
-                // Text is written to memory, which takes it all.
-                let _ = write!(data, "{}{x} {y}", if k == 0 { "M" } else { "L" });
-            }
+            let points: Vec<[f64; 2]> = line.iter().map(|point| placed(*point, corners)).collect();
+            data += &path(&points, false);
         }
     }
     if data.is_empty() {
         return data;
     }
-    let [_, [red, green, blue], _] = tones(material);
-    let colour = mark_colour(material, Colour::new(red, green, blue)).hex();
+    let colour = mark_colour(material, robot::plain(material)).hex();
     format!(
         "<path fill=\"none\" stroke=\"{colour}\" stroke-width=\"{MARK_WIDTH}\" shape-rendering=\"auto\" d=\"{data}\"/>"
     )
