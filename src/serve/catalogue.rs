@@ -35,6 +35,8 @@ pub struct Collection {
     pub tasks: Vec<String>,
     /// The robots, fittest first.
     pub robots: Vec<Entry>,
+    /// Robots that were in the archive when it was read before: a page may still list them.
+    pub gone: Vec<Entry>,
 }
 
 /// A robot that can be watched.
@@ -249,7 +251,10 @@ impl Watched {
         if now != self.stamp
             && let Ok(collection) = archive(&self.path, &mut Vec::new())
         {
-            (self.stamp, self.collection) = (now, Arc::new(collection));
+            let Collection { robots, gone, .. } = &*self.collection;
+            let has_gone = |robot: &&Entry| collection.robots.iter().all(|other| other.id != robot.id);
+            let gone = gone.iter().chain(robots).filter(has_gone).cloned().collect();
+            (self.stamp, self.collection) = (now, Arc::new(Collection { gone, ..collection }));
             self.changes += 1;
         }
     }
@@ -261,7 +266,7 @@ impl Collection {
     /// # Errors
     /// If there is none.
     pub fn robot(&self, id: &str) -> Result<&Entry, Refusal> {
-        let found = self.robots.iter().find(|robot| robot.id == id);
+        let found = self.robots.iter().chain(&self.gone).find(|robot| robot.id == id);
         found.ok_or_else(|| Refusal::Unknown(format!("{}: there is no robot {id:?}", self.name)))
     }
 }
@@ -296,6 +301,7 @@ fn published() -> Result<Collection, Error> {
         bins: Vec::new(),
         tasks,
         robots,
+        gone: Vec::new(),
     })
 }
 
@@ -353,5 +359,6 @@ fn of_run(run: RunFile, audit: Option<&AuditFile>) -> Result<Collection, Error> 
         dataset: Some(run.dataset),
         config: run.config,
         robots,
+        gone: Vec::new(),
     })
 }
