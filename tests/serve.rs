@@ -17,7 +17,7 @@ use morphcog::serve::simulations::MAX_SIMULATIONS;
 use morphcog::sim::Physics;
 use morphcog::task::direction::Direction;
 use morphcog::task::protocol::Protocol;
-use morphcog::task::recording::Frame;
+use morphcog::task::recording::{Frame, Seen};
 use morphcog::task::rollout::record;
 use morphcog::task::stimulus::{Encoding, Reduction, StimulusParams, stimulus};
 use serde_json::{Value, json};
@@ -266,7 +266,7 @@ fn a_simulation_is_what_the_engine_computes() {
     let robot = gallery::find("QMAXD").unwrap().unwrap();
     let seen = stimulus(&drawing(), 14, 14, &config.stimulus).unwrap();
     let protocol = Protocol { control_steps: 120, ..config.protocol.clone() };
-    let images = [("drawing".to_string(), seen.clone())];
+    let images = [Seen { class: 0, label: "drawing".to_string(), stimulus: seen.clone() }];
     let expected = record("QMAXD", &robot.body, &config.physics, &protocol, true, &images);
 
     let begin = &events[0].1;

@@ -13,6 +13,7 @@ use crate::store::images::{DatasetRef, ImageRef};
 use crate::store::robots::{Selection, Source};
 use crate::store::run::{Dimensions, FORMAT, FORMAT_VERSION, Robot, RunFile};
 use crate::task::direction::Direction;
+use crate::task::judge::Judge;
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
 
@@ -60,6 +61,14 @@ pub struct Published {
     pub zero_walks: Direction,
     /// Its body.
     pub body: Body,
+}
+
+impl Published {
+    /// What its walks say.
+    pub fn judge(&self) -> Judge {
+        let says = |way| if way == self.zero_walks { vec![0] } else { vec![1] };
+        Judge { left: says(Direction::Left), right: says(Direction::Right) }
+    }
 }
 
 /// All published robots.

@@ -11,9 +11,9 @@ use crate::base::threads::pool;
 use crate::body::Body;
 use crate::config::{Config, MAX_NUMBER};
 use crate::data::dataset::{Dataset, DatasetError, Split};
+use crate::search::probing;
 use crate::search::probing::Probing;
 use crate::search::training::scarcest;
-use crate::search::{probing, showing};
 use crate::store::folder::{check_out, writable};
 use crate::store::images::DatasetRef;
 use crate::store::names::RESPONSE_JSON;
@@ -23,6 +23,7 @@ use crate::store::response::{
 use crate::store::robots::{Selection, Source};
 use crate::store::unwritten::Unwritten;
 use crate::store::whereabouts::{Whereabouts, load_dataset_of, see};
+use crate::task::direction;
 use crate::task::evaluation::fresh_rollouts;
 use crate::task::grouping::Grouping;
 use crate::task::perturbation::Condition;
@@ -356,7 +357,7 @@ impl Measuring<'_> {
                 None => None,
                 Some(task) => {
                     let examples = self.images.examples(gait, config, task);
-                    let threshold = showing::THRESHOLD;
+                    let threshold = direction::THRESHOLD;
                     teachable(&shown, response.scatter, &examples, threshold, options.seed, stop)?
                 }
             };

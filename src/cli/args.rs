@@ -18,6 +18,7 @@ use crate::data::dataset::BUILTIN;
 use crate::search::showing;
 use crate::store::images::HeldOut;
 use crate::store::robots::Selection;
+use crate::task::direction;
 use crate::view::console::Mode;
 use crate::view::pictures::Format;
 use crate::view::scene::Look;
@@ -261,7 +262,7 @@ pub(super) struct EvalArgs {
     #[arg(long, value_name = "NAME")]
     pub(super) dataset: Option<String>,
     /// Displacements up to this many voxel lengths are wrong.
-    #[arg(long, default_value_t = showing::THRESHOLD)]
+    #[arg(long, default_value_t = direction::THRESHOLD)]
     pub(super) threshold: f64,
     /// Actuation cycles per image.
     #[arg(long, default_value_t = showing::CYCLES, value_parser = clap::value_parser!(u32).range(1..=10_000))]

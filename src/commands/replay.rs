@@ -2,7 +2,7 @@
 
 use crate::analysis::gallery;
 use crate::base::error::Error;
-use crate::base::{Grid, number};
+use crate::base::number;
 use crate::body::Body;
 use crate::config::Config;
 use crate::data::dataset::Split;
@@ -11,8 +11,9 @@ use crate::store::folder;
 use crate::store::images::{DatasetRef, ImageRef};
 use crate::store::robots::{Selection, Source};
 use crate::store::whereabouts::{Whereabouts, load_dataset_of, see};
+use crate::task::judge::Judge;
 use crate::task::protocol::RolloutMode;
-use crate::task::recording::Recording;
+use crate::task::recording::{Recording, Seen};
 use crate::task::rollout::record;
 use std::path::PathBuf;
 use std::str::FromStr;
@@ -80,8 +81,8 @@ pub struct Replay {
 pub struct Subject {
     /// The robot.
     pub found: Found,
-    /// Images with their labels, as it sees them.
-    pub images: Vec<(String, Grid<f64>)>,
+    /// Images, as it sees them.
+    pub images: Vec<Seen>,
 }
 
 /// Records a robot's rollout as its config's protocol has it.
@@ -107,9 +108,10 @@ pub fn replay(options: &Options) -> Result<Replay, Error> {
 
 /// Records a rollout.
 pub fn record_subject(subject: &Subject) -> Recording {
-    let Subject { found: Found { name, body, config, .. }, images } = subject;
+    let Subject { found: Found { name, body, config, judge, .. }, images } = subject;
     let fresh = config.protocol.rollout == RolloutMode::Fresh;
-    record(name, body, &config.physics, &config.protocol, fresh, images)
+    let recording = record(name, body, &config.physics, &config.protocol, fresh, images);
+    Recording { judge: judge.clone(), ..recording }
 }
 
 /// Finds a robot and the images it is to be shown.
@@ -162,7 +164,8 @@ pub fn subject(options: &Options) -> Result<Subject, Error> {
             (Some(path), _) => Error::input(format!("{}: training_images: {error}", path.display())),
             (None, _) => Error::input(format!("training_images: {error}")),
         })?;
-        images.push((format!("{label} ({split} {index})"), see(config, &dataset, split, index)?));
+        let stimulus = see(config, &dataset, split, index)?;
+        images.push(Seen { class: label, label: format!("{label} ({split} {index})"), stimulus });
     }
     config.data.dataset = dataset.name().to_string();
     check_length(config, images.len())?;
@@ -209,6 +212,8 @@ pub struct Found {
     pub dataset: Option<DatasetRef>,
     /// What a page says about it: words and values.
     pub about: Vec<(String, String)>,
+    /// What its walks say.
+    judge: Option<Judge>,
     /// The run.json it is from; none of a published one.
     archive: Option<PathBuf>,
     published: bool,
@@ -243,6 +248,7 @@ pub fn find(options: &Options) -> Result<Found, Error> {
             ("Task".to_string(), "0|1".to_string()),
             ("Published fitness".to_string(), format!("{} voxel lengths", number::fixed(robot.fitness, 2))),
         ];
+        let judge = Some(robot.judge());
         let (name, body, config) = (robot.name, robot.body, gallery::config()?);
         return Ok(Found {
             name,
@@ -251,6 +257,7 @@ pub fn find(options: &Options) -> Result<Found, Error> {
             training: Vec::new(),
             dataset: None,
             about,
+            judge,
             archive: None,
             published: true,
         });
@@ -288,6 +295,7 @@ pub fn find(options: &Options) -> Result<Found, Error> {
         training: run.training_images.clone(),
         dataset: Some(run.dataset.clone()),
         about,
+        judge: run.judge(robot),
         archive: Some(archive),
         published: false,
         config: run.config.clone(),

@@ -1,6 +1,5 @@
 //! `morphcog report`: gathers what is known of runs, for a page.
 
-use crate::base::Grid;
 use crate::base::error::Error;
 use crate::commands::plot::Progress;
 use crate::commands::replay;
@@ -14,7 +13,7 @@ use crate::store::names::{AUDIT_JSON, CAPACITY_JSON, EVAL_JSON, METRICS};
 use crate::store::run::{Robot, RunFile, different};
 use crate::store::whereabouts::{Whereabouts, load_dataset_of, see};
 use crate::task::protocol::RolloutMode;
-use crate::task::recording::Recording;
+use crate::task::recording::{Recording, Seen};
 use crate::task::rollout::record;
 use std::path::{Path, PathBuf};
 
@@ -32,8 +31,8 @@ pub struct Dossier {
     pub progress: Option<Progress>,
     /// What was found of it, and of nothing else.
     pub findings: Findings,
-    /// What its robots are shown on the page: labels and stimuli.
-    pub images: Vec<(String, Grid<f64>)>,
+    /// What its robots are shown on the page.
+    pub images: Vec<Seen>,
 }
 
 /// What tests found; none of what was not done.
@@ -123,7 +122,7 @@ pub fn gather(
 }
 
 /// The training images, or one of each class if they are many.
-fn images(run: &RunFile, path: &Path, whereabouts: &Whereabouts) -> Result<Vec<(String, Grid<f64>)>, Error> {
+fn images(run: &RunFile, path: &Path, whereabouts: &Whereabouts) -> Result<Vec<Seen>, Error> {
     let hint = |error: Error| match &error.hint {
         None => error.hint("or --rollouts 0 for a report without moving pictures".to_string()),
         Some(_) => error,
@@ -144,7 +143,7 @@ fn images(run: &RunFile, path: &Path, whereabouts: &Whereabouts) -> Result<Vec<(
         let label = format!("{} (train {})", image.label, image.index);
         let seen = see(&run.config, &dataset, Split::Train, image.index);
         let seen = seen.map_err(|error| error.within("training_images").within(&path.display().to_string()));
-        Ok((label, seen?))
+        Ok(Seen { class: image.label, label, stimulus: seen? })
     };
     shown.iter().map(one).collect()
 }
@@ -154,7 +153,9 @@ impl Dossier {
     pub fn record(&self, robot: &Robot) -> Recording {
         let config = &self.run.config;
         let fresh = config.protocol.rollout == RolloutMode::Fresh;
-        record(&robot.id, &robot.body, &config.physics, &config.protocol, fresh, &self.images)
+        let recording =
+            record(&robot.id, &robot.body, &config.physics, &config.protocol, fresh, &self.images);
+        Recording { judge: self.run.judge(robot), ..recording }
     }
 
     /// Seconds that the run took, and offspring it made; none without a metrics.csv.

@@ -16,6 +16,7 @@ use crate::store::eval::EvalFile;
 use crate::store::images::HeldOut;
 use crate::store::names::{AUDIT_JSON, RUN_JSON};
 use crate::store::robots::{Chosen, Selection, Source};
+use crate::task::direction;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -250,7 +251,7 @@ impl Job<'_> {
             split: HeldOut::Test,
             validation: None,
             seed: 1,
-            threshold: showing::THRESHOLD,
+            threshold: direction::THRESHOLD,
             cycles: showing::CYCLES,
             data: self.place.data.clone(),
             dataset: None,

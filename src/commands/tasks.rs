@@ -18,6 +18,7 @@ use crate::store::names::{AUDIT_JSON, METRICS, RUN_JSON, TASK_JSON};
 use crate::store::robots::{Selection, Source};
 use crate::store::setting::RunRef;
 use crate::store::task::{State, TaskFile};
+use crate::task::direction;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -348,7 +349,7 @@ fn steps(task: &Task, place: &Place, stop: &AtomicBool, observer: &dyn Observer)
             split: step.split,
             validation: None,
             seed: 1,
-            threshold: showing::THRESHOLD,
+            threshold: direction::THRESHOLD,
             cycles: showing::CYCLES,
             data: place.data.clone(),
             dataset: None,

@@ -10,7 +10,7 @@ use crate::commands::eval_images::chosen_by;
 use crate::config::Config;
 use crate::data::dataset::{Dataset, Split};
 use crate::search::held_out::{images_besides, test_images};
-use crate::search::showing::{CYCLES, THRESHOLD, Walker, control_steps, task_of};
+use crate::search::showing::{CYCLES, Walker, control_steps, task_of};
 use crate::store::eval::Trial;
 use crate::store::folder::check_out;
 use crate::store::images::{HeldOut, ImageRef};
@@ -21,6 +21,7 @@ use crate::store::team::{FORMAT, FORMAT_VERSION, Member, TeamBaselines, TeamFile
 use crate::store::unwritten::Unwritten;
 use crate::store::validation::shown as shown_for_validation;
 use crate::store::whereabouts::{Whereabouts, load_dataset_of, see};
+use crate::task::direction::THRESHOLD;
 use crate::task::grouping::{self, Group};
 use crate::task::voting::{Accuracy, Ballot, CLIP, Sides};
 use std::collections::BTreeSet;

@@ -9,8 +9,6 @@ use crate::task::grouping::{self, Grouping};
 use crate::task::protocol::{Protocol, RolloutMode};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
-/// Displacements up to this count as wrong in the paper's test \[voxel lengths\].
-pub const THRESHOLD: f64 = 3.0;
 /// Actuation cycles per image in the paper's test.
 pub const CYCLES: u32 = 10;
 

@@ -21,6 +21,7 @@ use crate::store::robots::{Chosen, Selection, Source, first_physical};
 use crate::store::run::{Robot, RunFile};
 use crate::store::validation::{FORMAT, Validated, ValidationFile};
 use crate::store::whereabouts::{Whereabouts, load_dataset_of, see};
+use crate::task::direction;
 use crate::task::grouping;
 use crate::task::grouping::Grouping;
 use std::collections::BTreeMap;
@@ -105,7 +106,7 @@ fn ranked(
     let chosen = Selection::Validated(count).of(std::slice::from_ref(source), 0)?;
     let skilled = |robot: &&Robot| showing::task_of(&grouping, robot).is_some();
     let robots = chosen.iter().map(|chosen| chosen.robot).filter(skilled).collect();
-    let wanted = Wanted { count, images: config.validation.images, threshold: showing::THRESHOLD };
+    let wanted = Wanted { count, images: config.validation.images, threshold: direction::THRESHOLD };
     let best = best(source, dataset, &grouping, robots, &wanted, &walker)?;
     Ok(best.map(|best| best.into_iter().map(|(_, validated)| validated).collect()))
 }

@@ -5,13 +5,12 @@ use crate::base::error::Error;
 use crate::body::{Body, VoxelCounts};
 use crate::config::Config;
 use crate::serve::course::Course;
-use crate::serve::judge::Judge;
 use crate::serve::refusal::Refusal;
 use crate::store::audit::AuditFile;
 use crate::store::images::DatasetRef;
 use crate::store::names::{AUDIT_JSON, RUN_JSON};
 use crate::store::run::{Robot, RunFile};
-use crate::task::direction::Assignment;
+use crate::task::judge::Judge;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -276,16 +275,13 @@ fn published() -> Result<Collection, Error> {
     let grouping = config.grouping()?;
     let tasks: Vec<String> = grouping.tasks().iter().map(|split| split.name()).collect();
     let entry = |robot: gallery::Published| Entry {
+        judge: Some(robot.judge()),
         id: robot.name,
         task: tasks.first().expect("the published robots perform a task").clone(),
         fitness: robot.fitness,
         voxels: robot.body.counts(),
         cell: Vec::new(),
         generation: None,
-        judge: grouping
-            .tasks()
-            .first()
-            .and_then(|split| Judge::of(split, Assignment { a: robot.zero_walks })),
         audit: None,
         body: robot.body,
     };
@@ -328,11 +324,6 @@ fn archive(path: &Path, notes: &mut Vec<String>) -> Result<Collection, Error> {
 }
 
 fn of_run(run: RunFile, audit: Option<&AuditFile>) -> Result<Collection, Error> {
-    let grouping = run.config.grouping()?;
-    let judge = |robot: &Robot| {
-        let split = grouping.tasks().iter().find(|split| split.name() == robot.task)?;
-        Judge::of(split, Assignment::from_training(split, run.fitness(), &run.answers(robot)))
-    };
     let audited = |robot: &Robot| {
         let found = audit?.robot(&robot.id)?;
         Some(Audited { verdict: found.verdict.name(), conclusion: found.conclusion() })
@@ -344,7 +335,7 @@ fn of_run(run: RunFile, audit: Option<&AuditFile>) -> Result<Collection, Error> 
         voxels: robot.voxels,
         cell: robot.cell.clone(),
         generation: Some(robot.generation),
-        judge: judge(robot),
+        judge: run.judge(robot),
         audit: audited(robot),
         body: robot.body.clone(),
     };

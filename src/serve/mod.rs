@@ -6,7 +6,6 @@ pub mod catalogue;
 pub mod course;
 pub mod http;
 pub mod images;
-pub mod judge;
 pub mod refusal;
 pub mod request;
 pub mod routes;

@@ -1,9 +1,9 @@
 //! One simulation at the pace that is asked for, reported moment by moment.
 
-use crate::serve::judge::{Answer, answer};
 use crate::serve::request::{MAX_STEPS, Pace, Plan, Seen};
 use crate::serve::simulations::{Control, Slot};
 use crate::sim::System;
+use crate::task::judge::{Answer, answer};
 use crate::task::recording::{Frame, VoxelCorners};
 use crate::task::rollout::Rollout;
 use std::sync::Arc;

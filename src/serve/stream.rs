@@ -4,9 +4,9 @@
 //! centre of mass.
 
 use crate::body::Material;
-use crate::serve::judge::THRESHOLD;
 use crate::serve::request::{Plan, Seen};
 use crate::serve::simulation::{Event, STEPS_PER_SECOND};
+use crate::task::direction::THRESHOLD;
 use crate::task::recording::{Frame, VoxelCorners};
 use crate::view::colour::{TONE_AREAS, mark, tones};
 use crate::view::html::{STEPS, quantised};

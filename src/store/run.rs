@@ -13,7 +13,9 @@ use crate::qd::descriptor::{count_bin, possible_cells};
 use crate::qd::{Archive, ArchiveStats, DescriptorSpace, Elite};
 use crate::store::images::{DatasetRef, ImageRef, answers};
 use crate::store::training::Origin;
+use crate::task::direction::Assignment;
 use crate::task::fitness::Fitness;
+use crate::task::judge::Judge;
 use crate::task::score::Answer;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -250,6 +252,17 @@ impl RunFile {
     /// What an elite answered to the training images.
     pub fn answers(&self, robot: &Robot) -> Vec<Answer> {
         answers(&self.training_images, robot.displacements.iter().copied().map(Some))
+    }
+
+    /// What the walks of a robot say; none of a gait, or of a robot that is to walk the same way
+    /// always.
+    pub fn judge(&self, robot: &Robot) -> Option<Judge> {
+        if self.config.measures_response() {
+            return None;
+        }
+        let grouping = self.config.grouping().ok()?;
+        let split = grouping.tasks().iter().find(|split| split.name() == robot.task)?;
+        Judge::of(split, Assignment::from_training(split, self.fitness(), &self.answers(robot)))
     }
 
     /// Whether its displacements are those of its bodies under the training images as the config's

@@ -5,6 +5,9 @@ use crate::task::fitness::Fitness;
 use crate::task::grouping::{Group, Split};
 use crate::task::score::{Answer, of_split};
 
+/// Displacements up to this many voxel lengths say nothing (paper, section "Generalization test").
+pub const THRESHOLD: f64 = 3.0;
+
 /// A way to walk.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Direction {

@@ -6,6 +6,7 @@ pub mod direction;
 pub mod evaluation;
 pub mod fitness;
 pub mod grouping;
+pub mod judge;
 pub mod perturbation;
 pub mod protocol;
 pub mod recording;

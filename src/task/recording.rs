@@ -2,16 +2,26 @@
 
 use crate::base::Grid;
 use crate::body::Body;
+use crate::task::judge::Judge;
+
+/// An image as a robot sees it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Seen {
+    /// Its class.
+    pub class: u8,
+    /// What it is, for people: "0 (train 1)".
+    pub label: String,
+    /// What the sensors see: H × W in [0, 1].
+    pub stimulus: Grid<f64>,
+}
 
 /// One stretch of a recording under one stimulus.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Phase {
     /// Index in [`Recording::frames`] of the frame before the phase's first control step.
     pub first_frame: usize,
-    /// What the sensors see: H × W in [0, 1].
-    pub stimulus: Grid<f64>,
-    /// What the image is, for people: "0 (train 1)".
-    pub label: String,
+    /// The image.
+    pub seen: Seen,
     /// Signed x displacement of the centre of mass over the phase, voxel lengths (right is
     /// positive).
     pub displacement: f64,
@@ -56,4 +66,6 @@ pub struct Recording {
     pub cycle: usize,
     /// Whether the rollout ended early as unstable.
     pub unstable: bool,
+    /// What its walks say; none of a robot without a task.
+    pub judge: Option<Judge>,
 }

@@ -5,7 +5,7 @@ use crate::base::stop::Stopped;
 use crate::body::Body;
 use crate::sim::{Energy, Physics, Start, System, Unstable, World, Worlds};
 use crate::task::protocol::{Protocol, RolloutMode};
-use crate::task::recording::{Frame, Phase, Recording, VoxelCorners};
+use crate::task::recording::{Frame, Phase, Recording, Seen, VoxelCorners};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
@@ -198,15 +198,15 @@ pub fn same_to_sensors(body: &Body, stimuli: &[&Grid<f64>]) -> Vec<usize> {
     stimuli.iter().enumerate().map(|(i, stimulus)| *first.entry(seen(stimulus)).or_insert(i)).collect()
 }
 
-/// Records a robot's rollout frame by frame for pictures; images with their labels, one phase each.
-/// An unstable rollout is recorded up to its end.
+/// Records a robot's rollout frame by frame for pictures; one phase for each image, and no judge. An
+/// unstable rollout is recorded up to its end.
 pub fn record(
     robot: &str,
     body: &Body,
     physics: &Physics,
     protocol: &Protocol,
     fresh: bool,
-    images: &[(String, Grid<f64>)],
+    images: &[Seen],
 ) -> Recording {
     let system = Arc::new(System::new(body, physics.clone()));
     let mut rollout = Rollout::new(&system, protocol);
@@ -218,14 +218,15 @@ pub fn record(
         frames: Vec::new(),
         cycle: physics.cycle_steps as usize,
         unstable: false,
+        judge: None,
     };
-    for (index, (label, stimulus)) in images.iter().enumerate() {
+    for (index, seen) in images.iter().enumerate() {
         if fresh || index == 0 {
             rollout.reset();
             recording.frames.push(rollout.frame());
         }
         let first_frame = recording.frames.len() - 1;
-        rollout.look_at(stimulus);
+        rollout.look_at(&seen.stimulus);
         let mut unstable = false;
         let mut displacement = rollout.moved();
         for _ in 0..protocol.control_steps {
@@ -236,12 +237,7 @@ pub fn record(
             displacement = rollout.moved();
             recording.frames.push(rollout.frame());
         }
-        recording.phases.push(Phase {
-            first_frame,
-            stimulus: stimulus.clone(),
-            label: label.clone(),
-            displacement,
-        });
+        recording.phases.push(Phase { first_frame, seen: seen.clone(), displacement });
         if unstable {
             recording.unstable = true;
             break;
@@ -315,7 +311,8 @@ mod tests {
     }
 
     fn recorded(fresh: bool, physics: &Physics) -> Recording {
-        let images = [("dark".to_string(), image(0.0, 0.0)), ("bright".to_string(), image(1.0, 0.0))];
+        let seen = |class, label: &str, stimulus| Seen { class, label: label.to_string(), stimulus };
+        let images = [seen(0, "dark", image(0.0, 0.0)), seen(1, "bright", image(1.0, 0.0))];
         record("r", &body(), physics, &protocol(), fresh, &images)
     }
 
@@ -327,7 +324,7 @@ mod tests {
         assert_eq!(recording.frames.len(), 1 + 2 * steps);
         let begin: Vec<usize> = recording.phases.iter().map(|phase| phase.first_frame).collect();
         assert_eq!((begin, recording.unstable), (vec![0, steps], false));
-        assert_eq!(recording.phases[1].label, "bright");
+        assert_eq!(recording.phases[1].seen.label, "bright");
         assert_eq!((recording.voxels.len(), recording.cycle), (9, 50));
         for (phase, end) in recording.phases.iter().zip([steps, 2 * steps]) {
             let way = recording.frames[end].centre[0] - recording.frames[phase.first_frame].centre[0];

@@ -86,6 +86,9 @@ pub fn mark(material: Material) -> &'static [&'static [[f64; 2]]] {
     }
 }
 
+/// Width of a mark, in voxel lengths.
+pub const MARK_EXTENT: f64 = 0.4;
+
 /// Width of a mark's lines, in voxel lengths.
 pub const MARK_WIDTH: f64 = 0.09;
 

@@ -5,6 +5,7 @@
 //! the robot walks.
 
 use crate::body::Material;
+use crate::task::direction::THRESHOLD;
 use crate::task::recording::Recording;
 use crate::view::colour::{TONE_AREAS, mark, tones};
 use crate::view::error::{PictureError, write_whole};
@@ -116,14 +117,16 @@ fn rollout(walk: &Walk, most: usize) -> serde_json::Value {
     let phases = recording.phases.iter().enumerate().map(|(k, phase)| {
         let range = walk.phase_frames(k);
         let first = shown.partition_point(|f| *f < range.start);
-        let stimulus = phase.stimulus.rows().flatten().map(|v| (255.0 * v.clamp(0.0, 1.0)).round() as u8);
+        let stimulus =
+            phase.seen.stimulus.rows().flatten().map(|v| (255.0 * v.clamp(0.0, 1.0)).round() as u8);
         json!({
             "first": first,
-            "label": phase.label,
+            "label": phase.seen.label,
+            "class": phase.seen.class,
             "displacement": number(phase.displacement),
             "fresh": walk.is_fresh(k),
-            "height": phase.stimulus.height(),
-            "width": phase.stimulus.width(),
+            "height": phase.seen.stimulus.height(),
+            "width": phase.seen.stimulus.width(),
             "stimulus": BASE64.encode(stimulus.collect::<Vec<u8>>()),
         })
     });
@@ -138,6 +141,8 @@ fn rollout(walk: &Walk, most: usize) -> serde_json::Value {
         "points": points,
         "cycle": recording.cycle.max(1),
         "unstable": recording.unstable,
+        "judge": recording.judge,
+        "threshold": THRESHOLD,
         "steps": shown,
         "phases": phases.collect::<Vec<_>>(),
         "unit": STEPS,
@@ -244,7 +249,7 @@ mod tests {
     fn the_page_needs_no_network_and_lets_no_text_become_markup() {
         let mut recording = simulated("34/56", 1, 5, false);
         recording.robot = "</script><script>alert(1)</script>".into();
-        recording.phases[0].label = "<script>".into();
+        recording.phases[0].seen.label = "<script>".into();
         let metadata = [("<b>".to_string(), "\"{{rollout}}\" & <script>x</script>".to_string())];
         let page = page(&recording, "<script>alert('t')</script>", &metadata).unwrap();
         for forbidden in

@@ -5,8 +5,7 @@
 //! what part of the world a picture shows; `scene` and `panel` make drawing primitives of one
 //! frame; `raster` paints them. On top of these stand the animated GIF, the self-contained HTML
 //! page and the view in a terminal. Figures for print are vectors and stand apart, in [`plot`].
-//! these stand the animated GIF, the self-contained HTML page and the view in a terminal. `serve`
-//! is a page of its own, over HTTP.
+//! `serve` is a page of its own, over HTTP.
 
 #[cfg(feature = "cli")]
 pub mod bar;
@@ -16,7 +15,7 @@ pub mod console;
 pub mod error;
 #[cfg(feature = "cli")]
 pub mod figures;
-pub mod font;
+pub mod fonts;
 pub mod gif;
 pub mod html;
 #[cfg(feature = "cli")]
@@ -68,15 +67,17 @@ pub(crate) fn simulated(
     use crate::body::Body;
     use crate::sim::Physics;
     use crate::task::protocol::Protocol;
+    use crate::task::recording::Seen;
     use crate::task::rollout::record;
     let body: Body = body.parse().expect("tests name bodies");
     let image = |phase: usize| {
         let pixel =
             |row: usize, column: usize| if (row + column + phase).is_multiple_of(3) { 1.0 } else { 0.0 };
         let stimulus = Grid::from_fn(body.height(), body.width(), pixel);
-        (format!("{} (train {})", phase % 2, 2 * phase + 1), stimulus)
+        let label = format!("{} (train {})", phase % 2, 2 * phase + 1);
+        Seen { class: (phase % 2) as u8, label, stimulus }
     };
-    let images: Vec<(String, Grid<f64>)> = (0..phases).map(image).collect();
+    let images: Vec<Seen> = (0..phases).map(image).collect();
     let protocol = Protocol { control_steps: steps, ..Protocol::default() };
     record("ROBOT", &body, &Physics::default(), &protocol, fresh, &images)
 }

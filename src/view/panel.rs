@@ -3,16 +3,24 @@
 
 use crate::base::number;
 use crate::body::{Body, Material};
+use crate::task::judge;
+use crate::task::recording::Seen;
 use crate::view::colour::Colour;
 use crate::view::scene::{Primitive, ruler};
 use crate::view::stage::Stage;
 use crate::view::walk::Walk;
-use crate::view::{colour, font};
+use crate::view::{colour, fonts};
 
 /// Side of the stimulus picture at zoom 1, pixels.
 const STIMULUS: f64 = 84.0;
 /// Distance from the picture's edges at zoom 1, pixels.
 const MARGIN: f64 = 10.0;
+
+/// Sizes of letters at zoom 1, pixels.
+const LARGE: f64 = 15.0;
+const SMALL: f64 = 11.0;
+/// Width for words beside the stimulus at zoom 1, pixels.
+const WORDS: f64 = 238.0;
 
 /// Everything around the world at a frame.
 pub fn panel(walk: &Walk, frame: usize, stage: &Stage) -> Vec<Primitive> {
@@ -35,6 +43,8 @@ pub struct Readout {
     pub time: String,
     /// Signed distance in the phase, with the direction as an arrow.
     pub displacement: String,
+    /// What that says ([`judge::verdict`]).
+    pub verdict: String,
 }
 
 /// The words for a frame.
@@ -53,10 +63,12 @@ pub fn readout(walk: &Walk, frame: usize) -> Readout {
     } else {
         '→'
     };
+    let Seen { class, label, .. } = &walk.phase(frame).seen;
     Readout {
-        label: walk.phase(frame).label.clone(),
+        label: label.clone(),
         time: format!("step {step}/{} · cycle {}", last - frames.start, number::fixed(cycles, 1)),
         displacement: format!("{arrow} {}", signed(d)),
+        verdict: judge::verdict(walk.recording().judge.as_ref(), d, *class, step >= last - frames.start),
     }
 }
 
@@ -70,7 +82,7 @@ pub fn signed(distance: f64) -> String {
 /// The picture as the sensors see it, the sensor voxels framed in their colour. Returns its width
 /// and height.
 fn stimulus(walk: &Walk, frame: usize, [x, y]: [f64; 2], z: f64, out: &mut Vec<Primitive>) -> [f64; 2] {
-    let image = &walk.phase(frame).stimulus;
+    let image = &walk.phase(frame).seen.stimulus;
     let longest = image.height().max(image.width()) as f64;
     let cell = (STIMULUS * z / longest).floor().max(1.0);
     let size = [cell * image.width() as f64, cell * image.height() as f64];
@@ -113,27 +125,23 @@ fn sensor_line(material: Material) -> Colour {
 fn readouts(walk: &Walk, frame: usize, [x, y]: [f64; 2], z: f64, out: &mut Vec<Primitive>) {
     let words = readout(walk, frame);
     let recording = walk.recording();
-    let mut line = |dy: f64, text: &str, dot: f64, colour, letters: usize| {
-        let text: String = if text.chars().count() > letters {
-            text.chars().take(letters - 1).chain(['…']).collect()
-        } else {
-            text.into()
-        };
-        out.extend(font::text(&text, [x, y + dy * z], dot * z, colour));
+    let mut line = |[dx, dy]: [f64; 2], text: &str, size: f64, bold, colour| {
+        let text = fonts::fitted(text, size, bold, WORDS - dx);
+        let wide = fonts::width(&text, size, bold);
+        out.push(Primitive::Text { text, at: [x + dx * z, y + dy * z], size: size * z, bold, colour });
+        dx + wide
     };
-    line(0.0, &words.label, 2.0, colour::INK, 19);
-    line(24.0, &words.time, 1.0, colour::FAINT, 38);
-    line(42.0, &words.displacement, 2.0, colour::TRACE, 19);
-    let letters = words.displacement.chars().count() as f64;
-    out.extend(font::text("voxel lengths", [x + (12.0 * letters + 4.0) * z, y + 49.0 * z], z, colour::FAINT));
+    line([0.0, 14.0], &words.label, LARGE, true, colour::INK);
+    line([0.0, 30.0], &words.time, SMALL, false, colour::FAINT);
+    let end = line([0.0, 49.0], &words.displacement, LARGE, true, colour::TRACE);
+    line([end + 5.0, 49.0], "voxel lengths", SMALL, false, colour::FAINT);
+    line([0.0, 67.0], &words.verdict, LARGE, true, colour::INK);
     let name = format!("robot {}", recording.robot);
-    let (note, colour) = if recording.unstable {
-        (format!("{name} · ended unstable"), colour::ALARM)
-    } else {
-        (name, colour::FAINT)
+    let (note, colour) = match recording.unstable {
+        true => (format!("{name} · ended unstable"), colour::ALARM),
+        false => (name, colour::FAINT),
     };
-    let note: String = note.chars().take(38).collect();
-    out.extend(font::text(&note, [x, y + 73.0 * z], z, colour));
+    line([0.0, 83.0], &note, SMALL, false, colour);
 }
 
 /// The materials that the body has.
@@ -162,7 +170,13 @@ fn legend(walk: &Walk, [x, y]: [f64; 2], z: f64, out: &mut Vec<Primitive>) {
             colour,
             smooth: true,
         }));
-        out.extend(font::text(material.name(), [x + 20.0 * z, top + z], z, colour::INK));
+        out.push(Primitive::Text {
+            text: material.name().to_string(),
+            at: [x + 22.0 * z, top + 8.5 * z],
+            size: SMALL * z,
+            bold: false,
+            colour: colour::INK,
+        });
     }
 }
 
@@ -175,9 +189,11 @@ fn numbers(walk: &Walk, frame: usize, stage: &Stage, out: &mut Vec<Primitive>) {
         let at = stage.to_pixels(frame, [zero + mark, 0.0]);
         let text = if mark == 0.0 { "0".into() } else { format!("{mark:+}").replace('-', "−") };
         // The sign hangs over: the digits stand under their tick.
-        let left = at[0] - (font::width(text.trim_start_matches(['+', '−'])) / 2.0) * z;
-        let sign = if mark == 0.0 { 0.0 } else { font::ADVANCE * z };
-        out.extend(font::text(&text, [(left - sign).round(), at[1] + 11.0 * z], z, colour::FAINT));
+        let size = SMALL * z;
+        let digits = fonts::width(text.trim_start_matches(['+', '−']), size, false);
+        let left = at[0] - digits / 2.0 - (fonts::width(&text, size, false) - digits);
+        let at = [left.round(), at[1] + 18.0 * z];
+        out.push(Primitive::Text { text, at, size, bold: false, colour: colour::FAINT });
     }
 }
 

@@ -172,7 +172,7 @@ pub fn make(console: &Console, replay: &Replay, wanted: &Wanted) -> Result<Vec<P
         console.line(&format!(
             "{}: sees {}, moves {} voxel lengths {way}",
             recording.robot,
-            phase.label,
+            phase.seen.label,
             number::fixed(phase.displacement.abs(), 2)
         ));
     }

@@ -58,10 +58,25 @@ pub enum Primitive {
         /// Whether its edges are smoothed.
         smooth: bool,
     },
+    /// Words.
+    Text {
+        /// The words.
+        text: String,
+        /// Where they begin on their base line.
+        at: [f64; 2],
+        /// Size of the letters, pixels.
+        size: f64,
+        /// Whether they are bold.
+        bold: bool,
+        /// Their colour.
+        colour: Colour,
+    },
 }
 
 /// Pixels per voxel length from which on materials are marked: smaller marks would be specks.
-const MARKED: f64 = 9.0;
+const MARKED: f64 = 5.0;
+/// Least width of a mark in pixels; in small voxels it takes more of their width than elsewhere.
+const MARK_PIXELS: f64 = 4.0;
 
 impl Primitive {
     /// A filled axis-parallel rectangle between two opposite corners.
@@ -179,11 +194,15 @@ fn body(walk: &Walk, frame: usize, window: &Window) -> Vec<Primitive> {
         out.extend(voxels().flat_map(|(material, corners)| {
             let colour = colour::mark_colour(material, colour::shade(material, area(&corners)));
             let width = (colour::MARK_WIDTH * window.scale).max(1.0);
+            let larger = (MARK_PIXELS / (colour::MARK_EXTENT * window.scale)).max(1.0);
             let line = move |points: &&[[f64; 2]]| Primitive::Line {
-                points: points.iter().map(|point| colour::placed(*point, corners)).collect(),
+                points: points
+                    .iter()
+                    .map(|point| colour::placed(point.map(|v| larger * v), corners))
+                    .collect(),
                 width,
                 colour,
-                smooth,
+                smooth: true,
             };
             colour::mark(material).iter().map(line)
         }));
@@ -293,7 +312,7 @@ mod tests {
             path.iter()
                 .filter_map(|p| match p {
                     Primitive::Line { points, .. } => Some(points.len()),
-                    Primitive::Quad { .. } => None,
+                    Primitive::Quad { .. } | Primitive::Text { .. } => None,
                 })
                 .max()
         };

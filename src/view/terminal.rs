@@ -73,7 +73,7 @@ pub fn frame(walk: &Walk, frame: usize, columns: usize, rows: usize, depth: Dept
     let colour = depth != Depth::Plain;
     let (columns, rows) = (columns.min(1000), rows.min(1000));
     let words = readout(walk, frame);
-    let status = format!("{}  {}  {}", words.label, words.time, words.displacement);
+    let status = format!("{}  {}  {}  {}", words.label, words.time, words.displacement, words.verdict);
     let status = if colour { status } else { status.replace(['·', '−'], "-").replace(['←', '→'], "") };
     let shown = status.chars().map(|c| if c.is_control() || (!colour && !c.is_ascii()) { '?' } else { c });
     let status: String = shown.chain(std::iter::repeat(' ')).take(columns).collect();
@@ -137,7 +137,7 @@ fn pixels(walk: &Walk, frame: usize, columns: usize, rows: usize, tall: f64) -> 
             }
         }
     }
-    let image = &walk.phase(frame).stimulus;
+    let image = &walk.phase(frame).seen.stimulus;
     if columns >= WIDE && 2 * image.width() < columns && image.height() < surface && tall == 1.0 {
         for ((row, column), intensity) in image.iter() {
             out[row * columns + column] = Pixel::Image(*intensity);

@@ -6,7 +6,7 @@ use crate::view::colour;
 use crate::view::plot::axes::{AXIS, Axis, MARGIN, Plot, heading};
 use crate::view::plot::canvas::{Canvas, Pen, TEXT, Words};
 use crate::view::plot::figure::{COLUMN, Figure};
-use crate::view::plot::{fonts, scales};
+use crate::view::{fonts, plot::scales};
 
 /// Robots that have a line of their own with their name; of more, lines are thin and nameless.
 const NAMED: usize = 40;

@@ -4,7 +4,7 @@ use crate::base::number;
 use crate::view::colour;
 use crate::view::colour::Colour;
 use crate::view::plot::canvas::{Canvas, HEADING, Pen, TEXT, Words};
-use crate::view::plot::{fonts, scales};
+use crate::view::{fonts, plot::scales};
 
 /// Line of an axis, points.
 const LINE: f64 = 0.6;

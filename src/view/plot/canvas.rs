@@ -4,7 +4,7 @@ use crate::base::number;
 use crate::base::text::shortened;
 use crate::view::colour;
 use crate::view::colour::Colour;
-use crate::view::plot::fonts;
+use crate::view::fonts;
 use std::fmt::Write;
 
 /// Most characters of a text.

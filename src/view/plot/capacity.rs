@@ -7,7 +7,7 @@ use crate::view::colour;
 use crate::view::plot::axes::{AXIS, Axis, MARGIN, Plot, heading, left_space};
 use crate::view::plot::canvas::{Anchor, Canvas, Pen, Words};
 use crate::view::plot::figure::{COLUMN, Figure, PAGE};
-use crate::view::plot::{fonts, scales};
+use crate::view::{fonts, plot::scales};
 
 /// Height of a panel, points.
 const PANEL: f64 = 104.0;

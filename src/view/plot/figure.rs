@@ -2,8 +2,8 @@
 
 use crate::view::colour;
 use crate::view::error::PictureError;
+use crate::view::fonts;
 use crate::view::plot::canvas::{escape, number};
-use crate::view::plot::fonts;
 use resvg::tiny_skia::{Pixmap, Transform};
 use resvg::usvg::{Options, Tree};
 

@@ -10,7 +10,6 @@ mod body;
 pub(super) mod canvas;
 mod capacity;
 mod figure;
-mod fonts;
 mod progress;
 mod response;
 pub(super) mod robot;

@@ -48,11 +48,11 @@ pub fn snapshots(recording: &Recording, every: usize, of: &str) -> Result<Figure
     for phase in 0..phases {
         let (row, column) = (phase / columns, phase % columns);
         let at = [MARGIN + column as f64 * (wide + 12.0), top + row as f64 * (panel_height + GAP)];
-        let label = &recording.phases[phase].label;
+        let label = &recording.phases[phase].seen.label;
         let d = signed(recording.phases[phase].displacement);
         let text = format!("{label}: {d} voxel lengths");
         canvas.fitted([at[0] + STIMULUS + 8.0, at[1] + 7.0], &text, plot_width, Words::default().bold());
-        robot::stimulus(&mut canvas, [at[0], at[1] + 1.0], STIMULUS, &recording.phases[phase].stimulus);
+        robot::stimulus(&mut canvas, [at[0], at[1] + 1.0], STIMULUS, &recording.phases[phase].seen.stimulus);
         let plot = Plot {
             at: [at[0] + STIMULUS + 8.0, at[1] + panel_height - 12.0 - high],
             size: [plot_width, high],

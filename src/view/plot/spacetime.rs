@@ -184,10 +184,10 @@ fn stimuli(canvas: &mut Canvas, walk: &Walk, rollout: &Range<usize>, plot: &Plot
             // Short phases of a long rollout have room for the picture only, or for nothing.
             let room = moment(plot, walk.phase_frames(k).len() as f64 / cycle) - top;
             if room >= STIMULUS + 6.0 {
-                robot::stimulus(canvas, at, STIMULUS, &phase.stimulus);
+                robot::stimulus(canvas, at, STIMULUS, &phase.seen.stimulus);
             }
             if room >= STIMULUS + 18.0 {
-                let name = phase.label.split(' ').next().expect("a split text has a first piece");
+                let name = phase.seen.label.split(' ').next().expect("a split text has a first piece");
                 canvas.fitted([at[0], at[1] + STIMULUS + 8.0], name, STIMULUS, Words::default().bold());
                 canvas.fitted(
                     [at[0], at[1] + STIMULUS + 17.0],
@@ -197,10 +197,10 @@ fn stimuli(canvas: &mut Canvas, walk: &Walk, rollout: &Range<usize>, plot: &Plot
                 );
             }
         } else {
-            let size = robot::stimulus(canvas, [left, top - STIMULUS - 4.0], STIMULUS, &phase.stimulus);
+            let size = robot::stimulus(canvas, [left, top - STIMULUS - 4.0], STIMULUS, &phase.seen.stimulus);
             let x = left + size[0] + 4.0;
             let most = plot.size[0] - size[0] - 4.0;
-            canvas.fitted([x, top - STIMULUS + 4.0], &phase.label, most, Words::default().bold());
+            canvas.fitted([x, top - STIMULUS + 4.0], &phase.seen.label, most, Words::default().bold());
             canvas.fitted([x, top - STIMULUS + 14.0], &words, most, Words::default());
         }
     }

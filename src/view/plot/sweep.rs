@@ -5,7 +5,7 @@ use crate::view::colour;
 use crate::view::plot::axes::{AXIS, Axis, MARGIN, Plot, heading};
 use crate::view::plot::canvas::{Canvas, Pen, TEXT, Words};
 use crate::view::plot::figure::{COLUMN, Figure};
-use crate::view::plot::{fonts, scales};
+use crate::view::{fonts, plot::scales};
 
 /// Height of a line, points.
 const LINE: f64 = 10.5;

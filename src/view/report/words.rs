@@ -9,6 +9,7 @@ use crate::store::capacity::CapacityFile;
 use crate::store::eval::Mean;
 use crate::store::folder::in_shell;
 use crate::store::names::{CONFIG, EVAL_JSON};
+use crate::task::direction;
 use crate::task::fitness::Fitness;
 use crate::task::protocol::RolloutMode;
 use crate::task::stimulus::Encoding;
@@ -152,7 +153,7 @@ pub(super) fn commands(dossier: &Dossier) -> String {
             "morphcog eval --archive {again} --images {images} --seed {seed} --robots {}",
             ids.join(",")
         );
-        if report.threshold != showing::THRESHOLD {
+        if report.threshold != direction::THRESHOLD {
             line += &format!(" --threshold {}", report.threshold);
         }
         let cycles = report.control_steps / dossier.run.config.physics.cycle_steps.max(1);

@@ -1,4 +1,4 @@
-//! The fonts of figures: embedded, so that pictures are the same on every machine.
+//! The fonts of figures and pictures: embedded, so that they are the same on every machine.
 //!
 //! An SVG names a list of families as wide as the embedded one or a little narrower: with any of
 //! them the words fit.
@@ -8,12 +8,17 @@ use skrifa::prelude::{LocationRef, Size};
 use skrifa::{FontRef, MetadataProvider};
 use std::sync::{Arc, LazyLock};
 
-const REGULAR: &[u8] = include_bytes!("../assets/DejaVuSansCondensed-subset.ttf");
-const BOLD: &[u8] = include_bytes!("../assets/DejaVuSansCondensed-Bold-subset.ttf");
+const REGULAR: &[u8] = include_bytes!("assets/DejaVuSansCondensed-subset.ttf");
+const BOLD: &[u8] = include_bytes!("assets/DejaVuSansCondensed-Bold-subset.ttf");
 const FAMILY: &str = "DejaVu Sans Condensed";
 
 /// What the figures' SVG asks for.
 pub const FAMILIES: &str = "'DejaVu Sans Condensed', Arial, Helvetica, 'Liberation Sans', sans-serif";
+
+/// An embedded font.
+pub fn font(bold: bool) -> FontRef<'static> {
+    FontRef::new(if bold { BOLD } else { REGULAR }).expect("the embedded fonts are fonts: a test reads them")
+}
 
 /// The embedded fonts and no others.
 pub fn database() -> Arc<Database> {
@@ -29,7 +34,7 @@ pub fn database() -> Arc<Database> {
 
 /// Width of a text in points at a font size.
 pub fn width(text: &str, size: f64, bold: bool) -> f64 {
-    let Ok(font) = FontRef::new(if bold { BOLD } else { REGULAR }) else { return 0.0 };
+    let font = font(bold);
     let metrics = font.glyph_metrics(Size::new(size as f32), LocationRef::default());
     let charmap = font.charmap();
     let advance =
@@ -80,8 +85,7 @@ mod tests {
 
     #[test]
     fn the_fonts_have_every_letter_that_figures_use() {
-        for font in [REGULAR, BOLD] {
-            let font = FontRef::new(font).unwrap();
+        for font in [font(false), font(true)] {
             for letter in "aäßéŁΔσ0–—−×·±²→←≥≤…%|'“”°µ".chars() {
                 assert!(font.charmap().map(letter).is_some(), "{letter}");
             }

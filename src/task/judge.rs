@@ -1,11 +1,8 @@
 //! [`Judge`]: what a walk says about the image.
 
-use crate::task::direction::{Assignment, Direction};
+use crate::task::direction::{Assignment, Direction, THRESHOLD};
 use crate::task::grouping::{Group, Split};
 use serde::Serialize;
-
-/// Displacements up to this many voxel lengths say nothing (paper, section "Generalization test").
-pub const THRESHOLD: f64 = 3.0;
 
 /// What robots of a task say by walking one way or the other.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
@@ -54,6 +51,22 @@ pub fn answer(judge: Option<&Judge>, moved: f64) -> Answer {
     Answer { moved, way: way.map(name), says }
 }
 
+/// The answer in words, as every view says it: empty while a walk says nothing, "0", "1 or 2". With
+/// `over`, the walk has ended: "0: right" or "0: wrong" if the image's `class` is one of the task's,
+/// and "undecided" if it says nothing. Empty without a judge.
+pub fn verdict(judge: Option<&Judge>, moved: f64, class: u8, over: bool) -> String {
+    let Some(judge) = judge else { return String::new() };
+    let says = answer(Some(judge), moved).says;
+    let classes = says.iter().map(u8::to_string).collect::<Vec<_>>().join(" or ");
+    let is_known = judge.left.contains(&class) || judge.right.contains(&class);
+    match (says.is_empty(), over && is_known) {
+        (true, _) if over => "undecided".to_string(),
+        (true, _) => String::new(),
+        (false, false) => classes,
+        (false, true) => format!("{classes}: {}", if says.contains(&class) { "right" } else { "wrong" }),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -69,6 +82,16 @@ mod tests {
         assert_eq!((says(-3.1).says, says(-3.1).way), (vec![1, 2], Some("left")));
         assert_eq!((says(3.0).says, says(-3.0).way), (vec![], None));
         assert_eq!((answer(None, -8.0).says, answer(None, -8.0).way), (vec![], Some("left")));
+        let words = |moved, class, over| verdict(judge.as_ref(), moved, class, over);
+        assert_eq!(
+            [words(5.0, 0, false), words(5.0, 0, true), words(5.0, 1, true)],
+            ["0", "0: right", "0: wrong"]
+        );
+        assert_eq!([words(-5.0, 2, true), words(-5.0, 7, true)], ["1 or 2: right", "1 or 2"]);
+        assert_eq!(
+            [words(2.0, 0, false), words(2.0, 0, true), verdict(None, 9.0, 0, true)],
+            ["", "undecided", ""]
+        );
         let all = Grouping::all_splits(&[0, 1], true).unwrap();
         assert_eq!(Judge::of(&all.tasks()[1], Assignment { a: Direction::Left }), None);
     }
