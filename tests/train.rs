@@ -101,6 +101,41 @@ fn a_training_ends_with_the_same_bytes_on_any_threads_and_after_any_stop() {
 }
 
 #[test]
+fn a_response_that_was_measured_before_is_taken_and_changes_nothing() {
+    let sandbox = sandbox();
+    let train = |out: &str, more: &str| {
+        let command = format!("train -q -a walkers --task 0|1 --robots top:2 {LITTLE} -o {out} {more}");
+        sandbox.run(&command).ended(0, &[]);
+        let log: serde_json::Value =
+            serde_json::from_str(&sandbox.read(&format!("{out}/training.json"))).unwrap();
+        log["rollouts"].clone()
+    };
+    let without = [train("one", ""), train("other-seed", "--seed 7")];
+    // Fewer rollouts than train asks for would do; here are more.
+    sandbox.run("response -q -a walkers --robots top:2 --images 60 --error 0").ended(0, &[]);
+    let with = [train("one", "--force"), train("other-seed", "--force --seed 7")];
+    assert!(without == with);
+    // It is what train begins with, for every seed: nothing of it is simulated again.
+    assert_eq!(with[0][0], with[1][0]);
+    assert_ne!(with[0][1], with[1][1]);
+    let text = sandbox.read("walkers/response.json");
+    let mut measured: serde_json::Value = serde_json::from_str(&text).unwrap();
+    let first = &mut measured["robots"][0]["displacements"][0];
+    *first = (first.as_f64().unwrap() + 0.5).into();
+    let changed = first.clone();
+    sandbox.write("walkers/response.json", measured.to_string());
+    assert_eq!(train("one", "--force")[0][0], changed);
+    // That of another seed, or of other physics, is not.
+    sandbox.run("response -q -a walkers --robots top:2 --images 60 --error 0 --seed 8").ended(0, &[]);
+    assert!(train("one", "--force") == without[0]);
+    sandbox.write("walkers/response.json", &text);
+    assert_ne!(train("one", "--force --set physics.gravity=90")[0], without[0][0]);
+    // One that is damaged is said, and measured again.
+    sandbox.write("walkers/response.json", "{");
+    assert!(train("one", "--force") == without[0]);
+}
+
+#[test]
 fn what_cannot_be_trained_is_one_clear_error_and_writes_nothing() {
     let sandbox = sandbox();
     let refused = |options: &str, code: i32, words: &[&str]| {

@@ -63,8 +63,8 @@ pub struct Options {
     pub images: usize,
     /// The relative error of the slopes at which a measurement ends.
     pub error: f64,
-    /// Seed of the random images.
-    pub seed: u64,
+    /// Seed of the random images, and of random robots; `None`: that of the run, as `train` has it.
+    pub seed: Option<u64>,
     /// Where the data are, if the command line says.
     pub data: Option<PathBuf>,
     /// Where the results go (response.json; CSV and pictures beside it).
@@ -122,8 +122,9 @@ pub fn measure(options: &Options, stop: &AtomicBool, observer: &dyn Observer) ->
         }
     }
     check_names(options, &subjects)?;
-    let images = images(options, &provenance)?;
-    let probing = Probing::new(&conditions(config, options.images), options.seed);
+    let seed = options.seed.unwrap_or(config.seed);
+    let images = images(options, &provenance, seed)?;
+    let probing = Probing::new(&conditions(config, options.images), seed);
     let pool = pool(options.threads)?;
     let run_seed = config.seed;
     let mut file = ResponseFile {
@@ -133,14 +134,14 @@ pub fn measure(options: &Options, stop: &AtomicBool, observer: &dyn Observer) ->
         run: provenance.run.clone(),
         run_seed,
         run_sha256: provenance.sha256.clone(),
-        setting: images.setting(options, config, &probing)?,
+        setting: images.setting(options, seed, config, &probing)?,
         robots: Vec::new(),
     };
     if !subjects.is_empty() {
         let label = format!("measuring {} robots:", subjects.len());
         observer.begins(&Work::new(label, (subjects.len() * options.images) as u64, "rollouts"));
     }
-    let measuring = Measuring { options, config, probing, images, stop };
+    let measuring = Measuring { options, config, probing, images, seed, stop };
     let mut unwritten = Unwritten::default();
     let mut stopped = false;
     for (number, subject) in subjects.iter().enumerate() {
@@ -190,7 +191,7 @@ fn check_numbers(options: &Options) -> Result<(), Error> {
     if !(0.0..1.0).contains(error) {
         return Err(Error::usage(format!("--error {error}: expected 0 or more, and below 1")));
     }
-    if *seed > MAX_NUMBER {
+    if let Some(seed) = seed.filter(|seed| *seed > MAX_NUMBER) {
         return Err(Error::usage(format!("--seed {seed}: expected at most {MAX_NUMBER}")));
     }
     Ok(())
@@ -229,7 +230,8 @@ fn provenance(options: &Options) -> Result<Provenance, Error> {
     };
     let source = Source::read(path)?;
     let chosen = Selection::Ids(options.robots.clone()).physical(options.physical_only);
-    let chosen = chosen.of(std::slice::from_ref(&source), options.seed)?;
+    let seed = options.seed.unwrap_or(source.run.config.seed);
+    let chosen = chosen.of(std::slice::from_ref(&source), seed)?;
     let robots = chosen.iter().map(|chosen| (chosen.robot.id.clone(), chosen.robot.body.clone())).collect();
     let sha256 = source.run.fingerprint();
     let run = &source.run;
@@ -256,7 +258,7 @@ struct Images {
 }
 
 /// The training images of the task's classes; none without a task.
-fn images(options: &Options, provenance: &Provenance) -> Result<Images, Error> {
+fn images(options: &Options, provenance: &Provenance, seed: u64) -> Result<Images, Error> {
     let Some(task) = &options.task else { return Ok(Images::default()) };
     let config = &provenance.config;
     let mut whereabouts = Whereabouts::given(options.data.as_deref());
@@ -267,7 +269,7 @@ fn images(options: &Options, provenance: &Provenance) -> Result<Images, Error> {
     let classes = task.concat();
     let per_class = IMAGES_PER_CLASS.min(scarcest(&dataset, &classes, LEAST_PER_CLASS)?);
     let failed = |error: DatasetError| Error::input(error.to_string());
-    let drawn = dataset.draw(Split::Train, &classes, per_class, options.seed, 0).map_err(failed)?;
+    let drawn = dataset.draw(Split::Train, &classes, per_class, seed, 0).map_err(failed)?;
     let labels = classes.iter().flat_map(|class| std::iter::repeat_n(*class, per_class));
     let see = |(label, index)| Ok((label, see(config, &dataset, Split::Train, index)?));
     let seen: Result<Vec<_>, Error> = labels.zip(drawn).map(see).collect();
@@ -280,14 +282,20 @@ fn reference(dataset: &Dataset) -> DatasetRef {
 }
 
 impl Images {
-    fn setting(&self, options: &Options, config: &Config, probing: &Probing) -> Result<Setting, Error> {
+    fn setting(
+        &self,
+        options: &Options,
+        seed: u64,
+        config: &Config,
+        probing: &Probing,
+    ) -> Result<Setting, Error> {
         let name = |[a, b]: &[Vec<u8>; 2]| {
             let grouping =
                 Grouping::two_groups(a, b).map_err(|error| Error::usage(format!("--task: {error}")));
             grouping.map(|grouping| grouping.tasks()[0].name())
         };
         Ok(Setting {
-            seed: options.seed,
+            seed,
             images: options.images,
             error: options.error,
             dataset: self.dataset.clone(),
@@ -314,6 +322,7 @@ struct Measuring<'a> {
     config: &'a Config,
     probing: Probing,
     images: Images,
+    seed: u64,
     stop: &'a AtomicBool,
 }
 
@@ -327,6 +336,7 @@ impl Measuring<'_> {
     ) -> Result<Option<RobotResponse>, Stopped> {
         let Measuring { options, config, probing, stop, .. } = self;
         let mut shown: Vec<Shown> = Vec::new();
+        let mut displacements: Vec<Option<f64>> = Vec::new();
         let mut rollouts = 0;
         loop {
             let numbers = rollouts..options.images.min(rollouts + BATCH);
@@ -340,7 +350,9 @@ impl Measuring<'_> {
                     &|_| (),
                     stop,
                 )?;
-                Ok(rolled.into_iter().map(Result::ok).collect())
+                let rolled: Vec<Option<f64>> = rolled.into_iter().map(Result::ok).collect();
+                displacements.extend(&rolled);
+                Ok(rolled)
             })?);
             progress(rollouts);
             check(stop)?;
@@ -358,12 +370,11 @@ impl Measuring<'_> {
                 Some(task) => {
                     let examples = self.images.examples(gait, config, task);
                     let threshold = direction::THRESHOLD;
-                    teachable(&shown, response.scatter, &examples, threshold, options.seed, stop)?
+                    teachable(&shown, response.scatter, &examples, threshold, self.seed, stop)?
                 }
             };
-            let counts = [rollouts, rollouts - shown.len()];
             let taught = taught.map(Into::into);
-            return Ok(Some(RobotResponse::new(id, gait, &response, counts, ended_by, taught)));
+            return Ok(Some(RobotResponse::new(id, gait, &response, displacements, ended_by, taught)));
         }
     }
 }

@@ -30,7 +30,8 @@ then
 All soft voxels and sensors of a robot are made wide, narrow or left at rest by random images, each
 independently of the others: by how much does each move the body? A measurement ends when the slopes
 are known well enough (--error), or after --images rollouts. Images of a dataset are only needed
-with --task. Ctrl-C stops it.";
+with --task. `train` takes what is in response.json for its own first rollouts, for any task: if
+many trainings begin with the same gaits, measure these first. Ctrl-C stops it.";
 
 /// Two groups of classes.
 type Groups = [Vec<u8>; 2];
@@ -55,9 +56,9 @@ pub(super) struct ResponseArgs {
     /// before the last image.
     #[arg(long, default_value_t = 0.2)]
     error: f64,
-    /// Seed of what is drawn: random images, and robots with random:N.
-    #[arg(long, default_value_t = 1)]
-    seed: u64,
+    /// Seed of what is drawn: random images, and robots with random:N (default: that of the run).
+    #[arg(long)]
+    seed: Option<u64>,
     /// Folder with the images of the task.
     #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,
@@ -85,7 +86,7 @@ pub(super) fn run(args: ResponseArgs, console: &Console) -> Result<(), Error> {
         robots,
         archives: archive.iter().cloned().collect(),
         physical_only: args.physical_only,
-        seed: args.seed,
+        seed: args.seed.unwrap_or(1),
         data: args.data.clone(),
     };
     let robots = choice::one_by_one(&search, console)?;

@@ -24,7 +24,8 @@ use crate::search::{held_out, validation};
 use crate::store::folder::{IfExists, RunFolder};
 use crate::store::images::ImageRef;
 use crate::store::metrics::{Metrics, Totals};
-use crate::store::names::{CONFIG, ELITES, RUN_JSON, TRAINING_JSON};
+use crate::store::names::{CONFIG, ELITES, RESPONSE_JSON, RUN_JSON, TRAINING_JSON};
+use crate::store::response::ResponseFile;
 use crate::store::robots::{Selection, Source};
 use crate::store::run::{Dimensions, FORMAT, FORMAT_VERSION, Robot, RunFile};
 use crate::store::training::{Batch, FILE, File, Origin};
@@ -129,6 +130,9 @@ pub fn train(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> R
     let origin = origin(&source, &dataset)?;
     held_out::check(&config, &dataset)?;
     let walkers = walkers(&source, &options.robots, config.seed)?;
+    // A gait's response is the same for every task and every seed of a training.
+    let probing = Probing::new(&training.conditions, source.run.config.seed);
+    let measured = measured(&source, &config, &probing, &walkers, observer);
     let [log, run] = [TRAINING_JSON, RUN_JSON].map(|name| options.out.join(name));
     if options.if_exists == IfExists::Resume && run.exists() && !log.exists() {
         let text = format!("{}: the run in this folder is no training", options.out.display());
@@ -141,7 +145,7 @@ pub fn train(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> R
         let path = folder.path().join(name);
         write_atomically(&path, content).map_err(|error| Error::writing(&path, &error))
     };
-    let key = key(&config, &walkers, &training);
+    let key = key(&config, source.run.config.seed, &walkers, &training);
     let mut log = Log::open(log, key, stop)?;
     write(CONFIG, config.to_toml().as_bytes())?;
     whereabouts::remember(&folder, &dataset)?;
@@ -150,8 +154,7 @@ pub fn train(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> R
     let (gaits, images) = (walkers.len(), training.images.len());
     observer
         .note(&format!("training in {}: {gaits} gaits, {images} training images", folder.path().display()));
-    let probing = Probing::new(&training.conditions, config.seed);
-    let trainer = Trainer { config: &config, training: &training, probing };
+    let trainer = Trainer { config: &config, training: &training, probing, measured };
     let taught = pool.install(|| trainer.train(&walkers, &mut log, observer));
     // What was simulated is kept, however it ended.
     let saved = log.save();
@@ -241,14 +244,40 @@ fn walkers<'a>(source: &'a Source, robots: &Selection, seed: u64) -> Result<Vec<
     Ok(walkers)
 }
 
+/// What `morphcog response` measured of each gait, where it lies beside the run and holds for this
+/// training: what would be simulated again otherwise.
+fn measured(
+    source: &Source,
+    config: &Config,
+    probing: &Probing,
+    walkers: &[Walker],
+    observer: &dyn Observer,
+) -> Vec<Batch> {
+    let nothing = || vec![Vec::new(); walkers.len()];
+    let path = source.path.with_file_name(RESPONSE_JSON);
+    let of_run = &source.run.config;
+    if !path.exists() || (&config.physics, &config.protocol) != (&of_run.physics, &of_run.protocol) {
+        return nothing();
+    }
+    let file = match ResponseFile::read(&path) {
+        Ok(file) => file,
+        Err(error) => {
+            observer.warning(&format!("{error}; responses are measured again"));
+            return nothing();
+        }
+    };
+    let (run, seed, conditions) = (&source.run, of_run.seed, probing.conditions());
+    walkers.iter().map(|walker| file.known(run, seed, conditions, &walker.gait).to_vec()).collect()
+}
+
 /// Of all that rollouts depend on; more challengers come after those that there were.
-fn key(config: &Config, walkers: &[Walker], training: &Training) -> String {
+fn key(config: &Config, seed_of_gaits: u64, walkers: &[Walker], training: &Training) -> String {
     let bodies: Vec<String> = walkers.iter().map(|walker| walker.robot.body.to_string()).collect();
     let images: Vec<usize> = training.images.iter().map(|image| image.index).collect();
     let train = TrainConfig { challengers: 0, ..config.train };
     let essence = Config { train, ..config.essence() }.to_toml();
     let text = format!(
-        "{} {essence} {bodies:?} {} {images:?}",
+        "{} {essence} {seed_of_gaits} {bodies:?} {} {images:?}",
         env!("CARGO_PKG_VERSION"),
         training.dataset.train_sha256
     );
@@ -291,12 +320,12 @@ impl<'a> Log<'a> {
         Ok(Log { path, key, batches, asked: 0, simulated: 0, saved, stop })
     }
 
-    /// Rollouts of a body under stimuli and conditions.
+    /// Rollouts of a body under stimuli and conditions; the first are `known`.
     fn rollouts(
         &mut self,
         body: &Body,
-        stimuli: &[Grid<f64>],
-        conditions: &[Condition],
+        (stimuli, conditions): (&[Grid<f64>], &[Condition]),
+        known: &[Option<f64>],
         config: &Config,
     ) -> Result<Batch, Error> {
         let number = self.asked;
@@ -317,12 +346,14 @@ impl<'a> Log<'a> {
             };
         }
         let setting = (&config.physics, &config.protocol);
+        let known = &known[..known.len().min(stimuli.len())];
+        let (stimuli, conditions) = (&stimuli[known.len()..], &conditions[known.len()..]);
         let found = fresh_rollouts(body, stimuli, conditions, setting, &|_| (), self.stop);
         let (found, _) = found.map_err(|_| {
             Error::stopped("stopped; what was simulated is saved".to_string())
                 .hint("the same command with --resume goes on".to_string())
         })?;
-        let batch: Batch = found.into_iter().map(Result::ok).collect();
+        let batch: Batch = known.iter().copied().chain(found.into_iter().map(Result::ok)).collect();
         self.batches.push(batch.clone());
         if self.saved.1.elapsed() >= SAVE_EVERY {
             self.save()?;
@@ -352,6 +383,8 @@ struct Trainer<'a> {
     config: &'a Config,
     training: &'a Training,
     probing: Probing,
+    /// Displacements of each gait under random images that are known before.
+    measured: Vec<Batch>,
 }
 
 /// Rollouts that are kept.
@@ -367,24 +400,29 @@ impl Rollouts for Kept<'_, '_> {
     fn roll(&mut self, body: &Body, stimuli: &[Grid<f64>], conditions: &[usize]) -> Result<Batch, Error> {
         let conditions: Vec<Condition> =
             conditions.iter().map(|number| self.conditions[*number].clone()).collect();
-        self.log.rollouts(body, stimuli, &conditions, self.config)
+        self.log.rollouts(body, (stimuli, &conditions), &[], self.config)
     }
 }
 
 impl Trainer<'_> {
     /// Measures a gait's response; `None` if most of its rollouts are unstable.
-    fn response(&self, gait: &Gait, log: &mut Log) -> Result<Option<Response>, Error> {
+    fn response(
+        &self,
+        gait: &Gait,
+        measured: &[Option<f64>],
+        log: &mut Log,
+    ) -> Result<Option<Response>, Error> {
         let Trainer { config, probing, .. } = self;
         let count = config.train.random_images;
         let shown = probing.shown(gait, &config.physics, 0..count, |probe, stimuli, conditions| {
-            log.rollouts(probe, stimuli, conditions, config)
+            log.rollouts(probe, (stimuli, conditions), measured, config)
         })?;
         Ok(response(&shown, count))
     }
 
     /// The training images as a gait sees them; both groups weigh the same.
     fn images(&self, gait: &Gait) -> Vec<Image> {
-        let Trainer { config, training, probing } = self;
+        let Trainer { config, training, probing, .. } = self;
         let all = probing.conditions();
         let [a, b] = config.task.groups.as_ref().expect("a training has two groups");
         let of =
@@ -425,9 +463,9 @@ impl Trainer<'_> {
         let plan = self.plan();
         let Trainer { config, probing, .. } = self;
         let mut best: Option<(&Walker, Teacher)> = None;
-        for walker in walkers {
+        for (walker, measured) in walkers.iter().zip(&self.measured) {
             let gait = &walker.gait;
-            let Some(response) = self.response(gait, log)? else { continue };
+            let Some(response) = self.response(gait, measured, log)? else { continue };
             told_response(observer, &walker.robot.id, gait, &response);
             let mut teacher = Teacher::new(gait, &response, self.images(gait), plan, &config.physics);
             let conditions = probing.conditions();

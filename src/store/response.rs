@@ -1,10 +1,12 @@
 //! `response.json` and `response.csv`: the responses of robots' gaits, beside the run's `run.json`.
 
 use crate::base::error::Error;
-use crate::base::files::write_atomically;
+use crate::base::files::{read_text, write_atomically};
 use crate::base::table;
 use crate::body::Body;
+use crate::config::reading;
 use crate::store::images::DatasetRef;
+use crate::store::run::RunFile;
 use crate::task::perturbation::Condition;
 use crate::task::response::{Gait, Response};
 use crate::task::teachable::{Estimate, Teachable};
@@ -108,6 +110,9 @@ pub struct RobotResponse {
     pub intercept: f64,
     /// The same under each condition; none of one without stable rollouts.
     pub intercepts: Vec<Option<f64>>,
+    /// Displacement of the gait under each random image, in the order in which they are drawn \[voxel
+    /// lengths\]; `null` where unstable. `train` begins with them.
+    pub displacements: Vec<Option<f64>>,
     /// The soft voxels and sensors, row-major.
     pub places: Vec<Place>,
     /// What the gait could be taught, if that was asked for.
@@ -165,12 +170,12 @@ impl From<Teachable> for Taught {
 }
 
 impl RobotResponse {
-    /// What `rollouts` told of a gait.
+    /// What rollouts under random images told of a gait.
     pub(crate) fn new(
         id: &str,
         gait: &Gait,
         response: &Response,
-        [rollouts, unstable]: [usize; 2],
+        displacements: Vec<Option<f64>>,
         ended_by: EndedBy,
         taught: Option<Taught>,
     ) -> Self {
@@ -184,8 +189,9 @@ impl RobotResponse {
         RobotResponse {
             id: id.to_string(),
             body: gait.built(&gait.design()),
-            rollouts,
-            unstable,
+            rollouts: displacements.len(),
+            unstable: displacements.iter().filter(|displacement| displacement.is_none()).count(),
+            displacements,
             ended_by,
             relative_error: response.relative_error(),
             r_squared: response.r_squared,
@@ -201,6 +207,35 @@ impl RobotResponse {
 }
 
 impl ResponseFile {
+    /// Reads a file.
+    ///
+    /// # Errors
+    /// What is wrong with the file, with its line and key.
+    pub fn read(path: &Path) -> Result<Self, Error> {
+        let text = read_text(path).map_err(|error| Error::reading(path, &error))?;
+        reading::read_versioned(&text, &path.display().to_string(), FORMAT, FORMAT_VERSION)
+    }
+
+    /// The displacements of a gait under the first random images of a seed, if they were measured for
+    /// this run as it is, by this version, under these conditions.
+    pub(crate) fn known(
+        &self,
+        run: &RunFile,
+        seed: u64,
+        conditions: &[Condition],
+        gait: &Gait,
+    ) -> &[Option<f64>] {
+        let Setting { seed: own, conditions: shown, .. } = &self.setting;
+        let is_of_it =
+            self.run_sha256 == run.fingerprint() && self.program_version == env!("CARGO_PKG_VERSION");
+        let has_gait =
+            |robot: &&RobotResponse| Gait::of(&robot.body).is_some_and(|own| own.probe() == gait.probe());
+        match is_of_it && *own == seed && shown == conditions {
+            true => self.robots.iter().find(has_gait).map_or(&[], |robot| &robot.displacements),
+            false => &[],
+        }
+    }
+
     /// Its text: the head on one line, then one line per robot.
     pub fn to_json(&self) -> String {
         let head = ResponseFile { robots: Vec::new(), ..self.clone() };

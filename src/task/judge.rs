@@ -51,8 +51,8 @@ pub fn answer(judge: Option<&Judge>, moved: f64) -> Answer {
     Answer { moved, way: way.map(name), says }
 }
 
-/// The answer in words, as every view says it: empty while a walk says nothing, "0", "1 or 2". With
-/// `over`, the walk has ended: "0: right" or "0: wrong" if the image's `class` is one of the task's,
+/// The answer in words: empty while a walk says nothing, "says 0", "says 1 or 2". With `over`, the
+/// walk has ended: "says 0: correct" or "says 0: wrong" if the image's `class` is one of the task's,
 /// and "undecided" if it says nothing. Empty without a judge.
 pub fn verdict(judge: Option<&Judge>, moved: f64, class: u8, over: bool) -> String {
     let Some(judge) = judge else { return String::new() };
@@ -62,8 +62,10 @@ pub fn verdict(judge: Option<&Judge>, moved: f64, class: u8, over: bool) -> Stri
     match (says.is_empty(), over && is_known) {
         (true, _) if over => "undecided".to_string(),
         (true, _) => String::new(),
-        (false, false) => classes,
-        (false, true) => format!("{classes}: {}", if says.contains(&class) { "right" } else { "wrong" }),
+        (false, false) => format!("says {classes}"),
+        (false, true) => {
+            format!("says {classes}: {}", if says.contains(&class) { "correct" } else { "wrong" })
+        }
     }
 }
 
@@ -85,9 +87,9 @@ mod tests {
         let words = |moved, class, over| verdict(judge.as_ref(), moved, class, over);
         assert_eq!(
             [words(5.0, 0, false), words(5.0, 0, true), words(5.0, 1, true)],
-            ["0", "0: right", "0: wrong"]
+            ["says 0", "says 0: correct", "says 0: wrong"]
         );
-        assert_eq!([words(-5.0, 2, true), words(-5.0, 7, true)], ["1 or 2: right", "1 or 2"]);
+        assert_eq!([words(-5.0, 2, true), words(-5.0, 7, true)], ["says 1 or 2: correct", "says 1 or 2"]);
         assert_eq!(
             [words(2.0, 0, false), words(2.0, 0, true), verdict(None, 9.0, 0, true)],
             ["", "undecided", ""]

@@ -68,7 +68,7 @@ pub fn readout(walk: &Walk, frame: usize) -> Readout {
         label: label.clone(),
         time: format!("step {step}/{} · cycle {}", last - frames.start, number::fixed(cycles, 1)),
         displacement: format!("{arrow} {}", signed(d)),
-        verdict: judge::verdict(walk.recording().judge.as_ref(), d, *class, step >= last - frames.start),
+        verdict: judge::verdict(walk.recording().judge.as_ref(), d, *class, frame + 1 >= frames.end),
     }
 }
 

@@ -37,7 +37,7 @@
     const says = Math.abs(d) > rollout.threshold ? (d < 0 ? rollout.judge.left : rollout.judge.right) : [];
     if (!says.length) return over ? "undecided" : "";
     const known = over && [...rollout.judge.left, ...rollout.judge.right].includes(phases[p].class);
-    return says.join(" or ") + (known ? (says.includes(phases[p].class) ? ": right" : ": wrong") : "");
+    return "says " + says.join(" or ") + (known ? (says.includes(phases[p].class) ? ": correct" : ": wrong") : "");
   };
   const moved = (f) => origin(f, 0) - origin(phases[phaseOf(f)].first, 0);
   const signed = (d) => {
@@ -149,7 +149,7 @@
     $("step").textContent = `${step} of ${stepsIn(p)}`;
     $("cycle").textContent = (step / rollout.cycle).toFixed(1);
     $("moved").textContent = (Math.abs(d) < 0.005 ? "" : d < 0 ? "← " : "→ ") + signed(d);
-    $("verdict").textContent = verdict(p, d, step === stepsIn(p));
+    $("verdict").textContent = verdict(p, d, frame === N - 1 || phaseOf(frame + 1) !== p);
     $("time").value = frame;
     $("time").setAttribute("aria-valuetext", `${phases[p].label}, step ${step} of ${stepsIn(p)}`);
     $("world").setAttribute("aria-label", `The robot sees ${phases[p].label}; step ${step}; moved ${signed(d)} voxel lengths`);

@@ -124,6 +124,7 @@ mod tests {
         let places = slopes.into_iter().enumerate();
         let place = |(column, (slope, error)): (usize, (f64, f64))| Place { row: 0, column, slope, error };
         RobotResponse {
+            displacements: vec![Some(1.0); 60],
             id: "a".to_string(),
             body: "256/314/000".parse().unwrap(),
             rollouts: 120,
