@@ -17,7 +17,8 @@ pub struct TrainConfig {
     /// two for each soft voxel and sensor the slopes are mostly noise.
     pub random_images: usize,
     /// Rounds in which the response is measured around the latest design, and the lesson is solved
-    /// again. Default 6: more seldom help.
+    /// again. Default 6: more seldom help. 0: the robot keeps its own soft voxels and sensors, and is
+    /// only refined; of several robots, the fittest.
     pub rounds: usize,
     /// Training images that a round shows. Default 120: with fewer, slopes are noisier, and the
     /// constant is off.
@@ -61,7 +62,6 @@ impl TrainConfig {
         let least = [
             ("images_per_class", self.images_per_class, 1),
             ("random_images", self.random_images, LEAST_RANDOM_IMAGES),
-            ("rounds", self.rounds, 1),
             ("images", self.images, 2),
             ("final_images", self.final_images, 2),
         ];

@@ -469,8 +469,14 @@ impl Trainer<'_> {
             told_response(observer, &walker.robot.id, gait, &response);
             let mut teacher = Teacher::new(gait, &response, self.images(gait), plan, &config.physics);
             let conditions = probing.conditions();
-            let round = teacher.round(&mut Kept { config, conditions, log })?;
-            told_round(observer, &walker.robot.id, &round, &plan);
+            let mut rollouts = Kept { config, conditions, log };
+            if plan.rounds == 0 {
+                let fitness = teacher.own(&mut rollouts)?;
+                told_own(observer, &walker.robot.id, fitness);
+                best = Some((walker, teacher));
+                break;
+            }
+            told_round(observer, &walker.robot.id, &teacher.round(&mut rollouts)?, &plan);
             if best.as_ref().is_none_or(|(_, best)| teacher.predicted() > best.predicted()) {
                 best = Some((walker, teacher));
             }
@@ -495,6 +501,11 @@ fn told_response(observer: &dyn Observer, robot: &str, gait: &Gait, response: &R
     observer.note(&format!(
         "{robot}: {places} soft voxels and sensors explain {share} % of its response; the rest is {noise} voxel lengths"
     ));
+}
+
+fn told_own(observer: &dyn Observer, robot: &str, fitness: f64) {
+    observer.note(&format!("{robot}: fitness {} as it is", number::fixed(fitness, 2)));
+    observer.finding("own", &serde_json::json!({ "robot": robot, "fitness": fitness }));
 }
 
 fn told_round(observer: &dyn Observer, robot: &str, round: &Round, plan: &Plan) {

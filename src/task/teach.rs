@@ -43,7 +43,7 @@ const NEAREST_OF: usize = 8;
 pub struct Plan {
     /// Seed of all chance.
     pub seed: u64,
-    /// Rounds in which the response is measured around a design.
+    /// Rounds in which the response is measured around a design; 0: the robot keeps its own.
     pub rounds: usize,
     /// Training images of a round.
     pub images: usize,
@@ -197,7 +197,44 @@ impl<'a> Teacher<'a> {
     pub fn round<R: Rollouts>(&mut self, rollouts: &mut R) -> Result<Round, R::Error> {
         self.rounds += 1;
         let mut random = self.random(Use::Round, self.rounds as u64);
-        let numbers = self.drawn(self.plan.images, &mut random);
+        let (measured, off) = self.measured(&mut random, rollouts)?;
+        let before = self.design.clone();
+        let (predicted, design) = self.solved(&before, self.side, |lesson| lesson.solve(&mut random));
+        let round = Round {
+            round: self.rounds,
+            predicted: self.predicted,
+            measured,
+            off,
+            changed: design.iter().zip(&before).filter(|(a, b)| a != b).count(),
+            rollouts: self.rollouts,
+        };
+        self.earlier.push(before);
+        (self.predicted, self.design) = (predicted, design);
+        Ok(round)
+    }
+
+    /// Takes the robot's own design, and the side that suits it, in place of a solution; measures the
+    /// response around it. Returns its mean clipped margin.
+    ///
+    /// # Errors
+    /// What the rollouts say.
+    pub fn own<R: Rollouts>(&mut self, rollouts: &mut R) -> Result<f64, R::Error> {
+        self.design = self.gait.design();
+        let (measured, _) = self.measured(&mut self.random(Use::Round, 0), rollouts)?;
+        if measured < 0.0 {
+            self.side = -self.side;
+        }
+        Ok(measured.abs())
+    }
+
+    /// Measures the response around the design, under training images: the mean clipped margin of its
+    /// answers, and by how far displacements were to the right of what the model said.
+    fn measured<R: Rollouts>(
+        &mut self,
+        random: &mut Stream,
+        rollouts: &mut R,
+    ) -> Result<(f64, f64), R::Error> {
+        let numbers = self.drawn(self.plan.images, random);
         let draw = |(turn, number): (usize, &usize)| {
             let material = |material: &Material| {
                 // Half of the rollouts are of the design itself; the groups take turns, so as many
@@ -239,19 +276,7 @@ impl<'a> Teacher<'a> {
         }
         let of_itself = asked.iter().zip(&found).filter(|((_, design), _)| *design == self.design);
         let measured = self.mean_score(of_itself.map(|((number, _), found)| (*number, nowhere(*found))));
-        let before = self.design.clone();
-        let (predicted, design) = self.solved(&before, self.side, |lesson| lesson.solve(&mut random));
-        let round = Round {
-            round: self.rounds,
-            predicted: self.predicted,
-            measured,
-            off: if stable > 0.0 { off / stable } else { 0.0 },
-            changed: design.iter().zip(&before).filter(|(a, b)| a != b).count(),
-            rollouts: self.rollouts,
-        };
-        self.earlier.push(before);
-        (self.predicted, self.design) = (predicted, design);
-        Ok(round)
+        Ok((measured, if stable > 0.0 { off / stable } else { 0.0 }))
     }
 
     /// Shows the last designs the same training images, and refines the best of them by
