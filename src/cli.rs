@@ -182,7 +182,7 @@ fn run_evolve(args: EvolveArgs, console: &Console, ranks: Ranks) -> Result<(), E
 }
 
 fn run_eval(args: EvalArgs, console: &Console, ranks: Ranks) -> Result<(), Error> {
-    let (archives, robots) = (args.archives.archive, selected(args.robots)?.unwrap_or(Selection::All));
+    let (archives, robots) = (args.archives.paths(), selected(args.robots)?.unwrap_or(Selection::All));
     let of_gallery = archives.is_empty() && gallery::is_meant(&robots)?;
     if of_gallery && args.physical_only {
         let text = "--physical-only: expected robots of an archive, not published ones";
@@ -199,7 +199,7 @@ fn run_eval(args: EvalArgs, console: &Console, ranks: Ranks) -> Result<(), Error
     let name = eval::own_name(args.split);
     let beside = || match of_gallery {
         true => Path::new(&format!("gallery-{name}")).to_path_buf(),
-        false => folder::above(&archives).join(name),
+        false => folder::beside_all(&archives, name),
     };
     let out = args.out.unwrap_or_else(beside);
     let robots = match robots {

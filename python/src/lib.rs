@@ -173,7 +173,7 @@ struct RunData {
 impl RunData {
     #[new]
     fn new(path: PathBuf) -> PyResult<Self> {
-        let path = folder::run_json(path);
+        let path = folder::first_run(path).map_err(|text| raised(&Error::input(text)))?;
         let run = RunFile::read(&path).map_err(|error| raised(&error))?;
         Ok(RunData { run, path })
     }

@@ -2,6 +2,7 @@
 //! trained here.
 
 use crate::base::error::Error;
+use crate::base::shipped;
 use crate::body::Body;
 use crate::config::{BUILT_IN, Config};
 use crate::data::catalogue;
@@ -10,6 +11,7 @@ use crate::qd::Archive;
 use crate::search::training::Training;
 use crate::store::audit::AuditFile;
 use crate::store::images::{DatasetRef, ImageRef};
+use crate::store::names::AUDIT_JSON;
 use crate::store::robots::{Selection, Source};
 use crate::store::run::{Dimensions, FORMAT, FORMAT_VERSION, Robot, RunFile};
 use crate::task::direction::Direction;
@@ -26,28 +28,16 @@ pub const ALL: &str = "gallery";
 /// The list of them.
 pub(crate) const TEXT: &str = include_str!("../../data/gallery.json");
 
-/// Runs of trained zero-one robots and their audits, the best on validation images first.
-const TRAINED: [[&str; 2]; 2] = [
-    [
-        include_str!("../../data/trained/zero-one-1/run.json"),
-        include_str!("../../data/trained/zero-one-1/audit.json"),
-    ],
-    [
-        include_str!("../../data/trained/zero-one-2/run.json"),
-        include_str!("../../data/trained/zero-one-2/audit.json"),
-    ],
-];
-
 /// Runs whose robots were trained to tell zeros from ones, each with its audit; the best on
 /// validation images first.
 ///
 /// # Errors
 /// If what is built in is damaged (which a test excludes).
 pub fn trained() -> Result<Vec<(RunFile, AuditFile)>, Error> {
-    let read = |[run, audit]: &[&str; 2]| {
-        Ok((RunFile::parse(run, "data/trained")?, AuditFile::parse(audit, "data/trained")?))
-    };
-    TRAINED.iter().map(read).collect()
+    let paths = shipped::runs(Path::new("gallery:zero_one")).map_err(Error::other)?;
+    let read =
+        |path: &PathBuf| Ok((RunFile::read(path)?, AuditFile::read(&path.with_file_name(AUDIT_JSON))?));
+    paths.iter().map(read).collect()
 }
 
 /// A published robot.

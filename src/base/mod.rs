@@ -9,6 +9,7 @@ pub mod number;
 pub mod observer;
 pub mod random;
 pub mod ranks;
+pub mod shipped;
 pub mod signals;
 pub mod statistics;
 pub mod table;

@@ -63,7 +63,7 @@ pub(super) struct AuditArgs {
 pub(super) fn run(args: AuditArgs, console: &Console, ranks: Ranks) -> Result<(), Error> {
     let criteria = Criteria::load(args.criteria.as_deref(), &args.set)?;
     let stop = signals::stop_flag()?;
-    let (archives, chosen) = (&args.archives.archive, selected(args.robots.clone())?);
+    let (archives, chosen) = (&args.archives.paths(), selected(args.robots.clone())?);
     let chosen = chosen.unwrap_or(Selection::All);
     let sources = sources(archives, &chosen)?;
     let of_archives = sources.iter().filter_map(|source| match source {
@@ -92,7 +92,7 @@ pub(super) fn run(args: AuditArgs, console: &Console, ranks: Ranks) -> Result<()
     for (source, robots) in sources.into_iter().zip(asked) {
         let Some(robots) = robots else { continue };
         let beside = match &source {
-            Source::Archive(path) => path.with_file_name(AUDIT_JSON),
+            Source::Archive(path) => folder::beside(path, AUDIT_JSON),
             Source::Gallery => Path::new("gallery-audit.json").to_path_buf(),
         };
         let robots = match (&source, robots.validated()) {

@@ -19,11 +19,22 @@ use std::path::PathBuf;
 /// Archives, of a command that takes several.
 #[derive(Debug, Args)]
 pub(super) struct Archives {
-    /// A run.json, or its folder; several may follow, and the option may be repeated (default: the
-    /// newest under runs/).
-    #[arg(short, long, value_name = "FILE", value_parser = run_json(), num_args = 1..)]
-    pub(super) archive: Vec<PathBuf>,
+    /// A run.json, or its folder, or runs of the gallery (gallery:zero_one); several may follow, and
+    /// the option may be repeated (default: the newest under runs/).
+    #[arg(short, long, value_name = "FILE", value_parser = run_jsons(), num_args = 1..)]
+    archive: Vec<Runs>,
 }
+
+impl Archives {
+    /// Every run.json that is meant.
+    pub(super) fn paths(&self) -> Vec<PathBuf> {
+        self.archive.iter().flat_map(|Runs(paths)| paths).cloned().collect()
+    }
+}
+
+/// What one value means: a run.json, or those of a set of shipped runs.
+#[derive(Clone, Debug)]
+pub(super) struct Runs(pub(super) Vec<PathBuf>);
 
 /// What is said of robots, wherever some are chosen.
 pub(super) const ROBOTS: &str = "Which robots: all, top:N or random:N (of each task; of several archives together), \
@@ -80,7 +91,12 @@ pub(super) fn say_unfinished<'a>(archives: impl IntoIterator<Item = &'a PathBuf>
     }
 }
 
-/// Reads the path of a run.json, or of its folder.
+/// Reads the path of a run.json, or of its folder; of a set of shipped runs, the first.
 pub(super) fn run_json() -> impl TypedValueParser<Value = PathBuf> {
-    PathBufValueParser::new().map(folder::run_json)
+    PathBufValueParser::new().try_map(folder::first_run)
+}
+
+/// Reads the path of a run.json, or of its folder, or the name of shipped runs.
+pub(super) fn run_jsons() -> impl TypedValueParser<Value = Runs> {
+    PathBufValueParser::new().try_map(|path| folder::run_json(path).map(Runs))
 }

@@ -73,7 +73,7 @@ pub(super) struct PlotArgs {
 
 pub(super) fn run(args: PlotArgs, console: &Console) -> Result<(), Error> {
     let PlotArgs { kind, physical_only, images, data, dataset, .. } = args;
-    let archives = args.archives.archive;
+    let archives = args.archives.paths();
     // What is wrong with the file is to be known before robots are searched for.
     figures::endings(args.out.as_deref())?;
     let robots: Vec<Named> = match selected(args.robot)? {

@@ -3,7 +3,7 @@
 use crate::base::error::Error;
 use crate::base::number;
 use crate::cli::choice;
-use crate::cli::choice::{Archives, run_json};
+use crate::cli::choice::{Archives, Runs, run_jsons};
 use crate::commands::report;
 use crate::store::folder;
 use crate::view::console::Console;
@@ -26,8 +26,8 @@ pub(super) struct ReportArgs {
     #[command(flatten)]
     archives: Archives,
     /// The same without the option's name, as command lines of before have it.
-    #[arg(value_parser = run_json(), hide = true)]
-    runs: Vec<PathBuf>,
+    #[arg(value_parser = run_jsons(), hide = true)]
+    runs: Vec<Runs>,
     /// Robots that can be watched, the fittest of each run; the more, the fewer frames each has
     /// (the page stays below 20 MB).
     #[arg(long, default_value_t = 100)]
@@ -44,13 +44,13 @@ pub(super) struct ReportArgs {
 }
 
 pub(super) fn run(args: ReportArgs, console: &Console) -> Result<(), Error> {
-    let mut archives = args.archives.archive;
-    archives.extend(args.runs);
+    let mut archives = args.archives.paths();
+    archives.extend(args.runs.into_iter().flat_map(|Runs(paths)| paths));
     if archives.is_empty() {
         archives.push(folder::newest_run()?);
     }
     choice::say_unfinished(&archives, console);
-    let out = args.out.unwrap_or_else(|| folder::above(&archives).join("report.html"));
+    let out = args.out.unwrap_or_else(|| folder::beside_all(&archives, "report.html"));
     folder::writable(&out)?;
     let gathered =
         report::gather(&archives, args.data.as_deref(), args.rollouts > 0, &|text| console.warning(text))?;

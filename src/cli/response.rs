@@ -91,7 +91,7 @@ pub(super) fn run(args: ResponseArgs, console: &Console) -> Result<(), Error> {
     };
     let robots = choice::one_by_one(&search, console)?;
     let beside = || match &archive {
-        Some(path) => path.with_file_name(RESPONSE_JSON),
+        Some(path) => folder::beside(path, RESPONSE_JSON),
         None => Path::new(&format!("gallery-{RESPONSE_JSON}")).to_path_buf(),
     };
     let options = Options {

@@ -35,7 +35,7 @@ pub(super) struct ServeArgs {
 }
 
 pub(super) fn run(args: ServeArgs, console: &Console) -> Result<(), Error> {
-    let archives = match args.archives.archive {
+    let archives = match args.archives.paths() {
         // A page without a run is of use, too: the published robots are there.
         given if given.is_empty() => folder::newest_run().into_iter().collect(),
         given => given,

@@ -62,7 +62,7 @@ pub(super) struct TeamArgs {
 }
 
 pub(super) fn run(args: TeamArgs, console: &Console) -> Result<(), Error> {
-    let archives = args.archives.archive;
+    let archives = args.archives.paths();
     if archives.is_empty() {
         let text = "--archive: expected the runs whose robots are the team";
         let hint = "no team is published with the program yet; morphcog help team has examples";
@@ -76,7 +76,7 @@ pub(super) fn run(args: TeamArgs, console: &Console) -> Result<(), Error> {
         split: args.split,
         seed: args.seed,
         data: args.data,
-        out: args.out.unwrap_or_else(|| folder::above(&archives).join(TEAM_JSON)),
+        out: args.out.unwrap_or_else(|| folder::beside_all(&archives, TEAM_JSON)),
         threads: args.threads.map(usize::from),
         archives,
     };

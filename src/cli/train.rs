@@ -2,6 +2,7 @@
 
 use crate::base::error::Error;
 use crate::base::ranks::Ranks;
+use crate::base::shipped;
 use crate::base::signals;
 use crate::cli::choice;
 use crate::cli::choice::{ROBOTS, run_json, selected};
@@ -75,8 +76,11 @@ pub(super) fn run(args: TrainArgs, console: &Console) -> Result<(), Error> {
     let archive = args.archive.map_or_else(folder::newest_run, Ok)?;
     let robots = selected(args.robots)?.unwrap_or(Selection::Top(GAITS));
     let name = name(&archive, &args.task, args.seed);
-    let beside = archive.parent().and_then(|folder| folder.parent()).map(|folder| folder.join(&name));
-    let out = args.out.or(beside).unwrap_or_else(|| PathBuf::from(&name));
+    let beside = match shipped::is_shipped(&archive) {
+        true => Some(Path::new(folder::RUNS)),
+        false => archive.parent().and_then(|folder| folder.parent()),
+    };
+    let out = args.out.or(beside.map(|folder| folder.join(&name))).unwrap_or_else(|| PathBuf::from(&name));
     let if_exists = match (args.resume, args.force) {
         (true, _) => IfExists::Resume,
         (_, true) => IfExists::Overwrite,
@@ -109,6 +113,7 @@ fn name(archive: &Path, task: &Groups, seed: Option<u64>) -> String {
     });
     let of = archive.parent().unwrap_or(Path::new(""));
     let of = of.file_name().map_or("run".to_string(), |name| name.to_string_lossy().into_owned());
+    let of = of.trim_start_matches(shipped::PREFIX);
     let seed = seed.map_or(String::new(), |seed| format!("-seed{seed}"));
     format!("{of}-{}{seed}", suffix.join("v"))
 }

@@ -4,10 +4,11 @@
 use crate::base::error::Error;
 use crate::base::files::read_text;
 use crate::base::hash::sha256_hex;
+use crate::base::shipped;
 use crate::commands::tasks::{AuditStep, EvalStep, Run, Steps, Task, Training, selection};
 use crate::config::{Config, Settings, flatten, reading};
 use crate::search::train;
-use crate::store::folder::{self, run_json};
+use crate::store::folder::{self, first_run};
 use crate::store::robots::Source;
 use crate::task::grouping::Grouping;
 use schemars::JsonSchema;
@@ -231,9 +232,14 @@ impl SweepPlan {
     fn base(&self, path: &Path) -> Result<Base, Error> {
         let folder = path.parent().unwrap_or(Path::new(""));
         if let Some(archive) = &self.archive {
-            let archive = run_json(folder.join(archive));
+            let is_shipped = shipped::is_shipped(archive);
+            let archive = if is_shipped { archive.clone() } else { folder.join(archive) };
+            let archive = first_run(archive).map_err(|text| Error::at("archive", text))?;
             let source = Source::read(&archive).map_err(|error| error.within("archive").of("archive"))?;
-            let archive = std::path::absolute(&archive).map_err(|error| Error::reading(&archive, &error))?;
+            let archive = match is_shipped {
+                true => archive,
+                false => std::path::absolute(&archive).map_err(|error| Error::reading(&archive, &error))?,
+            };
             return Ok(Base::Train(archive, Box::new(source)));
         }
         let config =

@@ -5,7 +5,7 @@
 //! it ends with the same bits.
 
 use crate::base::error::Error;
-use crate::base::files::{read_text, write_atomically};
+use crate::base::files::{exists, read_text, write_atomically};
 use crate::base::hash::sha256_hex;
 use crate::base::observer::Observer;
 use crate::base::threads::pool;
@@ -256,7 +256,7 @@ fn measured(
     let nothing = || vec![Vec::new(); walkers.len()];
     let path = source.path.with_file_name(RESPONSE_JSON);
     let of_run = &source.run.config;
-    if !path.exists() || (&config.physics, &config.protocol) != (&of_run.physics, &of_run.protocol) {
+    if !exists(&path) || (&config.physics, &config.protocol) != (&of_run.physics, &of_run.protocol) {
         return nothing();
     }
     let file = match ResponseFile::read(&path) {

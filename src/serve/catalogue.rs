@@ -2,6 +2,7 @@
 
 use crate::analysis::gallery;
 use crate::base::error::Error;
+use crate::base::files::exists;
 use crate::body::{Body, VoxelCounts};
 use crate::config::Config;
 use crate::serve::course::Course;
@@ -316,7 +317,7 @@ fn trained() -> Result<Collection, Error> {
 fn archive(path: &Path, notes: &mut Vec<String>) -> Result<Collection, Error> {
     let run = RunFile::read(path)?;
     let beside = path.with_file_name(AUDIT_JSON);
-    let audit = match beside.exists() {
+    let audit = match exists(&beside) {
         true => AuditFile::of_run(&run, &beside).map_err(|error| notes.push(error.message)).ok(),
         false => None,
     };

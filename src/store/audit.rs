@@ -1,7 +1,7 @@
 //! `audit.json` and `audit.csv`: the verdicts on a run's robots, beside its `run.json`.
 
 use crate::base::error::Error;
-use crate::base::files::{read_text, write_atomically};
+use crate::base::files::{exists, read_text, write_atomically};
 use crate::base::table;
 use crate::config::audit::Criteria;
 use crate::config::reading;
@@ -121,7 +121,7 @@ impl AuditFile {
     pub fn of_run(run: &RunFile, path: &Path) -> Result<Self, Error> {
         let archive = path.with_file_name(crate::store::names::RUN_JSON);
         let make = format!("morphcog audit --archive {}", archive.display());
-        if !path.exists() {
+        if !exists(path) {
             let text =
                 format!("{}: there is no such file: these robots have not been audited", path.display());
             return Err(Error::input(text).hint(make));

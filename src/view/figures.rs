@@ -208,7 +208,7 @@ pub fn no_robot(kind: Kind) -> Error {
 /// `plot-<kind>[-robot]` beside a run.json, or here.
 fn stem(archive: Option<&Path>, kind: Kind, robot: &str) -> PathBuf {
     let name = if robot.is_empty() { format!("plot-{kind}") } else { format!("plot-{kind}-{robot}") };
-    archive.map_or_else(|| PathBuf::from(&name), |path| path.with_file_name(&name))
+    archive.map_or_else(|| PathBuf::from(&name), |path| folder::beside(path, &name))
 }
 
 fn of_robot(wanted: &Wanted, named: &Named) -> Result<Made, Error> {

@@ -2,7 +2,7 @@
 
 use crate::analysis::gallery;
 use crate::base::error::Error;
-use crate::base::number;
+use crate::base::{number, shipped};
 use crate::commands::replay::Replay;
 use crate::store::folder;
 use crate::view::console::Console;
@@ -126,7 +126,10 @@ pub fn folder(archive: Option<&Path>, robot: &str) -> Result<PathBuf, Error> {
         None if gallery::find(robot)?.is_some() => return Ok(PathBuf::new()),
         None => folder::newest_run()?,
     };
-    Ok(archive.parent().unwrap_or(Path::new("")).to_path_buf())
+    match shipped::is_shipped(&archive) {
+        true => Ok(PathBuf::new()),
+        false => Ok(archive.parent().unwrap_or(Path::new("")).to_path_buf()),
+    }
 }
 
 /// Makes the pictures, says where they are and what the robot did; the files made.
