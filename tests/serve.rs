@@ -340,6 +340,47 @@ fn a_simulation_keeps_its_pace_and_is_told_to_change() {
 }
 
 #[test]
+fn robots_of_several_tasks_walk_together_as_a_team_and_are_counted() {
+    let sandbox = Sandbox::tiny();
+    for (name, groups) in [("a", "[[0],[1]]"), ("b", "[[2],[3]]"), ("c", "[[0],[1]]")] {
+        let options =
+            format!("--set task.groups={groups} --set data.train_images= --set data.images_per_class=1");
+        sandbox.run(&format!("evolve -q -c tiny.toml {options} -o {name}")).ended(0, &[]);
+    }
+    let server = Server::start(&sandbox, "--archive a b c");
+    let team = json_of(&server.get("/api/team"));
+    // The first robot of each task; the ones that ship with the program are of other data.
+    let members = team["members"].as_array().unwrap();
+    let tasks: Vec<&str> = members.iter().map(|member| member["task"].as_str().unwrap()).collect();
+    assert_eq!((tasks, &team["classes"]), (vec!["0|1", "2|3"], &json!([0, 1, 2, 3])));
+    assert_eq!(members[0]["archive"], 2);
+    let request = json!({ "shown": { "drawing": drawing() }, "speed": 0 });
+    let events: Vec<(String, Value)> = server.events("/api/team", &request).collect();
+    let names: Vec<&str> = events.iter().map(|(name, _)| name.as_str()).collect();
+    assert_eq!((names[0], names[1], names[names.len() - 1]), ("begin", "moment", "end"));
+    assert_eq!(events[0].1["members"].as_array().unwrap().len(), 2);
+    let end = &events[names.len() - 1].1;
+    assert_eq!(end["step"], 20);
+    // Each walks as it does by itself.
+    for (place, member) in members.iter().enumerate() {
+        let request = json!({
+            "subject": { "archive": member["archive"], "robot": member["robot"] },
+            "shown": { "drawing": drawing() }, "speed": 0,
+        });
+        let alone: Vec<(String, Value)> = server.events("/api/simulations", &request).collect();
+        assert_eq!(alone[alone.len() - 1].1["answer"]["moved"], end["tally"]["moved"][place]);
+    }
+    let sum =
+        |key: &str| end["tally"][key].as_array().unwrap().iter().map(|v| v.as_f64().unwrap()).sum::<f64>();
+    assert_eq!(sum("votes") + end["tally"]["silent"].as_f64().unwrap(), 2.0);
+    refused(&server.post("/api/team", &json!({ "control_steps": 0 })), 400, "control_steps");
+    // Robots of one task are no team.
+    let server = Server::start(&sandbox, "--archive a");
+    assert_eq!(json_of(&server.get("/api/team"))["members"], json!([]));
+    refused(&server.post("/api/team", &json!({})), 404, "two or more tasks");
+}
+
+#[test]
 fn simulations_end_when_nobody_listens_and_only_so_many_run() {
     let sandbox = Sandbox::new();
     let server = Server::start(&sandbox, "");

@@ -271,6 +271,48 @@ fn a_body_that_is_built_and_the_robot_it_makes_are_in_sight_together() {
 }
 
 #[test]
+fn a_team_walks_on_small_stages_and_its_votes_are_counted() {
+    let sandbox = Sandbox::tiny();
+    let Some(mut browser) = browser(&sandbox) else { return };
+    for (name, groups) in [("a", "[[0],[1]]"), ("b", "[[0],[2]]"), ("c", "[[1],[2]]")] {
+        let options =
+            format!("--set task.groups={groups} --set data.train_images= --set data.images_per_class=1");
+        let longer = "--set protocol.control_steps=200 --set generations=30";
+        sandbox.run(&format!("evolve -q -c tiny.toml {options} {longer} -o {name}")).ended(0, &[]);
+    }
+    let server = Server::start(&sandbox, "--archive a b c");
+    for (width, height, dark) in [(1280, 800, false), (390, 844, true)] {
+        let mut tab = browser.tab(width, height, dark);
+        open(&mut tab, &server);
+        tab.eval("(() => { const s = document.getElementById('speed'); s.value = '0'; s.onchange(); })()");
+        let alone = tab.text("#who");
+        tab.click("#tab-team");
+        assert_eq!(tab.text("#who"), "The team");
+        draw(&mut tab, &zero());
+        tab.wait("document.querySelectorAll('#stages figure').length === 3");
+        at_end(&mut tab);
+        let votes = "[...document.querySelectorAll('#tally span')].reduce((sum, cell) => sum + Number(cell.textContent), 0)";
+        let turned = "document.querySelectorAll('#stages figure[data-way=left], #stages figure[data-way=right]').length";
+        assert_eq!(tab.eval(votes), tab.eval(turned));
+        let says = tab.text("#says");
+        assert!(["0", "1", "2", "undecided"].contains(&says.as_str()), "{says}");
+        assert!(tab.text("#spoken").starts_with("The team sees your drawing. It says "));
+        let fits = "document.documentElement.scrollWidth <= window.innerWidth";
+        assert_eq!(tab.eval(fits), true);
+        keep_picture(&format!("team-{width}.png"), &tab.screenshot());
+        // Back to a robot by itself.
+        tab.click("#tab-robots");
+        at_end(&mut tab);
+        assert_eq!(
+            (tab.text("#who"), tab.eval("document.getElementById('together').hidden")),
+            (alone, true.into())
+        );
+        assert_eq!(tab.complaints(), Vec::<String>::new());
+        tab.close();
+    }
+}
+
+#[test]
 fn a_simulation_ends_with_its_tab() {
     let sandbox = Sandbox::new();
     let Some(mut browser) = browser(&sandbox) else { return };

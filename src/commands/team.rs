@@ -23,7 +23,8 @@ use crate::store::validation::shown as shown_for_validation;
 use crate::store::whereabouts::{Whereabouts, load_dataset_of, see};
 use crate::task::direction::THRESHOLD;
 use crate::task::grouping::{self, Group};
-use crate::task::voting::{Accuracy, Ballot, CLIP, Sides};
+use crate::task::judge::Judge;
+use crate::task::voting::{Accuracy, Ballot, CLIP};
 use std::collections::BTreeSet;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, AtomicU64};
@@ -306,7 +307,7 @@ fn baselines(
     for (number, &a) in classes.iter().enumerate() {
         for &b in &classes[number + 1..] {
             // A positive value is a walk to the right.
-            pairs.push((Sides { left: vec![b], right: vec![a] }, moments.apart(&[a], &[b])));
+            pairs.push((Judge { left: vec![b], right: vec![a] }, moments.apart(&[a], &[b])));
         }
     }
     let voted = |stimulus: &Grid<f64>| {

@@ -21,6 +21,7 @@ pub fn asset(path: &str) -> Option<Response> {
         "/pad.js" => (JS, include_str!("page/pad.js")),
         "/images.js" => (JS, include_str!("page/images.js")),
         "/robots.js" => (JS, include_str!("page/robots.js")),
+        "/team.js" => (JS, include_str!("page/team.js")),
         "/editor.js" => (JS, include_str!("page/editor.js")),
         _ => return None,
     };

@@ -7,6 +7,7 @@ use crate::body::{Body, VoxelCounts};
 use crate::config::Config;
 use crate::serve::course::Course;
 use crate::serve::refusal::Refusal;
+use crate::serve::request::Who;
 use crate::store::audit::AuditFile;
 use crate::store::images::DatasetRef;
 use crate::store::names::{AUDIT_JSON, RUN_JSON};
@@ -268,6 +269,21 @@ impl Collection {
     pub fn robot(&self, id: &str) -> Result<&Entry, Refusal> {
         let found = self.robots.iter().chain(&self.gone).find(|robot| robot.id == id);
         found.ok_or_else(|| Refusal::Unknown(format!("{}: there is no robot {id:?}", self.name)))
+    }
+
+    /// A robot by its id, with all that its simulation depends on.
+    ///
+    /// # Errors
+    /// If there is none.
+    pub fn who(&self, id: &str) -> Result<Who, Refusal> {
+        let (robot, config) = (self.robot(id)?, &self.config);
+        Ok(Who {
+            body: robot.body.clone(),
+            physics: config.physics.clone(),
+            protocol: config.protocol.clone(),
+            encoding: config.stimulus,
+            judge: robot.judge.clone(),
+        })
     }
 }
 

@@ -13,6 +13,7 @@ pub mod server;
 pub mod simulation;
 pub mod simulations;
 pub mod stream;
+pub mod team;
 
 use crate::base::error::Error;
 use crate::body::Body;

@@ -147,16 +147,7 @@ impl Subject {
         let wrong = |text: &str| Err(Refusal::Wrong(text.to_string()));
         match self {
             Subject { archive: Some(index), robot: Some(id), body: None, encoding: None } => {
-                let collection = catalogue.collection(index)?;
-                let robot = collection.robot(&id)?;
-                let config = &collection.config;
-                Ok(Who {
-                    body: robot.body.clone(),
-                    physics: config.physics.clone(),
-                    protocol: config.protocol.clone(),
-                    encoding: config.stimulus,
-                    judge: robot.judge.clone(),
-                })
+                catalogue.collection(index)?.who(&id)
             }
             Subject { archive: None, robot: None, body: Some(body), encoding } => {
                 if !body.is_connected() {

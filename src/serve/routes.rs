@@ -5,7 +5,8 @@ use crate::serve::assets::asset;
 use crate::serve::http::{Request, Response};
 use crate::serve::refusal::Refusal;
 use crate::serve::request::{ChangeRequest, Pace, Plan, SeeRequest, SimulationRequest};
-use crate::serve::{Service, request, stream};
+use crate::serve::team::{TeamPlan, TeamRequest};
+use crate::serve::{Service, request, stream, team};
 use serde::Deserialize;
 use serde_json::json;
 
@@ -15,6 +16,8 @@ pub enum Reply {
     Whole(Response),
     /// A simulation begins.
     Simulation(Box<Plan>),
+    /// A team begins to walk.
+    Team(Box<TeamPlan>),
 }
 
 /// Answers a request to the server at a port.
@@ -69,6 +72,16 @@ pub fn reply(service: &Service, port: u16, request: &Request) -> Reply {
                 |plan| Reply::Simulation(Box::new(plan)),
             )
         }
+        ["api", "team"] if post => {
+            let asked = request::read::<TeamRequest>(&request.body);
+            let plan = asked.and_then(|asked| asked.plan(&service.catalogue, &service.images));
+            plan.map_or_else(|refusal| Reply::Whole(refused(refusal)), |plan| Reply::Team(Box::new(plan)))
+        }
+        ["api", "team"] => reading(&|| {
+            let members = team::members(&service.catalogue.collections());
+            let classes = team::classes(members.iter().map(|member| &member.judge));
+            Ok(Response::json(&json!({ "members": members, "classes": classes })))
+        }),
         ["api", "simulations"] => Reply::Whole(Response::wrong_method("POST")),
         ["api", "simulations", id] => posting(&|| change(service, id, &request.body)),
         _ => match asset(&request.path) {

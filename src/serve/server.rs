@@ -2,11 +2,11 @@
 
 use crate::base::error::Error;
 use crate::serve::http::Response;
-use crate::serve::request::Plan;
+use crate::serve::request::Who;
 use crate::serve::routes::Reply;
 use crate::serve::simulation::{Gone, live};
-use crate::serve::simulations::Control;
-use crate::serve::{Service, http, routes, stream};
+use crate::serve::simulations::{Control, Slot};
+use crate::serve::{Service, http, routes, stream, team};
 use std::io::{self, ErrorKind, Write};
 use std::net::{Ipv4Addr, SocketAddr, TcpListener, TcpStream};
 use std::sync::Arc;
@@ -112,10 +112,24 @@ fn connection(service: &Service, port: u16, stream: &mut TcpStream) {
         Err(refusal) => (refusal, false),
         Ok(Some(request)) => match routes::reply(service, port, &request) {
             Reply::Whole(response) => (response, request.method == "HEAD"),
-            Reply::Simulation(plan) => match simulation(service, &plan, stream) {
-                None => return,
-                Some(refusal) => (refusal, false),
-            },
+            Reply::Simulation(plan) => {
+                let lives =
+                    |slot: &Slot, tell: &mut Tell| live(slot, &plan, |event| tell(&stream::text(&event)));
+                match simulation(service, &plan.who, lives, stream) {
+                    None => return,
+                    Some(refusal) => (refusal, false),
+                }
+            }
+            Reply::Team(plan) => {
+                let lives = |slot: &Slot, tell: &mut Tell| {
+                    team::live(slot, &plan, |event| tell(&stream::of_team(&event)))
+                };
+                // A team takes one place.
+                match simulation(service, &plan.members[0].1, lives, stream) {
+                    None => return,
+                    Some(refusal) => (refusal, false),
+                }
+            }
         },
     };
     // The page was closed: the error has no reader.
@@ -124,17 +138,24 @@ fn connection(service: &Service, port: u16, stream: &mut TcpStream) {
     }
 }
 
+/// Sends an event.
+type Tell<'a> = dyn FnMut(&str) -> Result<(), Gone> + 'a;
+
 /// Runs a simulation over a connection; it ends when that does. What is to be answered if there is
 /// no place for it.
-fn simulation(service: &Service, plan: &Plan, stream: &mut TcpStream) -> Option<Response> {
-    let slot = match service.simulations.begin(plan.who.clone()) {
+fn simulation(
+    service: &Service,
+    who: &Who,
+    lives: impl FnOnce(&Slot, &mut Tell) -> Result<(), Gone>,
+    stream: &mut TcpStream,
+) -> Option<Response> {
+    let slot = match service.simulations.begin(who.clone()) {
         Ok(slot) => slot,
         Err(refusal) => return Some(routes::refused(refusal)),
     };
     let begun = http::begin_events(stream).and_then(|()| end_with(stream, &slot.control)).map_err(|_| Gone);
-    let told = begun.and_then(|()| {
-        live(&slot, plan, |event| stream.write_all(stream::text(&event).as_bytes()).map_err(|_| Gone))
-    });
+    let told = begun
+        .and_then(|()| lives(&slot, &mut |event: &str| stream.write_all(event.as_bytes()).map_err(|_| Gone)));
     // The thread that watches the connection has nothing left to do.
     slot.control.end();
     drop(slot);

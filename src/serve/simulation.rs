@@ -18,7 +18,7 @@ const TICK: Duration = Duration::from_millis(40);
 /// What takes longer is told in parts.
 const MOST_AT_ONCE: Duration = Duration::from_millis(100);
 /// How often a paused simulation sends a sign of simulation; so it notices that the page was closed.
-const HEARTBEAT: Duration = Duration::from_millis(400);
+pub(super) const HEARTBEAT: Duration = Duration::from_millis(400);
 /// A simulation that cannot keep its pace does not try to make up for more than this.
 const MOST_BEHIND: f64 = 0.5;
 
@@ -133,7 +133,7 @@ pub fn live(slot: &Slot, plan: &Plan, mut tell: impl FnMut(Event) -> Result<(), 
 }
 
 /// When the next control steps are due.
-struct Clock {
+pub(super) struct Clock {
     pace: Pace,
     paused: bool,
     /// The moment at which `first` control steps had been simulated; none before the first look.
@@ -141,11 +141,11 @@ struct Clock {
 }
 
 impl Clock {
-    fn new(pace: Pace) -> Self {
+    pub(super) fn new(pace: Pace) -> Self {
         Clock { pace, paused: false, begin: None }
     }
 
-    fn set(&mut self, pace: Option<Pace>, paused: Option<bool>) {
+    pub(super) fn set(&mut self, pace: Option<Pace>, paused: Option<bool>) {
         if pace.is_some() || paused.is_some() {
             self.pace = pace.unwrap_or(self.pace);
             self.paused = paused.unwrap_or(self.paused);
@@ -154,7 +154,7 @@ impl Clock {
     }
 
     /// Number of control steps that are due; none if it is paused.
-    fn due(&mut self, step: u32) -> Option<u32> {
+    pub(super) fn due(&mut self, step: u32) -> Option<u32> {
         let Pace::Times(times) = self.pace else {
             return (!self.paused).then_some(BATCH);
         };
@@ -172,7 +172,7 @@ impl Clock {
         Some(due.clamp(0.0, f64::from(BATCH).max(rate / 10.0)) as u32)
     }
 
-    fn sleep(&self, control: &Control) {
+    pub(super) fn sleep(&self, control: &Control) {
         if self.pace != Pace::Free {
             control.wait(TICK);
         }

@@ -3,9 +3,10 @@
 //! As in the page of a replay: steps of 1/200 voxel length from an origin per moment, near the
 //! centre of mass.
 
-use crate::body::Material;
-use crate::serve::request::{Plan, Seen};
+use crate::body::{Body, Material};
+use crate::serve::request::{Plan, Seen, Who};
 use crate::serve::simulation::{Event, STEPS_PER_SECOND};
+use crate::serve::team::{Name, TeamEvent};
 use crate::task::direction::THRESHOLD;
 use crate::task::recording::{Frame, VoxelCorners};
 use crate::view::colour::{TONE_AREAS, mark, tones};
@@ -37,16 +38,56 @@ pub fn text(event: &Event) -> String {
     format!("event: {name}\ndata: {data}\n\n")
 }
 
-fn begin(id: u64, plan: &Plan, voxels: &[VoxelCorners], frame: &Frame) -> Value {
-    let body = &plan.who.body;
+/// A team's event as it goes over the line.
+pub fn of_team(event: &TeamEvent) -> String {
+    let (name, data) = match event {
+        TeamEvent::Begin { id, plan, classes, stands } => {
+            let member =
+                |((name, who, _), (voxels, frame)): (&(Name, Who, Seen), &(Vec<VoxelCorners>, Frame))| {
+                    json!({
+                        "name": name,
+                        "body": who.body.to_string(),
+                        "voxels": corners(&who.body, voxels),
+                        "points": frame.points.len(),
+                        "frames": positions(std::slice::from_ref(frame)),
+                    })
+                };
+            let members: Vec<Value> = plan.members.iter().zip(stands).map(member).collect();
+            let first = plan.members.first().map(|(_, _, seen)| seen);
+            let seen = first.map(|seen| looks(0, plan.control_steps, seen));
+            let words = json!({
+                "id": id, "unit": STEPS, "rate": STEPS_PER_SECOND, "threshold": THRESHOLD, "until": plan.control_steps,
+                "classes": classes, "seen": seen, "members": members,
+            });
+            ("begin", words)
+        }
+        TeamEvent::Moment { step, frames, tally } => {
+            let frame =
+                |frame: &Option<Frame>| frame.as_ref().map(|frame| positions(std::slice::from_ref(frame)));
+            let frames: Vec<Option<String>> = frames.iter().map(frame).collect();
+            ("moment", json!({ "step": step, "frames": frames, "tally": tally }))
+        }
+        TeamEvent::Still => return ":\n\n".to_string(),
+        TeamEvent::End { step, tally } => ("end", json!({ "step": step, "tally": tally })),
+    };
+    format!("event: {name}\ndata: {data}\n\n")
+}
+
+/// Voxels with their corners, as the page draws them.
+fn corners(body: &Body, voxels: &[VoxelCorners]) -> Vec<Value> {
     let corners = |v: &VoxelCorners| {
         let material = body.at(v.row as isize, v.column as isize);
         json!([material.code(), v.corners, v.row, v.column])
     };
+    voxels.iter().map(corners).collect()
+}
+
+fn begin(id: u64, plan: &Plan, voxels: &[VoxelCorners], frame: &Frame) -> Value {
+    let body = &plan.who.body;
     json!({
         "id": id,
         "body": body.to_string(),
-        "voxels": voxels.iter().map(corners).collect::<Vec<_>>(),
+        "voxels": corners(body, voxels),
         "points": frame.points.len(),
         "unit": STEPS,
         "rate": STEPS_PER_SECOND,

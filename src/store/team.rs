@@ -9,7 +9,8 @@ use crate::store::eval::Trial;
 use crate::store::images::{HeldOut, ImageRef};
 use crate::task::direction::{Assignment, Direction};
 use crate::task::grouping::Group;
-use crate::task::voting::{Accuracy, Ballot, Sides};
+use crate::task::judge::Judge;
+use crate::task::voting::{Accuracy, Ballot};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -138,12 +139,12 @@ pub struct TeamBaselines {
 
 impl Member {
     /// What a walk of this robot to either side speaks for.
-    pub fn sides(&self) -> Sides {
+    pub fn judge(&self) -> Judge {
         let [a, b] = self.groups.clone();
         if self.first_group_walks == Direction::Left.name() {
-            Sides { left: a, right: b }
+            Judge { left: a, right: b }
         } else {
-            Sides { left: b, right: a }
+            Judge { left: b, right: a }
         }
     }
 
@@ -198,7 +199,7 @@ impl Decoded {
 
 impl TeamFile {
     /// What all walks under an image come to.
-    fn ballot(&self, sides: &[Sides], image: usize) -> Ballot {
+    fn ballot(&self, sides: &[Judge], image: usize) -> Ballot {
         let walks =
             sides.iter().zip(&self.members).map(|(sides, member)| (sides, member.displacements[image]));
         Ballot::count(&self.classes, walks, self.threshold, self.clip)
@@ -206,7 +207,7 @@ impl TeamFile {
 
     /// What the members answer together, of all images.
     pub(crate) fn decided(&self) -> Answers {
-        let sides: Vec<Sides> = self.members.iter().map(Member::sides).collect();
+        let sides: Vec<Judge> = self.members.iter().map(Member::judge).collect();
         let ballots: Vec<Ballot> = (0..self.images.len()).map(|image| self.ballot(&sides, image)).collect();
         let knows = |class: &u8| {
             sides.iter().filter(|sides| sides.left.contains(class) || sides.right.contains(class)).count()
@@ -231,7 +232,7 @@ impl TeamFile {
     /// The best robot by itself, with votes as the team's: its place, and how it does.
     pub(crate) fn best_body(&self) -> Option<(usize, Accuracy)> {
         let alone = |(place, member): (usize, &Member)| {
-            let sides = member.sides();
+            let sides = member.judge();
             let answer = |(image, walk): (&ImageRef, &Option<f64>)| {
                 let ballot = Ballot::count(&self.classes, [(&sides, *walk)], self.threshold, self.clip);
                 (self.classes[ballot.by_votes().0], image.label)

@@ -2,23 +2,15 @@
 //! without any trained weight.
 
 use crate::base::statistics::wilson;
+use crate::task::judge::Judge;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Walks count up to this far in a sum of walks \[voxel lengths\].
 pub const CLIP: f64 = 10.0;
 
-/// What a walk to either side speaks for.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Sides {
-    /// The classes of a walk to the left.
-    pub left: Vec<u8>,
-    /// Those of a walk to the right.
-    pub right: Vec<u8>,
-}
-
 /// What all walks under one image come to, for every class.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Ballot {
     /// Votes: one of each robot for every class of the side it walked to.
     pub votes: Vec<usize>,
@@ -33,7 +25,7 @@ impl Ballot {
     /// nothing. A walk of at most `threshold` gives no vote; one longer than `clip` counts as `clip`.
     pub fn count<'a>(
         classes: &[u8],
-        walks: impl IntoIterator<Item = (&'a Sides, Option<f64>)>,
+        walks: impl IntoIterator<Item = (&'a Judge, Option<f64>)>,
         threshold: f64,
         clip: f64,
     ) -> Self {
@@ -108,11 +100,11 @@ impl Accuracy {
 mod tests {
     use super::*;
 
-    fn sides(left: &[u8], right: &[u8]) -> Sides {
-        Sides { left: left.to_vec(), right: right.to_vec() }
+    fn sides(left: &[u8], right: &[u8]) -> Judge {
+        Judge { left: left.to_vec(), right: right.to_vec() }
     }
 
-    fn count(walks: &[(&Sides, Option<f64>)]) -> Ballot {
+    fn count(walks: &[(&Judge, Option<f64>)]) -> Ballot {
         Ballot::count(&[0, 1, 2], walks.iter().copied(), 3.0, CLIP)
     }
 

@@ -7,6 +7,7 @@ import { Simulation } from "./simulation.js";
 import { Pad } from "./pad.js";
 import { Robots, rows, signed } from "./robots.js";
 import { Stage, drawStimulus } from "./stage.js";
+import { Team } from "./team.js";
 
 // Strokes may follow each other that fast without a simulation for each.
 const AFTER_STROKE = 300, WHILE_DRAWING = 60;
@@ -34,6 +35,17 @@ const start = () => {
   if (!who) return;
   mark("living");
   simulation?.stop();
+  team.stop();
+  $("together").hidden = !who.team;
+  document.querySelector(".world").hidden = !!who.team;
+  for (const id of ["time", "step"]) $(id).hidden = !!who.team;
+  if (who.team) {
+    simulation = null;
+    team.start(picture.shown, Number($("speed").value)).catch(say).finally(() => { drawn = null; status(); });
+    say(null);
+    status();
+    return;
+  }
   const own = new Simulation({ subject: who.subject(), shown: shownTo(), control_steps: who.steps() }, Number($("speed").value), (name) => {
     if (simulation !== own) return;
     if (name === "begin" || name === "seen") { seen = own.phase(own.last); look(); }
@@ -59,16 +71,16 @@ const show = (next, after) => {
 
 // While a stroke is drawn, what it looks like to the sensors.
 const glance = async () => {
-  if (!who) return;
+  if (!who || who.team) return;
   const number = ++looked;
   const answer = await post("/api/stimulus", { subject: who.subject(), shown: shownTo() });
   if (number === looked) { seen = answer; look(); }
 };
 
 const look = () => {
+  $("picture").textContent = picture.about;
   if (!seen || !who) return;
   drawStimulus($("stimulus"), seen.stimulus, who.rows(), materials);
-  $("picture").textContent = picture.about;
 };
 
 let glancing = 0;
@@ -115,6 +127,38 @@ const editor = new Editor(materials, {
   },
 });
 
+const team = new Team(materials, (name, walk) => {
+  if (name === "begin") { seen = walk.begun.seen; look(); }
+  drawn = null;
+});
+
+// The whole team instead of one robot.
+const together = () => {
+  who = { team: true, name: "The team", rows: () => [] };
+  $("who").textContent = "The team";
+  $("about").textContent = `${team.members.length} robots answer together`;
+  $("encoding").textContent = "as the first robot of the team sees it";
+  images.labels = team.classes;
+  start();
+};
+
+const drawTeam = () => {
+  team.draw();
+  const walk = team.walk;
+  if (!walk?.begun) return;
+  const says = walk.tally?.says ?? null, known = walk.end && walk.begun.classes.includes(walk.begun.seen.label);
+  $("verdict").dataset.state = known ? (says === walk.begun.seen.label ? "right" : "wrong") : says === null ? (walk.end ? "none" : "idle") : "answer";
+  $("says").textContent = says === null ? (walk.end ? "undecided" : "") : says;
+  $("moved").textContent = `step ${walk.step} of ${walk.begun.until}`;
+  const play = walk.end || walk.paused ? "Play" : "Pause";
+  if ($("play").textContent !== play) $("play").textContent = play;
+  if (walk.end && !walk.told) {
+    walk.told = true;
+    if (document.documentElement.dataset.state === "living") mark("over");
+    $("spoken").textContent = `The team sees ${picture.about}. It says ${says ?? "nothing"}.`;
+  }
+};
+
 const words = (answer, over) => {
   const distance = Math.abs(answer.moved).toFixed(1);
   if (!answer.way) return { state: over ? "none" : "idle", says: over ? "undecided" : "", moved: `moved ${distance} voxels` };
@@ -126,6 +170,7 @@ const words = (answer, over) => {
 };
 
 const draw = () => {
+  if (who?.team) return drawTeam();
   const ready = simulation?.begun && simulation.moments.length;
   const answer = ready ? simulation.answered(simulation.frame) : null;
   stage.draw(simulation, answer);
@@ -153,19 +198,21 @@ const stage = new Stage($("world"), materials);
 const tick = (now) => {
   simulation?.pass(Math.min(now - previous, 200) / 1000);
   previous = now;
+  if (team.walk?.stale) drawn = null;
   const state = simulation?.begun ? `${simulation.frame} ${simulation.last} ${simulation.end !== null} ${simulation.playing}` : "none";
   if (state !== drawn) { drawn = state; draw(); }
   requestAnimationFrame(tick);
 };
 
 const play = () => {
+  if (who?.team && !team.over) return void team.change({ paused: !team.walk?.paused }).then(() => { team.walk.stale = true; }, say);
   if (!simulation || simulation.over) return start();
   simulation.play(!simulation.playing).catch(say);
   drawn = null;
 };
 $("play").onclick = play;
 $("again").onclick = start;
-$("speed").onchange = () => simulation?.pace(Number($("speed").value)).catch(say);
+$("speed").onchange = () => (who?.team ? team.change({ speed: Number($("speed").value) }) : simulation?.pace(Number($("speed").value)))?.catch(say);
 $("time").oninput = () => {
   if (!simulation?.begun) return;
   if (simulation.playing) simulation.play(false).catch(say);
@@ -198,18 +245,20 @@ setInterval(() => {
 }, 2000);
 
 tabs(["draw", "test"], (id) => { if (id === "draw") pad.draw(); else images.draw(); });
-tabs(["robots", "editor"], (id) => {
+tabs(["robots", "team", "editor"], (id) => {
+  if (id === "team") together();
+  else if (id === "robots" && who?.team && robots.robot) choose(robots.robot, robots.from);
   document.querySelector("main").dataset.tab = id;
   if (id === "editor") editor.draw();
 });
 for (const material of materials.list.slice(1)) {
   $("legend").append(element("li", {}, Drawing.swatch(material), material.name));
 }
-const redraw = () => { drawn = null; look(); pad.draw(); editor.draw(); };
+const redraw = () => { drawn = null; if (team.walk) team.walk.stale = true; look(); pad.draw(); editor.draw(); };
 window.addEventListener("resize", redraw);
 window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { redraw(); images.draw(); });
 // A tab that closes drops its connection, and with it its simulation.
-window.addEventListener("pagehide", () => simulation?.stop());
+window.addEventListener("pagehide", () => { simulation?.stop(); team.stop(); });
 requestAnimationFrame(tick);
 
 try {
@@ -218,6 +267,7 @@ try {
   const first = images.shown[0];
   if (first) picture = { shown: { image: { set: images.set.name, index: first.index } }, about: `a ${first.label} (${images.set.name} test image ${first.index})` };
   await robots.load();
+  await team.load();
   if (window.matchMedia("(prefers-reduced-motion: reduce)").matches) simulation?.play(false);
 } catch (error) { say(error); }
 document.documentElement.dataset.ready = "yes";

@@ -1,0 +1,325 @@
+//! A team: robots of several tasks see one picture at the same time, and their walks are counted while
+//! they walk.
+
+use crate::serve::catalogue::{Catalogue, Collection};
+use crate::serve::images::ImageSets;
+use crate::serve::refusal::Refusal;
+use crate::serve::request::{MAX_STEPS, Pace, Seen, Shown, Who};
+use crate::serve::simulation::{Clock, Gone, HEARTBEAT};
+use crate::serve::simulations::Slot;
+use crate::sim::System;
+use crate::task::direction::THRESHOLD;
+use crate::task::judge::Judge;
+use crate::task::recording::{Frame, VoxelCorners};
+use crate::task::rollout::Rollout;
+use crate::task::voting::{Ballot, CLIP};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeSet;
+use std::sync::Arc;
+
+/// Fewest robots that are a team.
+const LEAST: usize = 2;
+
+/// A robot of the team, by where it is found.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Name {
+    /// Number of its collection.
+    pub archive: usize,
+    /// Its id.
+    pub robot: String,
+    /// Its task, as "4|9".
+    pub task: String,
+    /// What its walks say.
+    pub judge: Judge,
+}
+
+/// The team: of every task the fittest robot of the first collection that has one, all of the same
+/// data: those with most tasks. Empty with fewer than two.
+pub fn members(collections: &[Arc<Collection>]) -> Vec<Name> {
+    let data = |from: &Collection| (from.config.data.dataset.clone(), from.config.data.builtin.clone());
+    let mut teams: Vec<(_, Vec<Name>)> = Vec::new();
+    for (archive, from) in collections.iter().enumerate() {
+        let of = data(from);
+        let place = teams.iter().position(|(other, _)| *other == of).unwrap_or_else(|| {
+            teams.push((of, Vec::new()));
+            teams.len() - 1
+        });
+        let members = &mut teams[place].1;
+        for robot in &from.robots {
+            let Some(judge) = &robot.judge else { continue };
+            if members.iter().all(|member| member.task != robot.task) {
+                let (id, task) = (robot.id.clone(), robot.task.clone());
+                members.push(Name { archive, robot: id, task, judge: judge.clone() });
+            }
+        }
+    }
+    let mut members = teams.into_iter().map(|(_, members)| members).max_by_key(Vec::len).unwrap_or_default();
+    members.sort_by(|a, b| a.task.cmp(&b.task));
+    if members.len() < LEAST { Vec::new() } else { members }
+}
+
+/// The classes that a team tells apart, in order.
+pub fn classes<'a>(judges: impl IntoIterator<Item = &'a Judge>) -> Vec<u8> {
+    let all: BTreeSet<u8> =
+        judges.into_iter().flat_map(|judge| judge.left.iter().chain(&judge.right)).copied().collect();
+    all.into_iter().collect()
+}
+
+/// A walk of the team to begin.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TeamRequest {
+    /// What all of them see.
+    #[serde(default)]
+    shown: Shown,
+    /// For how many control steps; default: the first robot's protocol.
+    control_steps: Option<u32>,
+    /// Times real time; 0: as fast as possible. Default 1.
+    speed: Option<f64>,
+}
+
+/// A walk that can be begun.
+#[derive(Clone, Debug)]
+pub struct TeamPlan {
+    /// The robots, with what each sees; at least two.
+    pub members: Vec<(Name, Who, Seen)>,
+    /// For how many control steps.
+    pub control_steps: u32,
+    /// How fast.
+    pub pace: Pace,
+}
+
+impl TeamRequest {
+    /// What it means.
+    ///
+    /// # Errors
+    /// If there is no team, or what is wrong with the request.
+    pub fn plan(self, catalogue: &Catalogue, images: &ImageSets) -> Result<TeamPlan, Refusal> {
+        let collections = catalogue.collections();
+        let names = members(&collections);
+        let mut members = Vec::new();
+        for name in names {
+            let who = collections[name.archive].who(&name.robot)?;
+            let seen = self.shown.clone().seen(&who, images)?;
+            members.push((name, who, seen));
+        }
+        let Some((_, first, _)) = members.first() else {
+            let text = "there is no team: expected robots of two or more tasks among the archives";
+            return Err(Refusal::Unknown(text.to_string()));
+        };
+        let control_steps = self.control_steps.unwrap_or(first.protocol.control_steps.min(MAX_STEPS));
+        if !(1..=MAX_STEPS).contains(&control_steps) {
+            return Err(Refusal::Wrong(format!("control_steps: {control_steps}: expected 1 to {MAX_STEPS}")));
+        }
+        Ok(TeamPlan { members, control_steps, pace: Pace::of(self.speed.unwrap_or(1.0))? })
+    }
+}
+
+/// What a team's walk reports.
+pub enum TeamEvent<'a> {
+    /// It begins, at rest.
+    Begin {
+        /// Its number.
+        id: u64,
+        /// The robots, and what is shown for how long.
+        plan: &'a TeamPlan,
+        /// The classes that are told apart.
+        classes: &'a [u8],
+        /// Each robot's voxels, and how it stands.
+        stands: Vec<(Vec<VoxelCorners>, Frame)>,
+    },
+    /// It went on.
+    Moment {
+        /// Control steps done.
+        step: u32,
+        /// How each robot stands; none of one that has become unstable.
+        frames: Vec<Option<Frame>>,
+        /// What the walks come to so far.
+        tally: Tally,
+    },
+    /// It stands still.
+    Still,
+    /// It has ended.
+    End {
+        /// Control steps done.
+        step: u32,
+        /// What the walks come to.
+        tally: Tally,
+    },
+}
+
+/// What the walks come to.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Tally {
+    /// How far each robot has walked \[voxel lengths\]; none of one that has become unstable.
+    pub moved: Vec<Option<f64>>,
+    /// Votes and sums of walks, for every class.
+    #[serde(flatten)]
+    pub ballot: Ballot,
+    /// The class with most votes; none while there is no vote.
+    pub says: Option<u8>,
+}
+
+/// A robot that walks.
+struct Walker<'a> {
+    rollout: Rollout<'a>,
+    is_unstable: bool,
+}
+
+/// Lets a team walk; `tell` gets what happens.
+///
+/// # Errors
+/// [`Gone`] as soon as `tell` says so.
+pub fn live(
+    slot: &Slot,
+    plan: &TeamPlan,
+    mut tell: impl FnMut(TeamEvent) -> Result<(), Gone>,
+) -> Result<(), Gone> {
+    let systems: Vec<Arc<System>> = plan
+        .members
+        .iter()
+        .map(|(_, who, _)| Arc::new(System::new(&who.body, who.physics.clone())))
+        .collect();
+    let mut walkers: Vec<Walker> = Vec::new();
+    for ((_, who, seen), system) in plan.members.iter().zip(&systems) {
+        let mut rollout = Rollout::new(system, &who.protocol);
+        rollout.look_at(&seen.stimulus);
+        walkers.push(Walker { rollout, is_unstable: false });
+    }
+    let judges: Vec<&Judge> = plan.members.iter().map(|(name, _, _)| &name.judge).collect();
+    let classes = classes(judges.iter().copied());
+    let stands = walkers.iter().map(|walker| (walker.rollout.voxels(), walker.rollout.frame())).collect();
+    tell(TeamEvent::Begin { id: slot.id, plan, classes: &classes, stands })?;
+    let mut clock = Clock::new(plan.pace);
+    let mut step = 0;
+    loop {
+        let news = slot.control.news();
+        clock.set(news.pace, news.paused);
+        if news.end || step >= plan.control_steps {
+            return tell(TeamEvent::End { step, tally: Tally::of(&walkers, &judges, &classes) });
+        }
+        let Some(due) = clock.due(step) else {
+            tell(TeamEvent::Still)?;
+            slot.control.wait(HEARTBEAT);
+            continue;
+        };
+        let due = due.min(plan.control_steps - step);
+        if due > 0 {
+            let over = &slot.control.over;
+            walkers.par_iter_mut().filter(|walker| !walker.is_unstable).for_each(|walker| {
+                for _ in 0..due {
+                    match walker.rollout.step_unless(over) {
+                        Ok(Ok(())) => {}
+                        Ok(Err(_)) => walker.is_unstable = true,
+                        Err(_) => {}
+                    }
+                    if walker.is_unstable || slot.control.is_over() {
+                        return;
+                    }
+                }
+            });
+            if slot.control.is_over() {
+                continue;
+            }
+            step += due;
+            let frame = |walker: &Walker| (!walker.is_unstable).then(|| walker.rollout.frame());
+            let frames = walkers.iter().map(frame).collect();
+            tell(TeamEvent::Moment { step, frames, tally: Tally::of(&walkers, &judges, &classes) })?;
+        }
+        clock.sleep(&slot.control);
+    }
+}
+
+impl Tally {
+    fn of(walkers: &[Walker], judges: &[&Judge], classes: &[u8]) -> Self {
+        let moved: Vec<Option<f64>> =
+            walkers.iter().map(|walker| (!walker.is_unstable).then(|| walker.rollout.moved())).collect();
+        let walks = judges.iter().copied().zip(moved.iter().copied());
+        let ballot = Ballot::count(classes, walks, THRESHOLD, CLIP);
+        let has_votes = ballot.votes.iter().any(|votes| *votes > 0);
+        let says = has_votes.then(|| classes[ballot.by_votes().0]);
+        Tally { moved, ballot, says }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::base::Grid;
+    use crate::serve::simulations::Simulations;
+    use crate::sim::Physics;
+    use crate::task::protocol::Protocol;
+    use crate::task::rollout::fresh_rollout;
+    use crate::task::stimulus::StimulusParams;
+    use std::sync::atomic::AtomicBool;
+
+    fn plan() -> TeamPlan {
+        let judge = |a, b| Judge { left: vec![a], right: vec![b] };
+        let member = |body: &str, judge: Judge| {
+            let who = Who {
+                body: body.parse().unwrap(),
+                physics: Physics::default(),
+                protocol: Protocol { control_steps: 120, ..Protocol::default() },
+                encoding: StimulusParams::default(),
+                judge: Some(judge.clone()),
+            };
+            let seen =
+                Seen { stimulus: Grid::filled(who.body.height(), who.body.width(), 1.0), label: Some(1) };
+            (Name { archive: 0, robot: body.to_string(), task: String::new(), judge }, who, seen)
+        };
+        let members = vec![member("3434/4345/6363", judge(0, 1)), member("334/463/343", judge(1, 2))];
+        TeamPlan { members, control_steps: 120, pace: Pace::Free }
+    }
+
+    #[test]
+    fn the_walks_of_a_team_are_those_of_its_robots_by_themselves_and_are_counted_as_team_counts() {
+        let plan = plan();
+        let simulations = Simulations::default();
+        let slot = simulations.begin(plan.members[0].1.clone()).unwrap();
+        let (mut moments, mut end) = (0, None);
+        live(&slot, &plan, |event| {
+            match event {
+                TeamEvent::Begin { classes, stands, .. } => {
+                    assert_eq!((classes, stands.len()), (&[0, 1, 2][..], 2))
+                }
+                TeamEvent::Moment { frames, .. } => {
+                    moments += usize::from(frames.iter().all(Option::is_some))
+                }
+                TeamEvent::Still => {}
+                TeamEvent::End { step, tally } => end = Some((step, tally)),
+            }
+            Ok(())
+        })
+        .unwrap();
+        let (step, tally) = end.unwrap();
+        assert!((step, moments > 3) == (120, true));
+        let alone = |(_, who, seen): &(Name, Who, Seen)| {
+            let system = Arc::new(System::new(&who.body, who.physics.clone()));
+            fresh_rollout(&system, &who.protocol, &seen.stimulus, &AtomicBool::new(false)).unwrap().ok()
+        };
+        let walks: Vec<Option<f64>> = plan.members.iter().map(alone).collect();
+        assert_eq!(tally.moved, walks);
+        let judges = plan.members.iter().map(|(name, _, _)| &name.judge);
+        assert_eq!(tally.ballot, Ballot::count(&[0, 1, 2], judges.zip(walks), THRESHOLD, CLIP));
+    }
+
+    #[test]
+    fn a_team_that_is_to_end_ends_in_the_middle_of_a_control_step() {
+        let mut plan = plan();
+        for (_, who, _) in &mut plan.members {
+            who.physics.substeps = u32::MAX;
+        }
+        let simulations = Simulations::default();
+        let slot = simulations.begin(plan.members[0].1.clone()).unwrap();
+        let begin = std::time::Instant::now();
+        std::thread::scope(|threads| {
+            threads.spawn(|| {
+                std::thread::sleep(std::time::Duration::from_millis(50));
+                simulations.close();
+            });
+            live(&slot, &plan, |_| Ok(())).unwrap();
+        });
+        assert!(begin.elapsed().as_secs() < 5, "{:?}", begin.elapsed());
+    }
+}
