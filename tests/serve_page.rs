@@ -193,8 +193,45 @@ fn by_hand(digit: u8, dice: &mut Dice) -> Vec<[f64; 2]> {
     line
 }
 
+/// Drawings of a seed, of which a few may be read wrong.
+fn draws_by_hand(seed: u64) {
+    let sandbox = Sandbox::new();
+    let Some(mut browser) = browser(&sandbox) else { return };
+    let server = Server::start(&sandbox, "");
+    let mut tab = browser.tab(1280, 900, false);
+    open(&mut tab, &server);
+    tab.eval("(() => { const s = document.getElementById('speed'); s.value = '0'; s.onchange(); })()");
+    let mut wrong = Vec::new();
+    let mut dice = Dice::new(77, seed);
+    for number in 0..40 {
+        let digit = number % 2;
+        tab.pointer = if dice.below(2) == 0 { "mouse" } else { "pen" };
+        let (says, moved) = answer(&mut tab, &by_hand(digit, &mut dice));
+        if says != digit.to_string() {
+            wrong.push(format!("seed {seed}, drawing {number}: a {digit} is {says:?}, {moved}"));
+        }
+    }
+    assert!(wrong.len() <= 2, "{} of 40 wrong:\n{}", wrong.len(), wrong.join("\n"));
+}
+
+// Side by side: most of the time is a browser's.
 #[test]
 fn digits_drawn_in_any_size_place_and_slant_are_read_by_the_robot_that_the_page_begins_with() {
+    draws_by_hand(1);
+}
+
+#[test]
+fn so_they_are_with_another_seed() {
+    draws_by_hand(2);
+}
+
+#[test]
+fn so_they_are_with_a_third_seed() {
+    draws_by_hand(3);
+}
+
+#[test]
+fn a_drawing_is_fitted_unless_that_is_turned_off() {
     let sandbox = Sandbox::new();
     let Some(mut browser) = browser(&sandbox) else { return };
     let server = Server::start(&sandbox, "");
@@ -204,19 +241,6 @@ fn digits_drawn_in_any_size_place_and_slant_are_read_by_the_robot_that_the_page_
     answer(&mut tab, &zero());
     tab.eval("window.scrollTo(0, 0)");
     keep_picture("serve.png", &tab.screenshot());
-    let mut wrong = Vec::new();
-    for seed in 1..=3 {
-        let mut dice = Dice::new(77, seed);
-        for number in 0..40 {
-            let digit = number % 2;
-            tab.pointer = if dice.below(2) == 0 { "mouse" } else { "pen" };
-            let (says, moved) = answer(&mut tab, &by_hand(digit, &mut dice));
-            if says != digit.to_string() {
-                wrong.push(format!("seed {seed}, drawing {number}: a {digit} is {says:?}, {moved}"));
-            }
-        }
-    }
-    assert!(wrong.len() <= 6, "{} of 120 wrong:\n{}", wrong.len(), wrong.join("\n"));
     // As drawn, it is another picture.
     let small: Vec<[f64; 2]> = zero().iter().map(|place| place.map(|v| 2.0 + v / 4.0)).collect();
     draw(&mut tab, &small);
@@ -296,7 +320,8 @@ fn a_team_walks_on_small_stages_and_its_votes_are_counted() {
         assert_eq!(tab.eval(votes), tab.eval(turned));
         let says = tab.text("#says");
         assert!(["0", "1", "2", "undecided"].contains(&says.as_str()), "{says}");
-        assert!(tab.text("#spoken").starts_with("The team sees your drawing. It says "));
+        let spoken = tab.text("#spoken");
+        assert!(spoken.starts_with("The team sees your drawing. It says "), "{spoken}");
         let fits = "document.documentElement.scrollWidth <= window.innerWidth";
         assert_eq!(tab.eval(fits), true);
         keep_picture(&format!("team-{width}.png"), &tab.screenshot());

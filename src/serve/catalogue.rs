@@ -7,12 +7,14 @@ use crate::body::{Body, VoxelCounts};
 use crate::config::Config;
 use crate::serve::course::Course;
 use crate::serve::refusal::Refusal;
-use crate::serve::request::Who;
+use crate::sim::Physics;
 use crate::store::audit::AuditFile;
 use crate::store::images::DatasetRef;
 use crate::store::names::{AUDIT_JSON, RUN_JSON};
 use crate::store::run::{Robot, RunFile};
 use crate::task::judge::Judge;
+use crate::task::protocol::Protocol;
+use crate::task::stimulus::StimulusParams;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -61,6 +63,21 @@ pub struct Entry {
     pub audit: Option<Audited>,
     /// Its body.
     pub body: Body,
+}
+
+/// Which body, with all that its simulation depends on.
+#[derive(Clone, Debug)]
+pub struct Who {
+    /// The body.
+    pub body: Body,
+    /// The constants of its world.
+    pub physics: Physics,
+    /// Where it starts, and how long it sees an image.
+    pub protocol: Protocol,
+    /// How it sees.
+    pub encoding: StimulusParams,
+    /// What its walks say; none of a body without a task.
+    pub judge: Option<Judge>,
 }
 
 /// What an audit found.

@@ -3,11 +3,10 @@
 
 use crate::base::Grid;
 use crate::body::Body;
-use crate::serve::catalogue::Catalogue;
+use crate::serve::catalogue::{Catalogue, Who};
 use crate::serve::images::{ImageName, ImageSets};
 use crate::serve::refusal::Refusal;
 use crate::sim::Physics;
-use crate::task::judge::Judge;
 use crate::task::protocol::Protocol;
 use crate::task::stimulus::{Encoding, Reduction, StimulusParams, stimulus};
 use serde::Deserialize;
@@ -105,21 +104,6 @@ impl Pace {
             ))),
         }
     }
-}
-
-/// Which body, with all that its simulation depends on.
-#[derive(Clone, Debug)]
-pub struct Who {
-    /// The body.
-    pub body: Body,
-    /// The constants of its world.
-    pub physics: Physics,
-    /// Where it starts, and how long it sees an image.
-    pub protocol: Protocol,
-    /// How it sees.
-    pub encoding: StimulusParams,
-    /// What its walks say; none of a body without a task.
-    pub judge: Option<Judge>,
 }
 
 /// What is seen, and of which class it is if that is known.

@@ -1,8 +1,8 @@
 //! `morphcog serve`: the page, and what it asks for, over HTTP on this machine only.
 
 use crate::base::error::Error;
+use crate::serve::catalogue::Who;
 use crate::serve::http::Response;
-use crate::serve::request::Who;
 use crate::serve::routes::Reply;
 use crate::serve::simulation::{Gone, live};
 use crate::serve::simulations::{Control, Slot};

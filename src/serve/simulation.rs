@@ -183,7 +183,7 @@ impl Clock {
 mod tests {
     use super::*;
     use crate::base::Grid;
-    use crate::serve::request::Who;
+    use crate::serve::catalogue::Who;
     use crate::serve::simulations::Simulations;
     use crate::sim::Physics;
     use crate::task::protocol::Protocol;

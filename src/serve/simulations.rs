@@ -1,7 +1,8 @@
 //! [`Simulations`]: what runs at the moment, and how it is told to change.
 
+use crate::serve::catalogue::Who;
 use crate::serve::refusal::Refusal;
-use crate::serve::request::{Pace, Seen, Who};
+use crate::serve::request::{Pace, Seen};
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};

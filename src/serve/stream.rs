@@ -4,7 +4,8 @@
 //! centre of mass.
 
 use crate::body::{Body, Material};
-use crate::serve::request::{Plan, Seen, Who};
+use crate::serve::catalogue::Who;
+use crate::serve::request::{Plan, Seen};
 use crate::serve::simulation::{Event, STEPS_PER_SECOND};
 use crate::serve::team::{Name, TeamEvent};
 use crate::task::direction::THRESHOLD;

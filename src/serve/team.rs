@@ -1,10 +1,10 @@
 //! A team: robots of several tasks see one picture at the same time, and their walks are counted while
 //! they walk.
 
-use crate::serve::catalogue::{Catalogue, Collection};
+use crate::serve::catalogue::{Catalogue, Collection, Who};
 use crate::serve::images::ImageSets;
 use crate::serve::refusal::Refusal;
-use crate::serve::request::{MAX_STEPS, Pace, Seen, Shown, Who};
+use crate::serve::request::{MAX_STEPS, Pace, Seen, Shown};
 use crate::serve::simulation::{Clock, Gone, HEARTBEAT};
 use crate::serve::simulations::Slot;
 use crate::sim::System;

@@ -50,6 +50,8 @@ export class Team {
       figure.dataset.task = name.task;
       return { canvas, figure, sides: Drawing.sidesOf(voxels, points) };
     });
+    const least = members.length > 24 ? 84 : members.length > 8 ? 120 : 190;
+    $("stages").style.gridTemplateColumns = `repeat(auto-fill, minmax(min(${least}px, 45%), 1fr))`;
     $("stages").replaceChildren(...this.stages.map((stage) => stage.figure));
     this.bars = classes.map((label) => element("li", {}, element("b", { textContent: label }), element("i"), element("span")));
     $("tally").replaceChildren(...this.bars);
