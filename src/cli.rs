@@ -4,6 +4,7 @@ mod args;
 mod audit;
 mod capacity;
 mod choice;
+mod demo;
 mod plot;
 mod process;
 mod report;
@@ -60,6 +61,7 @@ pub fn run(cli: Cli, console: &Console, ranks: Ranks) -> Result<(), Error> {
         return Err(Error::usage(text.to_string()).hint("start it without mpirun".to_string()));
     }
     match cli.command {
+        Command::Demo(args) => demo::run(args, console),
         Command::Evolve(args) => run_evolve(args, console, ranks),
         Command::Eval(args) => run_eval(args, console, ranks),
         Command::Response(args) => response::run(args, console),

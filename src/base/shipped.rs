@@ -6,6 +6,9 @@ use std::path::{Path, PathBuf};
 /// How a name of shipped runs begins.
 pub const PREFIX: &str = "gallery:";
 
+/// The set of the robot that `demo` trains on; it is of other data, and so not among all.
+const DEMO: &str = "demo";
+
 /// A run: its name, and its files with their names.
 type Run = (&'static str, &'static [(&'static str, &'static str)]);
 
@@ -23,8 +26,23 @@ macro_rules! run {
     };
 }
 
+/// The files of a run whose robots are trained on by `demo`: with the response of its gait.
+macro_rules! demo {
+    ($folder:literal) => {
+        (
+            "demo-1",
+            &[
+                ("run.json", include_str!(concat!("../../data/", $folder, "/run.json"))),
+                ("audit.json", include_str!(concat!("../../data/", $folder, "/audit.json"))),
+                ("response.json", include_str!(concat!("../../data/", $folder, "/response.json"))),
+            ],
+        )
+    };
+}
+
 /// All of them; the runs of a set are numbered, the best on validation images first.
-const RUNS: [Run; 2] = [run!("zero_one-1", "trained/zero-one-1"), run!("zero_one-2", "trained/zero-one-2")];
+const RUNS: &[Run] =
+    &[run!("zero_one-1", "trained/zero-one-1"), run!("zero_one-2", "trained/zero-one-2"), demo!("demo")];
 
 /// The run and the file that a path names, if it begins as those of shipped runs do.
 fn parts(path: &Path) -> Option<(&str, &str)> {
@@ -50,7 +68,8 @@ pub fn text(path: &Path) -> Option<&'static str> {
 /// What there is, if there is no run of that name.
 pub fn runs(path: &Path) -> Result<Vec<PathBuf>, String> {
     let (name, _) = parts(path).unwrap_or_default();
-    let is_meant = |run: &&Run| run.0 == name || set_of(run.0) == name || name == "all";
+    let is_meant =
+        |run: &&Run| run.0 == name || set_of(run.0) == name || name == "all" && set_of(run.0) != DEMO;
     let found: Vec<PathBuf> = RUNS
         .iter()
         .filter(is_meant)

@@ -3,6 +3,7 @@
 use crate::cli::audit::AuditArgs;
 use crate::cli::capacity::CapacityArgs;
 use crate::cli::choice::{Archives, ROBOTS, run_json};
+use crate::cli::demo::DemoArgs;
 use crate::cli::plot::PlotArgs;
 use crate::cli::report::ReportArgs;
 use crate::cli::reproduce::ReproduceArgs;
@@ -11,7 +12,7 @@ use crate::cli::serve::ServeArgs;
 use crate::cli::sweep::SweepArgs;
 use crate::cli::team::TeamArgs;
 use crate::cli::train::TrainArgs;
-use crate::cli::{audit, capacity, plot, report, reproduce, response, serve, sweep, team, train};
+use crate::cli::{audit, capacity, demo, plot, report, reproduce, response, serve, sweep, team, train};
 use crate::commands::replay::Shown;
 use crate::config;
 use crate::data::dataset::BUILTIN;
@@ -54,7 +55,9 @@ from 1); without a value, as in data.train_images=, it has its default again; ma
 
 const EXAMPLES: &str = "\
 Examples:
-  morphcog evolve --config quickstart.toml     about a minute, no download
+  morphcog demo                                about a minute, no download
+  morphcog serve                               draw a digit, and watch a body read it
+  morphcog evolve --config quickstart.toml     small robots from nothing
   morphcog replay --robot best                 watch the fittest robot of the newest run
   morphcog data fetch mnist                    then the paper's experiments:
   morphcog evolve --config zero_one.toml
@@ -66,6 +69,9 @@ Exit codes:
 
 #[derive(Debug, Subcommand)]
 pub(super) enum Command {
+    /// A first look: train a body for a minute, and test it.
+    #[command(after_help = demo::EXAMPLES)]
+    Demo(DemoArgs),
     /// Evolve bodies with MAP-Elites.
     #[command(after_help = "\
 Examples:

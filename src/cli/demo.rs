@@ -1,0 +1,150 @@
+//! `morphcog demo`: its words, and what it calls.
+
+use crate::base::error::Error;
+use crate::base::ranks::Ranks;
+use crate::base::signals;
+use crate::commands::replay::Shown;
+use crate::commands::{eval, replay};
+use crate::config;
+use crate::data::builtin::BuiltinDigits;
+use crate::data::dataset::{Dataset, Split};
+use crate::search::train;
+use crate::store::folder;
+use crate::store::folder::IfExists;
+use crate::store::images::HeldOut;
+use crate::store::names::{EVAL_JSON, RUN_JSON};
+use crate::store::robots::{BEST, Selection};
+use crate::task::direction;
+use crate::view::console::Console;
+use crate::view::pictures;
+use crate::view::pictures::Format;
+use crate::view::reporters::Reporter;
+use crate::view::summary;
+use clap::Args;
+use std::path::PathBuf;
+
+pub(super) const EXAMPLES: &str = "\
+Examples:
+  morphcog demo
+then
+  morphcog serve                       draw digits yourself
+  morphcog evolve --config quickstart.toml      from nothing
+
+About a minute, no download: a body that ships with the program is trained on with digits that the
+program draws itself. Bodies that are a little different challenge it; one that answers better takes
+its place. Then it is shown 200 digits that it has never seen.";
+
+/// The robot that is trained on.
+const ROBOT: &str = "gallery:demo";
+
+/// A little of everything, for two cores and a minute.
+const LITTLE: [&str; 8] = [
+    "data.dataset=builtin",
+    "train.rounds=0",
+    "train.images=40",
+    "train.final_images=100",
+    "train.challengers=8",
+    "train.images_per_class=500",
+    "train.random_images=300",
+    // The test's images say how it went.
+    "validation.best=0",
+];
+
+/// Images of the test.
+const TEST_IMAGES: usize = 200;
+
+#[derive(Debug, Args)]
+pub(super) struct DemoArgs {
+    /// Seed of all chance.
+    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u64).range(..=config::MAX_NUMBER))]
+    seed: u64,
+    /// Run folder.
+    #[arg(short, long, value_name = "DIR", default_value = "runs/demo")]
+    out: PathBuf,
+    /// Replace the run in the folder.
+    #[arg(long)]
+    force: bool,
+    /// Threads (default: one per core); the result does not depend on it.
+    #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    threads: Option<u16>,
+}
+
+pub(super) fn run(args: DemoArgs, console: &Console) -> Result<(), Error> {
+    let threads = args.threads.map(usize::from);
+    let options = train::Options {
+        archive: folder::first_run(PathBuf::from(ROBOT)).map_err(Error::other)?,
+        robots: Selection::Ids(vec![BEST.to_string()]),
+        groups: [vec![0], vec![1]],
+        seed: Some(args.seed),
+        set: LITTLE.map(str::to_string).to_vec(),
+        name: "demo".to_string(),
+        out: args.out.clone(),
+        if_exists: if args.force { IfExists::Overwrite } else { IfExists::Refuse },
+        data: None,
+        threads,
+    };
+    let stop = signals::stop_flag()?;
+    let reporter = Reporter::new(console);
+    let finished = train::train(&options, &stop, &reporter)?;
+    summary::training(console, &finished, &options.out);
+    let archive = options.out.join(RUN_JSON);
+    let test = eval::Options {
+        archives: vec![archive.clone()],
+        robots: Selection::Ids(vec![BEST.to_string()]),
+        images: TEST_IMAGES,
+        split: HeldOut::Test,
+        validation: None,
+        seed: args.seed,
+        threshold: direction::THRESHOLD,
+        cycles: crate::search::showing::CYCLES,
+        data: None,
+        dataset: None,
+        out: archive.with_file_name(EVAL_JSON),
+        threads,
+        ranks: Ranks::ALONE,
+    };
+    let eval::Finished { file, unwritten } = eval::eval(&test, &stop, &reporter)?;
+    let written = unwritten.is_none().then_some(test.out.as_path());
+    summary::evaluation(console, &file, None, written);
+    if let Some(error) = unwritten {
+        return Err(error);
+    }
+    if file.stopped {
+        return Err(Error::stopped("stopped during the test; the robot is saved".to_string()));
+    }
+    // Nothing is left to be saved: from here on a signal ends the process.
+    drop(stop);
+    let shown = replay::Options {
+        robot: BEST.to_string(),
+        archive: Some(archive),
+        images: new_digits()?,
+        ..replay::Options::default()
+    };
+    let replay = replay::replay(&shown)?;
+    let wanted = pictures::Wanted::beside(&options.out, &replay.name, &[Format::Gif, Format::Html]);
+    pictures::make(console, &replay, &wanted)?;
+    Ok(())
+}
+
+/// A zero and a one of the test's digits.
+fn new_digits() -> Result<Vec<Shown>, Error> {
+    let digits = Dataset::builtin(BuiltinDigits::default(), &[Split::Test]);
+    let digits = digits.map_err(|error| Error::other(error.to_string()))?;
+    let first = |class: u8| digits.indices_of(Split::Test, class).first().copied();
+    Ok([0, 1].into_iter().filter_map(first).map(|index| Shown { split: Split::Test, index }).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_settings_of_the_demonstration_are_those_of_a_config() {
+        let run =
+            crate::store::run::RunFile::read(&folder::first_run(PathBuf::from(ROBOT)).unwrap()).unwrap();
+        let set = LITTLE.map(str::to_string);
+        let config = train::config_of(&run.config, &[vec![0], vec![1]], Some(1), &set).unwrap();
+        assert_eq!((config.data.dataset.as_str(), config.train.rounds), ("builtin", 0));
+        assert_eq!(new_digits().unwrap().len(), 2);
+    }
+}
