@@ -1187,3 +1187,24 @@ fn an_instruction_set_that_is_not_there_is_an_error_that_names_those_that_are() 
         said(command).ended(code, words);
     }
 }
+
+#[test]
+fn robots_that_ship_with_the_program_are_named_where_archives_are() {
+    let sandbox = Sandbox::new();
+    sandbox.run("plot body -q -a gallery:zero_one-2 -o body.svg").ended(0, &[]);
+    sandbox
+        .run("replay -q -a gallery:zero_one --robot best --dataset builtin --images 0 -o walk.png")
+        .ended(0, &[]);
+    // Of a set, every run; results go to the present folder.
+    sandbox
+        .run("eval -q -a gallery:zero_one --dataset builtin --images 2 --cycles 1 --physical-only")
+        .ended(0, &[]);
+    let tested: serde_json::Value = serde_json::from_str(&sandbox.read("gallery-eval.json")).unwrap();
+    let robots = tested["robots"].as_array().unwrap();
+    assert!(robots.len() >= 2 && robots.iter().all(|robot| robot["task"] == "0|1"), "{robots:?}");
+    sandbox.run("plot body -q -a gallery:zero_one-1 --robot best").ended(0, &[]);
+    let id = &morphcog::analysis::gallery::trained().unwrap()[0].0.elites[0].id;
+    assert!(sandbox.path(&format!("gallery-zero_one-1-plot-body-{id}.svg")).exists());
+    let refused = sandbox.run("eval -a gallery:zero --images 2");
+    refused.ended(2, &["gallery:zero", "expected gallery:all, gallery:zero_one, gallery:zero_one-1"]);
+}
