@@ -146,7 +146,7 @@ const drawTeam = () => {
   team.draw();
   const walk = team.walk;
   if (!walk?.begun) return;
-  const says = walk.tally?.says ?? null, known = walk.end && walk.begun.classes.includes(walk.begun.seen.label);
+  const says = walk.tally?.says ?? null, known = walk.end && says !== null && walk.begun.classes.includes(walk.begun.seen.label);
   $("verdict").dataset.state = known ? (says === walk.begun.seen.label ? "right" : "wrong") : says === null ? (walk.end ? "none" : "idle") : "answer";
   $("says").textContent = says === null ? (walk.end ? "undecided" : "") : says;
   $("moved").textContent = `step ${walk.step} of ${walk.begun.until}`;
