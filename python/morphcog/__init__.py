@@ -250,7 +250,7 @@ class Run:
             raise Error("; ".join(texts) or done.stderr.strip())
 
     def _beside(self, name):
-        with open(_os.path.join(_os.path.dirname(self.path), name), encoding="utf-8") as file:
+        with open(self._data.beside(name), encoding="utf-8") as file:
             return _table(file.read())
 
     def __repr__(self):
@@ -266,7 +266,7 @@ def _table(text):
 
 
 def load_run(folder):
-    """A run by its folder or its run.json."""
+    """A run by its folder or its run.json; or one that ships with morphcog, as "gallery:zero_one"."""
     return Run(folder)
 
 

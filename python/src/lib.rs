@@ -178,6 +178,11 @@ impl RunData {
         Ok(RunData { run, path })
     }
 
+    /// Where results of a name go if nothing is said.
+    fn beside(&self, name: &str) -> PathBuf {
+        folder::beside(&self.path, name)
+    }
+
     #[getter]
     fn path(&self) -> PathBuf {
         self.path.clone()
