@@ -28,8 +28,8 @@ pub const ALL: &str = "gallery";
 /// The list of them.
 pub(crate) const TEXT: &str = include_str!("../../data/gallery.json");
 
-/// Runs whose robots were trained to tell zeros from ones, each with its audit; the best on
-/// validation images first.
+/// Runs whose robots were trained to tell zeros from ones, each with its audit, in the order of their
+/// seeds.
 ///
 /// # Errors
 /// If what is built in is damaged (which a test excludes).

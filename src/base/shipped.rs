@@ -40,9 +40,13 @@ macro_rules! demo {
     };
 }
 
-/// All of them; the runs of a set are numbered, the best on validation images first.
-const RUNS: &[Run] =
-    &[run!("zero_one-1", "trained/zero-one-1"), run!("zero_one-2", "trained/zero-one-2"), demo!("demo")];
+/// All of them. The runs of a set are numbered, trained ones by their seeds.
+const RUNS: &[Run] = &[
+    run!("zero_one-1", "trained/zero-one-1"),
+    run!("zero_one-2", "trained/zero-one-2"),
+    run!("zero_one-3", "trained/zero-one-3"),
+    demo!("demo"),
+];
 
 /// The run and the file that a path names, if it begins as those of shipped runs do.
 fn parts(path: &Path) -> Option<(&str, &str)> {

@@ -206,7 +206,7 @@ pub fn run_json(path: PathBuf) -> Result<Vec<PathBuf>, String> {
     }
 }
 
-/// The same, of a set of shipped runs the first: the best on validation images.
+/// The same, of a set of shipped runs the first.
 ///
 /// # Errors
 /// As [`run_json`].
