@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 /// How a name of shipped runs begins.
 pub const PREFIX: &str = "gallery:";
 
-/// The set of the robot that `demo` trains on; it is of other data, and so not among all.
+/// The gaits that `demo` trains; they have no task, and so are not among all.
 const DEMO: &str = "demo";
 
 /// A run: its name, and its files with their names.
@@ -26,26 +26,18 @@ macro_rules! run {
     };
 }
 
-/// The files of a run whose robots are trained on by `demo`: with the response of its gait.
-macro_rules! demo {
-    ($folder:literal) => {
-        (
-            "demo-1",
-            &[
-                ("run.json", include_str!(concat!("../../data/", $folder, "/run.json"))),
-                ("audit.json", include_str!(concat!("../../data/", $folder, "/audit.json"))),
-                ("response.json", include_str!(concat!("../../data/", $folder, "/response.json"))),
-            ],
-        )
-    };
-}
-
 /// All of them. The runs of a set are numbered, trained ones by their seeds.
 const RUNS: &[Run] = &[
     run!("zero_one-1", "trained/zero-one-1"),
     run!("zero_one-2", "trained/zero-one-2"),
     run!("zero_one-3", "trained/zero-one-3"),
-    demo!("demo"),
+    (
+        "demo-1",
+        &[
+            ("run.json", include_str!("../../data/demo/run.json")),
+            ("response.json", include_str!("../../data/demo/response.json")),
+        ],
+    ),
 ];
 
 /// The run and the file that a path names, if it begins as those of shipped runs do.

@@ -30,20 +30,19 @@ then
   morphcog serve                       draw digits yourself
   morphcog evolve --config quickstart.toml      from nothing
 
-About a minute, no download: a body that ships with the program is trained on with digits that the
-program draws itself. Bodies that are a little different challenge it; one that answers better takes
-its place. Then it is shown 200 digits that it has never seen.";
+About a minute, no download: a gait that ships with the program is trained to tell zeros from ones,
+on digits that the program draws itself. Then the robot is shown 200 digits that it has never seen.";
 
-/// The robot that is trained on.
-const ROBOT: &str = "gallery:demo";
+/// The gaits of which the best is trained, with its response.
+const GAITS: &str = "gallery:demo";
 
 /// A little of everything, for two cores and a minute.
 const LITTLE: [&str; 8] = [
     "data.dataset=builtin",
-    "train.rounds=0",
-    "train.images=40",
+    "train.rounds=3",
+    "train.images=80",
     "train.final_images=100",
-    "train.challengers=8",
+    "train.challengers=4",
     "train.images_per_class=500",
     "train.random_images=300",
     // The test's images say how it went.
@@ -72,7 +71,7 @@ pub(super) struct DemoArgs {
 pub(super) fn run(args: DemoArgs, console: &Console) -> Result<(), Error> {
     let threads = args.threads.map(usize::from);
     let options = train::Options {
-        archive: folder::first_run(PathBuf::from(ROBOT)).map_err(Error::other)?,
+        archive: folder::first_run(PathBuf::from(GAITS)).map_err(Error::other)?,
         robots: Selection::Ids(vec![BEST.to_string()]),
         groups: [vec![0], vec![1]],
         seed: Some(args.seed),
@@ -137,14 +136,30 @@ fn new_digits() -> Result<Vec<Shown>, Error> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::search::probing::Probing;
+    use crate::store::names::RESPONSE_JSON;
+    use crate::store::response::ResponseFile;
+    use crate::store::robots::Source;
+    use crate::task::response::Gait;
 
     #[test]
-    fn the_settings_of_the_demonstration_are_those_of_a_config() {
-        let run =
-            crate::store::run::RunFile::read(&folder::first_run(PathBuf::from(ROBOT)).unwrap()).unwrap();
+    fn the_response_that_ships_with_the_gaits_is_what_the_training_begins_with() {
+        let archive = folder::first_run(PathBuf::from(GAITS)).unwrap();
+        let Source { run, .. } = Source::read(&archive).unwrap();
         let set = LITTLE.map(str::to_string);
         let config = train::config_of(&run.config, &[vec![0], vec![1]], Some(1), &set).unwrap();
-        assert_eq!((config.data.dataset.as_str(), config.train.rounds), ("builtin", 0));
-        assert_eq!(new_digits().unwrap().len(), 2);
+        assert_eq!((config.data.dataset.as_str(), config.train.random_images), ("builtin", 300));
+        // After a change of the version, `morphcog response` makes it anew.
+        let file = ResponseFile::read(&archive.with_file_name(RESPONSE_JSON)).unwrap();
+        let conditions: Vec<_> = config.train.perturbations.conditions().collect();
+        let probing = Probing::new(&conditions, run.config.seed);
+        let gait = Gait::of(&run.best().unwrap().body).unwrap();
+        assert_eq!(file.known(&run, run.config.seed, probing.conditions(), &gait).len(), 300);
+    }
+
+    #[test]
+    fn a_zero_and_a_one_of_the_test_are_shown_at_the_end() {
+        let shown = new_digits().unwrap();
+        assert!(shown.len() == 2 && shown.iter().all(|shown| shown.split == Split::Test));
     }
 }
