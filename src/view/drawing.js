@@ -23,12 +23,14 @@ const Drawing = (() => {
   };
   const rgb = (colour) => `rgb(${colour.join(",")})`;
 
-  // A material's mark in a voxel of some colour; its corners in pixels, clockwise from the top left. Smaller, it would be a speck.
-  const MARKED = 9;
+  // A material's mark in a voxel of some colour; its corners in pixels, clockwise from the top left. In small voxels it is as
+  // large as elsewhere, 4 of 10 pixels; smaller yet, it would be a speck.
+  const MARKED = 5;
   const onto = (tones, [r, g, b]) => (0.2126 * r + 0.7152 * g + 0.0722 * b > 105 ? tones[0].map((v) => v >> 1) : tones[2].map((v) => 128 + (v >> 1)));
   const mark = (ctx, { tones, mark: lines }, [a, b, c, d], fill, scale) => {
     if (!lines.length || scale < MARKED) return;
-    const place = ([x, y]) => [0, 1].map((k) => (a[k] + b[k] + c[k] + d[k]) / 4 + x * (b[k] + c[k] - a[k] - d[k]) / 2 + y * (a[k] + b[k] - c[k] - d[k]) / 2);
+    const larger = Math.max(1, 10 / scale);
+    const place = ([x, y]) => [0, 1].map((k) => (a[k] + b[k] + c[k] + d[k]) / 4 + larger * (x * (b[k] + c[k] - a[k] - d[k]) + y * (a[k] + b[k] - c[k] - d[k])) / 2);
     ctx.strokeStyle = rgb(onto(tones, fill));
     ctx.lineWidth = Math.max(1, 0.09 * scale);
     ctx.beginPath();

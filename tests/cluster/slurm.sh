@@ -54,7 +54,7 @@ EOF
   }
   # The page's commands.
   while read -r command; do bash -c "$command"; done < <(commands Slurm)
-  finished 120 || { cat runs/plan/slurm-*.log; exit 1; }
+  finished 240 || { cat runs/plan/slurm-*.log; exit 1; }
   same "$work/slurm/runs/plan" "Slurm" || { cat runs/plan/slurm-*.log; exit 1; }
   # The signal before a time limit: of a minute, 45 seconds before its end; a run of more than a minute.
   mkdir limit
@@ -66,9 +66,9 @@ EOF
   morphcog sweep plan.toml --slurm > job.sh
   sbatch job.sh
   killer "$work/slurm/.*runs/plan .* --task" 3
-  finished 240 || { cat limit/runs/slurm-*.log; exit 1; }
+  finished 480 || { cat limit/runs/slurm-*.log; exit 1; }
   sbatch job.sh
-  finished 120 || { cat runs/plan/slurm-*.log; exit 1; }
+  finished 240 || { cat runs/plan/slurm-*.log; exit 1; }
   same "$work/slurm/runs/plan" "Slurm, tasks killed" || { cat runs/plan/slurm-*.log; exit 1; }
   grep -q 'stopped; ' limit/runs/slurm-1.log || { cat limit/runs/slurm-1.log; exit 1; }
   morphcog sweep limit/plan.toml --set 'seeds=[1]' --out limit/runs --status | grep -q '1 tasks: 1 done'
