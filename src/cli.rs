@@ -48,6 +48,7 @@ use choice::selected;
 use clap::CommandFactory;
 pub use process::{called, main};
 use std::path::Path;
+use std::sync::atomic::AtomicBool;
 
 /// Runs a command.
 ///
@@ -173,14 +174,18 @@ fn run_evolve(args: EvolveArgs, console: &Console, ranks: Ranks) -> Result<(), E
     // Nothing is left to be saved: from here on a signal ends the process.
     drop(stop);
     if args.replay && ranks.leads() {
-        let archive = Some(out.join(RUN_JSON));
-        let robot = BEST.to_string();
-        let replay = replay::Options { robot, archive, data: args.data, ..replay::Options::default() };
-        let replay = replay::replay(&replay)?;
-        let wanted = pictures::Wanted::beside(&out, &replay.name, &[Format::Gif, Format::Html]);
-        pictures::make(console, &replay, &wanted)?;
+        let shown = replay::Options { data: args.data, ..replay::Options::default() };
+        replay_best(&out, shown, console)?;
     }
     Ok(())
+}
+
+/// Replays the best robot of a run folder into it.
+fn replay_best(folder: &Path, shown: replay::Options, console: &Console) -> Result<(), Error> {
+    let (robot, archive) = (BEST.to_string(), Some(folder.join(RUN_JSON)));
+    let replay = replay::replay(&replay::Options { robot, archive, ..shown })?;
+    let wanted = pictures::Wanted::beside(folder, &replay.name, &[Format::Gif, Format::Html]);
+    pictures::make(console, &replay, &wanted).map(drop)
 }
 
 fn run_eval(args: EvalArgs, console: &Console, ranks: Ranks) -> Result<(), Error> {
@@ -223,9 +228,12 @@ fn run_eval(args: EvalArgs, console: &Console, ranks: Ranks) -> Result<(), Error
         out,
         archives,
     };
-    let stop = signals::stop_flag()?;
-    let finished = eval::eval(&options, &stop, &Reporter::new(console))?;
-    let eval::Finished { file: report, unwritten } = finished;
+    test(&options, &*signals::stop_flag()?, console)
+}
+
+/// Tests robots, and says how they did.
+fn test(options: &eval::Options, stop: &AtomicBool, console: &Console) -> Result<(), Error> {
+    let eval::Finished { file: report, unwritten } = eval::eval(options, stop, &Reporter::new(console))?;
     let capacity = CapacityFile::of(&report, &options.out);
     let written = unwritten.is_none().then_some(options.out.as_path());
     summary::evaluation(console, &report, capacity.as_ref(), written);

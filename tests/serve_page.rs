@@ -66,6 +66,19 @@ fn best() -> String {
     trained[0].0.elites[0].id.clone()
 }
 
+/// Simulates without waiting for real time.
+fn as_fast_as_possible(tab: &mut Tab) {
+    tab.eval("(() => { const s = document.getElementById('speed'); s.value = '0'; s.onchange(); })()");
+}
+
+/// A page of its own at the usual size, without waiting for real time.
+fn quick<'a>(browser: &'a mut Browser, server: &Server) -> Tab<'a> {
+    let mut tab = browser.tab(1280, 900, false);
+    open(&mut tab, server);
+    as_fast_as_possible(&mut tab);
+    tab
+}
+
 /// Chooses an archive by its number.
 fn choose(tab: &mut Tab, archive: &str) {
     let first = tab.text("#who");
@@ -99,7 +112,7 @@ fn a_drawn_zero_and_a_drawn_one_are_told_apart_and_the_page_fits_everywhere() {
     assert_eq!(tab.text("#who"), best());
     choose(&mut tab, "1");
     assert_eq!(tab.text("#who"), "QMAXD");
-    tab.eval("(() => { const s = document.getElementById('speed'); s.value = '0'; s.onchange(); })()");
+    as_fast_as_possible(&mut tab);
     // QMAXD walks right under a zero, left under a one.
     let (says, moved) = answer(&mut tab, &zero());
     assert!(says == "0" && moved.ends_with("right"), "{says}: {moved}");
@@ -198,9 +211,7 @@ fn draws_by_hand(seed: u64) {
     let sandbox = Sandbox::new();
     let Some(mut browser) = browser(&sandbox) else { return };
     let server = Server::start(&sandbox, "");
-    let mut tab = browser.tab(1280, 900, false);
-    open(&mut tab, &server);
-    tab.eval("(() => { const s = document.getElementById('speed'); s.value = '0'; s.onchange(); })()");
+    let mut tab = quick(&mut browser, &server);
     let mut wrong = Vec::new();
     let mut dice = Dice::new(77, seed);
     for number in 0..40 {
@@ -235,9 +246,7 @@ fn a_drawing_is_fitted_unless_that_is_turned_off() {
     let sandbox = Sandbox::new();
     let Some(mut browser) = browser(&sandbox) else { return };
     let server = Server::start(&sandbox, "");
-    let mut tab = browser.tab(1280, 900, false);
-    open(&mut tab, &server);
-    tab.eval("(() => { const s = document.getElementById('speed'); s.value = '0'; s.onchange(); })()");
+    let mut tab = quick(&mut browser, &server);
     answer(&mut tab, &zero());
     tab.eval("window.scrollTo(0, 0)");
     keep_picture("serve.png", &tab.screenshot());
@@ -308,7 +317,7 @@ fn a_team_walks_on_small_stages_and_its_votes_are_counted() {
     for (width, height, dark) in [(1280, 800, false), (390, 844, true)] {
         let mut tab = browser.tab(width, height, dark);
         open(&mut tab, &server);
-        tab.eval("(() => { const s = document.getElementById('speed'); s.value = '0'; s.onchange(); })()");
+        as_fast_as_possible(&mut tab);
         let alone = tab.text("#who");
         tab.click("#tab-team");
         assert_eq!(tab.text("#who"), "The team");

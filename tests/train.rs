@@ -136,6 +136,25 @@ fn a_response_that_was_measured_before_is_taken_and_changes_nothing() {
 }
 
 #[test]
+fn without_rounds_the_fittest_robot_is_refined_as_it_is() {
+    let sandbox = sandbox();
+    let train = |challengers: u32, out: &str| {
+        let set = format!("--set train.rounds=0 --set train.challengers={challengers}");
+        sandbox
+            .run(&format!("train -q -a walkers --task 0|1 --robots top:2 {LITTLE} {set} -o {out}"))
+            .ended(0, &[]);
+        let run = sandbox.run_file(out);
+        (run.elites[0].body.clone(), run.elites[0].parent.clone())
+    };
+    let walkers = sandbox.run_file("walkers");
+    let fittest = walkers.best().unwrap();
+    assert_eq!(train(0, "own"), (fittest.body.clone(), Some(fittest.id.clone())));
+    // One that is beaten is another.
+    let (body, parent) = train(40, "refined");
+    assert!(body != fittest.body && parent.as_ref() == Some(&fittest.id));
+}
+
+#[test]
 fn what_cannot_be_trained_is_one_clear_error_and_writes_nothing() {
     let sandbox = sandbox();
     let refused = |options: &str, code: i32, words: &[&str]| {

@@ -63,7 +63,7 @@ pub struct Options {
     pub images: usize,
     /// The relative error of the slopes at which a measurement ends.
     pub error: f64,
-    /// Seed of the random images, and of random robots; `None`: that of the run, as `train` has it.
+    /// Seed of the random images; `None`: that of the run, as `train` has it.
     pub seed: Option<u64>,
     /// Where the data are, if the command line says.
     pub data: Option<PathBuf>,

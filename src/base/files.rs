@@ -12,7 +12,8 @@ const TEMPORARY: [&str; 2] = [".", ".tmp"];
 /// Most bytes of a text: many times what any file of ours has.
 const MOST_TEXT: u64 = 256 << 20;
 
-/// Reads a text, also one of a [shipped](shipped) run. What does not end, as a device, is refused before it fills the memory.
+/// Reads a text, also one of a [shipped](shipped) run. What does not end, as a device, is refused
+/// before it fills the memory.
 ///
 /// # Errors
 /// What the system says; if it is no UTF-8; if it has more than 256 megabytes.

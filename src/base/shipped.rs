@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 /// How a name of shipped runs begins.
 pub const PREFIX: &str = "gallery:";
 
-/// The gaits that `demo` trains; they have no task, and so are not among all.
-const DEMO: &str = "demo";
+/// Gaits to be trained, as by `demo`; they have no task, and so are not among all.
+const GAITS: &str = "gaits";
 
 /// A run: its name, and its files with their names.
 type Run = (&'static str, &'static [(&'static str, &'static str)]);
@@ -32,10 +32,10 @@ const RUNS: &[Run] = &[
     run!("zero_one-2", "trained/zero-one-2"),
     run!("zero_one-3", "trained/zero-one-3"),
     (
-        "demo-1",
+        "gaits-1",
         &[
-            ("run.json", include_str!("../../data/demo/run.json")),
-            ("response.json", include_str!("../../data/demo/response.json")),
+            ("run.json", include_str!("../../data/gaits/seed-1/run.json")),
+            ("response.json", include_str!("../../data/gaits/seed-1/response.json")),
         ],
     ),
 ];
@@ -63,9 +63,9 @@ pub fn text(path: &Path) -> Option<&'static str> {
 /// # Errors
 /// What there is, if there is no run of that name.
 pub fn runs(path: &Path) -> Result<Vec<PathBuf>, String> {
-    let (name, _) = parts(path).unwrap_or_default();
+    let (name, _) = parts(path).expect("callers ask is_shipped before");
     let is_meant =
-        |run: &&Run| run.0 == name || set_of(run.0) == name || name == "all" && set_of(run.0) != DEMO;
+        |run: &&Run| run.0 == name || set_of(run.0) == name || name == "all" && set_of(run.0) != GAITS;
     let found: Vec<PathBuf> = RUNS
         .iter()
         .filter(is_meant)

@@ -1,23 +1,23 @@
 //! `morphcog demo`: its words, and what it calls.
 
-use crate::base::error::Error;
+use crate::base::error::{Error, ErrorKind};
 use crate::base::ranks::Ranks;
 use crate::base::signals;
+use crate::cli::{replay_best, test};
 use crate::commands::replay::Shown;
 use crate::commands::{eval, replay};
 use crate::config;
 use crate::data::builtin::BuiltinDigits;
 use crate::data::dataset::{Dataset, Split};
+use crate::search::showing::CYCLES;
 use crate::search::train;
 use crate::store::folder;
 use crate::store::folder::IfExists;
 use crate::store::images::HeldOut;
 use crate::store::names::{EVAL_JSON, RUN_JSON};
 use crate::store::robots::{BEST, Selection};
-use crate::task::direction;
+use crate::task::direction::THRESHOLD;
 use crate::view::console::Console;
-use crate::view::pictures;
-use crate::view::pictures::Format;
 use crate::view::reporters::Reporter;
 use crate::view::summary;
 use clap::Args;
@@ -27,14 +27,14 @@ pub(super) const EXAMPLES: &str = "\
 Examples:
   morphcog demo
 then
-  morphcog serve                       draw digits yourself
-  morphcog evolve --config quickstart.toml      from nothing
+  morphcog serve                                draw digits yourself
+  morphcog evolve --config quickstart.toml      small robots from nothing
 
 About a minute, no download: a gait that ships with the program is trained to tell zeros from ones,
-on digits that the program draws itself. Then the robot is shown 200 digits that it has never seen.";
+on digits that the program draws itself. Then the robot is shown 200 digits that it has never seen. Ctrl-C stops it; the same command goes on.";
 
 /// The gaits of which the best is trained, with its response.
-const GAITS: &str = "gallery:demo";
+const GAITS: &str = "gallery:gaits";
 
 /// A little of everything, for two cores and a minute.
 const LITTLE: [&str; 8] = [
@@ -60,7 +60,7 @@ pub(super) struct DemoArgs {
     /// Run folder.
     #[arg(short, long, value_name = "DIR", default_value = "runs/demo")]
     out: PathBuf,
-    /// Replace the run in the folder.
+    /// Begin anew where there is a run in the folder.
     #[arg(long)]
     force: bool,
     /// Threads (default: one per core); the result does not depend on it.
@@ -78,51 +78,38 @@ pub(super) fn run(args: DemoArgs, console: &Console) -> Result<(), Error> {
         set: LITTLE.map(str::to_string).to_vec(),
         name: "demo".to_string(),
         out: args.out.clone(),
-        if_exists: if args.force { IfExists::Overwrite } else { IfExists::Refuse },
+        if_exists: if args.force { IfExists::Overwrite } else { IfExists::Resume },
         data: None,
         threads,
     };
     let stop = signals::stop_flag()?;
-    let reporter = Reporter::new(console);
-    let finished = train::train(&options, &stop, &reporter)?;
+    let finished =
+        train::train(&options, &stop, &Reporter::new(console)).map_err(|error| match error.kind {
+            ErrorKind::Stopped => error.hint("the same command goes on".to_string()),
+            _ => error,
+        })?;
     summary::training(console, &finished, &options.out);
     let archive = options.out.join(RUN_JSON);
-    let test = eval::Options {
-        archives: vec![archive.clone()],
-        robots: Selection::Ids(vec![BEST.to_string()]),
+    let tested = eval::Options {
+        out: archive.with_file_name(EVAL_JSON),
+        archives: vec![archive],
+        robots: options.robots,
         images: TEST_IMAGES,
         split: HeldOut::Test,
         validation: None,
         seed: args.seed,
-        threshold: direction::THRESHOLD,
-        cycles: crate::search::showing::CYCLES,
+        threshold: THRESHOLD,
+        cycles: CYCLES,
         data: None,
         dataset: None,
-        out: archive.with_file_name(EVAL_JSON),
         threads,
         ranks: Ranks::ALONE,
     };
-    let eval::Finished { file, unwritten } = eval::eval(&test, &stop, &reporter)?;
-    let written = unwritten.is_none().then_some(test.out.as_path());
-    summary::evaluation(console, &file, None, written);
-    if let Some(error) = unwritten {
-        return Err(error);
-    }
-    if file.stopped {
-        return Err(Error::stopped("stopped during the test; the robot is saved".to_string()));
-    }
+    test(&tested, &stop, console)?;
     // Nothing is left to be saved: from here on a signal ends the process.
     drop(stop);
-    let shown = replay::Options {
-        robot: BEST.to_string(),
-        archive: Some(archive),
-        images: new_digits()?,
-        ..replay::Options::default()
-    };
-    let replay = replay::replay(&shown)?;
-    let wanted = pictures::Wanted::beside(&options.out, &replay.name, &[Format::Gif, Format::Html]);
-    pictures::make(console, &replay, &wanted)?;
-    Ok(())
+    let shown = replay::Options { images: new_digits()?, ..replay::Options::default() };
+    replay_best(&options.out, shown, console)
 }
 
 /// A zero and a one of the test's digits.

@@ -56,7 +56,8 @@ pub(super) struct ResponseArgs {
     /// before the last image.
     #[arg(long, default_value_t = 0.2)]
     error: f64,
-    /// Seed of what is drawn: random images, and robots with random:N (default: that of the run).
+    /// Seed of what is drawn: random images (default: that of the run, as train has it), and robots
+    /// with random:N (default: 1).
     #[arg(long)]
     seed: Option<u64>,
     /// Folder with the images of the task.

@@ -115,20 +115,16 @@ fn connection(service: &Service, port: u16, stream: &mut TcpStream) {
             Reply::Simulation(plan) => {
                 let lives =
                     |slot: &Slot, tell: &mut Tell| live(slot, &plan, |event| tell(&stream::text(&event)));
-                match simulation(service, &plan.who, lives, stream) {
-                    None => return,
-                    Some(refusal) => (refusal, false),
-                }
+                let Some(refusal) = simulation(service, &plan.who, lives, stream) else { return };
+                (refusal, false)
             }
             Reply::Team(plan) => {
                 let lives = |slot: &Slot, tell: &mut Tell| {
                     team::live(slot, &plan, |event| tell(&stream::of_team(&event)))
                 };
                 // A team takes one place.
-                match simulation(service, &plan.members[0].1, lives, stream) {
-                    None => return,
-                    Some(refusal) => (refusal, false),
-                }
+                let Some(refusal) = simulation(service, &plan.members[0].1, lives, stream) else { return };
+                (refusal, false)
             }
         },
     };

@@ -34,12 +34,15 @@ pub struct Name {
     pub judge: Judge,
 }
 
-/// The team: of every task the fittest robot of the first collection that has one, all of the same
-/// data: those with most tasks. Empty with fewer than two.
+/// The team: of every task the fittest robot of the first archive that has one, else of what is built
+/// in, all of the same data: those with most tasks. Empty with fewer than two.
 pub fn members(collections: &[Arc<Collection>]) -> Vec<Name> {
     let data = |from: &Collection| (from.config.data.dataset.clone(), from.config.data.builtin.clone());
     let mut teams: Vec<(_, Vec<Name>)> = Vec::new();
-    for (archive, from) in collections.iter().enumerate() {
+    let is_built_in = |(_, from): &(usize, &Arc<Collection>)| from.path.is_none();
+    let mut in_turn: Vec<(usize, &Arc<Collection>)> = collections.iter().enumerate().collect();
+    in_turn.sort_by_key(is_built_in);
+    for (archive, from) in in_turn {
         let of = data(from);
         let place = teams.iter().position(|(other, _)| *other == of).unwrap_or_else(|| {
             teams.push((of, Vec::new()));

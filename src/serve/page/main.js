@@ -241,6 +241,7 @@ const status = async () => {
 setInterval(() => {
   if (document.hidden) return;
   status();
+  if (!who?.team) team.load().catch(() => { /* so does status */ });
   if (robots.from) robots.refresh().catch(() => { /* status says that the program has ended */ });
 }, 2000);
 
