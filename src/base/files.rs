@@ -12,7 +12,7 @@ const TEMPORARY: [&str; 2] = [".", ".tmp"];
 /// Most bytes of a text: many times what any file of ours has.
 const MOST_TEXT: u64 = 256 << 20;
 
-/// Reads a text, also one of a [shipped](shipped) run. What does not end, as a device, is refused
+/// Reads a text, also one of a [shipped] run. What does not end, as a device, is refused
 /// before it fills the memory.
 ///
 /// # Errors
@@ -29,7 +29,7 @@ pub fn read_text(path: &Path) -> io::Result<String> {
     }
 }
 
-/// Whether there is a file, on the disk or of a [shipped](shipped) run.
+/// Whether there is a file, on the disk or of a [shipped] run.
 pub fn exists(path: &Path) -> bool {
     shipped::text(path).is_some() || path.exists()
 }
