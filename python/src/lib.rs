@@ -295,7 +295,7 @@ fn stimuli<'py>(
     for image in view.outer_iter() {
         let image = Grid::from_fn(tall, wide, |row, column| image[(row, column)]);
         let seen = stimulus(&image, height, width, &config.inner.stimulus)
-            .map_err(|error| refused(format!("stimulus.reduction: {error}")))?;
+            .map_err(|error| refused(format!("{}: {error}", error.key())))?;
         all.extend_from_slice(seen.cells());
     }
     let array = numpy::ndarray::Array3::from_shape_vec((count, height, width), all).expect("as many as said");

@@ -192,6 +192,5 @@ pub fn seen(
     index: usize,
 ) -> Result<Grid<f64>, Error> {
     let image = dataset.image(split, index).map_err(|error| Error::input(error.to_string()))?;
-    stimulus(&image, height, width, params)
-        .map_err(|error| Error::input(format!("stimulus.reduction: {error}")))
+    stimulus(&image, height, width, params).map_err(|error| Error::input(format!("{}: {error}", error.key())))
 }

@@ -4,6 +4,7 @@
 use crate::base::Grid;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
 
 /// How an image is reduced to the body's grid.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -41,11 +42,20 @@ pub struct StimulusParams {
     pub encoding: Encoding,
     /// For the encoding "threshold": the level, from 0 up to but below 1. Default 0.5.
     pub level: f64,
+    /// Rows and columns of pixels left out at every edge, before the reduction. Default 0. MNIST's
+    /// digits lie in the middle 20 × 20 of 28 × 28 pixels: with 4, every sensor sees a part of
+    /// them.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub margin: usize,
+}
+
+fn is_zero(margin: &usize) -> bool {
+    *margin == 0
 }
 
 impl Default for StimulusParams {
     fn default() -> Self {
-        StimulusParams { reduction: Reduction::Stride, encoding: Encoding::Intensity, level: 0.5 }
+        StimulusParams { reduction: Reduction::Stride, encoding: Encoding::Intensity, level: 0.5, margin: 0 }
     }
 }
 
@@ -83,9 +93,33 @@ pub enum StimulusError {
         /// The image's number of them.
         image: usize,
     },
+    /// Nothing is left between the margins.
+    #[error(
+        "a margin of {margin} leaves nothing of {height} x {width} pixels; it must be less than half of both sides"
+    )]
+    Margin {
+        /// Pixels at every edge.
+        margin: usize,
+        /// Rows of the image.
+        height: usize,
+        /// Columns of the image.
+        width: usize,
+    },
     /// A threshold that no pixel or every pixel would pass.
     #[error("the threshold's level is {0}, expected a number from 0 up to but below 1")]
     Level(f64),
+}
+
+impl StimulusError {
+    /// The key of a config that is to be changed.
+    pub fn key(&self) -> &'static str {
+        match self {
+            StimulusError::Empty { .. } => "body",
+            StimulusError::Stride { .. } => "stimulus.reduction",
+            StimulusError::Margin { .. } => "stimulus.margin",
+            StimulusError::Level(_) => "stimulus.level",
+        }
+    }
 }
 
 /// The stimulus of an image for a body of height × width voxels: one value in [0, 1] per voxel
@@ -104,15 +138,31 @@ pub fn stimulus(
         return Err(StimulusError::Empty { height, width });
     }
     params.validate()?;
+    let middle = match params.margin {
+        0 => Cow::Borrowed(image),
+        margin => Cow::Owned(without_margin(image, margin)?),
+    };
     let reduced = match params.reduction {
-        Reduction::Stride => strided(image, height, width)?,
-        Reduction::Area => averaged(image, height, width),
+        Reduction::Stride => strided(&middle, height, width)?,
+        Reduction::Area => averaged(&middle, height, width),
     };
     Ok(reduced.map(|&value| match params.encoding {
         Encoding::Intensity => value / 255.0,
         Encoding::Saturated => f64::from(value > 0.0),
         Encoding::Threshold => f64::from(value / 255.0 > params.level),
     }))
+}
+
+/// What is left of an image without so many rows and columns at every edge.
+fn without_margin(image: &Grid<u8>, margin: usize) -> Result<Grid<u8>, StimulusError> {
+    let (height, width) = (image.height(), image.width());
+    let left = |side: usize| side.checked_sub(margin.checked_mul(2)?).filter(|left| *left > 0);
+    match (left(height), left(width)) {
+        (Some(rows), Some(columns)) => {
+            Ok(Grid::from_fn(rows, columns, |r, c| image[(r + margin, c + margin)]))
+        }
+        _ => Err(StimulusError::Margin { margin, height, width }),
+    }
 }
 
 fn strided(image: &Grid<u8>, height: usize, width: usize) -> Result<Grid<f64>, StimulusError> {
@@ -229,11 +279,33 @@ mod tests {
     }
 
     #[test]
+    fn a_margin_is_cut_off_before_anything_else() {
+        let image = ramp(9, 12);
+        let middle = Grid::from_fn(5, 8, |r, c| image[(r + 2, c + 2)]);
+        for (reduction, width) in [(Area, 3), (Stride, 4)] {
+            let whole = params(reduction, Intensity);
+            let cut = StimulusParams { margin: 2, ..whole };
+            assert_eq!(stimulus(&image, 5, width, &cut), stimulus(&middle, 5, width, &whole));
+        }
+        for margin in [5, usize::MAX] {
+            let cut = StimulusParams { margin, ..params(Area, Intensity) };
+            let error = stimulus(&image, 3, 3, &cut).unwrap_err();
+            assert_eq!(error, StimulusError::Margin { margin, height: 9, width: 12 });
+        }
+        let edge = StimulusParams { margin: 4, ..params(Area, Intensity) };
+        assert_eq!(stimulus(&image, 1, 1, &edge).unwrap().area(), 1);
+    }
+
+    #[test]
     fn configs_name_them_in_lower_case() {
         let read = |text: &str| serde_json::from_str::<StimulusParams>(text).unwrap();
         assert_eq!(read("{}"), StimulusParams::default());
         let threshold = StimulusParams { level: 0.25, ..params(Stride, Threshold) };
         assert_eq!(read("{\"encoding\": \"threshold\", \"level\": 0.25}"), threshold);
         assert_eq!(serde_json::to_string(&Area).unwrap(), "\"area\"");
+        let text = |params: &StimulusParams| serde_json::to_string(params).unwrap();
+        assert!(!text(&threshold).contains("margin"));
+        let cut = StimulusParams { margin: 4, ..threshold };
+        assert_eq!(read(&text(&cut)), cut);
     }
 }
