@@ -19,7 +19,7 @@ mod train;
 use crate::analysis::gallery;
 use crate::base::error::Error;
 use crate::base::ranks::Ranks;
-use crate::base::{error, signals};
+use crate::base::{error, shipped, signals};
 use crate::commands::one_by_one::Named;
 use crate::commands::plan::{PAPER_TOML, Plan};
 use crate::commands::schema::{self, Schema};
@@ -27,7 +27,7 @@ use crate::commands::{bench, data, eval, one_by_one, replay, simulate};
 use crate::config;
 use crate::config::Config;
 use crate::data::catalogue::Catalogue;
-use crate::data::dataset::{Dataset, Split};
+use crate::data::dataset::{BUILTIN, Dataset, Split};
 use crate::data::fetch::{FetchError, FetchOptions, fetch};
 use crate::data::files::places;
 use crate::search::evolve;
@@ -47,7 +47,7 @@ use args::{Command, DataCommand, DatasetArgs, EvalArgs, EvolveArgs, ReplayArgs, 
 use choice::selected;
 use clap::CommandFactory;
 pub use process::{called, main};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
 /// Runs a command.
@@ -255,16 +255,31 @@ fn run_replay(args: ReplayArgs, console: &Console) -> Result<(), Error> {
     let (width, every, fps, look) = (args.width, usize::from(args.every), args.fps, args.look);
     // What is wrong with the file is to be known before the simulation starts.
     let named = out.as_deref().map(|path| pictures::Wanted::named(path, &format)).transpose()?;
+    // Without a run, the best body that ships with the program.
+    let is_first_look = args.archive.is_none()
+        && args.robot == Selection::Ids(vec![BEST.to_string()])
+        && folder::newest_run().is_err();
+    let archive = if is_first_look { Some(PathBuf::from(shipped::BEST)) } else { args.archive };
     let search = one_by_one::Options {
         robots: args.robot,
-        archives: args.archive.into_iter().collect(),
+        archives: archive.into_iter().collect(),
         physical_only,
         seed: args.seed,
         data: data.clone(),
     };
     let Named { archive, robot } = the_one(&search, console)?;
     let folder = pictures::folder(archive.as_deref(), &robot)?;
-    let replay = replay::replay(&replay::Options { robot, physical_only, archive, images, data, dataset })?;
+    let options = replay::Options { robot, physical_only, archive, images, data, dataset };
+    let has_choice = options.dataset.is_none() && options.data.is_none() && options.images.is_empty();
+    let replay = match replay::replay(&options) {
+        Err(_) if is_first_look && has_choice => {
+            console.line(
+                "no run under runs/, and no MNIST: a body of gallery:zero_one, on the program's own digits",
+            );
+            replay::replay(&replay::Options { dataset: Some(BUILTIN.to_string()), ..options })
+        }
+        replay => replay,
+    }?;
     let wanted = named.unwrap_or_else(|| pictures::Wanted::beside(&folder, &replay.name, &format));
     let made = pictures::make(console, &replay, &pictures::Wanted { width, every, fps, look, ..wanted })?;
     match made.last().filter(|_| open) {

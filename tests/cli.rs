@@ -883,6 +883,22 @@ fn the_results_of_one_command_never_overwrite_those_of_another() {
 }
 
 #[test]
+fn without_a_run_the_best_body_of_the_program_is_shown_on_its_own_digits() {
+    let sandbox = Sandbox::new();
+    let said = sandbox.run("replay --format gif").ended(0, &[]);
+    assert!(said.out.contains("gallery:zero_one") && said.out.contains(": sees 0"), "{}", said.out);
+    let made = files(&sandbox.path("."));
+    assert!(
+        made.keys().any(|name| name.starts_with("replay-") && name.ends_with(".gif")),
+        "{:?}",
+        made.keys()
+    );
+    // What is asked for by name is not replaced.
+    let said = sandbox.run("replay --dataset mnist --format gif").ended(3, &[]);
+    assert!(said.err.contains("mnist"), "{}", said.err);
+}
+
+#[test]
 fn a_run_may_be_named_by_its_folder() {
     let sandbox = with_run();
     for command in [

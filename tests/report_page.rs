@@ -5,8 +5,9 @@
 
 mod common;
 
-use common::browser::{Browser, found};
-use common::program::{Sandbox, TINY};
+use common::browser::{Browser, found, keep_picture};
+use common::program::{Sandbox, TINY, pairs};
+use morphcog::store::team::TeamFile;
 use std::io::Write;
 
 #[test]
@@ -52,4 +53,52 @@ fn a_click_on_a_cell_plays_its_robot() {
         assert_eq!(tab.complaints(), Vec::<String>::new());
         tab.close();
     }
+}
+
+#[test]
+fn a_team_walks_on_the_page_and_says_there_what_it_said_in_its_test() {
+    let Some(program) = found() else { return };
+    let sandbox = pairs();
+    let runs = "--archive pairs/0v1 pairs/0v4 pairs/1v4";
+    sandbox.run(&format!("team -q {runs} --classes 0,1,4 --images 30")).ended(0, &[]);
+    sandbox.run(&format!("report -q {runs} --rollouts 3")).ended(0, &[]);
+    let team = TeamFile::read(&sandbox.path("pairs/team.json")).unwrap();
+    let answers = team.answers.unwrap().votes.answers;
+    let address = format!("file://{}", sandbox.path("pairs/report.html").display());
+    let mut browser = Browser::start(&program, &sandbox);
+    for (width, height, dark) in [(1280, 900, false), (390, 844, true)] {
+        let mut tab = browser.tab(width, height, dark);
+        tab.open(&address);
+        tab.wait("document.querySelectorAll('#team .stages figure').length === 3");
+        tab.wait("document.querySelector('#team .says').textContent.startsWith('step ')");
+        for (number, class) in team.classes.iter().enumerate() {
+            let place = team.images.iter().position(|image| image.label == *class).unwrap();
+            tab.eval(&format!("document.querySelectorAll('#team .watch button')[{number}].click()"));
+            tab.wait(&format!("document.getElementById('team').dataset.walks === 'team-{number}'"));
+            let end = "const time = document.querySelector('#team input'); time.value = time.max; \
+                       time.dispatchEvent(new Event('input'))";
+            tab.eval(&format!("(() => {{ {end} }})()"));
+            let verdict = if answers[place] == *class { "correct" } else { "wrong" };
+            assert_eq!(tab.text("#team .says"), format!("step 500 says {}: {verdict}", answers[place]));
+            // Who walked farther than the threshold has voted.
+            let turned = "document.querySelectorAll('#team figure[data-way=left], #team figure[data-way=right]').length";
+            let voted = team
+                .members
+                .iter()
+                .filter(|m| m.displacements[place].is_some_and(|d| d.abs() > team.threshold));
+            assert_eq!(tab.eval(turned), voted.count());
+        }
+        keep_picture(&format!("report-team-{width}.png"), &tab.screenshot());
+        let wide = tab.eval("document.documentElement.scrollWidth").as_u64().unwrap();
+        assert!(wide <= u64::from(width), "{wide} pixels wide");
+        assert_eq!(tab.complaints(), Vec::<String>::new());
+        tab.close();
+    }
+    // A team of other runs is not theirs.
+    let said = sandbox.run("report --archive pairs/0v1 pairs/0v4 --rollouts 0").ended(0, &[]);
+    assert!(
+        said.err.contains("team.json: expected a team of robots of these runs; left out"),
+        "{}",
+        said.err
+    );
 }

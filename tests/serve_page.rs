@@ -5,7 +5,7 @@
 
 mod common;
 
-use common::browser::{Browser, Tab, found};
+use common::browser::{Browser, Tab, found, keep_picture};
 use common::hostile::Dice;
 use common::program::{Sandbox, terminate};
 use common::server::Server;
@@ -51,13 +51,6 @@ fn zero() -> Vec<[f64; 2]> {
 
 fn one() -> Vec<[f64; 2]> {
     (0..=12).map(|k| f64::from(k) / 12.0).map(|t| [16.0 - 4.0 * t, 5.0 + 18.0 * t]).collect()
-}
-
-/// Writes what is in sight into the folder that MORPHCOG_SCREENSHOTS names, if it does.
-fn keep_picture(name: &str, shot: &[u8]) {
-    if let Some(folder) = std::env::var_os("MORPHCOG_SCREENSHOTS") {
-        std::fs::write(std::path::Path::new(&folder).join(name), shot).unwrap();
-    }
 }
 
 /// The robot that the page begins with.

@@ -3,22 +3,10 @@
 
 mod common;
 
-use common::program::{Sandbox, TINY, files};
+use common::program::{Sandbox, TINY, files, pairs};
 use morphcog::store::team::TeamFile;
 use serde_json::Value;
 use std::collections::BTreeMap;
-
-/// Runs of all pairs of three digits, in `pairs/`.
-fn pairs() -> Sandbox {
-    let sandbox = Sandbox::new();
-    for [a, b] in [[0, 1], [0, 4], [1, 4]] {
-        let task = format!("groups = [[{a}], [{b}]]");
-        let config = TINY.replace("groups = [[0], [1]]", &task).replace("train_images = [0, 1]", "");
-        sandbox.write("run.toml", config);
-        sandbox.run(&format!("evolve -q -c run.toml -o pairs/{a}v{b}")).ended(0, &[]);
-    }
-    sandbox
-}
 
 const TEAM: &str = "team --archive pairs/0v1 pairs/0v4 pairs/1v4 --classes 0,1,4";
 

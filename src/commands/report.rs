@@ -4,15 +4,17 @@ use crate::base::error::Error;
 use crate::commands::plot::Progress;
 use crate::commands::replay;
 use crate::data::dataset::Split;
+use crate::search::showing::control_steps;
 use crate::store::audit::AuditFile;
 use crate::store::capacity::CapacityFile;
 use crate::store::eval::EvalFile;
 use crate::store::folder;
 use crate::store::images::ImageRef;
-use crate::store::names::{AUDIT_JSON, CAPACITY_JSON, EVAL_JSON, METRICS};
+use crate::store::names::{AUDIT_JSON, CAPACITY_JSON, EVAL_JSON, METRICS, TEAM_JSON};
 use crate::store::run::{Robot, RunFile, different};
+use crate::store::team::{Member, TeamFile};
 use crate::store::whereabouts::{Whereabouts, load_dataset_of, see};
-use crate::task::protocol::RolloutMode;
+use crate::task::protocol::{Protocol, RolloutMode};
 use crate::task::recording::{Recording, Seen};
 use crate::task::rollout::record;
 use std::path::{Path, PathBuf};
@@ -77,6 +79,19 @@ impl Findings {
     }
 }
 
+/// A team of robots of the runs, and images to watch it by.
+#[derive(Clone, Debug)]
+pub struct Team {
+    /// What `team` found.
+    pub file: TeamFile,
+    /// The run of each of its robots.
+    pub runs: Vec<usize>,
+    /// Images to watch it by, the first of each class: places among the file's images.
+    pub images: Vec<usize>,
+    /// What the robots of each run see of these.
+    pub seen: Vec<Vec<Seen>>,
+}
+
 /// Everything for a page.
 #[derive(Clone, Debug)]
 pub struct Gathered {
@@ -84,6 +99,8 @@ pub struct Gathered {
     pub runs: Vec<Dossier>,
     /// What was found of several runs together, above their folders.
     pub together: Findings,
+    /// What `team` found of robots of these runs, there, too.
+    pub team: Option<Team>,
 }
 
 /// Reads runs and what lies beside them; `warn` is told what cannot be read. Without `with_rollouts`
@@ -118,7 +135,62 @@ pub fn gather(
             Findings::read(&folder::above(archives), &all, warn)
         }
     };
-    Ok(Gathered { runs, together })
+    let team = match folder::beside_all(archives, TEAM_JSON) {
+        path if archives.len() > 1 && path.exists() => {
+            let whereabouts = archives.iter().fold(Whereabouts::given(data), |all, path| all.and_of(path));
+            let found = Team::read(&path, &runs, with_rollouts.then_some(&whereabouts));
+            found.map_err(|error| warn(&format!("{error}; left out"))).ok()
+        }
+        _ => None,
+    };
+    Ok(Gathered { runs, together, team })
+}
+
+impl Team {
+    /// The team of a file, if it has answered and all its robots are of these runs. Without
+    /// `whereabouts` there are no images to watch it by.
+    fn read(path: &Path, runs: &[Dossier], whereabouts: Option<&Whereabouts>) -> Result<Self, Error> {
+        let file = TeamFile::read(path)?;
+        let wrong = |text: &str| Error::input(format!("{}: {text}", path.display()));
+        if file.answers.is_none() {
+            return Err(wrong("this test was stopped: expected the answers of a whole team"));
+        }
+        let hashes: Vec<String> = runs.iter().map(|dossier| dossier.run.fingerprint()).collect();
+        let of_member = |member: &Member| hashes.iter().position(|hash| *hash == member.run_sha256);
+        let of: Option<Vec<usize>> = file.members.iter().map(of_member).collect();
+        let of = of.ok_or_else(|| wrong("expected a team of robots of these runs"))?;
+        let is_first = |(place, image): &(usize, &ImageRef)| {
+            file.images.iter().position(|other| other.label == image.label) == Some(*place)
+        };
+        let mut images: Vec<usize> =
+            file.images.iter().enumerate().filter(is_first).map(|(place, _)| place).collect();
+        let (Some(whereabouts), Some(first)) = (whereabouts, of.first()) else {
+            return Ok(Team { file, runs: of, images: Vec::new(), seen: vec![Vec::new(); runs.len()] });
+        };
+        images.sort_by_key(|place| file.images[*place].label);
+        let (run, split) = (&runs[*first].run, file.split.split());
+        let dataset = load_dataset_of(Some(&run.dataset), &run.config, whereabouts, &[split])?;
+        let seen = |dossier: &Dossier| {
+            let one = |place: &usize| {
+                let ImageRef { index, label } = file.images[*place];
+                let stimulus = see(&dossier.run.config, &dataset, split, index)?;
+                Ok(Seen { class: label, label: format!("{label} ({split} {index})"), stimulus })
+            };
+            images.iter().map(one).collect()
+        };
+        let seen = runs.iter().map(seen).collect::<Result<Vec<Vec<Seen>>, Error>>()?;
+        Ok(Team { file, runs: of, images, seen })
+    }
+
+    /// The rollout of a member under one of the images to watch it by.
+    pub fn record(&self, runs: &[Dossier], member: usize, image: usize) -> Recording {
+        let run = self.runs[member];
+        let config = &runs[run].run.config;
+        let control_steps = control_steps(config, self.file.cycles);
+        let protocol = Protocol { control_steps, ..config.protocol.clone() };
+        let Member { id, body, .. } = &self.file.members[member];
+        record(id, body, &config.physics, &protocol, true, std::slice::from_ref(&self.seen[run][image]))
+    }
 }
 
 /// The training images, or one of each class if they are many.

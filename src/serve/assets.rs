@@ -12,8 +12,10 @@ pub fn asset(path: &str) -> Option<Response> {
         "/icon.svg" => ("image/svg+xml", include_str!("page/icon.svg")),
         // The looks of the page that `replay` writes, and what is new here.
         "/replay.css" => (CSS, include_str!("../view/replay.css")),
+        "/stages.css" => (CSS, include_str!("../view/stages.css")),
         "/page.css" => (CSS, include_str!("page/page.css")),
         "/drawing.js" => (JS, include_str!("../view/drawing.js")),
+        "/stages.js" => (JS, include_str!("../view/stages.js")),
         "/main.js" => (JS, include_str!("page/main.js")),
         "/api.js" => (JS, include_str!("page/api.js")),
         "/stage.js" => (JS, include_str!("page/stage.js")),

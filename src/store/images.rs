@@ -1,6 +1,7 @@
 //! Which images a run was made with and robots are shown: by their places in a dataset, and as
 //! robots see them.
 
+use crate::data::dataset::Split;
 use crate::task::score::Answer;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -40,6 +41,14 @@ impl HeldOut {
     /// Whether a file needs not say it.
     pub(crate) fn is_default(&self) -> bool {
         *self == HeldOut::default()
+    }
+
+    /// The split of the dataset that these images are of.
+    pub fn split(&self) -> Split {
+        match self {
+            HeldOut::Test => Split::Test,
+            HeldOut::Validation => Split::Train,
+        }
     }
 }
 

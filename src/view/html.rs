@@ -95,10 +95,17 @@ pub(super) fn player(rollout: &str) -> String {
 /// # Errors
 /// [`PictureError::Encode`] if it cannot be packed.
 pub(super) fn packed(walk: &Walk, most: usize) -> Result<String, PictureError> {
+    pack(&rollout(walk, most))
+}
+
+/// A value as text: gzip in base64. The same bytes every time: the header has no time in it.
+///
+/// # Errors
+/// [`PictureError::Encode`] if it cannot be packed.
+pub(super) fn pack(value: &serde_json::Value) -> Result<String, PictureError> {
     let failed = |error: std::io::Error| PictureError::Encode(error.to_string());
-    // The same bytes every time: the header has no time in it.
     let mut packer = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::best());
-    packer.write_all(rollout(walk, most).to_string().as_bytes()).map_err(failed)?;
+    packer.write_all(value.to_string().as_bytes()).map_err(failed)?;
     Ok(BASE64.encode(packer.finish().map_err(failed)?))
 }
 
@@ -148,9 +155,15 @@ fn rollout(walk: &Walk, most: usize) -> serde_json::Value {
         "unit": STEPS,
         "origins": BASE64.encode(bytes(origins.iter().flatten().map(|v| v.to_le_bytes()))),
         "positions": BASE64.encode(bytes(positions.map(i16::to_le_bytes))),
-        "materials": Material::ALL.map(|m| json!({ "name": m.name(), "tones": tones(m), "mark": mark(m), "sensor": m.is_sensor() })),
+        "materials": materials(),
         "areas": TONE_AREAS,
     })
+}
+
+/// All materials as the pages' scripts draw them.
+pub(super) fn materials() -> serde_json::Value {
+    let material = |m| json!({ "name": Material::name(m), "tones": tones(m), "mark": mark(m), "sensor": Material::is_sensor(m) });
+    Material::ALL.map(material).to_vec().into()
 }
 
 fn bytes<const N: usize>(words: impl Iterator<Item = [u8; N]>) -> Vec<u8> {

@@ -64,7 +64,17 @@ pub fn team(console: &Console, file: &TeamFile, out: Option<&Path>) -> Result<()
 }
 
 fn answers(console: &Console, file: &TeamFile) {
-    let (Some(answers), Some(baselines)) = (&file.answers, &file.baselines) else { return };
+    let Some((headers, rows)) = table(file) else { return };
+    let headers: Vec<&str> = headers.iter().map(String::as_str).collect();
+    console.table(&headers, &rows);
+    console.line("");
+    remarks(file).iter().for_each(|line| console.line(line));
+}
+
+/// What the team answers, and what answers the same images without bodies: headers and rows; none
+/// while there are no answers.
+pub(super) fn table(file: &TeamFile) -> Option<(Vec<String>, Vec<Vec<String>>)> {
+    let (Some(answers), Some(baselines)) = (&file.answers, &file.baselines) else { return None };
     let row = |name: &str, accuracy: &Accuracy| {
         let [accuracy, interval] = figures(accuracy);
         vec![name.to_string(), accuracy, interval]
@@ -79,30 +89,33 @@ fn answers(console: &Console, file: &TeamFile) {
         (row("nearest neighbour", &baselines.nearest_neighbour), none()),
         (row(&format!("best body ({})", baselines.best_body_id), &baselines.best_body), none()),
     ];
-    let classes: Vec<String> = file.classes.iter().map(|class| format!("% of {class}")).collect();
-    let mut headers = vec!["answers", "accuracy %", "95 % interval"];
-    headers.extend(classes.iter().map(String::as_str));
-    console.table(&headers, &rows.map(|(row, classes)| [row, classes].concat()));
-    console.line("");
+    let mut headers = ["answers", "accuracy %", "95 % interval"].map(str::to_string).to_vec();
+    headers.extend(file.classes.iter().map(|class| format!("% of {class}")));
+    Some((headers, rows.map(|(row, classes)| [row, classes].concat()).to_vec()))
+}
+
+/// What is to be said of these answers, in lines.
+pub(super) fn remarks(file: &TeamFile) -> Vec<String> {
+    let (Some(answers), Some(baselines)) = (&file.answers, &file.baselines) else { return Vec::new() };
     let (images, robots) = (file.images.len(), file.members.len());
-    console.line(&format!(
-        "{images} {} {} images, {robots} robots, no trained weights",
-        file.dataset, file.split
-    ));
-    console.line(&format!(
-        "most votes: {} % of the images had a tie; on average {} % of the robots that know the answer voted for it, \
-         {} of {robots} did not move",
-        percent(answers.ties),
-        percent(answers.agreement),
-        number::fixed(answers.not_moved, 1)
-    ));
-    console.line(&format!(
-        "linear classifiers and nearest neighbour: {} training images, the pixels that the first robot sees",
-        baselines.training_images
-    ));
+    let mut lines = vec![
+        format!("{images} {} {} images, {robots} robots, no trained weights", file.dataset, file.split),
+        format!(
+            "most votes: {} % of the images had a tie; on average {} % of the robots that know the answer voted for it, \
+             {} of {robots} did not move",
+            percent(answers.ties),
+            percent(answers.agreement),
+            number::fixed(answers.not_moved, 1)
+        ),
+        format!(
+            "linear classifiers and nearest neighbour: {} training images, the pixels that the first robot sees",
+            baselines.training_images
+        ),
+    ];
     if file.dataset == "mnist" && file.classes.len() == 10 {
-        console.line(LITERATURE);
+        lines.push(LITERATURE.to_string());
     }
+    lines
 }
 
 /// Accuracy and interval \[%\].

@@ -252,3 +252,10 @@ impl Tab<'_> {
         self.browser.call(None, "Target.closeTarget", json!({ "targetId": id }));
     }
 }
+
+/// Writes what is in sight into the folder that MORPHCOG_SCREENSHOTS names, if it does.
+pub fn keep_picture(name: &str, shot: &[u8]) {
+    if let Some(folder) = std::env::var_os("MORPHCOG_SCREENSHOTS") {
+        std::fs::write(std::path::Path::new(&folder).join(name), shot).unwrap();
+    }
+}

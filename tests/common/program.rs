@@ -190,3 +190,15 @@ pub fn without_seconds(metrics: &str) -> Vec<String> {
     assert!(metrics.lines().next().is_some_and(|header| header.ends_with(",seconds")));
     metrics.lines().map(|line| line.rsplit_once(',').unwrap().0.to_string()).collect()
 }
+
+/// Runs of all pairs of three digits, in `pairs/`.
+pub fn pairs() -> Sandbox {
+    let sandbox = Sandbox::new();
+    for [a, b] in [[0, 1], [0, 4], [1, 4]] {
+        let task = format!("groups = [[{a}], [{b}]]");
+        let config = TINY.replace("groups = [[0], [1]]", &task).replace("train_images = [0, 1]", "");
+        sandbox.write("run.toml", config);
+        sandbox.run(&format!("evolve -q -c run.toml -o pairs/{a}v{b}")).ended(0, &[]);
+    }
+    sandbox
+}

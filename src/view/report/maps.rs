@@ -10,7 +10,6 @@ use crate::view::report::bodies::button;
 use crate::view::walk::Walk;
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
-use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Bytes of all rollouts of a page together, before they are packed: packed, as text, they are
 /// about as many.
@@ -33,11 +32,11 @@ pub(super) fn played(dossier: &Dossier, most: usize) -> Vec<&Robot> {
 }
 
 impl Rollouts {
-    /// Rollouts them.
+    /// Simulates them.
     pub fn record(
         gathered: &Gathered,
         most: usize,
-        simulated: &(dyn Fn(u64) + Sync),
+        simulated: &(dyn Fn() + Sync),
     ) -> Result<Self, PictureError> {
         let jobs: Vec<(usize, &Dossier, &Robot)> = gathered
             .runs
@@ -47,12 +46,13 @@ impl Rollouts {
                 played(dossier, most).into_iter().map(move |robot| (number, dossier, robot))
             })
             .collect();
-        let each = (MOST_BYTES / jobs.len().max(1)).min(MOST_OF_ONE);
-        let done = AtomicU64::new(0);
+        // A team's walks need room, too.
+        let most_bytes = if gathered.team.is_some() { MOST_BYTES / 2 } else { MOST_BYTES };
+        let each = (most_bytes / jobs.len().max(1)).min(MOST_OF_ONE);
         let one = |&(number, dossier, robot): &(usize, &Dossier, &Robot)| {
             let recording = dossier.record(robot);
             let rollout = packed(&Walk::new(&recording)?, each)?;
-            simulated(done.fetch_add(1, Ordering::Relaxed) + 1);
+            simulated();
             Ok(((number, robot.id.clone()), rollout))
         };
         jobs.par_iter().map(one).collect::<Result<BTreeMap<_, _>, _>>().map(Rollouts)

@@ -4,6 +4,7 @@
 mod bodies;
 mod maps;
 pub(crate) mod tables;
+mod team;
 mod words;
 
 use crate::commands::report::{Dossier, Findings, Gathered};
@@ -12,6 +13,10 @@ use crate::view::html::{escape, fill};
 use crate::view::plot::Figure;
 use crate::view::{html, plot};
 use maps::Rollouts;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+const SCRIPT: &str =
+    concat!(include_str!("../drawing.js"), include_str!("../stages.js"), include_str!("report.js"));
 
 /// What goes into a page.
 #[derive(Clone, Copy, Debug)]
@@ -25,7 +30,9 @@ pub struct Content<'a> {
 impl Content<'_> {
     /// Rollouts that have to be simulated for it.
     pub fn count(&self) -> usize {
-        self.gathered.runs.iter().map(|dossier| maps::played(dossier, self.rollouts).len()).sum()
+        let of_runs: usize =
+            self.gathered.runs.iter().map(|dossier| maps::played(dossier, self.rollouts).len()).sum();
+        of_runs + self.gathered.team.as_ref().map_or(0, team::count)
     }
 
     /// The page as text; `simulated` gets the number of rollouts simulated so far.
@@ -33,9 +40,14 @@ impl Content<'_> {
     /// # Errors
     /// If a rollout cannot be drawn.
     pub fn page(&self, simulated: &(dyn Fn(u64) + Sync)) -> Result<String, PictureError> {
-        let Gathered { runs, together } = self.gathered;
-        let rollouts = Rollouts::record(self.gathered, self.rollouts, simulated)?;
+        let Gathered { runs, together, team } = self.gathered;
+        let done = AtomicU64::new(0);
+        let simulated = || simulated(done.fetch_add(1, Ordering::Relaxed) + 1);
+        let rollouts = Rollouts::record(self.gathered, self.rollouts, &simulated)?;
         let mut content = words::contents(runs);
+        if let Some(team) = team {
+            content += &team::section(team, runs, &simulated)?;
+        }
         if runs.len() > 1 {
             content += &overview(runs, together);
         }
@@ -43,7 +55,9 @@ impl Content<'_> {
             content += &run(number, dossier, &rollouts, runs.len() > 1);
         }
         content += &rollouts.elements();
-        let style = [include_str!("../replay.css"), include_str!("report.css")].concat();
+        let style =
+            [include_str!("../replay.css"), include_str!("../stages.css"), include_str!("report.css")]
+                .concat();
         let player = serde_json::Value::from(html::player("%ROLLOUT%")).to_string().replace('<', "\\u003c");
         Ok(fill(
             include_str!("report.html"),
@@ -52,7 +66,7 @@ impl Content<'_> {
                 ("style", &style),
                 ("content", &content),
                 ("player", &player),
-                ("script", include_str!("report.js")),
+                ("script", SCRIPT),
             ],
         ))
     }

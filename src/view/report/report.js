@@ -55,4 +55,70 @@
     const first = section.querySelector("button[data-first]");
     if (first) play(first, false);
   }
+
+  // The team: the walks under one image at a time, from the moment it is chosen.
+  const team = document.querySelector("#team .watch")?.closest("section");
+  if (!team) return;
+  const $ = (what) => team.querySelector(what);
+  const { members, classes, threshold, unit, steps, materials } = JSON.parse(document.getElementById("team-robots").textContent);
+  const stages = new Stages.Team($(".stages"), $(".tally"), { members, classes, threshold, materials });
+  const time = $("input"), last = steps.length - 1;
+  // Points of a robot at all moments: differences of 8 bits to the moment before, at first 16-bit numbers.
+  const moments = (text, count) => {
+    const raw = atob(text), bytes = new Uint8Array(raw.length);
+    for (let i = 0; i < raw.length; i++) bytes[i] = raw.charCodeAt(i);
+    const view = new DataView(bytes.buffer), all = [];
+    if (!bytes.length) return all;
+    let at = Array.from({ length: 2 * count }, (_, i) => view.getInt16(2 * i, true));
+    all.push(at);
+    for (let byte = 4 * count; byte < bytes.length; byte += 2 * count) all.push(at = at.map((v, i) => v + view.getInt8(byte + i)));
+    return all;
+  };
+  let walk = null, begun = 0, playing = null, asked = 0;
+  // Between two moments points are on straight lines.
+  const stand = (k, at) => {
+    const own = walk.moments[k], a = Math.min(Math.floor(at), own.length - 1), b = Math.min(a + 1, own.length - 1), t = Math.min(at - a, 1);
+    const moved = (m) => walk.tallies[m].moved[k] ?? 0;
+    const points = Array.from({ length: members[k].points }, (_, i) => [0, 1].map((axis) => (own[a][2 * i + axis] * (1 - t) + own[b][2 * i + axis] * t) / unit));
+    return Stages.stand(members[k].at + moved(a) * (1 - t) + moved(b) * t, points);
+  };
+  const draw = (at) => {
+    const tally = walk.tallies[Math.floor(at)], over = at >= last;
+    stages.draw(members.map((_, k) => stand(k, at)), walk.starts, tally);
+    const says = tally.says === null ? (over ? "undecided" : "") : `says ${tally.says}` + (over ? (tally.says === walk.class ? ": correct" : ": wrong") : "");
+    $(".says").textContent = `step ${steps[Math.floor(at)]} ${says}`;
+    $(".play").textContent = playing === null ? "Play" : "Pause";
+  };
+  const at = () => Number(time.value);
+  const run = (now) => {
+    // A second of a robot's time is fifty control steps.
+    const step = (now - begun) / 20, next = steps.findIndex((other) => other > step);
+    const to = next < 0 ? last : next - 1 + (step - steps[next - 1]) / (steps[next] - steps[next - 1]);
+    time.value = String(Math.floor(to));
+    playing = to < last ? requestAnimationFrame(run) : null;
+    draw(to);
+  };
+  const hold = () => { if (playing !== null) cancelAnimationFrame(playing); playing = null; };
+  const go = (from) => { hold(); playing = requestAnimationFrame((now) => { begun = now - 20 * steps[from]; run(now); }); };
+  const watch = async (button) => {
+    const turn = ++asked;
+    hold();
+    delete team.dataset.walks;
+    team.querySelectorAll(".watch button").forEach((other) => other.setAttribute("aria-pressed", String(other === button)));
+    try {
+      const found = JSON.parse(await unpack(button.dataset.walks));
+      if (turn !== asked) return;
+      team.dataset.walks = button.dataset.walks;
+      walk = { ...found, moments: found.frames.map((text, k) => moments(text, members[k].points)) };
+      walk.starts = members.map((_, k) => stand(k, 0));
+      if (window.matchMedia("(prefers-reduced-motion: reduce)").matches) { time.value = String(last); draw(last); } else go(0);
+    } catch (error) {
+      $(".says").textContent = `This browser cannot unpack it (${error}).`;
+    }
+  };
+  team.querySelectorAll(".watch button").forEach((button) => button.addEventListener("click", () => watch(button)));
+  time.addEventListener("input", () => { if (walk) { hold(); draw(at()); } });
+  $(".play").addEventListener("click", () => { if (walk) { if (playing !== null) { hold(); draw(at()); } else go(at() >= last ? 0 : at()); } });
+  window.addEventListener("resize", () => { if (walk && playing === null) draw(at()); });
+  watch($(".watch button"));
 })();

@@ -18,7 +18,7 @@ use crate::view::report::words;
 const LISTED: usize = 50;
 
 /// A table; the first column is words, all others are numbers.
-fn table(headers: &[&str], rows: impl IntoIterator<Item = Vec<String>>) -> String {
+pub(super) fn table(headers: &[&str], rows: impl IntoIterator<Item = Vec<String>>) -> String {
     let class = |place: usize| if place == 0 { "" } else { " class=\"number\"" };
     let head: String = headers
         .iter()
