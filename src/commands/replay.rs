@@ -4,7 +4,7 @@ use crate::analysis::gallery;
 use crate::base::error::Error;
 use crate::base::number;
 use crate::body::Body;
-use crate::config::Config;
+use crate::config::{Config, DataConfig};
 use crate::data::dataset::Split;
 use crate::search::training::Training;
 use crate::store::folder;
@@ -141,7 +141,11 @@ pub fn subject(options: &Options) -> Result<Subject, Error> {
         let all = match own {
             [] => {
                 let train = whereabouts.load(&config.data, &[Split::Train]).map_err(offer)?;
-                Training::of(config, &train).map_err(offer)?.images
+                // Not more than are shown: another dataset may have fewer.
+                let most = (MAX_IMAGES / config.classes().len().max(1)).max(1);
+                let images_per_class = config.data.images_per_class.min(most);
+                let data = DataConfig { images_per_class, ..config.data.clone() };
+                Training::of(&Config { data, ..config.clone() }, &train).map_err(offer)?.images
             }
             own => own.to_vec(),
         };
