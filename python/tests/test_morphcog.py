@@ -195,7 +195,7 @@ def test_the_command_has_the_same_words_and_exit_codes(tmp_path):
     plan = tmp_path / "plan.toml"
     plan.write_text('config = "quickstart.toml"\nset = ["generations=2"]\n')
     listed = command("sweep", "plan.toml", "--list").stdout
-    assert f"{sys.executable} -m morphcog sweep" in listed
+    assert f"{os.path.normpath(sys.executable)} -m morphcog sweep" in listed
     subprocess.run(listed, shell=True, check=True, cwd="/", timeout=100)
     assert "1 done" in command("sweep", "plan.toml", "--status").stdout
 
