@@ -32,39 +32,32 @@ def of_program(count: int, out: Path) -> float:
     return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
 
 
-def of_module(body, stimuli, config) -> tuple[float, list[float]]:
+def of_module(body, stimuli, config, walks: list[float]) -> float:
     before = resource.getrusage(resource.RUSAGE_SELF)
     found = mc.displacements([body], stimuli, config=config)
     after = resource.getrusage(resource.RUSAGE_SELF)
-    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime, list(found[0])
+    assert list(found[0]) == walks, "the same images, other numbers"
+    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
 
 
 run = mc.load_run(archive)
 pixels, _ = mc.images("builtin", "test")
+body = run["best"].body
 ratios, turns = [], []
-shown = []
-found = []
-
-
-def through_python() -> float:
-    global found
-    seconds, found = of_module(run["best"].body, mc.stimuli(pixels[shown], run.config), run.config)
-    return seconds
-
-
 print("turn,images,eval_s,start_s,python_s,ratio")
 with tempfile.TemporaryDirectory() as folder:
     out = Path(folder) / "eval.json"
     of_program(images, out)
-    shown = [image["index"] for image in json.loads(out.read_text())["images"]]
+    tested = json.loads(out.read_text())
+    walks = tested["robots"][0]["displacements"]
+    stimuli = mc.stimuli(pixels[[image["index"] for image in tested["images"]]], run.config)
     for turn in range(repeats):
         # What eval does besides (reading, baselines, writing) is that of an evaluation of two images, less those two. Machines grow
         # slower and faster, so the two take turns in going first.
         start = of_program(2, out)
-        seconds = through_python() if turn % 2 else None
-        whole = of_program(images, out)
-        seconds = seconds if turn % 2 else through_python()
-        assert found == json.loads(out.read_text())["robots"][0]["displacements"], "the same images, other numbers"
+        by_turns = [lambda: of_program(images, out), lambda: of_module(body, stimuli, run.config, walks)]
+        times = {job: by_turns[job]() for job in ((0, 1) if turn % 2 else (1, 0))}
+        whole, seconds = times[0], times[1]
         simulated = (whole - start) * images / (images - 2)
         ratios.append(seconds / simulated)
         turns.append((whole, start, seconds))

@@ -142,7 +142,11 @@ fn bookkeeping(criterion: &mut Criterion) {
     });
 }
 
-criterion_group!(name = one_thread; config = Criterion::default().with_measurement(Processor); targets = rollouts, side_by_side);
+criterion_group! {
+    name = one_thread;
+    config = Criterion::default().with_measurement(Processor);
+    targets = rollouts, side_by_side
+}
 // Threads that wait for each other, and files: what they take is the clock's time.
 criterion_group!(by_the_clock, evaluations, bookkeeping);
 criterion_main!(one_thread, by_the_clock);

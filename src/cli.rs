@@ -17,7 +17,7 @@ mod team;
 mod train;
 
 use crate::analysis::gallery;
-use crate::base::error::Error;
+use crate::base::error::{Error, ErrorKind};
 use crate::base::ranks::Ranks;
 use crate::base::{error, shipped, signals};
 use crate::commands::one_by_one::Named;
@@ -256,10 +256,12 @@ fn run_replay(args: ReplayArgs, console: &Console) -> Result<(), Error> {
     // What is wrong with the file is to be known before the simulation starts.
     let named = out.as_deref().map(|path| pictures::Wanted::named(path, &format)).transpose()?;
     // Without a run, the best body that ships with the program.
-    let is_first_look = args.archive.is_none()
-        && args.robot == Selection::Ids(vec![BEST.to_string()])
-        && folder::newest_run().is_err();
-    let archive = if is_first_look { Some(PathBuf::from(shipped::BEST)) } else { args.archive };
+    let is_bare = args.archive.is_none() && args.robot == Selection::Ids(vec![BEST.to_string()]);
+    let is_first_look = is_bare && folder::newest_run().is_err();
+    let archive = match is_first_look {
+        true => Some(folder::first_run(PathBuf::from(shipped::ZERO_ONE)).map_err(Error::other)?),
+        false => args.archive,
+    };
     let search = one_by_one::Options {
         robots: args.robot,
         archives: archive.into_iter().collect(),
@@ -270,12 +272,13 @@ fn run_replay(args: ReplayArgs, console: &Console) -> Result<(), Error> {
     let Named { archive, robot } = the_one(&search, console)?;
     let folder = pictures::folder(archive.as_deref(), &robot)?;
     let options = replay::Options { robot, physical_only, archive, images, data, dataset };
-    let has_choice = options.dataset.is_none() && options.data.is_none() && options.images.is_empty();
+    if is_first_look {
+        console.line(&format!("no run under runs/: the best body of {}", shipped::ZERO_ONE));
+    }
+    let is_any = options.dataset.is_none() && options.data.is_none() && options.images.is_empty();
     let replay = match replay::replay(&options) {
-        Err(_) if is_first_look && has_choice => {
-            console.line(
-                "no run under runs/, and no MNIST: a body of gallery:zero_one, on the program's own digits",
-            );
+        Err(error) if is_first_look && is_any && error.kind == ErrorKind::Input => {
+            console.line(&format!("{}; it sees the program's own digits instead", error.message));
             replay::replay(&replay::Options { dataset: Some(BUILTIN.to_string()), ..options })
         }
         replay => replay,

@@ -473,7 +473,8 @@ fn simulate_reads_standard_input_and_writes_every_point_and_pixel() {
     command.write_stdin(scenario);
     let said = common::program::said(command).ended(0, &[]);
     let table: Vec<Vec<&str>> = said.out.lines().map(|line| line.split(',').collect()).collect();
-    let names = "step,com_x,com_y,x_0,y_0,x_1,y_1,x_2,y_2,x_3,y_3,x_4,y_4,x_5,y_5,x_6,y_6,x_7,y_7,pixel_0_0,pixel_0_1,pixel_1_0,pixel_1_1";
+    let names = "step,com_x,com_y,x_0,y_0,x_1,y_1,x_2,y_2,x_3,y_3,x_4,y_4,x_5,y_5,x_6,y_6,x_7,y_7,\
+                 pixel_0_0,pixel_0_1,pixel_1_0,pixel_1_1";
     assert_eq!((table[0].join(",").as_str(), table.len()), (names, 8));
     for row in &table[1..] {
         let numbers: Vec<f64> = row.iter().map(|text| text.parse().unwrap()).collect();

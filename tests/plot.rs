@@ -9,7 +9,8 @@ use std::collections::BTreeMap;
 use std::sync::OnceLock;
 
 const CAPACITY: &str = r#"{
-  "format": "morphcog-capacity", "format_version": 1, "program_version": "0.1.0", "run": "tiny", "selected": "all elites",
+  "format": "morphcog-capacity", "format_version": 1, "program_version": "0.1.0", "run": "tiny",
+  "selected": "all elites",
   "dataset": "builtin", "patience_on": "test", "trainings": 3, "stopped": false,
   "tasks": [{"task": "0|1", "robots": 2, "accuracy": 0.6, "curves": [
     {"network": "mlp", "fit": [0.5, 0.05, 0.0], "capacity": 2.0, "points": [

@@ -28,7 +28,8 @@ fn a_click_on_a_cell_plays_its_robot() {
         let mut tab = browser.tab(width, height, dark);
         tab.open(&address);
         // The fittest robot is there from the beginning.
-        let playing = "document.querySelector('iframe')?.contentDocument?.getElementById('label')?.textContent.length > 0";
+        let playing = "document.querySelector('iframe')?.contentDocument\
+                       ?.getElementById('label')?.textContent.length > 0";
         tab.wait(playing);
         let chosen = "document.querySelector('.cells [aria-pressed=true]').dataset.robot";
         let fittest = tab.eval(chosen);
@@ -40,7 +41,8 @@ fn a_click_on_a_cell_plays_its_robot() {
         tab.eval(&format!("document.querySelector('.cells [data-robot=\"{other}\"]').click()"));
         tab.wait(&format!("document.querySelector('.about').textContent.startsWith('{other}')"));
         tab.wait(&format!(
-            "{playing} && JSON.parse(document.querySelector('iframe').contentDocument.getElementById('rollout').textContent).robot === '{other}'"
+            "{playing} && JSON.parse(document.querySelector('iframe').contentDocument\
+             .getElementById('rollout').textContent).robot === '{other}'"
         ));
         assert_eq!(tab.eval(chosen), other.as_str());
         // From cell to cell by keys.
@@ -81,7 +83,8 @@ fn a_team_walks_on_the_page_and_says_there_what_it_said_in_its_test() {
             let verdict = if answers[place] == *class { "correct" } else { "wrong" };
             assert_eq!(tab.text("#team .says"), format!("step 500 says {}: {verdict}", answers[place]));
             // Who walked farther than the threshold has voted.
-            let turned = "document.querySelectorAll('#team figure[data-way=left], #team figure[data-way=right]').length";
+            let turned =
+                "document.querySelectorAll('#team figure:is([data-way=left], [data-way=right])').length";
             let voted = team
                 .members
                 .iter()

@@ -303,7 +303,8 @@ fn a_body_of_ones_own_simulations_as_simulate_has_it() {
     let server = Server::start(&sandbox, "");
     let stimulus = json!([[0, 0.5, 1], [0, 0, 1]]);
     let body = json!([[3, 3, 6], [4, 0, 5]]);
-    let request = json!({ "subject": { "body": body }, "shown": { "stimulus": stimulus }, "control_steps": 60, "speed": 0 });
+    let (subject, shown) = (json!({ "body": body }), json!({ "stimulus": stimulus }));
+    let request = json!({ "subject": subject, "shown": shown, "control_steps": 60, "speed": 0 });
     let (_, end) = server.events("/api/simulations", &request).last().unwrap();
     let scenario = json!({ "body": body, "stimulus": stimulus, "control_steps": 60 });
     sandbox.write("scenario.json", scenario.to_string());

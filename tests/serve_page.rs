@@ -247,7 +247,8 @@ fn a_drawing_is_fitted_unless_that_is_turned_off() {
     let small: Vec<[f64; 2]> = zero().iter().map(|place| place.map(|v| 2.0 + v / 4.0)).collect();
     draw(&mut tab, &small);
     at_end(&mut tab);
-    let lit = "JSON.stringify([...document.getElementById('stimulus').getContext('2d').getImageData(0, 0, 300, 300).data])";
+    let lit = "JSON.stringify([...document.getElementById('stimulus').getContext('2d')\
+               .getImageData(0, 0, 300, 300).data])";
     let fitted = tab.eval(lit);
     tab.click("#fit");
     at_end(&mut tab);
@@ -317,8 +318,10 @@ fn a_team_walks_on_small_stages_and_its_votes_are_counted() {
         draw(&mut tab, &zero());
         tab.wait("document.querySelectorAll('#stages figure').length === 3");
         at_end(&mut tab);
-        let votes = "[...document.querySelectorAll('#tally span')].reduce((sum, cell) => sum + Number(cell.textContent), 0)";
-        let turned = "document.querySelectorAll('#stages figure[data-way=left], #stages figure[data-way=right]').length";
+        let votes =
+            "[...document.querySelectorAll('#tally span')].reduce((sum, cell) => sum + +cell.textContent, 0)";
+        let turned =
+            "document.querySelectorAll('#stages figure:is([data-way=left], [data-way=right])').length";
         assert_eq!(tab.eval(votes), tab.eval(turned));
         let says = tab.text("#says");
         assert!(["0", "1", "2", "undecided"].contains(&says.as_str()), "{says}");

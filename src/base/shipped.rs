@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 /// How a name of shipped runs begins.
 pub const PREFIX: &str = "gallery:";
 
-/// The run whose robot is shown to those who have none of their own.
-pub const BEST: &str = "gallery:zero_one-1/run.json";
+/// Robots that tell zeros from ones, the best run first: what is shown where there are no others.
+pub const ZERO_ONE: &str = "gallery:zero_one";
 
 /// Gaits to be trained, as by `demo`; they have no task, and so are not among all.
 const GAITS: &str = "gaits";

@@ -137,7 +137,7 @@ Examples:
 scenario.json:
   {\"body\": [[3, 3, 6], [4, 0, 5]],         rows from the top; 0 empty, 1 rigid, 2 soft, 3 and 4 muscle (in phase,
                                            antiphase), 5 and 6 sensor (shrinks, expands)
-   \"stimulus\": [[0, 0.5, 1], [0, 0, 1]],   one pixel per voxel, 0 to 1; or \"stimuli\": [...] with \"switch_every\": 500
+   \"stimulus\": [[0, 0.5, 1], [0, 0, 1]],   one pixel per voxel, 0 to 1; or \"stimuli\": [...], \"switch_every\": 500
    \"control_steps\": 500, \"start_row\": 2, \"start_column\": 493, \"reset_between\": false}
 
 Output: step,com_x,com_y in world units (a voxel is 0.1); with --points also x_0,y_0,… and pixel_0_0,….
@@ -184,9 +184,10 @@ Examples:
         shell: clap_complete::Shell,
     },
     /// The man pages.
-    #[command(
-        after_help = "Examples:\n  morphcog man > morphcog.1 && man ./morphcog.1\n  morphcog man --out ~/.local/share/man/man1"
-    )]
+    #[command(after_help = "\
+Examples:
+  morphcog man > morphcog.1 && man ./morphcog.1
+  morphcog man --out ~/.local/share/man/man1")]
     Man {
         /// Folder for the pages of all commands (default: the page of morphcog itself, to standard
         /// output).

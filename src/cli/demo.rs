@@ -31,7 +31,8 @@ then
   morphcog evolve --config quickstart.toml      small robots from nothing
 
 About a minute, no download: a gait that ships with the program is trained to tell zeros from ones,
-on digits that the program draws itself. Then the robot is shown 200 digits that it has never seen. Ctrl-C stops it; the same command goes on.";
+on digits that the program draws itself. Then the robot is shown 200 digits that it has never seen.
+Ctrl-C stops it; the same command goes on.";
 
 /// The gaits of which the best is trained, with its response.
 const GAITS: &str = "gallery:gaits";

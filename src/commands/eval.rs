@@ -132,7 +132,7 @@ pub fn eval(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Re
         return Err(Error::input(text.to_string()));
     }
     let shown = HeldOutImages::draw(config, &sources, &dataset, options)?;
-    let test_sha256 = dataset.fingerprint(Split::Test).unwrap_or_default();
+    let test_sha256 = dataset.fingerprint(Split::Test).expect("both splits are loaded");
     let steps = checked_steps(config, options.cycles)?;
     let asked = (options.robots.describe(), options.split, options.seed, options.threshold);
     let mut report = EvalFile::new(&sources, asked, steps, &shown.images, test_sha256);

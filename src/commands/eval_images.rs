@@ -47,11 +47,9 @@ impl<'a> HeldOutImages<'a> {
             let text = format!("--images {asked}: expected {least} or more, one of each class");
             return Err(Error::usage(text));
         }
-        let (images, split) = match options.split {
-            HeldOut::Test => {
-                let classes = config.classes();
-                (held_out::test_images(&classes, dataset, asked, options.seed)?, Split::Test)
-            }
+        let classes = config.classes();
+        let images = match options.split {
+            HeldOut::Test => held_out::test_images(&classes, dataset, asked, options.seed)?,
             HeldOut::Validation => {
                 let runs: Vec<_> = sources.iter().map(|source| &source.run).collect();
                 // Now or before: a robot that is named may be one of the best of `validation.json`.
@@ -60,10 +58,10 @@ impl<'a> HeldOutImages<'a> {
                     None => options.robots.names_any().then(|| shown_for_validation(source)).flatten(),
                 };
                 let besides = chosen_by(sources, dataset, count)?;
-                let classes = config.classes();
-                (images_besides(&besides, &runs, &classes, dataset, "--images", asked)?, Split::Train)
+                images_besides(&besides, &runs, &classes, dataset, "--images", asked)?
             }
         };
+        let split = options.split.split();
         let stimuli = images.iter().map(|image| see(config, dataset, split, image.index));
         let stimuli = stimuli.collect::<Result<_, _>>()?;
         Ok(HeldOutImages { config, dataset, options, images, stimuli })

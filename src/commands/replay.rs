@@ -274,15 +274,13 @@ pub fn find(options: &Options) -> Result<Found, Error> {
     let robots = Selection::Ids(vec![options.robot.clone()]).physical(options.physical_only);
     let robots = robots.of(std::slice::from_ref(&source), 0);
     let robots = robots.map_err(|error| {
-        let hint = error.hint.clone().unwrap_or_default();
         let error = error.within(&archive.display().to_string());
-        // Without an archive, the robot may have been meant for a published one.
-        match options.archive {
-            None if !options.physical_only => {
-                error.hint(format!("{hint}; published robots: morphcog gallery"))
-            }
-            _ => error,
+        if options.archive.is_some() || options.physical_only {
+            return error;
         }
+        // Without an archive, the robot may have been meant for a published one.
+        let own = error.hint.clone().map_or(String::new(), |hint| format!("{hint}; "));
+        error.hint(format!("{own}published robots: morphcog gallery"))
     })?;
     let (robot, run) = (robots[0].robot, &source.run);
     let about = vec![

@@ -90,9 +90,10 @@ pub fn team(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Re
     let splits = robots.iter().map(|chosen| split_of(&sources[chosen.source], chosen));
     let splits = splits.collect::<Result<Vec<grouping::Split>, Error>>()?;
     covered(&robots, &splits, &classes)?;
-    let (images, split) = match options.split {
-        HeldOut::Test => (test_images(&classes, &dataset, options.images, options.seed)?, Split::Test),
-        HeldOut::Validation => (validation_images(options, &sources, &classes, &dataset)?, Split::Train),
+    let split = options.split.split();
+    let images = match options.split {
+        HeldOut::Test => test_images(&classes, &dataset, options.images, options.seed)?,
+        HeldOut::Validation => validation_images(options, &sources, &classes, &dataset)?,
     };
     let mut file = TeamFile {
         format: FORMAT.to_string(),

@@ -396,7 +396,7 @@ mod tests {
     fn what_cannot_be_is_said_with_the_line_it_stands_on() {
         let text = "seed = 3\n\n[body]\nwidth = 5\nheight = 0\n\n[[item]]\nkeep = 1\n\n[[item]]\n\nkeep = 0\n[task]\n";
         let place = |key: &str| placed(Error::at(key, "wrong"), text, Format::Toml, "own.toml").message;
-        let line = |key: &str| place(key).split(": ").next().unwrap_or_default().to_string();
+        let line = |key: &str| place(key).split(": ").next().expect("a text has a first part").to_string();
         assert_eq!(place("seed"), "own.toml:1: seed: wrong");
         assert_eq!(line("body.height"), "own.toml:5");
         assert_eq!(line("item.2.keep"), "own.toml:12");
@@ -427,7 +427,7 @@ mod tests {
         };
         let outer = Outer { name: "a".to_string(), inner };
         let error = changed(outer, &overrides, check, |error| error.within("own.toml:7")).unwrap_err();
-        error.message.split(": ").next().unwrap_or_default().to_string()
+        error.message.split(": ").next().expect("a text has a first part").to_string()
     }
 
     #[test]

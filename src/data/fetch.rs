@@ -33,7 +33,8 @@ pub enum AttemptError {
     #[error("{0}")]
     Read(io::Error),
     /// More or fewer bytes than the published file has; at most one byte more is read.
-    #[error("expected {expected} bytes, found {}", if found > expected { "more".to_string() } else { found.to_string() })]
+    #[error("expected {expected} bytes, found {}",
+        if found > expected { "more".to_string() } else { found.to_string() })]
     Size {
         /// Size of the published file.
         expected: u64,

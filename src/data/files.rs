@@ -193,7 +193,7 @@ pub(crate) fn load(name: &str, place: &Place, split: Split) -> Result<(Vec<u8>, 
     hash.update(&labels.content);
     let fingerprint = hex(&hash.finalize());
     let describe = |path: &Path, bytes, sha256: &str| FileInfo {
-        name: path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default(),
+        name: path.file_name().expect("it was read as a file").to_string_lossy().into_owned(),
         bytes,
         sha256: sha256.to_string(),
     };

@@ -515,7 +515,8 @@ fn told_round(observer: &dyn Observer, robot: &str, round: &Round, plan: &Plan) 
     observer.finding(
         "round",
         &serde_json::json!({
-            "robot": robot, "round": round, "rollouts": rollouts, "predicted": predicted, "measured": measured, "off": off,
+            "robot": robot, "round": round, "rollouts": rollouts, "predicted": predicted, "measured": measured,
+            "off": off,
             "changed": changed,
         }),
     );

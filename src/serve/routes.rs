@@ -6,7 +6,8 @@ use crate::serve::http::{Request, Response};
 use crate::serve::refusal::Refusal;
 use crate::serve::request::{ChangeRequest, Pace, Plan, SeeRequest, SimulationRequest};
 use crate::serve::team::{TeamPlan, TeamRequest};
-use crate::serve::{Service, request, stream, team};
+use crate::serve::{Service, request, team};
+use crate::view::html::materials;
 use serde::Deserialize;
 use serde_json::json;
 
@@ -38,7 +39,7 @@ pub fn reply(service: &Service, port: u16, request: &Request) -> Reply {
     };
     match parts.as_slice() {
         ["api", "status"] => reading(&|| Ok(Response::json(&service.status()))),
-        ["api", "materials"] => reading(&|| Ok(Response::json(&stream::materials()))),
+        ["api", "materials"] => reading(&|| Ok(Response::json(&materials()))),
         ["api", "archives"] => reading(&|| Ok(Response::json(&service.catalogue.list()))),
         ["api", "archives", index] => reading(&|| archive(service, index)),
         ["api", "archives", index, "progress"] => {

@@ -3,24 +3,16 @@
 //! As in the page of a replay: steps of 1/200 voxel length from an origin per moment, near the
 //! centre of mass.
 
-use crate::body::{Body, Material};
 use crate::serve::catalogue::Who;
 use crate::serve::request::{Plan, Seen};
 use crate::serve::simulation::{Event, STEPS_PER_SECOND};
 use crate::serve::team::{Name, TeamEvent};
 use crate::task::direction::THRESHOLD;
 use crate::task::recording::{Frame, VoxelCorners};
-use crate::view::colour::{TONE_AREAS, mark, tones};
-use crate::view::html::{STEPS, quantised};
+use crate::view::html::{STEPS, corners, quantised};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD as BASE64;
 use serde_json::{Value, json};
-
-/// What a page has to know of materials to draw them.
-pub fn materials() -> Value {
-    let material = |m: Material| json!({ "name": m.name(), "tones": tones(m), "mark": mark(m), "sensor": m.is_sensor(), "muscle": m.is_muscle() });
-    json!({ "areas": TONE_AREAS, "list": Material::ALL.map(material) })
-}
 
 /// An event as it goes over the line.
 pub fn text(event: &Event) -> String {
@@ -72,15 +64,6 @@ pub fn of_team(event: &TeamEvent) -> String {
         TeamEvent::End { step, tally } => ("end", json!({ "step": step, "tally": tally })),
     };
     format!("event: {name}\ndata: {data}\n\n")
-}
-
-/// Voxels with their corners, as the page draws them.
-fn corners(body: &Body, voxels: &[VoxelCorners]) -> Vec<Value> {
-    let corners = |v: &VoxelCorners| {
-        let material = body.at(v.row as isize, v.column as isize);
-        json!([material.code(), v.corners, v.row, v.column])
-    };
-    voxels.iter().map(corners).collect()
 }
 
 fn begin(id: u64, plan: &Plan, voxels: &[VoxelCorners], frame: &Frame) -> Value {

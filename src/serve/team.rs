@@ -12,7 +12,7 @@ use crate::task::direction::THRESHOLD;
 use crate::task::judge::Judge;
 use crate::task::recording::{Frame, VoxelCorners};
 use crate::task::rollout::Rollout;
-use crate::task::voting::{Ballot, CLIP};
+use crate::task::voting::{CLIP, Tally};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
@@ -152,18 +152,6 @@ pub enum TeamEvent<'a> {
     },
 }
 
-/// What the walks come to.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Tally {
-    /// How far each robot has walked \[voxel lengths\]; none of one that has become unstable.
-    pub moved: Vec<Option<f64>>,
-    /// Votes and sums of walks, for every class.
-    #[serde(flatten)]
-    pub ballot: Ballot,
-    /// The class with most votes; none while there is no vote.
-    pub says: Option<u8>,
-}
-
 /// A robot that walks.
 struct Walker<'a> {
     rollout: Rollout<'a>,
@@ -200,7 +188,7 @@ pub fn live(
         let news = slot.control.news();
         clock.set(news.pace, news.paused);
         if news.end || step >= plan.control_steps {
-            return tell(TeamEvent::End { step, tally: Tally::of(&walkers, &judges, &classes) });
+            return tell(TeamEvent::End { step, tally: tally(&walkers, &judges, &classes) });
         }
         let Some(due) = clock.due(step) else {
             tell(TeamEvent::Still)?;
@@ -228,22 +216,16 @@ pub fn live(
             step += due;
             let frame = |walker: &Walker| (!walker.is_unstable).then(|| walker.rollout.frame());
             let frames = walkers.iter().map(frame).collect();
-            tell(TeamEvent::Moment { step, frames, tally: Tally::of(&walkers, &judges, &classes) })?;
+            tell(TeamEvent::Moment { step, frames, tally: tally(&walkers, &judges, &classes) })?;
         }
         clock.sleep(&slot.control);
     }
 }
 
-impl Tally {
-    fn of(walkers: &[Walker], judges: &[&Judge], classes: &[u8]) -> Self {
-        let moved: Vec<Option<f64>> =
-            walkers.iter().map(|walker| (!walker.is_unstable).then(|| walker.rollout.moved())).collect();
-        let walks = judges.iter().copied().zip(moved.iter().copied());
-        let ballot = Ballot::count(classes, walks, THRESHOLD, CLIP);
-        let has_votes = ballot.votes.iter().any(|votes| *votes > 0);
-        let says = has_votes.then(|| classes[ballot.by_votes().0]);
-        Tally { moved, ballot, says }
-    }
+/// What the walks come to so far.
+fn tally(walkers: &[Walker], judges: &[&Judge], classes: &[u8]) -> Tally {
+    let moved = walkers.iter().map(|walker| (!walker.is_unstable).then(|| walker.rollout.moved())).collect();
+    Tally::of(classes, judges, moved, (THRESHOLD, CLIP))
 }
 
 #[cfg(test)]
@@ -255,6 +237,7 @@ mod tests {
     use crate::task::protocol::Protocol;
     use crate::task::rollout::fresh_rollout;
     use crate::task::stimulus::StimulusParams;
+    use crate::task::voting::Ballot;
     use std::sync::atomic::AtomicBool;
 
     fn plan() -> TeamPlan {

@@ -274,7 +274,7 @@ impl ResponseFile {
 /// The pictures of robots beside results in `out`, as SVG and as PNG; of one robot they have the
 /// results' name.
 pub fn pictures(out: &Path, ids: &[&str]) -> Vec<[PathBuf; 2]> {
-    let stem = out.file_stem().unwrap_or_default().to_string_lossy();
+    let stem = out.file_stem().expect("its name was checked before anything was measured").to_string_lossy();
     let named = |id: &&str| match ids.len() {
         1 => PICTURES.map(|ending| out.with_extension(ending)),
         _ => PICTURES.map(|ending| out.with_file_name(format!("{stem}-{id}.{ending}"))),

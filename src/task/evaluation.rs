@@ -631,7 +631,7 @@ mod tests {
         };
         let evaluation = run(&CALM, RolloutMode::Fresh, Savings::default(), &[3, 4], Box::new(may_win));
         let all = run(&CALM, RolloutMode::Fresh, Savings::default(), &[], Box::new(|_| true)).outcome.known();
-        let mut known = all.unwrap_or_default();
+        let mut known = all.expect("all images are shown");
         known[2] = None;
         let outcome = Outcome::Stopped(known);
         assert_eq!(evaluation, Evaluation { outcome, simulated: 2, shared: 2, stopped: 1 });

@@ -248,7 +248,8 @@ mod tests {
 
         #[test]
         fn mirrored_answers_are_as_fit(answers in prop::collection::vec((any::<bool>(), -30.0..30.0f64), 1..20)) {
-            let of = |sign: f64| answers.iter().map(move |&(a, d)| (if a { A } else { B }, sign * d)).collect::<Vec<_>>();
+            let group = |is_a: bool| if is_a { A } else { B };
+            let of = |sign: f64| answers.iter().map(move |&(a, d)| (group(a), sign * d)).collect::<Vec<_>>();
             for kind in MANY {
                 prop_assert_eq!(fitness(kind, &of(1.0)), fitness(kind, &of(-1.0)));
             }

@@ -73,6 +73,34 @@ impl Ballot {
     }
 }
 
+/// What the walks of a team come to under one image, at their end or before.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Tally {
+    /// How far each robot has walked \[voxel lengths\]; none of one that has become unstable.
+    pub moved: Vec<Option<f64>>,
+    /// Votes and sums of walks, for every class.
+    #[serde(flatten)]
+    pub ballot: Ballot,
+    /// The class with most votes; none while there is no vote.
+    pub says: Option<u8>,
+}
+
+impl Tally {
+    /// Of walks, each with what it says; threshold and clip as of [`Ballot::count`].
+    pub fn of(
+        classes: &[u8],
+        judges: &[&Judge],
+        moved: Vec<Option<f64>>,
+        (threshold, clip): (f64, f64),
+    ) -> Self {
+        let walks = judges.iter().copied().zip(moved.iter().copied());
+        let ballot = Ballot::count(classes, walks, threshold, clip);
+        let has_votes = ballot.votes.iter().any(|votes| *votes > 0);
+        let says = has_votes.then(|| classes[ballot.by_votes().0]);
+        Tally { moved, ballot, says }
+    }
+}
+
 /// How many answers are right.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Accuracy {

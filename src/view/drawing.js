@@ -144,5 +144,12 @@ const Drawing = (() => {
     return made.firstChild;
   };
 
-  return { css, fit, sidesOf, ruler, robot, voxel, swatch, path, stimulus };
+  // A new element.
+  const element = (tag, properties = {}, ...children) => {
+    const made = Object.assign(document.createElement(tag), properties);
+    made.append(...children);
+    return made;
+  };
+
+  return { css, element, fit, sidesOf, ruler, robot, voxel, swatch, path, stimulus };
 })();

@@ -4,16 +4,16 @@
 //! frame (near the centre of mass, in 64-bit floats): exact within 0.0025 voxel lengths however far
 //! the robot walks.
 
-use crate::body::Material;
+use crate::body::{Body, Material};
 use crate::task::direction::THRESHOLD;
-use crate::task::recording::Recording;
+use crate::task::recording::{Recording, VoxelCorners};
 use crate::view::colour::{TONE_AREAS, mark, tones};
 use crate::view::error::{PictureError, write_whole};
 use crate::view::gif;
 use crate::view::walk::Walk;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD as BASE64;
-use serde_json::json;
+use serde_json::{Value, json};
 use std::io::Write;
 use std::path::Path;
 
@@ -102,7 +102,7 @@ pub(super) fn packed(walk: &Walk, most: usize) -> Result<String, PictureError> {
 ///
 /// # Errors
 /// [`PictureError::Encode`] if it cannot be packed.
-pub(super) fn pack(value: &serde_json::Value) -> Result<String, PictureError> {
+pub(super) fn pack(value: &Value) -> Result<String, PictureError> {
     let failed = |error: std::io::Error| PictureError::Encode(error.to_string());
     let mut packer = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::best());
     packer.write_all(value.to_string().as_bytes()).map_err(failed)?;
@@ -111,7 +111,7 @@ pub(super) fn pack(value: &serde_json::Value) -> Result<String, PictureError> {
 
 /// The recording as the page's script reads it; `most`: bytes of positions, of which there are
 /// fewer for longer rollouts.
-fn rollout(walk: &Walk, most: usize) -> serde_json::Value {
+fn rollout(walk: &Walk, most: usize) -> Value {
     let recording = walk.recording();
     let points = recording.frames.iter().map(|f| f.points.len()).min().unwrap_or(0);
     let every = (walk.len() * points * 4).div_ceil(most.max(1)).max(1);
@@ -141,10 +141,7 @@ fn rollout(walk: &Walk, most: usize) -> serde_json::Value {
     json!({
         "robot": recording.robot,
         "body": body.to_string(),
-        "voxels": recording.voxels.iter().map(|v| {
-            let material = body.at(v.row as isize, v.column as isize);
-            json!([material.code(), v.corners])
-        }).collect::<Vec<_>>(),
+        "voxels": corners(body, &recording.voxels),
         "points": points,
         "cycle": recording.cycle.max(1),
         "unstable": recording.unstable,
@@ -156,14 +153,25 @@ fn rollout(walk: &Walk, most: usize) -> serde_json::Value {
         "origins": BASE64.encode(bytes(origins.iter().flatten().map(|v| v.to_le_bytes()))),
         "positions": BASE64.encode(bytes(positions.map(i16::to_le_bytes))),
         "materials": materials(),
-        "areas": TONE_AREAS,
     })
 }
 
-/// All materials as the pages' scripts draw them.
-pub(super) fn materials() -> serde_json::Value {
-    let material = |m| json!({ "name": Material::name(m), "tones": tones(m), "mark": mark(m), "sensor": Material::is_sensor(m) });
-    Material::ALL.map(material).to_vec().into()
+/// What the pages' scripts have to know of materials to draw them.
+pub(crate) fn materials() -> Value {
+    let material = |m: Material| {
+        let (name, tones, mark) = (m.name(), tones(m), mark(m));
+        json!({ "name": name, "tones": tones, "mark": mark, "sensor": m.is_sensor(), "muscle": m.is_muscle() })
+    };
+    json!({ "areas": TONE_AREAS, "list": Material::ALL.map(material) })
+}
+
+/// Voxels as the pages' scripts draw them: material, corners, row and column.
+pub(crate) fn corners(body: &Body, voxels: &[VoxelCorners]) -> Vec<Value> {
+    let corners = |v: &VoxelCorners| {
+        let material = body.at(v.row as isize, v.column as isize);
+        json!([material.code(), v.corners, v.row, v.column])
+    };
+    voxels.iter().map(corners).collect()
 }
 
 fn bytes<const N: usize>(words: impl Iterator<Item = [u8; N]>) -> Vec<u8> {
@@ -215,13 +223,13 @@ mod tests {
     use super::*;
     use crate::view::simulated;
 
-    fn embedded(page: &str) -> serde_json::Value {
+    fn embedded(page: &str) -> Value {
         let (_, rest) = page.split_once("<script type=\"application/json\" id=\"rollout\">").unwrap();
         serde_json::from_str(rest.split_once("</script>").unwrap().0).unwrap()
     }
 
     /// Positions by shown frame, as the script decodes them.
-    fn positions(rollout: &serde_json::Value) -> Vec<Vec<Option<[f64; 2]>>> {
+    fn positions(rollout: &Value) -> Vec<Vec<Option<[f64; 2]>>> {
         let data = |key: &str| BASE64.decode(rollout[key].as_str().unwrap()).unwrap();
         let origins: Vec<f64> =
             data("origins").chunks(8).map(|b| f64::from_le_bytes(b.try_into().unwrap())).collect();

@@ -233,7 +233,8 @@ mod tests {
             let walk = Walk::new(&recording).unwrap();
             let mut out = vec![];
             stimulus(&walk, 0, [0.0, 0.0], 1.0, &mut out);
-            let line = |p: &&Primitive| matches!(p, Primitive::Quad { fill, .. } if *fill == sensor_line(Material::SensorShrink));
+            let shrinks = sensor_line(Material::SensorShrink);
+            let line = |p: &&Primitive| matches!(p, Primitive::Quad { fill, .. } if *fill == shrinks);
             out.iter().filter(line).count()
         };
         assert_eq!((frames("33/33"), frames("53/33"), frames("55/33")), (0, 4, 6));

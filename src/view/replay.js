@@ -70,7 +70,7 @@
   }
 
   let frame = 0;
-  const body = { voxels: rollout.voxels, sides: Drawing.sidesOf(rollout.voxels, P), areas: rollout.areas, materials: rollout.materials };
+  const body = { voxels: rollout.voxels, sides: Drawing.sidesOf(rollout.voxels, P), areas: rollout.materials.areas, materials: rollout.materials.list };
 
   const drawWorld = () => {
     const canvas = $("world"), width = canvas.parentElement.clientWidth - 24, groundHeight = 30;
@@ -100,7 +100,7 @@
   const drawStimulus = () => {
     const canvas = $("stimulus"), p = phaseOf(frame), { height, width } = phases[p];
     const grey = (r, c) => images[p].getUint8(r * width + c);
-    Drawing.stimulus(canvas, canvas.parentElement.clientWidth, { height, width, grey }, rows, rollout.materials);
+    Drawing.stimulus(canvas, canvas.parentElement.clientWidth, { height, width, grey }, rows, rollout.materials.list);
   };
 
   const gutter = 52;
@@ -194,7 +194,7 @@
     button.append(far); button.onclick = () => seek(p.first); $("phases").append(button);
   });
   const used = new Set(rollout.voxels.map(([m]) => m));
-  rollout.materials.forEach((m, k) => {
+  rollout.materials.list.forEach((m, k) => {
     if (!used.has(k)) return;
     const item = document.createElement("li");
     item.append(Drawing.swatch(m), m.name); $("legend").append(item);

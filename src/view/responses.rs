@@ -16,7 +16,8 @@ pub fn response(console: &Console, finished: &Finished, out: &Path) {
     let written = unwritten.is_none() && !file.robots.is_empty();
     if console.mode() == Mode::Json {
         let done = serde_json::json!({
-            "file": written.then(|| out.display().to_string()), "stopped": stopped, "run": file.run, "setting": file.setting,
+            "file": written.then(|| out.display().to_string()), "stopped": stopped, "run": file.run,
+            "setting": file.setting,
             "robots": file.robots,
         });
         return console.event("responses", &done);

@@ -2,12 +2,7 @@
 // A team: robots that see one picture, each on a small stage, and the votes their walks come to. For the page of `serve` and for
 // reports; after drawing.js.
 const Stages = (() => {
-  const { css, fit } = Drawing;
-  const element = (name, properties = {}, ...children) => {
-    const made = Object.assign(document.createElement(name), properties);
-    made.append(...children);
-    return made;
-  };
+  const { css, element, fit } = Drawing;
 
   // How a body stands: where its centre of mass is, its points, and how large it is [voxel lengths].
   const stand = (x, points) => {

@@ -32,7 +32,8 @@ pub fn evolution(console: &Console, finished: &Finished, out: &Path) {
         let elites = run.elites.len();
         let best = finished.best();
         let done = serde_json::json!({
-            "folder": out.display().to_string(), "generations": run.generations, "stopped": finished.stopped, "best": best,
+            "folder": out.display().to_string(), "generations": run.generations, "stopped": finished.stopped,
+            "best": best,
             "elites": elites, "stats": run.stats, "totals": totals,
         });
         return console.event("finished", &done);
@@ -127,7 +128,8 @@ pub fn evaluation(console: &Console, report: &EvalFile, capacity: Option<&Capaci
     }
     if console.mode() == Mode::Json {
         let done = serde_json::json!({
-            "file": out.map(|out| out.display().to_string()), "stopped": report.stopped, "images": report.images.len(), "split": report.split,
+            "file": out.map(|out| out.display().to_string()), "stopped": report.stopped,
+            "images": report.images.len(), "split": report.split,
             "dataset": report.dataset, "trained_on": report.trained_on,
             "means": report.means, "baselines": report.baselines,
             "robots": report.robots.iter().map(RobotReport::without_displacements).collect::<Vec<_>>(),

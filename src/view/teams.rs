@@ -101,8 +101,8 @@ pub(super) fn remarks(file: &TeamFile) -> Vec<String> {
     let mut lines = vec![
         format!("{images} {} {} images, {robots} robots, no trained weights", file.dataset, file.split),
         format!(
-            "most votes: {} % of the images had a tie; on average {} % of the robots that know the answer voted for it, \
-             {} of {robots} did not move",
+            "most votes: {} % of the images had a tie; on average {} % of the robots that know the answer voted \
+             for it, {} of {robots} did not move",
             percent(answers.ties),
             percent(answers.agreement),
             number::fixed(answers.not_moved, 1)

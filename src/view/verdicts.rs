@@ -13,7 +13,8 @@ pub fn audit(console: &Console, finished: &Finished, out: &Path) {
     if console.mode() == Mode::Json {
         let short = |robot: &&RobotAudit| RobotAudit { rollouts: Vec::new(), ..(*robot).clone() };
         let done = serde_json::json!({
-            "file": unwritten.is_none().then(|| out.display().to_string()), "stopped": stopped, "run": file.run, "elites": file.elites,
+            "file": unwritten.is_none().then(|| out.display().to_string()), "stopped": stopped, "run": file.run,
+            "elites": file.elites,
             "robots": robots.iter().map(short).collect::<Vec<_>>(),
         });
         return console.event("audited", &done);

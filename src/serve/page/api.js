@@ -40,11 +40,7 @@ export const $ = (id) => document.getElementById(id);
 
 export const bytes = (text) => Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
 
-export const element = (tag, properties = {}, ...children) => {
-  const made = Object.assign(document.createElement(tag), properties);
-  made.append(...children);
-  return made;
-};
+export const { element } = Drawing;
 
 // Tabs as the ARIA practices have them: arrows move, only the chosen one is in the tab order.
 export const tabs = (ids, chosen) => {

@@ -1,11 +1,10 @@
 "use strict";
 (() => {
   const page = JSON.parse(document.getElementById("player").textContent);
+  const bytes = (text) => Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
   // Text of a rollout: gzip in base64, in an element of its own.
   const unpack = async (id) => {
-    const raw = atob(document.getElementById(id).textContent), bytes = new Uint8Array(raw.length);
-    for (let i = 0; i < raw.length; i++) bytes[i] = raw.charCodeAt(i);
-    const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
+    const stream = new Blob([bytes(document.getElementById(id).textContent)]).stream().pipeThrough(new DecompressionStream("gzip"));
     return new Response(stream).text();
   };
   for (const section of document.querySelectorAll("[data-run]")) {
@@ -65,13 +64,10 @@
   const time = $("input"), last = steps.length - 1;
   // Points of a robot at all moments: differences of 8 bits to the moment before, at first 16-bit numbers.
   const moments = (text, count) => {
-    const raw = atob(text), bytes = new Uint8Array(raw.length);
-    for (let i = 0; i < raw.length; i++) bytes[i] = raw.charCodeAt(i);
-    const view = new DataView(bytes.buffer), all = [];
-    if (!bytes.length) return all;
+    const view = new DataView(bytes(text).buffer);
     let at = Array.from({ length: 2 * count }, (_, i) => view.getInt16(2 * i, true));
-    all.push(at);
-    for (let byte = 4 * count; byte < bytes.length; byte += 2 * count) all.push(at = at.map((v, i) => v + view.getInt8(byte + i)));
+    const all = [at];
+    for (let byte = 4 * count; byte < view.byteLength; byte += 2 * count) all.push(at = at.map((v, i) => v + view.getInt8(byte + i)));
     return all;
   };
   let walk = null, begun = 0, playing = null, asked = 0;
@@ -83,10 +79,11 @@
     return Stages.stand(members[k].at + moved(a) * (1 - t) + moved(b) * t, points);
   };
   const draw = (at) => {
-    const tally = walk.tallies[Math.floor(at)], over = at >= last;
-    stages.draw(members.map((_, k) => stand(k, at)), walk.starts, tally);
-    const says = tally.says === null ? (over ? "undecided" : "") : `says ${tally.says}` + (over ? (tally.says === walk.class ? ": correct" : ": wrong") : "");
-    $(".says").textContent = `step ${steps[Math.floor(at)]} ${says}`;
+    // At the end the answer, also one that no robot voted for.
+    const tally = walk.tallies[Math.floor(at)], over = at >= last, says = over ? walk.answer : tally.says;
+    stages.draw(members.map((_, k) => stand(k, at)), walk.starts, { ...tally, says });
+    const verdict = over ? (says === walk.class ? ": correct" : ": wrong") : "";
+    $(".says").textContent = `step ${steps[Math.floor(at)]} ` + (says === null ? "" : `says ${says}${verdict}`);
     $(".play").textContent = playing === null ? "Play" : "Pause";
   };
   const at = () => Number(time.value);

@@ -108,7 +108,8 @@ pub(super) fn about(dossier: &Dossier) -> String {
         .map(|(key, value)| format!("<tr><th scope=\"row\">{key}</th><td>{}</td></tr>\n", escape(&value)))
         .collect();
     format!(
-        "<div class=\"card\"><table><tbody>\n{rows}</tbody></table></div>\n<details><summary>Config</summary><pre>{}</pre></details>\n",
+        "<div class=\"card\"><table><tbody>\n{rows}</tbody></table></div>\n\
+         <details><summary>Config</summary><pre>{}</pre></details>\n",
         escape(&run.config.to_toml())
     )
 }

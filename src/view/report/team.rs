@@ -3,13 +3,13 @@
 
 use crate::base::Grid;
 use crate::commands::report::{Dossier, Team};
-use crate::task::direction::THRESHOLD;
+use crate::search::showing::control_steps;
+use crate::store::team::Member;
 use crate::task::judge::Judge;
-use crate::task::recording::{Frame, Recording};
-use crate::task::voting::Ballot;
-use crate::view::colour::TONE_AREAS;
+use crate::task::recording::{Frame, Recording, VoxelCorners};
+use crate::task::voting::Tally;
 use crate::view::error::PictureError;
-use crate::view::html::{escape, materials, pack};
+use crate::view::html::{corners, escape, materials, pack};
 use crate::view::report::{figure, tables};
 use crate::view::{plot, teams};
 use base64::Engine;
@@ -40,8 +40,11 @@ pub(super) fn section(
 ) -> Result<String, PictureError> {
     let file = &team.file;
     let mut out = "<section id=\"team\">\n<h2>The team</h2>\n".to_string();
-    out += "<p>Each robot has one vote for every class of the side it walks to; a walk of at most 3 voxel lengths gives \
-     none.</p>\n";
+    out += &format!(
+        "<p>Each robot has one vote for every class of the side it walks to; a walk of at most {} voxel lengths \
+         gives none.</p>\n",
+        file.threshold
+    );
     if let Some((headers, rows)) = teams::table(file) {
         let headers: Vec<&str> = headers.iter().map(String::as_str).collect();
         out += &tables::table(&headers, rows);
@@ -49,7 +52,7 @@ pub(super) fn section(
     for line in teams::remarks(file) {
         out += &format!("<p>{}.</p>\n", escape(&line));
     }
-    if !team.images.is_empty() && !file.members.is_empty() {
+    if count(team) > 0 {
         out += &watched(team, runs, simulated)?;
     }
     let figures = [(plot::confusion(file), "column"), (plot::poster(file), "page")];
@@ -61,78 +64,26 @@ pub(super) fn section(
 
 /// Buttons, the stages, and the walks.
 fn watched(team: &Team, runs: &[Dossier], simulated: &(dyn Fn() + Sync)) -> Result<String, PictureError> {
-    let file = &team.file;
-    let members = file.members.len();
+    let shown = shown(team, runs);
+    let members = team.file.members.len();
     let jobs: Vec<(usize, usize)> =
         (0..team.images.len()).flat_map(|image| (0..members).map(move |member| (image, member))).collect();
-    let largest =
-        file.members.iter().map(|member| (member.body.height() + 1) * (member.body.width() + 1)).max();
-    // Two bytes for a point.
-    let moment = 2 * largest.unwrap_or(1) * jobs.len();
-    let steps = file.members.iter().zip(&team.runs).map(|(_, run)| {
-        let cycle = runs[*run].run.config.physics.cycle_steps as usize;
-        cycle * file.cycles as usize
-    });
-    let steps = steps.max().unwrap_or(0);
-    let apart = (steps * moment).div_ceil(MOST_BYTES).max(LEAST_APART);
-    let shown: Vec<usize> = (0..steps).step_by(apart).chain([steps]).collect();
-    let walks: Vec<Walked> = jobs
-        .par_iter()
-        .map(|(image, member)| {
-            let walked = Walked::new(&team.record(runs, *member, *image), &shown);
-            simulated();
-            walked
-        })
-        .collect();
-    let judges: Vec<Judge> = file.members.iter().map(|member| member.judge()).collect();
-    let robots: Vec<Value> = file
-        .members
-        .iter()
-        .zip(&judges)
-        .zip(&walks)
-        .map(|((member, judge), walked)| {
-            json!({ "robot": member.id, "task": member.task, "judge": judge, "voxels": walked.voxels,
-                "points": walked.points, "at": walked.begin })
-        })
-        .collect();
-    let about = json!({
-        "members": robots, "classes": file.classes, "threshold": THRESHOLD, "unit": STEPS, "steps": shown,
-        "materials": { "areas": TONE_AREAS, "list": materials() },
-    });
+    let walk = |(image, member): &(usize, usize)| {
+        let walk = PackedWalk::new(&team.record(runs, *member, *image), &shown);
+        simulated();
+        walk
+    };
+    let walks: Vec<PackedWalk> = jobs.par_iter().map(walk).collect();
     // In a script element only "<" could end it or open another.
-    let mut elements = format!(
-        "<script type=\"application/json\" id=\"team-robots\">{}</script>\n",
-        about.to_string().replace('<', "\\u003c")
-    );
+    let robots = robots(team, &walks, &shown).to_string().replace('<', "\\u003c");
+    let mut elements = format!("<script type=\"application/json\" id=\"team-robots\">{robots}</script>\n");
     let mut buttons = String::new();
-    for (number, (place, walks)) in team.images.iter().zip(walks.chunks(members)).enumerate() {
-        let image = file.images[*place];
-        let answer = file.answers.as_ref().map(|answers| answers.votes.answers[*place]);
-        let tallies: Vec<Value> = (0..shown.len())
-            .map(|moment| {
-                let moved: Vec<Option<f64>> = walks.iter().map(|walked| walked.moved[moment]).collect();
-                let walks = judges.iter().zip(moved.iter().copied());
-                let ballot = Ballot::count(&file.classes, walks, file.threshold, file.clip);
-                let is_last = moment + 1 == shown.len();
-                let has_votes = ballot.votes.iter().any(|votes| *votes > 0);
-                let says = if is_last { answer } else { None };
-                let says = says.or(has_votes.then(|| file.classes[ballot.by_votes().0]));
-                let moved: Vec<Option<f64>> =
-                    moved.iter().map(|moved| moved.map(|moved| (100.0 * moved).round() / 100.0)).collect();
-                json!({ "moved": moved, "votes": ballot.votes, "says": says })
-            })
-            .collect();
-        let frames: Vec<&str> = walks.iter().map(|walked| walked.positions.as_str()).collect();
-        let packed = pack(&json!({ "class": image.label, "frames": frames, "tallies": tallies }))?;
-        elements += &format!("<script type=\"text/plain\" id=\"team-{number}\">{packed}</script>\n");
-        let says = answer.map_or(String::new(), |answer| format!("says {answer}"));
-        let label = format!("class {}, {} {}: {says}", image.label, file.split.split(), image.index);
-        buttons += &format!(
-            "<button type=\"button\" data-walks=\"team-{number}\" data-right=\"{}\" aria-pressed=\"false\" \
-             aria-label=\"{label}\" title=\"{label}\">{}<small>{says}</small></button>",
-            answer == Some(image.label),
-            thumbnail(&team.seen[team.runs[0]][number].stimulus)
+    for (number, walks) in walks.chunks(members).enumerate() {
+        elements += &format!(
+            "<script type=\"text/plain\" id=\"team-{number}\">{}</script>\n",
+            pack(&under_image(team, number, walks))?
         );
+        buttons += &button(team, number);
     }
     Ok(format!(
         "<h3>Watch it</h3>\n<p>The first image of each class, as the first robot sees it.</p>\n\
@@ -140,39 +91,99 @@ fn watched(team: &Team, runs: &[Dossier], simulated: &(dyn Fn() + Sync)) -> Resu
          <div class=\"card\"><div class=\"together\"><div class=\"stages\"></div>\
          <ol class=\"tally\" aria-label=\"Votes for each class\"></ol></div>\n\
          <div class=\"bar\"><button type=\"button\" class=\"play\">Pause</button>\
-         <input type=\"range\" min=\"0\" max=\"{}\" value=\"0\" aria-label=\"Moment\"><span class=\"says\"></span></div></div>\n{elements}",
+         <input type=\"range\" min=\"0\" max=\"{}\" value=\"0\" aria-label=\"Moment\">\
+         <span class=\"says\"></span></div></div>\n{elements}",
         shown.len() - 1
     ))
 }
 
-/// A walk at some moments, packed.
-struct Walked {
-    /// Material and corners of each voxel.
-    voxels: Vec<Value>,
+/// The moments that are shown, in control steps, the first and the last among them.
+fn shown(team: &Team, runs: &[Dossier]) -> Vec<usize> {
+    let Team { file, runs: of, .. } = team;
+    let points = |member: &Member| (member.body.height() + 1) * (member.body.width() + 1);
+    let points = file.members.iter().map(points).max().unwrap_or(0);
+    let steps = of.iter().map(|run| control_steps(&runs[*run].run.config, file.cycles) as usize);
+    let steps = steps.max().unwrap_or(0);
+    // Two bytes for a point.
+    let apart = (steps * 2 * points * count(team)).div_ceil(MOST_BYTES).max(LEAST_APART);
+    (0..steps).step_by(apart).chain([steps]).collect()
+}
+
+/// The robots and what else the page's script has to know of all walks. The first walks are under
+/// the first image, one of each robot.
+fn robots(team: &Team, walks: &[PackedWalk], shown: &[usize]) -> Value {
+    let file = &team.file;
+    let robot = |(member, walk): (&Member, &PackedWalk)| {
+        json!({
+            "robot": member.id, "task": member.task, "judge": member.judge(), "points": walk.points,
+            "voxels": corners(&member.body, &walk.voxels), "at": walk.begin,
+        })
+    };
+    json!({
+        "members": file.members.iter().zip(walks).map(robot).collect::<Vec<_>>(), "classes": file.classes,
+        "threshold": file.threshold, "unit": STEPS, "steps": shown, "materials": materials(),
+    })
+}
+
+/// All walks under an image, and what they come to at every moment.
+fn under_image(team: &Team, number: usize, walks: &[PackedWalk]) -> Value {
+    let file = &team.file;
+    let judges: Vec<Judge> = file.members.iter().map(Member::judge).collect();
+    let judges: Vec<&Judge> = judges.iter().collect();
+    let tally = |moment: usize| {
+        let moved = walks.iter().map(|walk| walk.moved[moment]).collect();
+        Tally::of(&file.classes, &judges, moved, (file.threshold, file.clip))
+    };
+    let tallies: Vec<Tally> = (0..walks[0].moved.len()).map(tally).collect();
+    json!({
+        "class": file.images[team.images[number]].label, "answer": answer(team, number),
+        "frames": walks.iter().map(|walk| walk.positions.as_str()).collect::<Vec<_>>(), "tallies": tallies,
+    })
+}
+
+/// What the team answered to one of the images to watch it by.
+fn answer(team: &Team, number: usize) -> u8 {
+    let answers = team.file.answers.as_ref().expect("a team that has not answered is left out");
+    answers.votes.answers[team.images[number]]
+}
+
+/// A button that shows the walks under an image.
+fn button(team: &Team, number: usize) -> String {
+    let image = team.file.images[team.images[number]];
+    let answer = answer(team, number);
+    let label = format!("class {}, {} {}: says {answer}", image.label, team.file.split.split(), image.index);
+    format!(
+        "<button type=\"button\" data-walks=\"team-{number}\" data-right=\"{}\" aria-pressed=\"false\" \
+         aria-label=\"{label}\" title=\"{label}\">{}<small>says {answer}</small></button>",
+        answer == image.label,
+        thumbnail(&team.seen[team.runs[0]][number].stimulus)
+    )
+}
+
+/// A walk at some moments, its points packed.
+struct PackedWalk {
+    voxels: Vec<VoxelCorners>,
     points: usize,
     /// Where its centre of mass is at first \[voxel lengths\].
     begin: f64,
     /// How far it has walked \[voxel lengths\]; none of an unstable one.
     moved: Vec<Option<f64>>,
-    /// Its points.
+    /// Its points, packed as [`positions`] says, in base64.
     positions: String,
 }
 
-impl Walked {
+impl PackedWalk {
     fn new(recording: &Recording, shown: &[usize]) -> Self {
-        let voxel = |v: &crate::task::recording::VoxelCorners| {
-            json!([recording.body.at(v.row as isize, v.column as isize).code(), v.corners])
-        };
-        let begin = recording.frames[0].centre[0];
+        let first = &recording.frames[0];
+        let begin = first.centre[0];
         // An unstable walk ends early, and then stands still on its stage.
         let there = |step: &usize| recording.frames.get(*step).filter(|frame| is_finite(frame));
         let frames: Vec<&Frame> = shown.iter().map_while(there).collect();
-        let moved = shown.iter().map(|step| there(step).map(|frame| frame.centre[0] - begin)).collect();
-        Walked {
-            voxels: recording.voxels.iter().map(voxel).collect(),
-            points: recording.frames[0].points.len(),
+        PackedWalk {
+            voxels: recording.voxels.clone(),
+            points: first.points.len(),
             begin,
-            moved,
+            moved: shown.iter().map(|step| there(step).map(|frame| frame.centre[0] - begin)).collect(),
             positions: BASE64.encode(positions(&frames)),
         }
     }

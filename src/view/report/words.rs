@@ -53,6 +53,10 @@ pub(super) fn methods(dossier: &Dossier) -> String {
         Encoding::Saturated => "1 for any pixel above 0".to_string(),
         Encoding::Threshold => format!("1 for any pixel above {} of full intensity", config.stimulus.level),
     };
+    let margin = match config.stimulus.margin {
+        0 => String::new(),
+        margin => format!(" (without a margin of {margin} pixels)"),
+    };
     let steps = config.protocol.control_steps;
     let cycles = number::fixed(f64::from(steps) / f64::from(config.physics.cycle_steps), 0);
     let rollout = match config.protocol.rollout {
@@ -86,7 +90,7 @@ pub(super) fn methods(dossier: &Dossier) -> String {
          The archive's dimensions are the numbers of muscle, sensor and all voxels in seven bins each{}; {} of its \
           {} cells can be filled. \
          Each generation mutated up to {} elites; an offspring replaced an elite only if it was strictly fitter. \
-         Robots were trained on {} images of {} ({}); each image was shown for {steps} control steps ({cycles} \
+         Robots were trained on {} images of {} ({}); each image{margin} was shown for {steps} control steps ({cycles} \
           actuation cycles) in {rollout}, \
          a sensor's stimulus being {encoding}. Fitness is {fitness}.",
         run.generations,
