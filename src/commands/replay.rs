@@ -141,9 +141,9 @@ pub fn subject(options: &Options) -> Result<Subject, Error> {
         let all = match own {
             [] => {
                 let train = whereabouts.load(&config.data, &[Split::Train]).map_err(offer)?;
-                // Not more than are shown: another dataset may have fewer.
-                let most = (MAX_IMAGES / config.classes().len().max(1)).max(1);
-                let images_per_class = config.data.images_per_class.min(most);
+                // No more than are shown: another dataset may have fewer.
+                let is_shown = |per_class: &usize| per_class * config.classes().len() <= MAX_IMAGES;
+                let images_per_class = Some(config.data.images_per_class).filter(is_shown).unwrap_or(1);
                 let data = DataConfig { images_per_class, ..config.data.clone() };
                 Training::of(&Config { data, ..config.clone() }, &train).map_err(offer)?.images
             }
