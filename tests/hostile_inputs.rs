@@ -156,7 +156,7 @@ impl World {
         let request = format!(
             "POST /api/simulations HTTP/1.1\r\nHost: 127.0.0.1:PORT\r\nOrigin: \
              http://127.0.0.1:PORT\r\nContent-Length: LENGTH\r\n\r\n{}",
-            json!({ "subject": { "archive": 2, "robot": "ROBOT" }, "control_steps": 40, "speed": 0.0,
+            json!({ "subject": { "archive": 3, "robot": "ROBOT" }, "control_steps": 40, "speed": 0.0,
                     "shown": { "stimulus": [[0, 1, 0.5, 0], [1, 0, 0, 1], [0, 0, 1, 0]] } })
         );
         let id = sandbox.run_file("run").elites[0].id.clone();
@@ -389,7 +389,7 @@ fn request(world: &World, dice: &mut Dice, case: &mut Case) {
         "stimulus",
         "scenario",
         "rollouts/1",
-        "archives/2",
+        "archives/3",
         "images?set=builtin&class=1",
     ];
     let mut head = head.replace("/api/simulations", &format!("/api/{}", dice.pick(&paths)));

@@ -42,7 +42,7 @@ const SIMULATIONS: [(&str, &str); 21] = [
 
 /// SHA-256 over the elites' cells, ids, and bits of objectives and displacements.
 const SEQUENTIAL_RUN: &str = "38e9052e5c9f95a3bd20ccd9b52f8b46c803f55a0e0a28dce0adb9538d2ce672";
-const GAITS_RUN: &str = "f61db093831825185d410574e416a76f618bd494abed790ff2daaffe90575267";
+const GAITS_RUN: &str = "2294ed6c40f0ef8f35ebfec24a0262a478108f67c2c9dd1aaea820fb75aa856c";
 
 /// The bits of all points before the first control step and after each, until the simulation
 /// becomes unstable.

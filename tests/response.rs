@@ -56,7 +56,7 @@ fn a_robot_is_as_fit_as_opposite_images_move_its_probe_apart() {
         let linear = odd.iter().map(|odd| odd * odd).sum::<f64>() / 4.0 - chance;
         let anyway = (even.iter().sum::<f64>() / 4.0).abs();
         let size = robot.body.height() * robot.body.width();
-        let response = (places.clamp(1, size / 3) as f64).sqrt()
+        let response = (places.clamp(1, size * 2 / 3) as f64).sqrt()
             * (linear.signum() * linear.abs().sqrt() - anyway / 8.0);
         assert!((response - robot.objective).abs() < 1e-9, "{}: {response}", robot.id);
         if places == 0 {

@@ -10,6 +10,7 @@ use common::hostile::Dice;
 use common::program::{Sandbox, terminate};
 use common::server::Server;
 use morphcog::analysis::gallery;
+use morphcog::base::shipped::ZERO_ONE;
 use serde_json::Value;
 use std::f64::consts::TAU;
 use std::io::Write;
@@ -55,7 +56,7 @@ fn one() -> Vec<[f64; 2]> {
 
 /// The robot that the page begins with.
 fn best() -> String {
-    let trained = gallery::trained().unwrap();
+    let trained = gallery::trained(ZERO_ONE).unwrap();
     trained[0].0.elites[0].id.clone()
 }
 
@@ -266,7 +267,7 @@ fn a_run_that_begins_while_the_page_is_open_appears_grows_and_ends_on_it() {
     let mut child = sandbox.endless("runs/live");
     let text = "document.getElementById('archive').textContent";
     tab.wait(&format!("{text}.includes('of 10000000')"));
-    choose(&mut tab, "2");
+    choose(&mut tab, "3");
     tab.wait("!document.getElementById('progress').hidden");
     tab.wait("document.querySelectorAll('#curves svg').length === 3");
     tab.wait("document.getElementById('course').textContent.includes('left')");
@@ -295,6 +296,23 @@ fn a_body_that_is_built_and_the_robot_it_makes_are_in_sight_together() {
         assert!((1.0..=800.0).contains(&bottom.as_f64().unwrap()), "{id} ends at {bottom}");
     }
     keep_picture("serve-editor.png", &tab.screenshot());
+}
+
+#[test]
+fn the_team_that_ships_reads_a_drawn_zero_and_a_drawn_one() {
+    let sandbox = Sandbox::new();
+    let Some(mut browser) = browser(&sandbox) else { return };
+    let server = Server::start(&sandbox, "");
+    let mut tab = quick(&mut browser, &server);
+    tab.click("#tab-team");
+    for (line, digit) in [(one(), "1"), (zero(), "0")] {
+        draw(&mut tab, &line);
+        tab.wait("document.querySelectorAll('#stages figure').length === 45");
+        at_end(&mut tab);
+        assert_eq!(tab.text("#says"), digit);
+    }
+    keep_picture("team-ten.png", &tab.screenshot());
+    assert_eq!(tab.complaints(), Vec::<String>::new());
 }
 
 #[test]

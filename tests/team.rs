@@ -121,7 +121,7 @@ fn what_is_missing_or_does_not_go_together_is_said_with_exit_code_3() {
     sandbox
         .run("team --archive pairs/0v1 pairs/0v4 --classes 0,1")
         .ended(3, &["tells 0|4 apart", "classes of the team only"]);
-    sandbox.run("team").ended(3, &["--archive"]);
+    sandbox.run("team").ended(3, &["data fetch mnist"]);
     sandbox.run("team --archive nowhere").ended(3, &["nowhere"]);
     sandbox.run("team --archive pairs/0v1 pairs/0v1 --classes 0,1").ended(2, &["expected different runs"]);
     sandbox.run("team --archive pairs/0v1 --classes 0,77").ended(2, &["builtin has no class 77"]);

@@ -28,13 +28,13 @@ pub const ALL: &str = "gallery";
 /// The list of them.
 pub(crate) const TEXT: &str = include_str!("../../data/gallery.json");
 
-/// Runs whose robots were trained to tell zeros from ones, each with its audit, in the order of their
-/// seeds.
+/// The runs of a set that ships with the program, [`shipped::ZERO_ONE`] or [`shipped::TEAM`], each with
+/// its audit, in their order.
 ///
 /// # Errors
-/// If what is built in is damaged (which a test excludes).
-pub fn trained() -> Result<Vec<(RunFile, AuditFile)>, Error> {
-    let paths = shipped::runs(Path::new(shipped::ZERO_ONE)).map_err(Error::other)?;
+/// If there is no such set, or what is built in is damaged (which a test excludes).
+pub fn trained(set: &str) -> Result<Vec<(RunFile, AuditFile)>, Error> {
+    let paths = shipped::runs(Path::new(set)).map_err(Error::other)?;
     let read =
         |path: &PathBuf| Ok((RunFile::read(path)?, AuditFile::read(&path.with_file_name(AUDIT_JSON))?));
     paths.iter().map(read).collect()
@@ -184,6 +184,7 @@ pub fn source(data: Option<&Path>, dataset: Option<&str>) -> Result<Source, Erro
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::collections::BTreeSet;
 
     #[test]
     fn the_gallery_holds_the_five_published_zero_one_robots() {
@@ -198,12 +199,16 @@ mod tests {
 
     #[test]
     fn the_trained_robots_are_physical_and_see_and_walk_alike() {
-        let trained = trained().unwrap();
-        let like = |run: &RunFile| (run.config.body_spec(), run.config.stimulus, run.config.classes());
-        for (run, audit) in &trained {
-            assert_eq!(like(run), like(&trained[0].0));
-            assert_eq!(audit.run_sha256, run.fingerprint());
-            assert!(run.elites.iter().all(|robot| audit.robot(&robot.id).unwrap().is_physical()));
+        for (set, pairs) in [(shipped::ZERO_ONE, 1), (shipped::TEAM, 45)] {
+            let trained = trained(set).unwrap();
+            let like = |run: &RunFile| (run.config.body_spec(), run.config.stimulus, run.dataset.clone());
+            for (run, audit) in &trained {
+                assert_eq!(like(run), like(&trained[0].0));
+                assert_eq!(audit.run_sha256, run.fingerprint());
+                assert!(run.elites.iter().all(|robot| audit.robot(&robot.id).unwrap().is_physical()));
+            }
+            let tasks: BTreeSet<Vec<u8>> = trained.iter().map(|(run, _)| run.config.classes()).collect();
+            assert_eq!(tasks.len(), pairs, "{set}");
         }
     }
 }

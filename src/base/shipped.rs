@@ -9,6 +9,9 @@ pub const PREFIX: &str = "gallery:";
 /// Robots that tell zeros from ones, the best run first: what is shown where there are no others.
 pub const ZERO_ONE: &str = "gallery:zero_one";
 
+/// A robot for each pair of digits, which answer together.
+pub const TEAM: &str = "gallery:team";
+
 /// Gaits to be trained, as by `demo`; they have no task, and so are not among all.
 const GAITS: &str = "gaits";
 
@@ -17,7 +20,7 @@ type Run = (&'static str, &'static [(&'static str, &'static str)]);
 
 /// The files of a run in a folder of `data/`.
 macro_rules! run {
-    ($name:literal, $folder:literal) => {
+    ($name:expr, $folder:expr) => {
         (
             $name,
             &[
@@ -29,19 +32,37 @@ macro_rules! run {
     };
 }
 
-/// All of them. The runs of a set are numbered, trained ones by their seeds.
-const RUNS: &[Run] = &[
-    run!("zero_one-1", "trained/zero-one-1"),
-    run!("zero_one-2", "trained/zero-one-2"),
-    run!("zero_one-3", "trained/zero-one-3"),
-    (
+/// Robots that tell a pair of digits apart; `data/team` has a folder for each.
+macro_rules! pairs {
+    ($($pair:literal)*) => { &[$(run!(concat!("team-", $pair), concat!("team/", $pair))),*] };
+}
+
+/// All of them, set by set. The runs of a set are numbered, trained ones by their seeds; those of the
+/// team are named after their digits.
+const SETS: &[&[Run]] = &[
+    &[
+        run!("zero_one-1", "trained/zero-one-1"),
+        run!("zero_one-2", "trained/zero-one-2"),
+        run!("zero_one-3", "trained/zero-one-3"),
+    ],
+    pairs!(
+        "0v1" "0v2" "0v3" "0v4" "0v5" "0v6" "0v7" "0v8" "0v9" "1v2" "1v3" "1v4" "1v5" "1v6" "1v7"
+        "1v8" "1v9" "2v3" "2v4" "2v5" "2v6" "2v7" "2v8" "2v9" "3v4" "3v5" "3v6" "3v7" "3v8" "3v9"
+        "4v5" "4v6" "4v7" "4v8" "4v9" "5v6" "5v7" "5v8" "5v9" "6v7" "6v8" "6v9" "7v8" "7v9" "8v9"
+    ),
+    &[(
         "gaits-1",
         &[
             ("run.json", include_str!("../../data/gaits/seed-1/run.json")),
             ("response.json", include_str!("../../data/gaits/seed-1/response.json")),
         ],
-    ),
+    )],
 ];
+
+/// All of them.
+fn all() -> impl Iterator<Item = &'static Run> {
+    SETS.iter().copied().flatten()
+}
 
 /// The run and the file that a path names, if it begins as those of shipped runs do.
 fn parts(path: &Path) -> Option<(&str, &str)> {
@@ -57,7 +78,7 @@ pub fn is_shipped(path: &Path) -> bool {
 /// The text of a file of a shipped run; none of other paths, or if there is no such file.
 pub fn text(path: &Path) -> Option<&'static str> {
     let (name, file) = parts(path)?;
-    let (_, files) = RUNS.iter().find(|(run, _)| *run == name)?;
+    let (_, files) = all().find(|(run, _)| *run == name)?;
     files.iter().find(|(own, _)| *own == file).map(|(_, text)| *text)
 }
 
@@ -69,16 +90,16 @@ pub fn runs(path: &Path) -> Result<Vec<PathBuf>, String> {
     let (name, _) = parts(path).expect("callers ask is_shipped before");
     let is_meant =
         |run: &&Run| run.0 == name || set_of(run.0) == name || name == "all" && set_of(run.0) != GAITS;
-    let found: Vec<PathBuf> = RUNS
-        .iter()
-        .filter(is_meant)
-        .map(|(run, _)| PathBuf::from(format!("{PREFIX}{run}/run.json")))
-        .collect();
+    let path = |(run, _): &Run| PathBuf::from(format!("{PREFIX}{run}/run.json"));
+    let found: Vec<PathBuf> = all().filter(is_meant).map(path).collect();
     match found.is_empty() {
         true => {
-            let mut names: Vec<&str> = RUNS.iter().flat_map(|(run, _)| [set_of(run), run]).collect();
-            names.dedup();
-            let names: Vec<String> = names.iter().map(|name| format!("{PREFIX}{name}")).collect();
+            // A set, and one of its runs as an example.
+            let names: Vec<String> = SETS
+                .iter()
+                .filter_map(|set| set.first())
+                .map(|(run, _)| format!("{PREFIX}{}, {PREFIX}{run}", set_of(run)))
+                .collect();
             Err(format!("there is no {PREFIX}{name}: expected {PREFIX}all, {}", names.join(", ")))
         }
         false => Ok(found),
@@ -107,6 +128,10 @@ mod tests {
         }
         assert!(!is_shipped(Path::new("runs/gallery:x/run.json")));
         let error = runs(Path::new("gallery:zero")).unwrap_err();
-        assert!(error.contains("gallery:zero_one, gallery:zero_one-1"), "{error}");
+        assert!(
+            error.contains("gallery:zero_one, gallery:zero_one-1, gallery:team, gallery:team-0v1"),
+            "{error}"
+        );
+        assert_eq!(runs(Path::new(TEAM)).unwrap().len(), 45);
     }
 }

@@ -1,7 +1,7 @@
 //! `morphcog team`: its words, and what it calls.
 
 use crate::base::error::Error;
-use crate::base::signals;
+use crate::base::{shipped, signals};
 use crate::cli::choice;
 use crate::cli::choice::{Archives, selected};
 use crate::commands::team;
@@ -18,6 +18,7 @@ use std::path::PathBuf;
 
 pub(super) const EXAMPLES: &str = "\
 Examples:
+  morphcog team --images 100                               the team that ships with the program
   morphcog team --archive runs/pairs/*                     a robot of each run
   morphcog team --archive runs/0v1 runs/0v2 runs/1v2 --classes 0,1,2
   morphcog team --archive runs/pairs/* --split validation --images 400
@@ -27,7 +28,12 @@ most votes win, and of classes with as many votes the one that all robots togeth
 towards. A second answer is that sum of walks alone. Nothing is trained. team.json keeps every walk:
 the same command goes on after Ctrl-C, and with more runs.";
 
+/// What is said of `--archive`: elsewhere the newest run is the default.
+const ARCHIVE: &str = "A run.json, or its folder, or runs of the gallery; several may follow, and the option may be \
+repeated (default: gallery:team, a robot for each pair of digits)";
+
 #[derive(Debug, Args)]
+#[command(mut_arg("archive", |archive| archive.help(ARCHIVE)))]
 pub(super) struct TeamArgs {
     #[command(flatten)]
     archives: Archives,
@@ -62,11 +68,10 @@ pub(super) struct TeamArgs {
 }
 
 pub(super) fn run(args: TeamArgs, console: &Console) -> Result<(), Error> {
-    let archives = args.archives.paths();
+    let mut archives = args.archives.paths();
     if archives.is_empty() {
-        let text = "--archive: expected the runs whose robots are the team";
-        let hint = "no team is published with the program yet; morphcog help team has examples";
-        return Err(Error::input(text.to_string()).hint(hint.to_string()));
+        archives = folder::run_json(PathBuf::from(shipped::TEAM)).map_err(Error::other)?;
+        console.line(&format!("no --archive: the {} robots of {}", archives.len(), shipped::TEAM));
     }
     choice::say_unfinished(&archives, console);
     let options = Options {

@@ -42,14 +42,14 @@ impl Config {
     }
 
     /// By what the fitness of a body is multiplied: 1, or, if it is a response, the square root of
-    /// the number of its soft voxels and sensors, up to a third of its grid. Of two gaits that
+    /// the number of its soft voxels and sensors, up to two thirds of its grid. Of two gaits that
     /// respond as strongly, the one with more places can be taught more: together they can move it
-    /// by at most so much (Cauchy's inequality), and by that only if all respond alike. More than a
-    /// third leave too little that walks.
+    /// by at most so much (Cauchy's inequality), and by that only if all respond alike. More than
+    /// two thirds leave too little that walks.
     pub(crate) fn place_factor(&self, body: &Body) -> f64 {
         match self.measures_response() {
             true => {
-                let most = body.height() * body.width() / 3;
+                let most = body.height() * body.width() * 2 / 3;
                 (body.probe().counts().sensor.clamp(1, most.max(1)) as f64).sqrt()
             }
             false => 1.0,

@@ -3,6 +3,7 @@
 use crate::analysis::gallery;
 use crate::base::error::Error;
 use crate::base::files::exists;
+use crate::base::shipped;
 use crate::body::{Body, VoxelCounts};
 use crate::config::Config;
 use crate::serve::course::Course;
@@ -156,7 +157,9 @@ impl Catalogue {
     /// What is wrong with an archive.
     pub fn open(archives: &[PathBuf], runs: &Path) -> Result<(Self, Vec<String>), Error> {
         let mut notes = Vec::new();
-        let built_in = vec![Arc::new(trained()?), Arc::new(published()?)];
+        let zero_one = trained(shipped::ZERO_ONE, "Trained on thousands of images")?;
+        let team = trained(shipped::TEAM, "Ten digits: a robot for each pair")?;
+        let built_in = [zero_one, published()?, team].map(Arc::new).to_vec();
         let opened = SystemTime::now();
         let mut watched = Vec::new();
         for path in archives {
@@ -335,16 +338,19 @@ fn published() -> Result<Collection, Error> {
     })
 }
 
-fn trained() -> Result<Collection, Error> {
+/// The robots of a set that ships with the program. All see and walk alike.
+fn trained(set: &str, name: &str) -> Result<Collection, Error> {
     let mut all = Vec::new();
-    for (run, audit) in gallery::trained()? {
+    for (run, audit) in gallery::trained(set)? {
         all.push(of_run(run, Some(&audit))?);
     }
     let robots = all.iter_mut().flat_map(|one| std::mem::take(&mut one.robots)).collect();
+    let mut tasks: Vec<String> = all.iter().flat_map(|one| one.tasks.clone()).collect();
+    tasks.dedup();
     let first = all.swap_remove(0);
-    let name = "Trained on thousands of images".to_string();
+    let name = name.to_string();
     // Cells are of one run.
-    Ok(Collection { name, generations: None, dataset: None, bins: Vec::new(), robots, ..first })
+    Ok(Collection { name, generations: None, dataset: None, bins: Vec::new(), tasks, robots, ..first })
 }
 
 fn archive(path: &Path, notes: &mut Vec<String>) -> Result<Collection, Error> {

@@ -34,15 +34,24 @@ pub struct Name {
     pub judge: Judge,
 }
 
-/// The team: of every task the fittest robot of the first archive that has one, else of what is built
-/// in, all of the same data: those with most tasks. Empty with fewer than two.
+/// The team: of every task the fittest robot of the first archive that has one, all of the same data:
+/// those with most tasks. If the archives have fewer than two, the team that ships with the program.
 pub fn members(collections: &[Arc<Collection>]) -> Vec<Name> {
+    type Numbered<'a> = Vec<(usize, &'a Arc<Collection>)>;
+    let (built_in, archives): (Numbered, Numbered) =
+        collections.iter().enumerate().partition(|(_, from)| from.path.is_none());
+    let own = largest(archives);
+    match own.len() < LEAST {
+        true => largest(built_in.into_iter().max_by_key(|(_, from)| from.tasks.len())),
+        false => own,
+    }
+}
+
+/// The largest team among collections, each with its number.
+fn largest<'a>(collections: impl IntoIterator<Item = (usize, &'a Arc<Collection>)>) -> Vec<Name> {
     let data = |from: &Collection| (from.config.data.dataset.clone(), from.config.data.builtin.clone());
     let mut teams: Vec<(_, Vec<Name>)> = Vec::new();
-    let is_built_in = |(_, from): &(usize, &Arc<Collection>)| from.path.is_none();
-    let mut in_turn: Vec<(usize, &Arc<Collection>)> = collections.iter().enumerate().collect();
-    in_turn.sort_by_key(is_built_in);
-    for (archive, from) in in_turn {
+    for (archive, from) in collections {
         let of = data(from);
         let place = teams.iter().position(|(other, _)| *other == of).unwrap_or_else(|| {
             teams.push((of, Vec::new()));
@@ -59,7 +68,7 @@ pub fn members(collections: &[Arc<Collection>]) -> Vec<Name> {
     }
     let mut members = teams.into_iter().map(|(_, members)| members).max_by_key(Vec::len).unwrap_or_default();
     members.sort_by(|a, b| a.task.cmp(&b.task));
-    if members.len() < LEAST { Vec::new() } else { members }
+    members
 }
 
 /// The classes that a team tells apart, in order.
@@ -97,7 +106,7 @@ impl TeamRequest {
     /// What it means.
     ///
     /// # Errors
-    /// If there is no team, or what is wrong with the request.
+    /// What is wrong with the request.
     pub fn plan(self, catalogue: &Catalogue, images: &ImageSets) -> Result<TeamPlan, Refusal> {
         let collections = catalogue.collections();
         let names = members(&collections);
@@ -107,10 +116,7 @@ impl TeamRequest {
             let seen = self.shown.clone().seen(&who, images)?;
             members.push((name, who, seen));
         }
-        let Some((_, first, _)) = members.first() else {
-            let text = "there is no team: expected robots of two or more tasks among the archives";
-            return Err(Refusal::Unknown(text.to_string()));
-        };
+        let (_, first, _) = members.first().expect("a team ships with the program");
         let control_steps = self.control_steps.unwrap_or(first.protocol.control_steps.min(MAX_STEPS));
         if !(1..=MAX_STEPS).contains(&control_steps) {
             return Err(Refusal::Wrong(format!("control_steps: {control_steps}: expected 1 to {MAX_STEPS}")));

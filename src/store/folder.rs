@@ -128,6 +128,7 @@ pub fn in_shell(path: &Path) -> String {
 /// # Errors
 /// If not.
 pub(crate) fn check_out(out: &Path, of: &Path, own: &str) -> Result<(), Error> {
+    of_file(out)?;
     let refuse = |text: &str| Err(Error::usage(format!("--out {}: {text}", out.display())));
     let csv = out.with_extension("csv");
     if csv == *out {

@@ -7,11 +7,10 @@ const NOWHERE = -32768;
 export class Team {
   constructor(materials, changed) { this.materials = materials; this.changed = changed; this.members = []; this.walk = null; }
 
-  // Who is in it; the tab is there if there is a team.
+  // Who is in it.
   async load() {
     const { members, classes } = await get("/api/team");
     this.members = members; this.classes = classes;
-    $("tab-team").hidden = members.length === 0;
     $("about-team").textContent = `${members.length} robots, each of which tells two groups of classes apart, answer together. Each has one vote for every class of the side it walks to; a walk of at most 3 voxel lengths gives none.`;
   }
 
