@@ -1224,7 +1224,8 @@ fn robots_that_ship_with_the_program_are_named_where_archives_are() {
     let robots = tested["robots"].as_array().unwrap();
     assert!(robots.len() >= 2 && robots.iter().all(|robot| robot["task"] == "0|1"), "{robots:?}");
     sandbox.run("plot body -q -a gallery:zero_one-1 --robot best").ended(0, &[]);
-    let id = &morphcog::analysis::gallery::trained("gallery:zero_one").unwrap()[0].0.elites[0].id;
+    let id =
+        &morphcog::analysis::gallery::trained(morphcog::base::shipped::ZERO_ONE).unwrap()[0].0.elites[0].id;
     assert!(sandbox.path(&format!("gallery-zero_one-1-plot-body-{id}.svg")).exists());
     let refused = sandbox.run("eval -a gallery:zero --images 2");
     refused.ended(2, &["gallery:zero", "expected gallery:all, gallery:zero_one, gallery:zero_one-1"]);

@@ -201,7 +201,11 @@ mod tests {
     fn the_trained_robots_are_physical_and_see_and_walk_alike() {
         for (set, pairs) in [(shipped::ZERO_ONE, 1), (shipped::TEAM, 45)] {
             let trained = trained(set).unwrap();
-            let like = |run: &RunFile| (run.config.body_spec(), run.config.stimulus, run.dataset.clone());
+            let like = |run: &RunFile| {
+                let Config { stimulus, protocol, physics, .. } = &run.config;
+                let world = (*stimulus, protocol.clone(), physics.clone());
+                (run.config.body_spec(), world, run.dataset.clone())
+            };
             for (run, audit) in &trained {
                 assert_eq!(like(run), like(&trained[0].0));
                 assert_eq!(audit.run_sha256, run.fingerprint());

@@ -12,11 +12,17 @@ pub const ZERO_ONE: &str = "gallery:zero_one";
 /// A robot for each pair of digits, which answer together.
 pub const TEAM: &str = "gallery:team";
 
-/// Gaits to be trained, as by `demo`; they have no task, and so are not among all.
-const GAITS: &str = "gaits";
+/// Gaits to be trained, as by `demo`; they have no task, and so are not among [`ALL`].
+pub const GAITS: &str = "gallery:gaits";
+
+/// All that have a task.
+const ALL: &str = "gallery:all";
 
 /// A run: its name, and its files with their names.
 type Run = (&'static str, &'static [(&'static str, &'static str)]);
+
+/// Runs that belong together: their name, and at least one of them.
+type Set = (&'static str, &'static [Run]);
 
 /// The files of a run in a folder of `data/`.
 macro_rules! run {
@@ -34,39 +40,43 @@ macro_rules! run {
 
 /// Robots that tell a pair of digits apart; `data/team` has a folder for each.
 macro_rules! pairs {
-    ($($pair:literal)*) => { &[$(run!(concat!("team-", $pair), concat!("team/", $pair))),*] };
+    ($($pair:literal)*) => { &[$(run!(concat!("gallery:team-", $pair), concat!("team/", $pair))),*] };
 }
 
-/// All of them, set by set. The runs of a set are numbered, trained ones by their seeds; those of the
-/// team are named after their digits.
-const SETS: &[&[Run]] = &[
-    &[
-        run!("zero_one-1", "trained/zero-one-1"),
-        run!("zero_one-2", "trained/zero-one-2"),
-        run!("zero_one-3", "trained/zero-one-3"),
-    ],
-    pairs!(
-        "0v1" "0v2" "0v3" "0v4" "0v5" "0v6" "0v7" "0v8" "0v9" "1v2" "1v3" "1v4" "1v5" "1v6" "1v7"
-        "1v8" "1v9" "2v3" "2v4" "2v5" "2v6" "2v7" "2v8" "2v9" "3v4" "3v5" "3v6" "3v7" "3v8" "3v9"
-        "4v5" "4v6" "4v7" "4v8" "4v9" "5v6" "5v7" "5v8" "5v9" "6v7" "6v8" "6v9" "7v8" "7v9" "8v9"
-    ),
-    &[(
-        "gaits-1",
+/// All of them. The runs of a set are numbered, trained ones by their seeds; those of the team are
+/// named after their digits.
+const SETS: &[Set] = &[
+    (
+        ZERO_ONE,
         &[
-            ("run.json", include_str!("../../data/gaits/seed-1/run.json")),
-            ("response.json", include_str!("../../data/gaits/seed-1/response.json")),
+            run!("gallery:zero_one-1", "trained/zero-one-1"),
+            run!("gallery:zero_one-2", "trained/zero-one-2"),
+            run!("gallery:zero_one-3", "trained/zero-one-3"),
         ],
-    )],
+    ),
+    (
+        TEAM,
+        pairs!(
+            "0v1" "0v2" "0v3" "0v4" "0v5" "0v6" "0v7" "0v8" "0v9" "1v2" "1v3" "1v4" "1v5" "1v6" "1v7"
+            "1v8" "1v9" "2v3" "2v4" "2v5" "2v6" "2v7" "2v8" "2v9" "3v4" "3v5" "3v6" "3v7" "3v8" "3v9"
+            "4v5" "4v6" "4v7" "4v8" "4v9" "5v6" "5v7" "5v8" "5v9" "6v7" "6v8" "6v9" "7v8" "7v9" "8v9"
+        ),
+    ),
+    (
+        GAITS,
+        &[(
+            "gallery:gaits-1",
+            &[
+                ("run.json", include_str!("../../data/gaits/seed-1/run.json")),
+                ("response.json", include_str!("../../data/gaits/seed-1/response.json")),
+            ],
+        )],
+    ),
 ];
-
-/// All of them.
-fn all() -> impl Iterator<Item = &'static Run> {
-    SETS.iter().copied().flatten()
-}
 
 /// The run and the file that a path names, if it begins as those of shipped runs do.
 fn parts(path: &Path) -> Option<(&str, &str)> {
-    let name = path.to_str()?.strip_prefix(PREFIX)?;
+    let name = path.to_str().filter(|name| name.starts_with(PREFIX))?;
     Some(name.split_once(['/', '\\']).unwrap_or((name, "")))
 }
 
@@ -78,7 +88,7 @@ pub fn is_shipped(path: &Path) -> bool {
 /// The text of a file of a shipped run; none of other paths, or if there is no such file.
 pub fn text(path: &Path) -> Option<&'static str> {
     let (name, file) = parts(path)?;
-    let (_, files) = all().find(|(run, _)| *run == name)?;
+    let (_, files) = SETS.iter().flat_map(|(_, runs)| *runs).find(|(run, _)| *run == name)?;
     files.iter().find(|(own, _)| *own == file).map(|(_, text)| *text)
 }
 
@@ -88,27 +98,20 @@ pub fn text(path: &Path) -> Option<&'static str> {
 /// What there is, if there is no run of that name.
 pub fn runs(path: &Path) -> Result<Vec<PathBuf>, String> {
     let (name, _) = parts(path).expect("callers ask is_shipped before");
-    let is_meant =
-        |run: &&Run| run.0 == name || set_of(run.0) == name || name == "all" && set_of(run.0) != GAITS;
-    let path = |(run, _): &Run| PathBuf::from(format!("{PREFIX}{run}/run.json"));
-    let found: Vec<PathBuf> = all().filter(is_meant).map(path).collect();
+    let of_set = |(set, runs): &Set| {
+        let is_whole = *set == name || name == ALL && *set != GAITS;
+        runs.iter().map(|(run, _)| *run).filter(|run| is_whole || *run == name).collect::<Vec<&str>>()
+    };
+    let found: Vec<PathBuf> =
+        SETS.iter().flat_map(of_set).map(|run| PathBuf::from(format!("{run}/run.json"))).collect();
     match found.is_empty() {
         true => {
-            // A set, and one of its runs as an example.
-            let names: Vec<String> = SETS
-                .iter()
-                .filter_map(|set| set.first())
-                .map(|(run, _)| format!("{PREFIX}{}, {PREFIX}{run}", set_of(run)))
-                .collect();
-            Err(format!("there is no {PREFIX}{name}: expected {PREFIX}all, {}", names.join(", ")))
+            // Of each set also one run, as an example.
+            let names: Vec<String> = SETS.iter().map(|(set, runs)| format!("{set}, {}", runs[0].0)).collect();
+            Err(format!("there is no {name}: expected {ALL}, {}", names.join(", ")))
         }
         false => Ok(found),
     }
-}
-
-/// The set of a run: its name without its number.
-fn set_of(run: &str) -> &str {
-    run.rsplit_once('-').map_or(run, |(set, _)| set)
 }
 
 #[cfg(test)]

@@ -2,7 +2,7 @@
 
 use crate::base::error::{Error, ErrorKind};
 use crate::base::ranks::Ranks;
-use crate::base::signals;
+use crate::base::{shipped, signals};
 use crate::cli::{replay_best, test};
 use crate::commands::replay::Shown;
 use crate::commands::{eval, replay};
@@ -33,9 +33,6 @@ then
 About a minute, no download: a gait that ships with the program is trained to tell zeros from ones,
 on digits that the program draws itself. Then the robot is shown 200 digits that it has never seen.
 Ctrl-C stops it; the same command goes on.";
-
-/// The gaits of which the best is trained, with its response.
-const GAITS: &str = "gallery:gaits";
 
 /// A little of everything, for two cores and a minute.
 const LITTLE: [&str; 8] = [
@@ -72,7 +69,7 @@ pub(super) struct DemoArgs {
 pub(super) fn run(args: DemoArgs, console: &Console) -> Result<(), Error> {
     let threads = args.threads.map(usize::from);
     let options = train::Options {
-        archive: folder::first_run(PathBuf::from(GAITS)).map_err(Error::other)?,
+        archive: folder::first_run(PathBuf::from(shipped::GAITS)).map_err(Error::other)?,
         robots: Selection::Ids(vec![BEST.to_string()]),
         groups: [vec![0], vec![1]],
         seed: Some(args.seed),
@@ -132,7 +129,7 @@ mod tests {
 
     #[test]
     fn the_response_that_ships_with_the_gaits_is_what_the_training_begins_with() {
-        let archive = folder::first_run(PathBuf::from(GAITS)).unwrap();
+        let archive = folder::first_run(PathBuf::from(shipped::GAITS)).unwrap();
         let Source { run, .. } = Source::read(&archive).unwrap();
         let set = LITTLE.map(str::to_string);
         let config = train::config_of(&run.config, &[vec![0], vec![1]], Some(1), &set).unwrap();

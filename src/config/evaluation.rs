@@ -45,7 +45,7 @@ impl Config {
     /// the number of its soft voxels and sensors, up to two thirds of its grid. Of two gaits that
     /// respond as strongly, the one with more places can be taught more: together they can move it
     /// by at most so much (Cauchy's inequality), and by that only if all respond alike. More than
-    /// two thirds leave too little that walks.
+    /// two thirds are not rewarded: something has to walk.
     pub(crate) fn place_factor(&self, body: &Body) -> f64 {
         match self.measures_response() {
             true => {
