@@ -12,7 +12,7 @@ pub const ZERO_ONE: &str = "gallery:zero_one";
 /// A robot for each pair of digits, which answer together.
 pub const TEAM: &str = "gallery:team";
 
-/// Gaits to be trained, as by `demo`; they have no task, and so are not among [`ALL`].
+/// Gaits to be trained, as by `demo`; they have no task, and so are not in `gallery:all`.
 pub const GAITS: &str = "gallery:gaits";
 
 /// All that have a task.
