@@ -143,8 +143,9 @@ fn without_rounds_the_fittest_robot_is_refined_as_it_is() {
     let able = walkers.into_iter().filter(|robot| robot.body.counts().sensor > 0);
     let fittest = able.max_by(|a, b| a.objective.total_cmp(&b.objective)).unwrap();
     let train = |challengers: u32, out: &str| {
-        let set = format!("--set train.rounds=0 --set train.challengers={challengers}");
-        let train = format!("train -q -a walkers --task 0|1 --robots all {LITTLE} {set} -o {out}");
+        let set =
+            format!("--set train.rounds=0 --set train.final_images=60 --set train.challengers={challengers}");
+        let train = format!("train -q -a walkers --task 3|14 --robots all {LITTLE} {set} -o {out}");
         sandbox.run(&train).ended(0, &[]);
         let run = sandbox.run_file(out);
         (run.elites[0].body.clone(), run.elites[0].parent.clone())

@@ -23,11 +23,11 @@ pub struct TrainConfig {
     /// Training images that a round shows. Default 120: with fewer, slopes are noisier, and the
     /// constant is off.
     pub images: usize,
-    /// Training images under which designs and challengers are compared, half of them near the
-    /// boundary. Default 400: with fewer, challengers win by chance.
+    /// Training images under which designs and challengers are compared. Default 400: with fewer,
+    /// small gains cannot be told from chance.
     pub final_images: usize,
     /// Bodies that challenge the best design, in sensors or in a few voxels of any material.
-    /// Default 60; later ones win more seldom.
+    /// Default 30; later ones win more seldom.
     pub challengers: usize,
     /// Under what images are shown by turns, so that designs do not depend on the first touch of
     /// the ground or exploit length limits.
@@ -42,7 +42,7 @@ impl Default for TrainConfig {
             rounds: 6,
             images: 120,
             final_images: 400,
-            challengers: 60,
+            challengers: 30,
             perturbations: ByTurns::default(),
         }
     }

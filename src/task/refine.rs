@@ -1,13 +1,12 @@
 //! Refining a taught robot: a hill climb over whole bodies on real rollouts.
 //!
 //! What a model says ends where a body is not linear. So at the end of a training the best design
-//! is *champion*: it is shown a few hundred training images, half of them random and half those
-//! that the model finds closest to the boundary; after some challengers it is shown others, so that
+//! is *champion*: it is shown a few hundred training images, after some challengers others, so that
 //! none wins by chance on these. Challengers differ from it in some sensors, chosen by the slopes
 //! and by how the champion really answered, or in a few voxels of any material. A challenger is
 //! shown the same images, and dropped as soon as it falls behind (racing; Maron & Moore 1994). One
-//! that answers better becomes champion. Every challenger with the champion's gait tells more of
-//! the slopes.
+//! that is better by more than chance becomes champion. Every challenger with the champion's gait
+//! tells more of the slopes.
 
 use crate::base::Grid;
 use crate::base::random::{Purpose, Stream, stream};
@@ -25,6 +24,11 @@ const FIRST_LOOK: usize = 24;
 /// By how many standard errors what is to come may be better than what was seen. Larger values drop
 /// later: with 2, three in four challengers of a hard task (3|012) are shown all 400 images.
 const ERRORS: f64 = 1.0;
+
+/// By how many of its standard errors a challenger must be better. Every change of a body throws its
+/// answers near the boundary anew, so many that are worse look better on a few hundred images. With
+/// 0, they won by chance.
+const ENOUGH_ERRORS: f64 = 1.0;
 
 /// What few images may hide of the spread of gains. Without it, a challenger whose first answers
 /// are all the champion's is taken for its twin.
@@ -154,23 +158,6 @@ impl<'a> Refinement<'a> {
         Ok(())
     }
 
-    /// How far the champion would walk under images of these conditions, going by the slopes and by
-    /// its answers so far \[voxel lengths\].
-    pub fn expected<'b>(&self, images: impl IntoIterator<Item = &'b Grid<f64>>) -> Vec<f64> {
-        let slopes = self.evidence.slopes_alone(self.ridge);
-        let moved = |stimulus: &Grid<f64>| -> f64 {
-            let cells = self.body.voxels().iter().zip(&slopes);
-            let is_place = |((_, material), _): &((_, &Material), _)| CHOICES.contains(material);
-            cells
-                .filter(is_place)
-                .map(|((place, material), slope)| slope * width(*material, stimulus[place], self.physics))
-                .sum()
-        };
-        let known = self.images.iter().zip(&self.displacements).map(|(image, d)| d - moved(&image.stimulus));
-        let intercept = known.sum::<f64>() / self.images.len().max(1) as f64;
-        images.into_iter().map(|stimulus| intercept + moved(stimulus)).collect()
-    }
-
     /// How far it walks under each image \[voxel lengths\].
     pub fn displacements(&self) -> &[f64] {
         &self.displacements
@@ -227,8 +214,10 @@ impl<'a> Refinement<'a> {
         if !other_gait {
             self.learn(&challenger, &order, &found);
         }
-        let gain: f64 = order.iter().zip(&found).map(|(number, d)| self.gain(*number, *d)).sum();
-        let won = is_stable && found.len() == order.len() && gain > 0.0;
+        let gains = || order.iter().zip(&found).map(|(number, d)| self.gain(*number, *d));
+        let (gain, squares) = gains().fold((0.0, 0.0), |(sum, squares), g| (sum + g, squares + g * g));
+        let error = (squares - gain * gain / order.len().max(1) as f64).max(0.0).sqrt();
+        let won = is_stable && found.len() == order.len() && gain > ENOUGH_ERRORS * error;
         if won {
             for (number, displacement) in order.iter().zip(&found) {
                 self.displacements[*number] = *displacement;

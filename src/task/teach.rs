@@ -34,10 +34,6 @@ pub const FINALISTS: usize = 4;
 /// fewer, showing the champion other images costs more.
 const CHALLENGERS_OF_A_SET: usize = 30;
 
-/// Of how many images the one that is closest to the boundary is shown. With more, images count
-/// that no gait tells apart; with fewer, most are answered right by every design of an easy task.
-const NEAREST_OF: usize = 8;
-
 /// How a gait is taught.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Plan {
@@ -300,14 +296,7 @@ impl<'a> Teacher<'a> {
         let cells: Vec<usize> = self.gait.places().iter().map(cell).collect();
         let evidence = self.evidence.among(&cells, body.height() * body.width());
         let Plan { seed, challengers, min_muscles, .. } = self.plan;
-        let by_model = |numbers: &[usize]| -> Vec<f64> {
-            let of = |number: &usize| {
-                let Image { example, condition, .. } = &self.images[*number];
-                self.intercepts[*condition] + dot(&self.slopes, &example.widths(&self.design))
-            };
-            numbers.iter().map(of).collect()
-        };
-        let (mut numbers, images) = self.telling(0, by_model);
+        let (mut numbers, images) = self.telling(0);
         let mut refinement = Refinement::new(
             body,
             images,
@@ -320,10 +309,7 @@ impl<'a> Teacher<'a> {
         }
         for challenger in 0..challengers {
             if challenger > 0 && challenger % CHALLENGERS_OF_A_SET == 0 {
-                let by_champion = |numbers: &[usize]| {
-                    refinement.expected(numbers.iter().map(|number| &self.images[*number].stimulus))
-                };
-                let (others, images) = self.telling(challenger, by_champion);
+                let (others, images) = self.telling(challenger);
                 numbers = others;
                 refinement.show(images, rollouts)?;
             }
@@ -341,24 +327,9 @@ impl<'a> Teacher<'a> {
     }
 
     /// Training images to compare bodies on, by their numbers, and as they are shown: of both
-    /// groups as many as far as they go. Half are random; half are those of several times as many
-    /// that are `expected` to be closest to the boundary.
-    fn telling(
-        &self,
-        draw: usize,
-        expected: impl FnOnce(&[usize]) -> Vec<f64>,
-    ) -> (Vec<usize>, Vec<WeightedImage>) {
-        let count = self.plan.final_images;
-        let mut random = self.random(Use::Finish, draw as u64);
-        let mut numbers = self.drawn(count / 2 * (1 + NEAREST_OF), &mut random);
-        let others = numbers.split_off((count / 2).min(numbers.len()));
-        let mut others: Vec<(f64, usize)> =
-            expected(&others).into_iter().map(f64::abs).zip(others.iter().copied()).collect();
-        others.sort_by(|a, b| a.0.total_cmp(&b.0));
-        for right in [1.0, -1.0] {
-            let of_group = others.iter().filter(|(_, number)| self.images[*number].example.right == right);
-            numbers.extend(of_group.take(count / 4).map(|(_, number)| *number));
-        }
+    /// groups as many as far as they go.
+    fn telling(&self, draw: usize) -> (Vec<usize>, Vec<WeightedImage>) {
+        let numbers = self.drawn(self.plan.final_images, &mut self.random(Use::Finish, draw as u64));
         let images: Vec<&Image> = numbers.iter().map(|number| &self.images[*number]).collect();
         let images = WeightedImage::all(&images, self.side);
         (numbers, images)
