@@ -30,7 +30,7 @@ then
   morphcog serve                                draw digits yourself
   morphcog evolve --config quickstart.toml      small robots from nothing
 
-About a minute, no download: a gait that ships with the program is trained to tell zeros from ones,
+A minute or two, no download: a gait that ships with the program is trained to tell zeros from ones,
 on digits that the program draws itself. Then the robot is shown 200 digits that it has never seen.
 Ctrl-C stops it; the same command goes on.";
 

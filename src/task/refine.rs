@@ -23,12 +23,12 @@ const FIRST_LOOK: usize = 24;
 
 /// By how many standard errors what is to come may be better than what was seen. Larger values drop
 /// later: with 2, three in four challengers of a hard task (3|012) are shown all 400 images.
-const ERRORS: f64 = 1.0;
+const ERRORS_OF_HOPE: f64 = 1.0;
 
 /// By how many of its standard errors a challenger must be better. Every change of a body throws its
 /// answers near the boundary anew, so many that are worse look better on a few hundred images. With
 /// 0, they won by chance.
-const ENOUGH_ERRORS: f64 = 1.0;
+const ERRORS_TO_WIN: f64 = 1.0;
 
 /// What few images may hide of the spread of gains. Without it, a challenger whose first answers
 /// are all the champion's is taken for its twin.
@@ -216,8 +216,8 @@ impl<'a> Refinement<'a> {
         }
         let gains = || order.iter().zip(&found).map(|(number, d)| self.gain(*number, *d));
         let (gain, squares) = gains().fold((0.0, 0.0), |(sum, squares), g| (sum + g, squares + g * g));
-        let error = (squares - gain * gain / order.len().max(1) as f64).max(0.0).sqrt();
-        let won = is_stable && found.len() == order.len() && gain > ENOUGH_ERRORS * error;
+        let error = (squares - gain * gain / order.len() as f64).max(0.0).sqrt();
+        let won = is_stable && found.len() == order.len() && gain > ERRORS_TO_WIN * error;
         if won {
             for (number, displacement) in order.iter().zip(&found) {
                 self.displacements[*number] = *displacement;
@@ -341,7 +341,7 @@ impl<'a> Refinement<'a> {
                 let mean = sum / seen;
                 let variance = (squares / seen - mean * mean).max(0.0) + DOUBT * DOUBT;
                 let error = (variance / seen * (seen + left) / left).sqrt();
-                bound += (left * (mean + ERRORS * error)).min(most);
+                bound += (left * (mean + ERRORS_OF_HOPE * error)).min(most);
             }
         }
         bound <= 0.0

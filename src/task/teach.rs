@@ -296,7 +296,7 @@ impl<'a> Teacher<'a> {
         let cells: Vec<usize> = self.gait.places().iter().map(cell).collect();
         let evidence = self.evidence.among(&cells, body.height() * body.width());
         let Plan { seed, challengers, min_muscles, .. } = self.plan;
-        let (mut numbers, images) = self.telling(0);
+        let (mut numbers, images) = self.compared_on(0);
         let mut refinement = Refinement::new(
             body,
             images,
@@ -309,7 +309,7 @@ impl<'a> Teacher<'a> {
         }
         for challenger in 0..challengers {
             if challenger > 0 && challenger % CHALLENGERS_OF_A_SET == 0 {
-                let (others, images) = self.telling(challenger);
+                let (others, images) = self.compared_on(challenger);
                 numbers = others;
                 refinement.show(images, rollouts)?;
             }
@@ -328,7 +328,7 @@ impl<'a> Teacher<'a> {
 
     /// Training images to compare bodies on, by their numbers, and as they are shown: of both
     /// groups as many as far as they go.
-    fn telling(&self, draw: usize) -> (Vec<usize>, Vec<WeightedImage>) {
+    fn compared_on(&self, draw: usize) -> (Vec<usize>, Vec<WeightedImage>) {
         let numbers = self.drawn(self.plan.final_images, &mut self.random(Use::Finish, draw as u64));
         let images: Vec<&Image> = numbers.iter().map(|number| &self.images[*number]).collect();
         let images = WeightedImage::all(&images, self.side);
