@@ -109,18 +109,20 @@ impl Command<'_> {
 #SBATCH --open-mode=append
 #SBATCH --output={log}
 
-# Two minutes before the time limit Slurm sends SIGUSR1. The task saves itself and ends with 75, and is queued again.
+# Two minutes before the time limit Slurm sends SIGUSR1. The task saves itself and ends with 75, and is queued again; so is a
+# task that the signal meets while it starts: it ends with 138.
+task= again=no
+trap 'again=yes; [ -z "$task" ] || kill -USR1 "$task"' USR1
+trap '[ -z "$task" ] || kill -TERM "$task"' TERM
 {line} --threads "${{SLURM_CPUS_PER_TASK:-1}}" --task &
 task=$!
-again=no
-trap 'again=yes; kill -USR1 "$task"' USR1
-trap 'kill -TERM "$task"' TERM
+if [ "$again" = yes ]; then kill -USR1 "$task"; fi
 while true; do
   wait "$task"
   code=$?
   kill -0 "$task" 2>/dev/null || break
 done
-if [ "$code" -eq 75 ] && [ "$again" = yes ]; then
+if [ "$again" = yes ] && {{ [ "$code" -eq 75 ] || [ "$code" -eq 138 ]; }}; then
   scontrol requeue "${{SLURM_ARRAY_JOB_ID}}_${{SLURM_ARRAY_TASK_ID}}"
 fi
 exit "$code"
