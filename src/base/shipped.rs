@@ -65,10 +65,10 @@ const SETS: &[Set] = &[
     (
         GAITS,
         &[(
-            "gallery:gaits-1",
+            "gallery:gaits-6",
             &[
-                ("run.json", include_str!("../../data/gaits/seed-1/run.json")),
-                ("response.json", include_str!("../../data/gaits/seed-1/response.json")),
+                ("run.json", include_str!("../../data/gaits/seed-6/run.json")),
+                ("response.json", include_str!("../../data/gaits/seed-6/response.json")),
             ],
         )],
     ),

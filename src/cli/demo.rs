@@ -42,7 +42,7 @@ const LITTLE: [&str; 8] = [
     "train.final_images=100",
     "train.challengers=4",
     "train.images_per_class=500",
-    "train.random_images=300",
+    "train.random_images=600",
     // The test's images say how it went.
     "validation.best=0",
 ];
@@ -133,13 +133,13 @@ mod tests {
         let Source { run, .. } = Source::read(&archive).unwrap();
         let set = LITTLE.map(str::to_string);
         let config = train::config_of(&run.config, &[vec![0], vec![1]], Some(1), &set).unwrap();
-        assert_eq!((config.data.dataset.as_str(), config.train.random_images), ("builtin", 300));
+        assert_eq!((config.data.dataset.as_str(), config.train.random_images), ("builtin", 600));
         // After a change of the version, `morphcog response` makes it anew.
         let file = ResponseFile::read(&archive.with_file_name(RESPONSE_JSON)).unwrap();
         let conditions: Vec<_> = config.train.perturbations.conditions().collect();
         let probing = Probing::new(&conditions, run.config.seed);
         let gait = Gait::of(&run.best().unwrap().body).unwrap();
-        assert_eq!(file.known(&run, run.config.seed, probing.conditions(), &gait).len(), 300);
+        assert_eq!(file.known(&run, run.config.seed, probing.conditions(), &gait).len(), 600);
     }
 
     #[test]
