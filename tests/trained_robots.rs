@@ -1,4 +1,4 @@
-//! The trained robots in `data/trained` and `data/team` walk as their files say, and are what the
+//! The robots in `data/trained`, `data/four_digit` and `data/team` walk as their files say, and are what the
 //! documentation says of them.
 #![allow(clippy::disallowed_methods)]
 
@@ -21,13 +21,18 @@ use std::path::{Path, PathBuf};
 const SHOWN: usize = 10;
 
 fn folders() -> Vec<PathBuf> {
-    let trained = Path::new(env!("CARGO_MANIFEST_DIR")).join("data/trained");
-    let mut all: Vec<PathBuf> =
-        std::fs::read_dir(trained).unwrap().map(|entry| entry.unwrap().path()).collect();
-    all.sort();
-    all.retain(|path| path.is_dir());
-    assert!(!all.is_empty());
-    all
+    let inside = |set: &str| {
+        let mut folders: Vec<PathBuf> =
+            std::fs::read_dir(Path::new(env!("CARGO_MANIFEST_DIR")).join("data").join(set))
+                .unwrap()
+                .map(|entry| entry.unwrap().path())
+                .collect();
+        folders.sort();
+        folders.retain(|path| path.is_dir());
+        assert!(!folders.is_empty(), "{set}");
+        folders
+    };
+    [inside("trained"), inside("four_digit")].concat()
 }
 
 #[test]

@@ -38,13 +38,14 @@ macro_rules! run {
     };
 }
 
-/// Robots that tell a pair of digits apart; `data/team` has a folder for each.
-macro_rules! pairs {
-    ($($pair:literal)*) => { &[$(run!(concat!("gallery:team-", $pair), concat!("team/", $pair))),*] };
+/// Runs that are named after their digits, in a folder of `data/`.
+macro_rules! tasks {
+    ($folder:literal: $($task:literal)*) => {
+        &[$(run!(concat!("gallery:", $folder, "-", $task), concat!($folder, "/", $task))),*]
+    };
 }
 
-/// All of them. The runs of a set are numbered, trained ones by their seeds; those of the team are
-/// named after their digits.
+/// All of them. The runs of a set are numbered by their seeds, or named after their digits.
 const SETS: &[Set] = &[
     (
         ZERO_ONE,
@@ -55,8 +56,13 @@ const SETS: &[Set] = &[
         ],
     ),
     (
+        // A robot for each of the paper's tasks of four digits.
+        "gallery:four_digit",
+        tasks!("four_digit": "0v123" "1v023" "2v013" "3v012" "01v23" "02v13" "03v12"),
+    ),
+    (
         TEAM,
-        pairs!(
+        tasks!("team":
             "0v1" "0v2" "0v3" "0v4" "0v5" "0v6" "0v7" "0v8" "0v9" "1v2" "1v3" "1v4" "1v5" "1v6" "1v7"
             "1v8" "1v9" "2v3" "2v4" "2v5" "2v6" "2v7" "2v8" "2v9" "3v4" "3v5" "3v6" "3v7" "3v8" "3v9"
             "4v5" "4v6" "4v7" "4v8" "4v9" "5v6" "5v7" "5v8" "5v9" "6v7" "6v8" "6v9" "7v8" "7v9" "8v9"
@@ -132,7 +138,7 @@ mod tests {
         assert!(!is_shipped(Path::new("runs/gallery:x/run.json")));
         let error = runs(Path::new("gallery:zero")).unwrap_err();
         assert!(
-            error.contains("gallery:zero_one, gallery:zero_one-1, gallery:team, gallery:team-0v1"),
+            error.contains("gallery:zero_one-1, gallery:four_digit, gallery:four_digit-0v123, gallery:team"),
             "{error}"
         );
         assert_eq!(runs(Path::new(TEAM)).unwrap().len(), 45);
