@@ -24,6 +24,11 @@ pub fn hex(bytes: &[u8]) -> String {
     })
 }
 
+/// The beginning of a hash, as much as people compare; all of one that is shorter, as files may have.
+pub fn short(hash: &str) -> &str {
+    hash.get(..10).unwrap_or(hash)
+}
+
 #[cfg(test)]
 mod tests {
     #[test]

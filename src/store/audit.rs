@@ -2,6 +2,7 @@
 
 use crate::base::error::Error;
 use crate::base::files::{exists, read_text, write_atomically};
+use crate::base::hash;
 use crate::base::table;
 use crate::config::audit::Criteria;
 use crate::config::reading;
@@ -131,8 +132,8 @@ impl AuditFile {
             let text = format!(
                 "{}: stale: it is about another state of the run (SHA-256 of its content {}…, expected {}…)",
                 path.display(),
-                file.run_sha256.get(..10).unwrap_or_default(),
-                &run.fingerprint()[..10]
+                hash::short(&file.run_sha256),
+                hash::short(&run.fingerprint())
             );
             return Err(Error::input(text).hint(format!("{make} audits the run as it is now")));
         }
@@ -155,7 +156,7 @@ impl AuditFile {
                 return Ok(file);
             }
         }
-        let short = run_sha256.get(..10).unwrap_or_default();
+        let short = hash::short(run_sha256);
         let text = format!(
             "{}: expected an {AUDIT_JSON} there, or in a folder there, about the run with SHA-256 {short}…",
             here.display()

@@ -2,6 +2,7 @@
 
 use crate::base::error::Error;
 use crate::base::files::read_text;
+use crate::base::hash;
 use crate::base::statistics::{bootstrap, standard_deviation, wilson};
 use crate::base::table;
 use crate::config::reading;
@@ -299,7 +300,7 @@ impl EvalFile {
                     path.display(),
                     run.name,
                     run.generations,
-                    run.sha256.get(..10).unwrap_or_default()
+                    hash::short(&run.sha256)
                 );
                 Err(Error::input(text).hint("morphcog eval tests the run as it is now".to_string()))
             }
