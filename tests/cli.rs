@@ -1230,3 +1230,43 @@ fn robots_that_ship_with_the_program_are_named_where_archives_are() {
     let refused = sandbox.run("eval -a gallery:zero --images 2");
     refused.ended(2, &["gallery:zero", "expected gallery:all, gallery:zero_one, gallery:zero_one-1"]);
 }
+
+#[test]
+fn runs_of_the_atlas_are_read_compressed_and_leave_their_results_here() {
+    let sandbox = with_run();
+    let compressed = |name: &str| {
+        let mut encoder = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::best());
+        std::io::Write::write_all(&mut encoder, sandbox.read(name).as_bytes()).unwrap();
+        encoder.finish().unwrap()
+    };
+    sandbox.run("audit -q -a run --robots best --set least_walk=0").ended(0, &[]);
+    for file in ["run.json", "audit.json"] {
+        sandbox.write(&format!("data/atlas/tiny-1/{file}.gz"), compressed(&format!("run/{file}")));
+        sandbox.write(&format!("elsewhere/tiny-2/{file}.gz"), compressed(&format!("run/{file}")));
+    }
+    let results_of =
+        |from: &str| (sandbox.read(&format!("{from}.json")), sandbox.read(&format!("{from}.csv")));
+    sandbox.run("eval -q -a run --robots best --images 4").ended(0, &[]);
+    sandbox.run("eval -q -a atlas:tiny-1 --robots best --images 4").ended(0, &[]);
+    assert_eq!(results_of("run/eval").1, results_of("atlas-tiny-1-eval").1);
+    sandbox.run("plot archive -q -a atlas:tiny").ended(0, &[]);
+    sandbox.run("report -q -a atlas:tiny-1 -o report.html").ended(0, &[]);
+    assert!(sandbox.read("report.html").contains("robots, 1 were audited"));
+
+    let elsewhere = |args: &str| {
+        let mut command = sandbox.command(args.split_whitespace());
+        command.env("MORPHCOG_ATLAS", "elsewhere");
+        said(command)
+    };
+    elsewhere("eval -q -a atlas:tiny-2 --robots best --images 4").ended(0, &[]);
+    elsewhere("eval -q -a atlas:tiny-1 --robots best --images 4").ended(0, &[]);
+    let both =
+        ["elsewhere/tiny-3/run.json.gz and no data/atlas/tiny-3/run.json.gz", "expected one of tiny-2"];
+    elsewhere("eval -a atlas:tiny-3 --images 4").ended(3, &both);
+    let unset =
+        ["atlas:tiny-2/run.json: cannot be read", "MORPHCOG_ATLAS is not set", "expected one of tiny-1"];
+    sandbox.run("eval -a atlas:tiny-2 --images 4").ended(3, &unset);
+    Sandbox::new().run("replay -a atlas:tiny-2").ended(3, &["set MORPHCOG_ATLAS to its data/atlas"]);
+    sandbox.write("data/atlas/broken-1/run.json.gz", &compressed("run/run.json")[..200]);
+    sandbox.run("eval -a atlas:broken --images 4").ended(3, &["atlas:broken-1/run.json: cannot be read"]);
+}

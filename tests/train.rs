@@ -198,8 +198,9 @@ fn what_cannot_be_trained_is_one_clear_error_and_writes_nothing() {
 #[test]
 fn evolve_with_train_ends_with_the_robot_that_train_makes_of_its_gaits() {
     let sandbox = Sandbox::new();
-    let little = "[train]\nrandom_images = 40\nrounds = 2\nimages = 24\nfinal_images = 20\nchallengers = 6\n";
-    sandbox.write("gaits.toml", format!("{}\n{little}", gaits()));
+    let little = "[train]\nrandom_images = 24\nrounds = 1\nimages = 8\nfinal_images = 10\nchallengers = 2\n";
+    let validation = "[validation]\nimages = 40\n";
+    sandbox.write("gaits.toml", format!("{}\n{little}{validation}", gaits()));
     sandbox.write("four.toml", TINY.replace("groups = [[0], [1]]", "splits = [0, 1, 2]"));
     sandbox.run("evolve -q -c four.toml --train -o refused").ended(2, &["--train", "task.groups"]);
     assert!(!sandbox.path("refused").exists());

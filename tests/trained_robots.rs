@@ -18,7 +18,7 @@ use morphcog::task::protocol::{Protocol, RolloutMode};
 use std::path::{Path, PathBuf};
 
 /// Images of each class that are shown again.
-const SHOWN: usize = 10;
+const SHOWN: usize = 4;
 
 fn folders() -> Vec<PathBuf> {
     let inside = |set: &str| {

@@ -1,6 +1,7 @@
 //! Writing files so that nothing is ever half-written, and reading texts that end.
 
-use crate::base::shipped;
+use crate::base::named::{self, Place};
+use flate2::read::GzDecoder;
 use std::ffi::{OsStr, OsString};
 use std::fs::File;
 use std::io::{self, Read, Write};
@@ -12,26 +13,28 @@ const TEMPORARY: [&str; 2] = [".", ".tmp"];
 /// Most bytes of a text: many times what any file of ours has.
 const MOST_TEXT: u64 = 256 << 20;
 
-/// Reads a text, also one of a [shipped] run. What does not end, as a device, is refused
-/// before it fills the memory.
+/// Reads a text, also one of a [named] run. What does not end, as a device, is refused before it
+/// fills the memory.
 ///
 /// # Errors
 /// What the system says; if it is no UTF-8; if it has more than 256 megabytes.
 pub fn read_text(path: &Path) -> io::Result<String> {
-    if let Some(text) = shipped::text(path) {
-        return Ok(text.to_string());
-    }
+    let source: Box<dyn Read> = match named::place(path).transpose()? {
+        Some(Place::Shipped(text)) => return Ok(text.to_string()),
+        Some(Place::Compressed(file)) => Box::new(GzDecoder::new(File::open(file)?)),
+        None => Box::new(File::open(path)?),
+    };
     let mut text = String::new();
-    let read = File::open(path)?.take(MOST_TEXT + 1).read_to_string(&mut text)?;
+    let read = source.take(MOST_TEXT + 1).read_to_string(&mut text)?;
     match read as u64 > MOST_TEXT {
         true => Err(io::Error::new(io::ErrorKind::FileTooLarge, "expected at most 256 MB of text")),
         false => Ok(text),
     }
 }
 
-/// Whether there is a file, on the disk or of a [shipped] run.
+/// Whether there is a file, on the disk or of a [named] run.
 pub fn exists(path: &Path) -> bool {
-    shipped::text(path).is_some() || path.exists()
+    named::place(path).map_or_else(|| path.exists(), |place| place.is_ok())
 }
 
 /// Writes a file as a whole or not at all: to a temporary name in the same folder, synced, then

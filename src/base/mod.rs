@@ -1,10 +1,12 @@
 //! What every module stands on (random generators, hashes, files; numbers, lines and tables as
 //! text).
 
+pub mod atlas;
 pub mod clock;
 pub mod error;
 pub mod files;
 pub mod hash;
+pub mod named;
 pub mod number;
 pub mod observer;
 pub mod random;

@@ -19,8 +19,8 @@ use std::path::PathBuf;
 /// Archives, of a command that takes several.
 #[derive(Debug, Args)]
 pub(super) struct Archives {
-    /// A run.json, or its folder, or runs of the gallery (gallery:zero_one); several may follow, and
-    /// the option may be repeated (default: the newest under runs/).
+    /// A run.json, or its folder, or runs of the gallery or the atlas (gallery:zero_one, atlas:zero_one);
+    /// several may follow, and the option may be repeated (default: the newest under runs/).
     #[arg(short, long, value_name = "FILE", value_parser = run_jsons(), num_args = 1..)]
     archive: Vec<Runs>,
 }

@@ -1,8 +1,8 @@
 //! `morphcog train`: its words, and what it calls.
 
 use crate::base::error::Error;
+use crate::base::named;
 use crate::base::ranks::Ranks;
-use crate::base::shipped;
 use crate::base::signals;
 use crate::cli::choice;
 use crate::cli::choice::{ROBOTS, run_json, selected};
@@ -76,7 +76,7 @@ pub(super) fn run(args: TrainArgs, console: &Console) -> Result<(), Error> {
     let archive = args.archive.map_or_else(folder::newest_run, Ok)?;
     let robots = selected(args.robots)?.unwrap_or(Selection::Top(GAITS));
     let name = name(&archive, &args.task, args.seed);
-    let beside = match shipped::is_shipped(&archive) {
+    let beside = match named::is_named(&archive) {
         true => Some(Path::new(folder::RUNS)),
         false => archive.parent().and_then(|folder| folder.parent()),
     };
@@ -111,9 +111,11 @@ fn name(archive: &Path, task: &Groups, seed: Option<u64>) -> String {
         let separator = if group.iter().any(|class| *class > 9) { "," } else { "" };
         group.iter().map(u8::to_string).collect::<Vec<_>>().join(separator)
     });
-    let of = archive.parent().unwrap_or(Path::new(""));
-    let of = of.file_name().map_or("run".to_string(), |name| name.to_string_lossy().into_owned());
-    let of = of.trim_start_matches(shipped::PREFIX);
+    let folder = archive.parent().and_then(Path::file_name).map(|name| name.to_string_lossy());
+    let of = match named::name(archive) {
+        Some((_, name)) => name,
+        None => folder.as_deref().unwrap_or("run"),
+    };
     let seed = seed.map_or(String::new(), |seed| format!("-seed{seed}"));
     format!("{of}-{}{seed}", suffix.join("v"))
 }

@@ -1,6 +1,7 @@
 //! `morphcog report`: gathers what is known of runs, for a page.
 
 use crate::base::error::Error;
+use crate::base::files::exists;
 use crate::commands::plot::Progress;
 use crate::commands::replay;
 use crate::data::dataset::Split;
@@ -51,7 +52,7 @@ pub struct Findings {
 impl Findings {
     /// Those in a folder that are about these runs as they are; verdicts are on one run.
     fn read(folder: &Path, runs: &[&RunFile], warn: &dyn Fn(&str)) -> Self {
-        let existing = |name: &str| Some(folder.join(name)).filter(|path| path.exists());
+        let existing = |name: &str| Some(folder.join(name)).filter(|path| exists(path));
         // A report of what can be read is better than none.
         let told = |error: Error| warn(&format!("{error}; left out"));
         let one = if let [run] = runs { Some(*run) } else { None };
@@ -118,7 +119,7 @@ pub fn gather(
     for path in archives {
         let run = RunFile::read(path)?;
         let folder = path.parent().unwrap_or(Path::new(""));
-        let progress = match path.with_file_name(METRICS).exists() {
+        let progress = match exists(&path.with_file_name(METRICS)) {
             true => Progress::of(&run, path).map_err(|error| warn(&format!("{error}; left out"))).ok(),
             false => None,
         };

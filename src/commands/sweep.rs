@@ -4,7 +4,7 @@
 use crate::base::error::Error;
 use crate::base::files::read_text;
 use crate::base::hash::sha256_hex;
-use crate::base::shipped;
+use crate::base::named;
 use crate::commands::tasks::{AuditStep, EvalStep, Run, Steps, Task, Training, selection};
 use crate::config::{Config, Settings, flatten, reading};
 use crate::search::train;
@@ -232,11 +232,11 @@ impl SweepPlan {
     fn base(&self, path: &Path) -> Result<Base, Error> {
         let folder = path.parent().unwrap_or(Path::new(""));
         if let Some(archive) = &self.archive {
-            let is_shipped = shipped::is_shipped(archive);
-            let archive = if is_shipped { archive.clone() } else { folder.join(archive) };
+            let is_named = named::is_named(archive);
+            let archive = if is_named { archive.clone() } else { folder.join(archive) };
             let archive = first_run(archive).map_err(|text| Error::at("archive", text))?;
             let source = Source::read(&archive).map_err(|error| error.within("archive").of("archive"))?;
-            let archive = match is_shipped {
+            let archive = match is_named {
                 true => archive,
                 false => std::path::absolute(&archive).map_err(|error| Error::reading(&archive, &error))?,
             };

@@ -150,7 +150,7 @@ impl AuditFile {
             std::fs::read_dir(here).into_iter().flatten().flatten().map(|entry| entry.path()).collect();
         folders.sort();
         folders.insert(0, folder.to_path_buf());
-        for path in folders.into_iter().map(|folder| folder.join(AUDIT_JSON)).filter(|path| path.exists()) {
+        for path in folders.into_iter().map(|folder| folder.join(AUDIT_JSON)).filter(|path| exists(path)) {
             let file = AuditFile::read(&path)?;
             if file.run_sha256 == run_sha256 {
                 return Ok(file);

@@ -2,7 +2,7 @@
 
 use crate::base::error::Error;
 use crate::base::files::{check_writable, remove_half_written};
-use crate::base::shipped;
+use crate::base::named;
 use crate::store::lock;
 use crate::store::lock::{Lock, Refusal};
 use crate::store::names::{
@@ -195,19 +195,19 @@ fn before_dot(name: &OsStr) -> Option<&[u8]> {
     name.as_encoded_bytes().split(|&byte| byte == b'.').next()
 }
 
-/// The run.json that is meant by its path or its folder's; or every one of a set of shipped runs.
+/// The run.json that is meant by its path or its folder's; or every one of those that are named together.
 ///
 /// # Errors
-/// If there is no shipped run of that name.
+/// If none that ships with the program has that name.
 pub fn run_json(path: PathBuf) -> Result<Vec<PathBuf>, String> {
     match () {
-        () if shipped::is_shipped(&path) => shipped::runs(&path),
+        () if named::is_named(&path) => named::runs(&path),
         () if path.is_dir() => Ok(vec![path.join(RUN_JSON)]),
         () => Ok(vec![path]),
     }
 }
 
-/// The same, of a set of shipped runs the first.
+/// The same, of several the first.
 ///
 /// # Errors
 /// As [`run_json`].
@@ -215,23 +215,24 @@ pub fn first_run(path: PathBuf) -> Result<PathBuf, String> {
     Ok(run_json(path)?.into_iter().next().expect("a path means at least one run"))
 }
 
-/// Where results of a run go if nothing is said: beside its run.json; those of a shipped one to the
+/// Where results of a run go if nothing is said: beside its run.json; those of a named one to the
 /// present folder.
 pub fn beside(archive: &Path, name: &str) -> PathBuf {
-    let of_shipped = archive.to_str().and_then(|path| path.strip_prefix(shipped::PREFIX));
-    let run = of_shipped.map(|path| path.trim_end_matches(RUN_JSON).trim_end_matches('/'));
-    run.map_or_else(|| archive.with_file_name(name), |run| PathBuf::from(format!("gallery-{run}-{name}")))
+    match named::name(archive) {
+        Some((of, run)) => PathBuf::from(format!("{of}-{run}-{name}")),
+        None => archive.with_file_name(name),
+    }
 }
 
 /// Where results of several runs together go if nothing is said: to the folder that all lie in; with
-/// shipped ones, to the present folder.
+/// named ones, to the present folder.
 pub fn beside_all(archives: &[PathBuf], name: &str) -> PathBuf {
     match archives {
         [one] => beside(one, name),
-        several if several.iter().any(|path| shipped::is_shipped(path)) => {
-            PathBuf::from(format!("gallery-{name}"))
-        }
-        several => above(several).join(name),
+        several => match several.iter().find_map(|path| named::name(path)) {
+            Some((of, _)) => PathBuf::from(format!("{of}-{name}")),
+            None => above(several).join(name),
+        },
     }
 }
 

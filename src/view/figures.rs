@@ -2,6 +2,7 @@
 
 use crate::analysis::gallery;
 use crate::base::error::Error;
+use crate::base::files::exists;
 use crate::commands::one_by_one::Named;
 use crate::commands::plot::Progress;
 use crate::commands::replay;
@@ -259,7 +260,7 @@ fn of_run(kind: Kind, path: &Path) -> Result<Figure, Error> {
         Kind::Capacity => {
             let (beside, eval) = (result(path, CAPACITY_JSON), path.with_file_name(EVAL_JSON));
             let file = CapacityFile::read(&beside).map_err(hint)?;
-            if beside != *path && eval.exists() {
+            if beside != *path && exists(&eval) {
                 // Where its robots come from.
                 EvalFile::of_runs(&eval, &[&RunFile::read(path)?])?;
             }

@@ -2,7 +2,7 @@
 
 use crate::analysis::gallery;
 use crate::base::error::Error;
-use crate::base::{number, shipped};
+use crate::base::{named, number};
 use crate::commands::replay::Replay;
 use crate::store::folder;
 use crate::view::console::Console;
@@ -126,7 +126,7 @@ pub fn folder(archive: Option<&Path>, robot: &str) -> Result<PathBuf, Error> {
         None if gallery::find(robot)?.is_some() => return Ok(PathBuf::new()),
         None => folder::newest_run()?,
     };
-    match shipped::is_shipped(&archive) {
+    match named::is_named(&archive) {
         true => Ok(PathBuf::new()),
         false => Ok(archive.parent().unwrap_or(Path::new("")).to_path_buf()),
     }

@@ -15,7 +15,8 @@ pub const PROGRAM: &str = env!("CARGO_BIN_EXE_morphcog");
 /// No command of a test may take longer.
 const LIMIT: Duration = Duration::from_secs(120);
 /// What the environment of the tests must not decide.
-pub const SETTINGS: [&str; 8] = [
+pub const SETTINGS: [&str; 9] = [
+    "MORPHCOG_ATLAS",
     "MORPHCOG_DATA",
     "MORPHCOG_ISA",
     "NO_COLOR",

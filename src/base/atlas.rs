@@ -1,0 +1,146 @@
+//! The atlas: runs that lie in the repository, compressed, and not in the program. A path that begins
+//! with [`PREFIX`] names them: `atlas:zero_one-1` one, `atlas:zero_one` one of every seed.
+
+use std::ffi::OsStr;
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// How a name of a run of the atlas begins.
+pub const PREFIX: &str = "atlas:";
+
+/// The environment variable that says where the atlas is.
+const VARIABLE: &str = "MORPHCOG_ATLAS";
+
+/// Where it is looked for after that: the repository's folder.
+const FOLDER: &str = "data/atlas";
+
+/// How the name of a compressed file ends.
+const COMPRESSED: &str = ".gz";
+
+/// The folder of a run and the file in it that a path names, if it begins as those of the atlas do.
+fn parts(path: &Path) -> Option<(&str, &str)> {
+    let name = path.to_str()?.strip_prefix(PREFIX)?;
+    Some(name.split_once(['/', '\\']).unwrap_or((name, "")))
+}
+
+/// Whether a path is of a run of the atlas.
+pub fn is_of_atlas(path: &Path) -> bool {
+    parts(path).is_some()
+}
+
+/// The folders in which the atlas may be, the first first; `variable` is the value of
+/// `MORPHCOG_ATLAS`.
+fn folders(variable: Option<&OsStr>) -> Vec<PathBuf> {
+    let set = variable.filter(|value| !value.is_empty()).map(PathBuf::from);
+    set.into_iter().chain([PathBuf::from(FOLDER)]).collect()
+}
+
+fn variable() -> Option<std::ffi::OsString> {
+    std::env::var_os(VARIABLE)
+}
+
+/// The compressed file that a path of the atlas names.
+///
+/// # Errors
+/// Where it was looked for, what there is instead, and how to get the atlas.
+pub fn file(path: &Path) -> io::Result<PathBuf> {
+    found(path, variable().as_deref())
+}
+
+fn found(path: &Path, variable: Option<&OsStr>) -> io::Result<PathBuf> {
+    let (run, file) = parts(path).expect("callers ask is_of_atlas before");
+    let folders = folders(variable);
+    let places = folders.iter().map(|folder| folder.join(run).join(format!("{file}{COMPRESSED}")));
+    let places: Vec<PathBuf> = places.collect();
+    if let Some(place) = places.iter().find(|place| place.is_file()) {
+        return Ok(place.clone());
+    }
+    let looked: Vec<String> = places.iter().map(|place| place.display().to_string()).collect();
+    let unset = if folders.len() == 1 { format!(" ({VARIABLE} is not set)") } else { String::new() };
+    let what = match folders.iter().map(|folder| names(folder)).find(|names| !names.is_empty()) {
+        Some(names) => format!("expected one of {}", names.join(", ")),
+        None => {
+            format!("the atlas is in the repository: call morphcog there, or set {VARIABLE} to its {FOLDER}")
+        }
+    };
+    Err(io::Error::new(
+        io::ErrorKind::NotFound,
+        format!("there is no {}{unset}; {what}", looked.join(" and no ")),
+    ))
+}
+
+/// Names of the runs in a folder, in order.
+fn names(folder: &Path) -> Vec<String> {
+    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    let of_runs = entries.filter(|entry| entry.path().is_dir());
+    let mut names: Vec<String> = of_runs.filter_map(|entry| entry.file_name().into_string().ok()).collect();
+    names.sort_by_key(|name| (name.trim_end_matches(|c: char| c.is_ascii_digit()).to_string(), seed(name)));
+    names
+}
+
+/// The number that a name ends with.
+fn seed(name: &str) -> Option<u64> {
+    name.rsplit_once('-')?.1.parse().ok()
+}
+
+/// The `run.json` of a run, or of every seed of a set; if there is none, of the run of that name,
+/// which reading will say.
+pub fn runs(path: &Path) -> Vec<PathBuf> {
+    seeds(path, variable().as_deref())
+}
+
+fn seeds(path: &Path, variable: Option<&OsStr>) -> Vec<PathBuf> {
+    let (name, _) = parts(path).expect("callers ask is_of_atlas before");
+    let run_json = |name: &str| PathBuf::from(format!("{PREFIX}{name}/run.json"));
+    for folder in folders(variable) {
+        if folder.join(name).is_dir() {
+            break;
+        }
+        let is_of_set = |found: &String| {
+            found.rsplit_once('-').is_some_and(|(set, _)| set == name) && seed(found).is_some()
+        };
+        let of_set: Vec<PathBuf> =
+            names(&folder).into_iter().filter(is_of_set).map(|name| run_json(&name)).collect();
+        if !of_set.is_empty() {
+            return of_set;
+        }
+    }
+    vec![run_json(name)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_lead_to_compressed_files_of_the_first_atlas_that_has_them() {
+        let folder = tempfile::tempdir().unwrap();
+        for run in ["zero_one-2", "zero_one-10", "zero_one-more-1", "zero_one"] {
+            std::fs::create_dir(folder.path().join(run)).unwrap();
+        }
+        std::fs::write(folder.path().join("zero_one-2/run.json.gz"), "").unwrap();
+        let variable = Some(folder.path().as_os_str());
+        let place = found(Path::new("atlas:zero_one-2/run.json"), variable).unwrap();
+        assert_eq!(place, folder.path().join("zero_one-2").join("run.json.gz"));
+        let error = found(Path::new("atlas:zero_one-3/run.json"), variable).unwrap_err().to_string();
+        let said = format!(
+            "there is no {} and no data/atlas/zero_one-3/run.json.gz; expected one of zero_one",
+            folder.path().join("zero_one-3/run.json.gz").display()
+        );
+        assert!(error.starts_with(&said), "{error}");
+        assert_eq!(seeds(Path::new("atlas:zero_one"), variable), [Path::new("atlas:zero_one/run.json")]);
+        std::fs::remove_dir(folder.path().join("zero_one")).unwrap();
+        let of_set = ["atlas:zero_one-2/run.json", "atlas:zero_one-10/run.json"].map(Path::new);
+        assert_eq!(seeds(Path::new("atlas:zero_one"), variable), of_set);
+    }
+
+    #[test]
+    fn without_an_atlas_the_error_says_how_to_get_it() {
+        let folder = tempfile::tempdir().unwrap();
+        let nowhere = folder.path().join("nowhere");
+        let error = found(Path::new("atlas:x/run.json"), Some(nowhere.as_os_str())).unwrap_err().to_string();
+        assert!(error.contains("nowhere/x/run.json.gz and no data/atlas/x/run.json.gz"), "{error}");
+        let error = found(Path::new("atlas:x-7/run.json"), None).unwrap_err().to_string();
+        assert!(error.contains("MORPHCOG_ATLAS is not set"), "{error}");
+    }
+}
