@@ -1,9 +1,10 @@
-//! The robots in `data/trained`, `data/four_digit` and `data/team` walk as their files say, and are what the
-//! documentation says of them.
+//! The robots in `data/trained`, `data/four_digit`, `data/team` and `data/atlas` walk as their files say, and are
+//! what the documentation says of them.
 #![allow(clippy::disallowed_methods)]
 
 use morphcog::base::Grid;
 use morphcog::base::stop::NEVER;
+use morphcog::body::Body;
 use morphcog::data::dataset::{Dataset, Split};
 use morphcog::data::files::places;
 use morphcog::search::showing::CYCLES;
@@ -65,12 +66,16 @@ fn mnist() -> Option<Dataset> {
 
 /// How the robot of a run walks under test images, ten cycles each; none where it is unstable.
 fn walks(run: &RunFile, mnist: &Dataset, images: &[ImageRef]) -> Vec<Option<f64>> {
+    walks_of(run, &run.elites[0].body, mnist, images)
+}
+
+fn walks_of(run: &RunFile, body: &Body, mnist: &Dataset, images: &[ImageRef]) -> Vec<Option<f64>> {
     let stimulus = |image: &ImageRef| see(&run.config, mnist, Split::Test, image.index).unwrap();
     let stimuli: Vec<Grid<f64>> = images.iter().map(stimulus).collect();
     let control_steps = CYCLES * run.config.physics.cycle_steps;
     let protocol = Protocol { rollout: RolloutMode::Fresh, control_steps, ..run.config.protocol.clone() };
     let setting = (&run.config.physics, &protocol);
-    let (walks, _) = fresh_rollouts(&run.elites[0].body, &stimuli, &[], setting, &|_| (), &NEVER).unwrap();
+    let (walks, _) = fresh_rollouts(body, &stimuli, &[], setting, &|_| (), &NEVER).unwrap();
     walks.into_iter().map(Result::ok).collect()
 }
 
@@ -113,4 +118,50 @@ fn the_team_that_ships_walks_and_answers_as_in_its_test() {
             assert_eq!(walked, [member.displacements[place]], "{}", member.task);
         }
     }
+}
+
+#[test]
+fn the_robots_of_the_atlas_are_audited_and_walk_as_in_the_test_of_the_paper_s_table() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let table = std::fs::read_to_string(root.join("data/atlas/reproduction.csv")).unwrap();
+    let mnist = mnist();
+    let mut tasks = 0;
+    for set in ["zero_one", "four_digit"] {
+        // Tests run in the project's folder, where the atlas is looked for.
+        let of_seed =
+            |seed: usize| RunFile::read(Path::new(&format!("atlas:{set}-{seed}/run.json"))).unwrap();
+        let runs: Vec<RunFile> = (1..=5).map(of_seed).collect();
+        let eval = EvalFile::read(Path::new(&format!("atlas:{set}/eval.json"))).unwrap();
+        let hashes = eval.runs.iter().map(|run| run.sha256.clone());
+        assert!(hashes.eq(runs.iter().map(RunFile::fingerprint)), "{set}");
+        let audit = |seed: usize| {
+            AuditFile::of_run(&runs[seed - 1], Path::new(&format!("atlas:{set}-{seed}/audit.json"))).unwrap()
+        };
+        let audits: Vec<AuditFile> = (1..=5).map(audit).collect();
+        for (number, robot) in eval.robots.iter().enumerate() {
+            assert!(audits[robot.run].robot(&robot.id).is_some(), "{}", robot.id);
+            if let Some(mnist) = &mnist {
+                // Another image for each.
+                let (run, place) = (&runs[robot.run], number * 7 % eval.images.len());
+                let elite = run.elites.iter().find(|elite| elite.id == robot.id).unwrap();
+                let walked = walks_of(run, &elite.body, mnist, &eval.images[place..=place]);
+                assert_eq!(walked, [robot.displacements[place]], "{}", robot.id);
+            }
+        }
+        for line in table.lines().skip(1) {
+            let cells: Vec<&str> = line.split(',').collect();
+            let of_task: Vec<f64> = eval
+                .robots
+                .iter()
+                .filter(|robot| robot.task == cells[0])
+                .map(|robot| robot.accuracy)
+                .collect();
+            if !of_task.is_empty() {
+                let mean = 100.0 * of_task.iter().sum::<f64>() / of_task.len() as f64;
+                assert!((mean - cells[4].parse::<f64>().unwrap()).abs() < 1e-9, "{line}");
+                tasks += 1;
+            }
+        }
+    }
+    assert_eq!(tasks, 8);
 }

@@ -72,10 +72,14 @@ fn found(path: &Path, variable: Option<&OsStr>) -> io::Result<PathBuf> {
 /// Names of the runs in a folder, in order.
 fn names(folder: &Path) -> Vec<String> {
     let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
-    let of_runs = entries.filter(|entry| entry.path().is_dir());
+    let of_runs = entries.filter(|entry| holds_run(&entry.path()));
     let mut names: Vec<String> = of_runs.filter_map(|entry| entry.file_name().into_string().ok()).collect();
     names.sort_by_key(|name| (name.trim_end_matches(|c: char| c.is_ascii_digit()).to_string(), seed(name)));
     names
+}
+
+fn holds_run(folder: &Path) -> bool {
+    folder.join(format!("run.json{COMPRESSED}")).is_file()
 }
 
 /// The number that a name ends with.
@@ -93,7 +97,7 @@ fn seeds(path: &Path, variable: Option<&OsStr>) -> Vec<PathBuf> {
     let (name, _) = parts(path).expect("callers ask is_of_atlas before");
     let run_json = |name: &str| PathBuf::from(format!("{PREFIX}{name}/run.json"));
     for folder in folders(variable) {
-        if folder.join(name).is_dir() {
+        if holds_run(&folder.join(name)) {
             break;
         }
         let is_of_set = |found: &String| {
@@ -117,19 +121,24 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         for run in ["zero_one-2", "zero_one-10", "zero_one-more-1", "zero_one"] {
             std::fs::create_dir(folder.path().join(run)).unwrap();
+            std::fs::write(folder.path().join(run).join("run.json.gz"), "").unwrap();
         }
-        std::fs::write(folder.path().join("zero_one-2/run.json.gz"), "").unwrap();
         let variable = Some(folder.path().as_os_str());
         let place = found(Path::new("atlas:zero_one-2/run.json"), variable).unwrap();
         assert_eq!(place, folder.path().join("zero_one-2").join("run.json.gz"));
-        let error = found(Path::new("atlas:zero_one-3/run.json"), variable).unwrap_err().to_string();
+        let error = found(Path::new("atlas:zero_one-30/run.json"), variable).unwrap_err().to_string();
         let said = format!(
-            "there is no {} and no data/atlas/zero_one-3/run.json.gz; expected one of zero_one",
-            folder.path().join("zero_one-3/run.json.gz").display()
+            "there is no {} and no data/atlas/zero_one-30/run.json.gz; expected one of zero_one",
+            folder.path().join("zero_one-30/run.json.gz").display()
         );
         assert!(error.starts_with(&said), "{error}");
         assert_eq!(seeds(Path::new("atlas:zero_one"), variable), [Path::new("atlas:zero_one/run.json")]);
-        std::fs::remove_dir(folder.path().join("zero_one")).unwrap();
+        // What is about all seeds may lie there.
+        std::fs::rename(
+            folder.path().join("zero_one/run.json.gz"),
+            folder.path().join("zero_one/eval.json.gz"),
+        )
+        .unwrap();
         let of_set = ["atlas:zero_one-2/run.json", "atlas:zero_one-10/run.json"].map(Path::new);
         assert_eq!(seeds(Path::new("atlas:zero_one"), variable), of_set);
     }
