@@ -34,7 +34,7 @@ pub(crate) const TEXT: &str = include_str!("../../data/gallery.json");
 /// # Errors
 /// If there is no such set, or what is built in is damaged (which a test excludes).
 pub fn trained(set: &str) -> Result<Vec<(RunFile, AuditFile)>, Error> {
-    let paths = shipped::runs(Path::new(set)).map_err(Error::other)?;
+    let paths = shipped::runs(set).map_err(Error::other)?;
     let read =
         |path: &PathBuf| Ok((RunFile::read(path)?, AuditFile::read(&path.with_file_name(AUDIT_JSON))?));
     paths.iter().map(read).collect()

@@ -17,17 +17,6 @@ const FOLDER: &str = "data/atlas";
 /// How the name of a compressed file ends.
 const COMPRESSED: &str = ".gz";
 
-/// The folder of a run and the file in it that a path names, if it begins as those of the atlas do.
-fn parts(path: &Path) -> Option<(&str, &str)> {
-    let name = path.to_str()?.strip_prefix(PREFIX)?;
-    Some(name.split_once(['/', '\\']).unwrap_or((name, "")))
-}
-
-/// Whether a path is of a run of the atlas.
-pub fn is_of_atlas(path: &Path) -> bool {
-    parts(path).is_some()
-}
-
 /// The folders in which the atlas may be, the first first; `variable` is the value of
 /// `MORPHCOG_ATLAS`.
 fn folders(variable: Option<&OsStr>) -> Vec<PathBuf> {
@@ -39,16 +28,15 @@ fn variable() -> Option<std::ffi::OsString> {
     std::env::var_os(VARIABLE)
 }
 
-/// The compressed file that a path of the atlas names.
+/// The compressed file of a run.
 ///
 /// # Errors
 /// Where it was looked for, what there is instead, and how to get the atlas.
-pub fn file(path: &Path) -> io::Result<PathBuf> {
-    found(path, variable().as_deref())
+pub fn file(run: &str, file: &str) -> io::Result<PathBuf> {
+    found(run, file, variable().as_deref())
 }
 
-fn found(path: &Path, variable: Option<&OsStr>) -> io::Result<PathBuf> {
-    let (run, file) = parts(path).expect("callers ask is_of_atlas before");
+fn found(run: &str, file: &str, variable: Option<&OsStr>) -> io::Result<PathBuf> {
     let folders = folders(variable);
     let places = folders.iter().map(|folder| folder.join(run).join(format!("{file}{COMPRESSED}")));
     let places: Vec<PathBuf> = places.collect();
@@ -89,12 +77,11 @@ fn seed(name: &str) -> Option<u64> {
 
 /// The `run.json` of a run, or of every seed of a set; if there is none, of the run of that name,
 /// which reading will say.
-pub fn runs(path: &Path) -> Vec<PathBuf> {
-    seeds(path, variable().as_deref())
+pub fn runs(name: &str) -> Vec<PathBuf> {
+    seeds(name, variable().as_deref())
 }
 
-fn seeds(path: &Path, variable: Option<&OsStr>) -> Vec<PathBuf> {
-    let (name, _) = parts(path).expect("callers ask is_of_atlas before");
+fn seeds(name: &str, variable: Option<&OsStr>) -> Vec<PathBuf> {
     let run_json = |name: &str| PathBuf::from(format!("{PREFIX}{name}/run.json"));
     for folder in folders(variable) {
         if holds_run(&folder.join(name)) {
@@ -124,15 +111,15 @@ mod tests {
             std::fs::write(folder.path().join(run).join("run.json.gz"), "").unwrap();
         }
         let variable = Some(folder.path().as_os_str());
-        let place = found(Path::new("atlas:zero_one-2/run.json"), variable).unwrap();
+        let place = found("zero_one-2", "run.json", variable).unwrap();
         assert_eq!(place, folder.path().join("zero_one-2").join("run.json.gz"));
-        let error = found(Path::new("atlas:zero_one-30/run.json"), variable).unwrap_err().to_string();
+        let error = found("zero_one-30", "run.json", variable).unwrap_err().to_string();
         let said = format!(
             "there is no {} and no data/atlas/zero_one-30/run.json.gz; expected one of zero_one",
             folder.path().join("zero_one-30/run.json.gz").display()
         );
         assert!(error.starts_with(&said), "{error}");
-        assert_eq!(seeds(Path::new("atlas:zero_one"), variable), [Path::new("atlas:zero_one/run.json")]);
+        assert_eq!(seeds("zero_one", variable), [Path::new("atlas:zero_one/run.json")]);
         // What is about all seeds may lie there.
         std::fs::rename(
             folder.path().join("zero_one/run.json.gz"),
@@ -140,16 +127,16 @@ mod tests {
         )
         .unwrap();
         let of_set = ["atlas:zero_one-2/run.json", "atlas:zero_one-10/run.json"].map(Path::new);
-        assert_eq!(seeds(Path::new("atlas:zero_one"), variable), of_set);
+        assert_eq!(seeds("zero_one", variable), of_set);
     }
 
     #[test]
     fn without_an_atlas_the_error_says_how_to_get_it() {
         let folder = tempfile::tempdir().unwrap();
         let nowhere = folder.path().join("nowhere");
-        let error = found(Path::new("atlas:x/run.json"), Some(nowhere.as_os_str())).unwrap_err().to_string();
+        let error = found("x", "run.json", Some(nowhere.as_os_str())).unwrap_err().to_string();
         assert!(error.contains("nowhere/x/run.json.gz and no data/atlas/x/run.json.gz"), "{error}");
-        let error = found(Path::new("atlas:x-7/run.json"), None).unwrap_err().to_string();
+        let error = found("x-7", "run.json", None).unwrap_err().to_string();
         assert!(error.contains("MORPHCOG_ATLAS is not set"), "{error}");
     }
 }

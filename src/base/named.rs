@@ -14,20 +14,34 @@ pub enum Place {
     Compressed(PathBuf),
 }
 
-/// Whether a path names a run, or a file of one.
-pub fn is_named(path: &Path) -> bool {
-    shipped::is_shipped(path) || atlas::is_of_atlas(path)
+/// The name of a run (`gallery:zero_one-1`) and the file of it in a path; none of other paths.
+fn parts(path: &Path) -> Option<(&str, &str)> {
+    let text = path.to_str()?;
+    let (name, file) = text.split_once(['/', '\\']).unwrap_or((text, ""));
+    [shipped::PREFIX, atlas::PREFIX].iter().any(|prefix| name.starts_with(prefix)).then_some((name, file))
 }
 
-/// Where a file of a named run is; none of other paths.
+/// Whether a path names a run, or a file of one.
+pub fn is_named(path: &Path) -> bool {
+    parts(path).is_some()
+}
+
+/// Whose a named run is (`gallery`, `atlas`), and its name.
+pub fn name(path: &Path) -> Option<(&str, &str)> {
+    parts(path)?.0.split_once(':')
+}
+
+/// Where a file of a named run is; none of other paths, or if nothing of that name ships with the
+/// program.
 ///
 /// # Errors
-/// That there is no such file, and what to do.
+/// That the atlas has no such file, and what to do.
 pub fn place(path: &Path) -> Option<io::Result<Place>> {
-    if let Some(text) = shipped::text(path) {
-        return Some(Ok(Place::Shipped(text)));
+    let (name, file) = parts(path)?;
+    match name.strip_prefix(atlas::PREFIX) {
+        Some(run) => Some(atlas::file(run, file).map(Place::Compressed)),
+        None => shipped::text(name, file).map(|text| Ok(Place::Shipped(text))),
     }
-    atlas::is_of_atlas(path).then(|| atlas::file(path).map(Place::Compressed))
 }
 
 /// The `run.json` of every run that a name means.
@@ -35,13 +49,8 @@ pub fn place(path: &Path) -> Option<io::Result<Place>> {
 /// # Errors
 /// What ships with the program, if there is no such run of it.
 pub fn runs(path: &Path) -> Result<Vec<PathBuf>, String> {
-    if atlas::is_of_atlas(path) { Ok(atlas::runs(path)) } else { shipped::runs(path) }
-}
-
-/// Whose a named run is (`gallery`, `atlas`), and its name.
-pub fn name(path: &Path) -> Option<(&str, &str)> {
-    let (of, run) = path.to_str().filter(|_| is_named(path))?.split_once(':')?;
-    Some((of, run.split_once(['/', '\\']).map_or(run, |(run, _)| run)))
+    let (name, _) = parts(path).expect("callers ask is_named before");
+    name.strip_prefix(atlas::PREFIX).map_or_else(|| shipped::runs(name), |run| Ok(atlas::runs(run)))
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! Runs that ship with the program. A path that begins with [`PREFIX`] names them: `gallery:zero_one-1`
 //! one, `gallery:zero_one` all of a set. Their files are read as if they lay in a folder of that name.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// How a name of shipped runs begins.
 pub const PREFIX: &str = "gallery:";
@@ -80,20 +80,8 @@ const SETS: &[Set] = &[
     ),
 ];
 
-/// The run and the file that a path names, if it begins as those of shipped runs do.
-fn parts(path: &Path) -> Option<(&str, &str)> {
-    let name = path.to_str().filter(|name| name.starts_with(PREFIX))?;
-    Some(name.split_once(['/', '\\']).unwrap_or((name, "")))
-}
-
-/// Whether a path is of a shipped run.
-pub fn is_shipped(path: &Path) -> bool {
-    parts(path).is_some()
-}
-
-/// The text of a file of a shipped run; none of other paths, or if there is no such file.
-pub fn text(path: &Path) -> Option<&'static str> {
-    let (name, file) = parts(path)?;
+/// The text of a file of the run of a name; none if there is no such run, or it has no such file.
+pub fn text(name: &str, file: &str) -> Option<&'static str> {
     let (_, files) = SETS.iter().flat_map(|(_, runs)| *runs).find(|(run, _)| *run == name)?;
     files.iter().find(|(own, _)| *own == file).map(|(_, text)| *text)
 }
@@ -102,8 +90,7 @@ pub fn text(path: &Path) -> Option<&'static str> {
 ///
 /// # Errors
 /// What there is, if there is no run of that name.
-pub fn runs(path: &Path) -> Result<Vec<PathBuf>, String> {
-    let (name, _) = parts(path).expect("callers ask is_shipped before");
+pub fn runs(name: &str) -> Result<Vec<PathBuf>, String> {
     let of_set = |(set, runs): &Set| {
         let is_whole = *set == name || name == ALL && *set != GAITS;
         runs.iter().map(|(run, _)| *run).filter(|run| is_whole || *run == name).collect::<Vec<&str>>()
@@ -126,21 +113,21 @@ mod tests {
 
     #[test]
     fn names_lead_to_runs_and_their_files() {
-        let all = runs(Path::new("gallery:all")).unwrap();
-        let set = runs(Path::new("gallery:zero_one")).unwrap();
-        let [one] = &runs(Path::new("gallery:zero_one-1")).unwrap()[..] else { panic!("one run") };
+        let all = runs("gallery:all").unwrap();
+        let set = runs("gallery:zero_one").unwrap();
+        let [one] = &runs("gallery:zero_one-1").unwrap()[..] else { panic!("one run") };
         assert!(all.len() >= set.len() && set.len() > 1 && set[0] == *one);
         for path in &all {
-            assert!(is_shipped(path) && text(path).unwrap().contains("morphcog-run"), "{}", path.display());
-            assert!(text(&path.with_file_name("audit.json")).unwrap().contains("morphcog-audit"));
-            assert_eq!(text(&path.with_file_name("nothing.json")), None);
+            let (name, file) = path.to_str().unwrap().split_once('/').unwrap();
+            assert!(text(name, file).unwrap().contains("morphcog-run"), "{}", path.display());
+            assert!(text(name, "audit.json").unwrap().contains("morphcog-audit"));
+            assert_eq!(text(name, "nothing.json"), None);
         }
-        assert!(!is_shipped(Path::new("runs/gallery:x/run.json")));
-        let error = runs(Path::new("gallery:zero")).unwrap_err();
+        let error = runs("gallery:zero").unwrap_err();
         assert!(
             error.contains("gallery:zero_one-1, gallery:four_digit, gallery:four_digit-0v123, gallery:team"),
             "{error}"
         );
-        assert_eq!(runs(Path::new(TEAM)).unwrap().len(), 45);
+        assert_eq!(runs(TEAM).unwrap().len(), 45);
     }
 }
