@@ -1253,6 +1253,28 @@ fn runs_of_the_atlas_are_read_compressed_and_leave_their_results_here() {
     sandbox.run("report -q -a atlas:tiny-1 -o report.html").ended(0, &[]);
     assert!(sandbox.read("report.html").contains("robots, 1 were audited"));
 
+    // What is audited here counts beside the verdicts that came with the run.
+    let missing = ["atlas:tiny-1/audit.json: robot", "has not been audited (1 of"];
+    sandbox.run("eval -q -a atlas:tiny-1 --robots random:2 --images 4 --physical-only").ended(3, &missing);
+    let run: serde_json::Value = serde_json::from_str(&sandbox.read("run/run.json")).unwrap();
+    let audited = sandbox.read("run/audit.json");
+    let ids = run["elites"].as_array().unwrap().iter().map(|robot| robot["id"].as_str().unwrap());
+    let all = ids.clone().count();
+    let others: Vec<&str> = ids.filter(|id| !audited.contains(id)).collect();
+    assert_eq!(others.len(), all - 1);
+    let others = others.join(",");
+    sandbox.run(&format!("audit -q -a atlas:tiny-1 --robots {others} --set least_walk=0")).ended(0, &[]);
+    sandbox.run("report -q -a atlas:tiny-1 -o all.html").ended(0, &[]);
+    assert!(sandbox.read("all.html").contains(&format!("robots, {all} were audited")));
+    let drawn = sandbox.run("eval -a atlas:tiny-1 --robots random:2 --images 4 --cycles 1 --physical-only");
+    assert!(!drawn.err.contains("has not been audited"), "{}", drawn.err);
+    sandbox.write(
+        "atlas-tiny-1-audit.json",
+        sandbox.read("atlas-tiny-1-audit.json").replace("sha256\":\"", "sha256\":\"0"),
+    );
+    let stale = ["atlas-tiny-1-audit.json: stale", "morphcog audit --archive atlas:tiny-1 audits the run"];
+    sandbox.run("eval -a atlas:tiny-1 --robots random:2 --images 4 --physical-only").ended(3, &stale);
+
     let elsewhere = |args: &str| {
         let mut command = sandbox.command(args.split_whitespace());
         command.env("MORPHCOG_ATLAS", "elsewhere");

@@ -125,7 +125,7 @@ impl Found {
     fn of(source: &Source, folder: &Path) -> Result<Self, Error> {
         let run = &source.run;
         let existing = |name: &str| Some(folder.join(name)).filter(|path| path.exists());
-        let audit = existing(AUDIT_JSON).map(|path| AuditFile::of_run(run, &path)).transpose()?;
+        let audit = existing(AUDIT_JSON).map(|_| AuditFile::of_run(run, &source.path)).transpose()?;
         let test = existing(EVAL_JSON).or(existing(EVAL_VALIDATION_JSON));
         let eval = test.map(|path| EvalFile::of_runs(&path, &[run])).transpose()?;
         Ok(Found { validated: ranking(source).unwrap_or_default(), audit, eval })

@@ -11,7 +11,7 @@ use crate::store::capacity::CapacityFile;
 use crate::store::eval::EvalFile;
 use crate::store::folder;
 use crate::store::images::ImageRef;
-use crate::store::names::{AUDIT_JSON, CAPACITY_JSON, EVAL_JSON, METRICS, TEAM_JSON};
+use crate::store::names::{CAPACITY_JSON, EVAL_JSON, METRICS, RUN_JSON, TEAM_JSON};
 use crate::store::run::{Robot, RunFile, different};
 use crate::store::team::{Member, TeamFile};
 use crate::store::whereabouts::{Whereabouts, load_dataset_of, see};
@@ -56,9 +56,9 @@ impl Findings {
         // A report of what can be read is better than none.
         let told = |error: Error| warn(&format!("{error}; left out"));
         let one = if let [run] = runs { Some(*run) } else { None };
-        let audit = existing(AUDIT_JSON)
-            .zip(one)
-            .and_then(|(path, run)| AuditFile::of_run(run, &path).map_err(told).ok());
+        let run_json = folder.join(RUN_JSON);
+        let audited = one.filter(|_| exists(&AuditFile::path(&run_json)));
+        let audit = audited.and_then(|run| AuditFile::of_run(run, &run_json).map_err(told).ok());
         let tested = existing(EVAL_JSON);
         let eval = tested.clone().and_then(|path| EvalFile::of_runs(&path, runs).map_err(told).ok());
         let is_of_it = |capacity: &CapacityFile| match (&eval, &tested) {

@@ -11,7 +11,7 @@ use crate::serve::refusal::Refusal;
 use crate::sim::Physics;
 use crate::store::audit::AuditFile;
 use crate::store::images::DatasetRef;
-use crate::store::names::{AUDIT_JSON, RUN_JSON};
+use crate::store::names::RUN_JSON;
 use crate::store::run::{Robot, RunFile};
 use crate::task::judge::Judge;
 use crate::task::protocol::Protocol;
@@ -355,9 +355,8 @@ fn trained(set: &str, name: &str) -> Result<Collection, Error> {
 
 fn archive(path: &Path, notes: &mut Vec<String>) -> Result<Collection, Error> {
     let run = RunFile::read(path)?;
-    let beside = path.with_file_name(AUDIT_JSON);
-    let audit = match exists(&beside) {
-        true => AuditFile::of_run(&run, &beside).map_err(|error| notes.push(error.message)).ok(),
+    let audit = match exists(&AuditFile::path(path)) {
+        true => AuditFile::of_run(&run, path).map_err(|error| notes.push(error.message)).ok(),
         false => None,
     };
     Ok(Collection { path: Some(path.to_path_buf()), ..of_run(run, audit.as_ref())? })

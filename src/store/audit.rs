@@ -7,6 +7,7 @@ use crate::base::table;
 use crate::config::audit::Criteria;
 use crate::config::reading;
 use crate::sim::Energy;
+use crate::store::folder;
 use crate::store::names::AUDIT_JSON;
 use crate::store::run::RunFile;
 use crate::task::perturbation::Kind;
@@ -115,19 +116,27 @@ impl AuditFile {
         reading::read_versioned(text, name, FORMAT, FORMAT_VERSION)
     }
 
-    /// The verdicts on a run, from its file.
+    /// Where the verdicts on a run are: beside its `run.json`; of a named run in the present folder,
+    /// if there are any.
+    pub fn path(run_json: &Path) -> PathBuf {
+        let made = folder::beside(run_json, AUDIT_JSON);
+        if exists(&made) { made } else { run_json.with_file_name(AUDIT_JSON) }
+    }
+
+    /// The verdicts on a run: those in the file of [`path`](AuditFile::path); of a named run also
+    /// those that came with it, by the same criteria, on other robots.
     ///
     /// # Errors
     /// If there is none, it is broken, or it is about another state of the run.
-    pub fn of_run(run: &RunFile, path: &Path) -> Result<Self, Error> {
-        let archive = path.with_file_name(crate::store::names::RUN_JSON);
-        let make = format!("morphcog audit --archive {}", archive.display());
+    pub fn of_run(run: &RunFile, run_json: &Path) -> Result<Self, Error> {
+        let path = &AuditFile::path(run_json);
+        let make = format!("morphcog audit --archive {}", folder::archive(run_json));
         if !exists(path) {
             let text =
                 format!("{}: there is no such file: these robots have not been audited", path.display());
             return Err(Error::input(text).hint(make));
         }
-        let file = AuditFile::read(path)?;
+        let mut file = AuditFile::read(path)?;
         if file.run_sha256 != run.fingerprint() {
             let text = format!(
                 "{}: stale: it is about another state of the run (SHA-256 of its content {}…, expected {}…)",
@@ -136,6 +145,13 @@ impl AuditFile {
                 hash::short(&run.fingerprint())
             );
             return Err(Error::input(text).hint(format!("{make} audits the run as it is now")));
+        }
+        let own = run_json.with_file_name(AUDIT_JSON);
+        if *path != own && exists(&own) {
+            let own = AuditFile::read(&own)?;
+            if (&own.run_sha256, &own.criteria) == (&file.run_sha256, &file.criteria) {
+                file.add(own);
+            }
         }
         Ok(file)
     }
@@ -170,10 +186,15 @@ impl AuditFile {
         let Ok(known) = AuditFile::read(path) else { return };
         let head = |file: &AuditFile| AuditFile { robots: Vec::new(), ..file.clone() };
         if head(&known) == head(self) {
-            let others = known.robots.into_iter().filter(|robot| self.robot(&robot.id).is_none());
-            let others: Vec<RobotAudit> = others.collect();
-            self.robots.extend(others);
+            self.add(known);
         }
+    }
+
+    /// Adds verdicts on other robots.
+    fn add(&mut self, known: AuditFile) {
+        let others = known.robots.into_iter().filter(|robot| self.robot(&robot.id).is_none());
+        let others: Vec<RobotAudit> = others.collect();
+        self.robots.extend(others);
     }
 
     /// What was found of a robot.

@@ -215,6 +215,14 @@ pub fn first_run(path: PathBuf) -> Result<PathBuf, String> {
     Ok(run_json(path)?.into_iter().next().expect("a path means at least one run"))
 }
 
+/// What `--archive` names a run by: its run.json; a named one by its name.
+pub fn archive(run_json: &Path) -> String {
+    match named::name(run_json) {
+        Some((of, run)) => format!("{of}:{run}"),
+        None => in_shell(run_json),
+    }
+}
+
 /// Where results of a run go if nothing is said: beside its run.json; those of a named one to the
 /// present folder.
 pub fn beside(archive: &Path, name: &str) -> PathBuf {

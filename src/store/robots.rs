@@ -3,7 +3,7 @@
 use crate::base::error::Error;
 use crate::base::random::{Purpose, stream};
 use crate::store::audit::AuditFile;
-use crate::store::names::AUDIT_JSON;
+use crate::store::folder;
 use crate::store::run::{Robot, RunFile};
 use crate::store::validation::{Validated, ranking};
 use std::path::{Path, PathBuf};
@@ -264,13 +264,13 @@ pub(crate) fn by_id<'a>(robots: &[Chosen<'a>], id: &str) -> Result<Vec<Chosen<'a
     }
 }
 
-/// The file of verdicts beside a run.
+/// The file of verdicts on a run.
 fn path(source: &Source) -> PathBuf {
-    source.path.with_file_name(AUDIT_JSON)
+    AuditFile::path(&source.path)
 }
 
 fn audits(sources: &[Source]) -> Result<Vec<AuditFile>, Error> {
-    sources.iter().map(|source| AuditFile::of_run(&source.run, &path(source))).collect()
+    sources.iter().map(|source| AuditFile::of_run(&source.run, &source.path)).collect()
 }
 
 /// Whether there are verdicts on all of them.
@@ -343,8 +343,8 @@ pub(crate) fn first_physical<'a>(
     count: usize,
 ) -> Result<Vec<(&'a Robot, Validated)>, Error> {
     let path = path(source);
-    let audit = AuditFile::of_run(&source.run, &path)?;
-    let (name, archive) = (path.display(), source.path.display());
+    let audit = AuditFile::of_run(&source.run, &source.path)?;
+    let (name, archive) = (path.display(), folder::archive(&source.path));
     let mut chosen = Vec::new();
     for task in &source.run.dimensions.tasks {
         let of_task: Vec<_> = ranked.iter().filter(|(robot, _)| robot.task == *task).collect();
