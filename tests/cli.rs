@@ -1253,7 +1253,7 @@ fn runs_of_the_atlas_are_read_compressed_and_leave_their_results_here() {
     sandbox.run("report -q -a atlas:tiny-1 -o report.html").ended(0, &[]);
     assert!(sandbox.read("report.html").contains("robots, 1 were audited"));
 
-    // What is audited here counts beside the verdicts that came with the run.
+    // An audit goes on from the verdicts that came with the run, and what it finds here counts.
     let missing = ["atlas:tiny-1/audit.json: robot", "has not been audited (1 of"];
     sandbox.run("eval -q -a atlas:tiny-1 --robots random:2 --images 4 --physical-only").ended(3, &missing);
     let run: serde_json::Value = serde_json::from_str(&sandbox.read("run/run.json")).unwrap();

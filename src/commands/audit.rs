@@ -15,6 +15,7 @@ use crate::data::dataset::Split;
 use crate::search::training::Training;
 use crate::sim::{Energy, System};
 use crate::store::audit::{AuditFile, PerturbedRollout, RobotAudit};
+use crate::store::folder;
 use crate::store::folder::check_out;
 use crate::store::names::AUDIT_JSON;
 use crate::store::robots;
@@ -100,7 +101,7 @@ struct Trial {
 }
 
 /// Audits robots. What an earlier audit of the same robots by the same criteria found is kept and
-/// not done again; the file is the same bytes however often it was stopped.
+/// not done again, at the usual place also what came with a named run; the file is the same bytes however often it was stopped.
 ///
 /// # Errors
 /// What is wrong with archive, data, selection or criteria.
@@ -124,6 +125,12 @@ pub fn audit(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> R
         return Err(Error::input(text).hint(hint));
     }
     file.add_known(&options.out);
+    if let Source::Archive(path) = &options.source
+        && options.out == folder::beside(path, AUDIT_JSON)
+    {
+        // What came with a named run; of another run this is the same file.
+        file.add_known(&path.with_file_name(AUDIT_JSON));
+    }
     let asked = subjects.iter().map(|subject| subject.id.clone()).collect();
     let open: Vec<Subject> =
         subjects.into_iter().filter(|subject| file.robot(&subject.id).is_none()).collect();

@@ -123,8 +123,7 @@ impl AuditFile {
         if exists(&made) { made } else { run_json.with_file_name(AUDIT_JSON) }
     }
 
-    /// The verdicts on a run: those in the file of [`path`](AuditFile::path); of a named run also
-    /// those that came with it, by the same criteria, on other robots.
+    /// The verdicts on a run, from the file of [`path`](AuditFile::path).
     ///
     /// # Errors
     /// If there is none, it is broken, or it is about another state of the run.
@@ -136,7 +135,7 @@ impl AuditFile {
                 format!("{}: there is no such file: these robots have not been audited", path.display());
             return Err(Error::input(text).hint(make));
         }
-        let mut file = AuditFile::read(path)?;
+        let file = AuditFile::read(path)?;
         if file.run_sha256 != run.fingerprint() {
             let text = format!(
                 "{}: stale: it is about another state of the run (SHA-256 of its content {}…, expected {}…)",
@@ -145,13 +144,6 @@ impl AuditFile {
                 hash::short(&run.fingerprint())
             );
             return Err(Error::input(text).hint(format!("{make} audits the run as it is now")));
-        }
-        let own = run_json.with_file_name(AUDIT_JSON);
-        if *path != own && exists(&own) {
-            let own = AuditFile::read(&own)?;
-            if (&own.run_sha256, &own.criteria) == (&file.run_sha256, &file.criteria) {
-                file.add(own);
-            }
         }
         Ok(file)
     }
@@ -186,15 +178,10 @@ impl AuditFile {
         let Ok(known) = AuditFile::read(path) else { return };
         let head = |file: &AuditFile| AuditFile { robots: Vec::new(), ..file.clone() };
         if head(&known) == head(self) {
-            self.add(known);
+            let others = known.robots.into_iter().filter(|robot| self.robot(&robot.id).is_none());
+            let others: Vec<RobotAudit> = others.collect();
+            self.robots.extend(others);
         }
-    }
-
-    /// Adds verdicts on other robots.
-    fn add(&mut self, known: AuditFile) {
-        let others = known.robots.into_iter().filter(|robot| self.robot(&robot.id).is_none());
-        let others: Vec<RobotAudit> = others.collect();
-        self.robots.extend(others);
     }
 
     /// What was found of a robot.
