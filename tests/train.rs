@@ -207,6 +207,10 @@ fn evolve_with_train_ends_with_the_robot_that_train_makes_of_its_gaits() {
     let said = sandbox.run("evolve -c gaits.toml --train --replay -o runs/one").ended(0, &["training in"]);
     let robot = sandbox.run_file("runs/one-0v1").elites[0].clone();
     assert!(said.out.contains(&robot.id), "{said:?}");
+    // It says how far it is in every step.
+    for step in ["response: 24/24 rollouts", "round 1 of 1: 8/8 rollouts", "refining: 2/2 challengers"] {
+        assert!(said.err.contains(step), "{step}: {}", said.err);
+    }
     assert!(sandbox.path(&format!("runs/one-0v1/replay-{}.gif", robot.id)).exists());
     assert!(sandbox.path("runs/one-0v1/audit.json").exists());
     sandbox.run("train -q -a runs/one --task 0|1 -o by_hand").ended(0, &[]);

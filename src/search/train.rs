@@ -7,7 +7,7 @@
 use crate::base::error::Error;
 use crate::base::files::{exists, read_text, write_atomically};
 use crate::base::hash::sha256_hex;
-use crate::base::observer::Observer;
+use crate::base::observer::{Observer, Work};
 use crate::base::threads::pool;
 use crate::base::{Grid, number};
 use crate::body::Body;
@@ -38,9 +38,9 @@ use crate::task::perturbation::Condition;
 use crate::task::protocol::{Protocol, RolloutMode};
 use crate::task::refine::Challenge;
 use crate::task::response::{Example, Gait, Response};
-use crate::task::teach::{FINALISTS, Image, Plan, Rollouts, Round, Taught, Teacher};
+use crate::task::teach::{Image, Plan, Rollouts, Round, Taught, Teacher};
 use std::path::PathBuf;
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
 /// How often the rollouts are saved. A power cut costs as much.
@@ -146,7 +146,7 @@ pub fn train(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> R
         write_atomically(&path, content).map_err(|error| Error::writing(&path, &error))
     };
     let key = key(&config, source.run.config.seed, &walkers, &training);
-    let mut log = Log::open(log, key, stop)?;
+    let mut log = Log::open(log, key, stop, observer)?;
     write(CONFIG, config.to_toml().as_bytes())?;
     whereabouts::remember(&folder, &dataset)?;
     let pool = pool(options.threads)?;
@@ -294,11 +294,19 @@ struct Log<'a> {
     /// Rollouts in them.
     simulated: usize,
     saved: (usize, Instant),
+    /// Rollouts of the work that began last; none if others are counted than rollouts.
+    done: Option<AtomicU64>,
     stop: &'a AtomicBool,
+    observer: &'a dyn Observer,
 }
 
 impl<'a> Log<'a> {
-    fn open(path: PathBuf, key: String, stop: &'a AtomicBool) -> Result<Self, Error> {
+    fn open(
+        path: PathBuf,
+        key: String,
+        stop: &'a AtomicBool,
+        observer: &'a dyn Observer,
+    ) -> Result<Self, Error> {
         let mut batches = Vec::new();
         if path.exists() {
             let text = read_text(&path).map_err(|error| Error::reading(&path, &error))?;
@@ -317,7 +325,25 @@ impl<'a> Log<'a> {
             batches = file.rollouts;
         }
         let saved = (batches.len(), Instant::now());
-        Ok(Log { path, key, batches, asked: 0, simulated: 0, saved, stop })
+        Ok(Log { path, key, batches, asked: 0, simulated: 0, saved, done: None, stop, observer })
+    }
+
+    /// Work begins whose rollouts are counted.
+    fn begins(&mut self, label: String, rollouts: usize) {
+        self.observer.begins(&Work::new(label, rollouts as u64, "rollouts"));
+        self.done = Some(AtomicU64::new(0));
+    }
+
+    /// Work begins of which each challenger is told by itself.
+    fn begins_challenges(&mut self, challengers: usize) {
+        self.observer.begins(&Work::new("refining:".to_string(), challengers as u64, "challengers"));
+        self.done = None;
+    }
+
+    fn rolled(&self, count: u64) {
+        if let Some(done) = &self.done {
+            self.observer.progress(done.fetch_add(count, Ordering::Relaxed) + count);
+        }
     }
 
     /// Rollouts of a body under stimuli and conditions; the first are `known`.
@@ -333,7 +359,10 @@ impl<'a> Log<'a> {
         self.simulated += stimuli.len();
         if let Some(batch) = self.batches.get(number) {
             return match batch.len() == stimuli.len() {
-                true => Ok(batch.clone()),
+                true => {
+                    self.rolled(batch.len() as u64);
+                    Ok(batch.clone())
+                }
                 false => {
                     let text = format!(
                         "{}: rollouts {number}: expected {}, found {}",
@@ -348,7 +377,9 @@ impl<'a> Log<'a> {
         let setting = (&config.physics, &config.protocol);
         let known = &known[..known.len().min(stimuli.len())];
         let (stimuli, conditions) = (&stimuli[known.len()..], &conditions[known.len()..]);
-        let found = fresh_rollouts(body, stimuli, conditions, setting, &|_| (), self.stop);
+        self.rolled(known.len() as u64);
+        let told = |count| self.rolled(count);
+        let found = fresh_rollouts(body, stimuli, conditions, setting, &told, self.stop);
         let (found, _) = found.map_err(|_| {
             Error::stopped("stopped; what was simulated is saved".to_string())
                 .hint("the same command with --resume goes on".to_string())
@@ -464,11 +495,15 @@ impl Trainer<'_> {
         let Trainer { config, probing, .. } = self;
         let mut best: Option<(&Walker, Teacher)> = None;
         for (walker, measured) in walkers.iter().zip(&self.measured) {
-            let gait = &walker.gait;
+            let (gait, robot) = (&walker.gait, &walker.robot.id);
+            log.begins(format!("{robot}: response:"), self.config.train.random_images);
             let Some(response) = self.response(gait, measured, log)? else { continue };
             told_response(observer, &walker.robot.id, gait, &response);
             let mut teacher = Teacher::new(gait, &response, self.images(gait), plan, &config.physics);
             let conditions = probing.conditions();
+            let what =
+                if plan.rounds == 0 { "as it is".to_string() } else { format!("round 1 of {}", plan.rounds) };
+            log.begins(format!("{robot}: {what}:"), plan.images);
             let mut rollouts = Kept { config, conditions, log };
             if plan.rounds == 0 {
                 let fitness = teacher.own(&mut rollouts)?;
@@ -486,11 +521,16 @@ impl Trainer<'_> {
             return Err(Error::input(text.to_string()).hint("choose others with --robots".to_string()));
         };
         let mut rollouts = Kept { config, conditions: probing.conditions(), log };
-        for _ in 1..plan.rounds {
+        for round in 1..plan.rounds {
+            rollouts
+                .log
+                .begins(format!("{}: round {} of {}:", walker.robot.id, round + 1, plan.rounds), plan.images);
             let round = teacher.round(&mut rollouts)?;
             told_round(observer, &walker.robot.id, &round, &plan);
         }
-        let told = |challenge: &Challenge| told_challenge(observer, challenge, &plan);
+        let challengers = teacher.challengers();
+        rollouts.log.begins_challenges(challengers);
+        let told = |challenge: &Challenge| told_challenge(observer, challenge, challengers);
         Ok((walker, teacher.finish(&mut rollouts, told)?))
     }
 }
@@ -522,16 +562,14 @@ fn told_round(observer: &dyn Observer, robot: &str, round: &Round, plan: &Plan) 
     );
 }
 
-fn told_challenge(observer: &dyn Observer, challenge: &Challenge, plan: &Plan) {
+fn told_challenge(observer: &dyn Observer, challenge: &Challenge, challengers: usize) {
     let Challenge { number, other_gait, shown, fitness, won } = challenge;
     let what = if *other_gait { "another gait" } else { "other sensors" };
     if *won {
         let fitness = number::fixed(*fitness, 3);
-        observer.note(&format!(
-            "challenger {number} of up to {}: {what}: fitness {fitness}",
-            plan.challengers + FINALISTS - 1
-        ));
+        observer.note(&format!("challenger {number} of {challengers}: {what}: fitness {fitness}"));
     }
+    observer.progress(*number as u64);
     observer.finding(
         "challenge",
         &serde_json::json!({

@@ -28,7 +28,7 @@ const CHANGED: f64 = 0.15;
 
 /// Designs that are compared when refining begins: that of the last solution, and those of the
 /// rounds before.
-pub const FINALISTS: usize = 4;
+const FINALISTS: usize = 4;
 
 /// Challengers that are compared on the same images. With more, they win by chance on these; with
 /// fewer, showing the champion other images costs more.
@@ -285,12 +285,7 @@ impl<'a> Teacher<'a> {
         rollouts: &mut R,
         mut told: impl FnMut(&Challenge),
     ) -> Result<Taught, R::Error> {
-        let mut finalists: Vec<Design> = Vec::new();
-        for design in self.earlier.iter().rev() {
-            if finalists.len() < FINALISTS && *design != self.design && !finalists.contains(design) {
-                finalists.push(design.clone());
-            }
-        }
+        let finalists = self.finalists();
         let body = self.gait.built(&self.design);
         let cell = |(row, column): &(usize, usize)| row * body.width() + column;
         let cells: Vec<usize> = self.gait.places().iter().map(cell).collect();
@@ -324,6 +319,22 @@ impl<'a> Teacher<'a> {
             side: self.side,
             rollouts: self.rollouts + refinement.rollouts(),
         })
+    }
+
+    /// How many bodies will challenge the design: those before it, and the challengers of the plan.
+    pub fn challengers(&self) -> usize {
+        self.finalists().len() + self.plan.challengers
+    }
+
+    /// The designs before the latest that challenge it first, the last of them first.
+    fn finalists(&self) -> Vec<Design> {
+        let mut finalists: Vec<Design> = Vec::new();
+        for design in self.earlier.iter().rev() {
+            if finalists.len() < FINALISTS && *design != self.design && !finalists.contains(design) {
+                finalists.push(design.clone());
+            }
+        }
+        finalists
     }
 
     /// Training images to compare bodies on, by their numbers, and as they are shown: of both

@@ -29,11 +29,11 @@ pub fn confusion(file: &TeamFile) -> Option<Figure> {
         file.images.len(),
         file.split
     );
-    let top = heading(&mut canvas, "Answers of the team", &of, COLUMN) + 4.0 + 2.0 * TEXT;
+    let top = heading(&mut canvas, "Answers of the team", &of, COLUMN) + 8.0 + 2.0 * TEXT;
     let left = MARGIN + 3.0 * TEXT;
     let side = (COLUMN - MARGIN - left) / count as f64;
     let middle = left + side * count as f64 / 2.0;
-    canvas.text([middle, top - 1.3 * TEXT], "answer", Words::middle());
+    canvas.text([middle, top - 1.7 * TEXT], "answer", Words::middle());
     let at = [MARGIN + TEXT, top + side * count as f64 / 2.0];
     canvas.text(at, "class", Words { upwards: true, ..Words::middle() });
     for (row, class) in file.classes.iter().enumerate() {
