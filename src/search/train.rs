@@ -196,7 +196,7 @@ pub(crate) fn config_of(
         data: DataConfig { train_images: None, ..of_walkers.data.clone() },
         protocol: Protocol { rollout: RolloutMode::Fresh, ..of_walkers.protocol.clone() },
         evaluation,
-        validation: ValidationConfig { best: 1, ..ValidationConfig::default() },
+        validation: ValidationConfig { best: 1, ..of_walkers.validation },
         ..of_walkers.clone()
     };
     reading::changed(base, set, |config: &Config| config.validate(), |error| error)
