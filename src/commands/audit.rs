@@ -101,7 +101,8 @@ struct Trial {
 }
 
 /// Audits robots. What an earlier audit of the same robots by the same criteria found is kept and
-/// not done again, at the usual place also what came with a named run; the file is the same bytes however often it was stopped.
+/// not done again, at the usual place also what came with a named run; the file is the same bytes
+/// however often it was stopped.
 ///
 /// # Errors
 /// What is wrong with archive, data, selection or criteria.

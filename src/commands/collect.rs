@@ -7,7 +7,7 @@ use crate::commands::tasks::{Place, Status, Task};
 use crate::store::audit::AuditFile;
 use crate::store::eval::EvalFile;
 use crate::store::images::HeldOut;
-use crate::store::names::{AUDIT_JSON, EVAL_JSON, EVAL_VALIDATION_JSON, METRICS, RUN_JSON};
+use crate::store::names::{EVAL_JSON, EVAL_VALIDATION_JSON, METRICS, RUN_JSON};
 use crate::store::robots::Source;
 use crate::store::run::RunFile;
 use crate::store::task::State;
@@ -125,7 +125,7 @@ impl Found {
     fn of(source: &Source, folder: &Path) -> Result<Self, Error> {
         let run = &source.run;
         let existing = |name: &str| Some(folder.join(name)).filter(|path| path.exists());
-        let audit = existing(AUDIT_JSON).map(|_| AuditFile::of_run(run, &source.path)).transpose()?;
+        let audit = AuditFile::if_any(run, &source.path)?;
         let test = existing(EVAL_JSON).or(existing(EVAL_VALIDATION_JSON));
         let eval = test.map(|path| EvalFile::of_runs(&path, &[run])).transpose()?;
         Ok(Found { validated: ranking(source).unwrap_or_default(), audit, eval })

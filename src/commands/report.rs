@@ -56,9 +56,8 @@ impl Findings {
         // A report of what can be read is better than none.
         let told = |error: Error| warn(&format!("{error}; left out"));
         let one = if let [run] = runs { Some(*run) } else { None };
-        let run_json = folder.join(RUN_JSON);
-        let audited = one.filter(|_| exists(&AuditFile::path(&run_json)));
-        let audit = audited.and_then(|run| AuditFile::of_run(run, &run_json).map_err(told).ok());
+        let audit =
+            one.and_then(|run| AuditFile::if_any(run, &folder.join(RUN_JSON)).map_err(told).ok()).flatten();
         let tested = existing(EVAL_JSON);
         let eval = tested.clone().and_then(|path| EvalFile::of_runs(&path, runs).map_err(told).ok());
         let is_of_it = |capacity: &CapacityFile| match (&eval, &tested) {

@@ -334,6 +334,14 @@ impl<'a> Log<'a> {
         self.done = Some(AtomicU64::new(0));
     }
 
+    /// A round begins, or, where there are none, the look at the robot as it is.
+    fn begins_round(&mut self, robot: &str, number: usize, plan: &Plan) {
+        match plan.rounds {
+            0 => self.begins(format!("{robot}: as it is:"), plan.images),
+            rounds => self.begins(format!("{robot}: round {number} of {rounds}:"), plan.images),
+        }
+    }
+
     /// Work begins of which each challenger is told by itself.
     fn begins_challenges(&mut self, challengers: usize) {
         self.observer.begins(&Work::new("refining:".to_string(), challengers as u64, "challengers"));
@@ -501,9 +509,7 @@ impl Trainer<'_> {
             told_response(observer, &walker.robot.id, gait, &response);
             let mut teacher = Teacher::new(gait, &response, self.images(gait), plan, &config.physics);
             let conditions = probing.conditions();
-            let what =
-                if plan.rounds == 0 { "as it is".to_string() } else { format!("round 1 of {}", plan.rounds) };
-            log.begins(format!("{robot}: {what}:"), plan.images);
+            log.begins_round(robot, 1, &plan);
             let mut rollouts = Kept { config, conditions, log };
             if plan.rounds == 0 {
                 let fitness = teacher.own(&mut rollouts)?;
@@ -521,10 +527,8 @@ impl Trainer<'_> {
             return Err(Error::input(text.to_string()).hint("choose others with --robots".to_string()));
         };
         let mut rollouts = Kept { config, conditions: probing.conditions(), log };
-        for round in 1..plan.rounds {
-            rollouts
-                .log
-                .begins(format!("{}: round {} of {}:", walker.robot.id, round + 1, plan.rounds), plan.images);
+        for number in 2..=plan.rounds {
+            rollouts.log.begins_round(&walker.robot.id, number, &plan);
             let round = teacher.round(&mut rollouts)?;
             told_round(observer, &walker.robot.id, &round, &plan);
         }

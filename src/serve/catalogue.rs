@@ -2,7 +2,6 @@
 
 use crate::analysis::gallery;
 use crate::base::error::Error;
-use crate::base::files::exists;
 use crate::base::shipped;
 use crate::body::{Body, VoxelCounts};
 use crate::config::Config;
@@ -355,10 +354,10 @@ fn trained(set: &str, name: &str) -> Result<Collection, Error> {
 
 fn archive(path: &Path, notes: &mut Vec<String>) -> Result<Collection, Error> {
     let run = RunFile::read(path)?;
-    let audit = match exists(&AuditFile::path(path)) {
-        true => AuditFile::of_run(&run, path).map_err(|error| notes.push(error.message)).ok(),
-        false => None,
-    };
+    let audit = AuditFile::if_any(&run, path).unwrap_or_else(|error| {
+        notes.push(error.message);
+        None
+    });
     Ok(Collection { path: Some(path.to_path_buf()), ..of_run(run, audit.as_ref())? })
 }
 

@@ -148,6 +148,17 @@ impl AuditFile {
         Ok(file)
     }
 
+    /// The verdicts on a run; none if it has not been audited.
+    ///
+    /// # Errors
+    /// If they are broken, or about another state of the run.
+    pub fn if_any(run: &RunFile, run_json: &Path) -> Result<Option<Self>, Error> {
+        match exists(&AuditFile::path(run_json)) {
+            true => AuditFile::of_run(run, run_json).map(Some),
+            false => Ok(None),
+        }
+    }
+
     /// The verdicts on a run with this fingerprint, from an audit in a folder or in a folder in it.
     ///
     /// # Errors
