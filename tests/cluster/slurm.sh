@@ -42,12 +42,15 @@ EOF
     sleep 0.5
   done
   sinfo -h -o %T | grep -q idle || { tail -20 slurmctld.log slurmd.log; exit 1; }
-  # Waits until no job is left; those that wait for their turn after a requeue are told not to.
+  # Waits until no job is left. A requeued job would wait two minutes; it is told not to, but only after some seconds: a node
+  # refuses a job for the second in which it revoked the job's last credential ("already killed, do not launch").
   finished() {
-    for _ in $(seq "$1"); do
-      squeue -h -t PENDING -o %A | while read -r job; do scontrol update "JobId=$job" StartTime=now 2> /dev/null || true; done
+    local end=$((SECONDS + $1)) pending
+    while [ "$SECONDS" -lt "$end" ]; do
       if [ -z "$(squeue -h)" ]; then return 0; fi
-      sleep 1
+      pending=$(squeue -h -t PENDING -o %A)
+      sleep 3
+      for job in $pending; do scontrol update "JobId=$job" StartTime=now 2> /dev/null || true; done
     done
     squeue
     return 1
