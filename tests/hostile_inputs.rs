@@ -26,9 +26,10 @@ use morphcog::store::folder::IfExists;
 use morphcog::store::images::HeldOut;
 use morphcog::store::robots::Selection;
 use morphcog::store::run::RunFile;
+use morphcog::store::team::TeamFile;
 use morphcog::view::console::{Console, Mode};
 use morphcog::view::figures::{self, Kind, Wanted};
-use morphcog::view::plot::Background;
+use morphcog::view::plot::{Background, confusion, poster};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::io::{self, Read, Write};
@@ -72,13 +73,14 @@ parents = 3
 /// What a kind of input is put to.
 type Target = (&'static str, fn(&World, &mut Dice, &mut Case));
 
-const TARGETS: [Target; 9] = [
+const TARGETS: [Target; 10] = [
     ("scenario", scenario),
     ("run", run),
     ("config", config),
     ("eval", evaluation),
     ("audit", audit),
     ("capacity", capacity),
+    ("team", team),
     ("metrics", metrics),
     ("checkpoint", checkpoint),
     ("request", request),
@@ -146,6 +148,9 @@ impl World {
         sandbox.run("eval -q --archive run/run.json --images 2 --cycles 1 --robots top:2").ended(0, &[]);
         let audit = "audit -q --archive run/run.json --robots top:2 --set perturbations.time_step=[2]";
         sandbox.run(audit).ended(0, &[]);
+        sandbox
+            .run("team -q --archive run/run.json --classes 0,1 --images 4 --out run/team.json")
+            .ended(0, &[]);
         let networks = "--set trainings=1 --set sizes=[1,3] --set networks=[\"mlp\"]";
         sandbox.run(&format!("capacity -q --eval run/eval.json {networks}")).ended(0, &[]);
         let scenario = json!({
@@ -170,6 +175,7 @@ impl World {
             ("eval", "run/eval.json"),
             ("audit", "run/audit.json"),
             ("capacity", "run/capacity.json"),
+            ("team", "run/team.json"),
             ("metrics", "run/metrics.csv"),
             ("checkpoint", "run/checkpoint.json"),
         ] {
@@ -335,6 +341,16 @@ fn capacity(world: &World, dice: &mut Dice, case: &mut Case) {
     case.input = world.json("capacity", dice);
     let folder = world.with("capacity.json", &case.input);
     world.plot(case, Kind::Capacity, &folder.join("capacity.json"), "capacity.json");
+}
+
+/// What a report shows of a team.
+fn team(world: &World, dice: &mut Dice, case: &mut Case) {
+    case.input = world.json("team", dice);
+    let folder = world.with("team.json", &case.input);
+    if let Some(file) = case.check(TeamFile::read(&folder.join("team.json")), "team.json") {
+        let (is_decided, has_robots) = (file.answers.is_some(), !file.members.is_empty());
+        assert_eq!((confusion(&file).is_some(), poster(&file).is_some()), (is_decided, has_robots));
+    }
 }
 
 fn metrics(world: &World, dice: &mut Dice, case: &mut Case) {

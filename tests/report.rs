@@ -173,6 +173,31 @@ fn its_commands_make_it_again() {
 }
 
 #[test]
+fn a_training_is_told_as_one_and_its_command_trains() {
+    let sandbox = Sandbox::new();
+    sandbox.run("report -q -a gallery:zero_one-1 --rollouts 0 -o page.html").ended(0, &[]);
+    let page = sandbox.read("page.html");
+    assert!(page.contains("was trained with morphcog") && !page.contains("for 1 generations"));
+    let commands = between(&page, "<pre># GAITS: run ", "</pre>")[0];
+    let command = commands.lines().nth(1).unwrap().replace("&#39;", "'").replace("&amp;", "&");
+    assert!(
+        command.starts_with("morphcog train --archive GAITS --task '0|1' --seed 1 --robots "),
+        "{command}"
+    );
+    // All of its flags are understood; it ends at the archive.
+    let line = command.replace("morphcog", common::program::PROGRAM);
+    let ended = std::process::Command::new("sh").args(["-c", &line]).current_dir(sandbox.path("")).output();
+    let said = String::from_utf8(ended.unwrap().stderr).unwrap();
+    assert!(said.contains("error: GAITS"), "{said}");
+    // Of an evolution without a config.toml beside it, the config is in the run.
+    sandbox.write("tiny.toml", common::program::TINY);
+    sandbox.run("evolve -q -c tiny.toml -o run").ended(0, &[]);
+    std::fs::remove_file(sandbox.path("run/config.toml")).unwrap();
+    sandbox.run("report -q run --rollouts 0 -o page.html").ended(0, &[]);
+    assert!(sandbox.read("page.html").contains("# CONFIG: the key &quot;config&quot; of run/run.json"));
+}
+
+#[test]
 fn what_is_no_run_is_refused() {
     let sandbox = sandbox();
     sandbox.run("report nowhere").ended(3, &["nowhere"]);

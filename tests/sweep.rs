@@ -176,6 +176,45 @@ fn a_changed_plan_keeps_what_is_done_and_refuses_other_settings_with_their_keys(
 }
 
 #[test]
+fn a_test_of_physical_robots_is_done_again_if_others_are_physical_now() {
+    let sandbox = sandbox();
+    let plan = PLAN.replace("[1, 2]", "[1]").replace("[4, 8]", "[4]");
+    sandbox.write("plan.toml", plan.split("[eval]").next().unwrap());
+    sandbox.run("sweep plan.toml --out all -q").ended(0, &[]);
+    // Verdicts as they might be.
+    let path = "all/tiny-parents=4-seed1/audit.json";
+    let judged = |ids: &[String]| {
+        let mut audit: serde_json::Value = serde_json::from_str(&sandbox.read(path)).unwrap();
+        for robot in audit["robots"].as_array_mut().unwrap() {
+            let is_physical = ids.iter().any(|id| robot["id"] == id.as_str());
+            robot["verdict"] = if is_physical { "physical" } else { "fragile" }.into();
+        }
+        sandbox.write(path, audit.to_string());
+    };
+    sandbox.write("plan.toml", plan.replace("images = 20", "images = 20\nphysical_only = true"));
+    let tested = || {
+        sandbox.run("sweep plan.toml --out all -q").ended(0, &[]);
+        let text = sandbox.read("all/tiny-parents=4-seed1/eval.json");
+        let eval: serde_json::Value = serde_json::from_str(&text).unwrap();
+        let robots = eval["robots"].as_array().unwrap().iter();
+        robots.map(|robot| robot["id"].as_str().unwrap().to_string()).collect::<Vec<_>>()
+    };
+    let robots = sandbox.run_file("all/tiny-parents=4-seed1").elites;
+    let ids: Vec<String> = robots.into_iter().take(4).map(|robot| robot.id).collect();
+    judged(&ids[..2]);
+    let mut before = tested();
+    before.sort_by_key(|id| ids.iter().position(|other| other == id));
+    assert_eq!(before, ids[..2]);
+    judged(&ids[1..3]);
+    // Something is still to do, as after a kill.
+    let task = "all/tiny-parents=4-seed1/task.json";
+    sandbox.write(task, sandbox.read(task).replace("\"done\"", "\"stopped\""));
+    let mut after = tested();
+    after.sort_by_key(|id| ids.iter().position(|other| other == id));
+    assert_eq!(after, ids[1..3]);
+}
+
+#[test]
 fn a_task_that_fails_does_not_stop_the_others_and_is_tried_again() {
     let sandbox = sandbox();
     let broken = sandbox.path("all").join(TASKS[1]);
@@ -265,6 +304,16 @@ fn what_was_found_is_collected_in_one_table_and_figures() {
         assert!(text.contains("parents=4") && text.contains("parents=8"), "{figure}");
     }
     assert!(sandbox.read("all/sweep-progress.svg").contains("2 seeds"));
+    // What is of another state of a run is left out, and the rest is there.
+    let before = sandbox.read("all/tiny-parents=4-seed1/run.json");
+    sandbox
+        .run("evolve -q -c all/tiny-parents=4-seed1/config.toml -o all/tiny-parents=4-seed1 --resume -g 30");
+    assert_ne!(sandbox.read("all/tiny-parents=4-seed1/run.json"), before);
+    sandbox
+        .run("sweep plan.toml --out all --collect")
+        .ended(0, &["audit.json: stale", "eval.json: stale", "left out"]);
+    let table = sandbox.read("all/sweep.csv");
+    assert_eq!(table.lines().count(), 5);
     // So they are in plot.
     let archives = TASKS.map(|task| format!("all/{task}")).join(" ");
     let said = sandbox.run(&format!("plot progress -a {archives} -o together.svg")).ended(0, &[]);

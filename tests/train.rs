@@ -151,6 +151,16 @@ fn without_rounds_the_fittest_robot_is_refined_as_it_is() {
         (run.elites[0].body.clone(), run.elites[0].parent.clone())
     };
     assert_eq!(train(0, "own"), (fittest.body.clone(), Some(fittest.id.clone())));
+    // In whichever order they are named.
+    let mut named: Vec<String> =
+        sandbox.run_file("walkers").elites.into_iter().map(|robot| robot.id).collect();
+    named.sort_by_key(|id| *id == fittest.id);
+    let last = format!(
+        "train -q -a walkers --task 3|14 --robots {} {LITTLE} --set train.rounds=0 --set train.challengers=0 -o last",
+        named.join(",")
+    );
+    sandbox.run(&last).ended(0, &[]);
+    assert_eq!(sandbox.run_file("last").elites[0].parent, Some(fittest.id.clone()));
     // One that is beaten is another.
     let (body, parent) = train(40, "refined");
     assert!(body != fittest.body && parent.as_ref() == Some(&fittest.id));
@@ -170,7 +180,15 @@ fn what_cannot_be_trained_is_one_clear_error_and_writes_nothing() {
     refused("--task 3|10,11", 3, &["class 10", "found 0"]);
     refused("--task 0|1 --set train.images=1", 3, &["train.images = 1", "--set"]);
     refused("--task 0|1 --set train.random_images=5", 3, &["train.random_images = 5"]);
+    refused(
+        "--task 0|1 --set train.random_images=1000000000000000000",
+        3,
+        &["train.random_images", "100000"],
+    );
+    refused("--task 0|1 --set train.perturbations.start=101", 3, &["train.perturbations.start", "100"]);
     refused("--task 0|1 --set train.round=5", 2, &["rounds"]);
+    let deep = "train.".repeat(10_000);
+    refused(&format!("--task 0|1 --set {deep}rounds=1"), 2, &["at most 16 parts"]);
     refused("--task 0|1 --set validation.images=100000", 3, &["100000"]);
     refused("--task 0|1 --robots nobody", 3, &["nobody"]);
     // One that no image can move.
@@ -186,10 +204,18 @@ fn what_cannot_be_trained_is_one_clear_error_and_writes_nothing() {
     let said = said.ended(3, &["blind/run.json", "soft voxel or a sensor", "--robots"]);
     assert_eq!(said.err.matches("error:").count(), 1, "{said:?}");
     assert!(!sandbox.path("refused").exists());
-    sandbox.run("train -q -a walkers --task 0|1 -o walkers").ended(5, &["--out"]);
+    sandbox.run("train -q -a walkers --task 0|1 -o walkers").ended(2, &["--out walkers", "another folder"]);
+    sandbox.run("train -q -a blind --task 0|1 -o walkers").ended(3, &["soft voxel"]);
     // A run and a training do not go on with each other.
     let before = files(&sandbox.path("walkers"));
     sandbox.run("train -q -a walkers --task 0|1 -o walkers --resume").ended(5, &["no training"]);
+    assert_eq!(files(&sandbox.path("walkers")), before);
+    // Nor does it replace its own gaits, by whichever name.
+    for out in ["walkers", "./walkers", "walkers/../walkers/"] {
+        sandbox
+            .run(&format!("train -q -a walkers --task 0|1 -o {out} --force"))
+            .ended(2, &["another folder"]);
+    }
     assert_eq!(files(&sandbox.path("walkers")), before);
     std::fs::write(sandbox.path("walkers").join("training.json"), "{}").unwrap();
     sandbox.run("evolve -q -c run.toml -o walkers --resume").ended(5, &["is a training", "train --resume"]);
@@ -220,4 +246,9 @@ fn evolve_with_train_ends_with_the_robot_that_train_makes_of_its_gaits() {
     sandbox.run("evolve -q -c gaits.toml --train -o runs/one").ended(5, &["runs/one"]);
     sandbox.run("evolve -q -c gaits.toml --train -o runs/one --resume").ended(0, &[]);
     assert_eq!(files(&sandbox.path("runs/one-0v1"))["run.json"], before);
+    // That the folder of the training is taken is known before gaits evolve.
+    std::fs::create_dir(sandbox.path("other")).unwrap();
+    std::fs::rename(sandbox.path("runs/one-0v1"), sandbox.path("other/two-0v1")).unwrap();
+    sandbox.run("evolve -q -c gaits.toml --train -o other/two").ended(5, &["other/two-0v1"]);
+    assert!(!sandbox.path("other/two").exists());
 }

@@ -9,6 +9,7 @@ use crate::base::observer::{Observer, Work};
 use crate::base::stop::{Stopped, check};
 use crate::base::threads::pool;
 use crate::body::Body;
+use crate::config::train::MOST_RANDOM_IMAGES;
 use crate::config::{Config, MAX_NUMBER};
 use crate::data::dataset::{Dataset, DatasetError, Split};
 use crate::search::probing;
@@ -36,9 +37,6 @@ use std::sync::atomic::AtomicBool;
 /// under each of six conditions. Larger ones overshoot what is needed; smaller ones leave cores
 /// idle at their ends.
 pub const BATCH: usize = 60;
-
-/// Most rollouts of a robot that can be asked for.
-pub const MOST_IMAGES: usize = 100_000;
 
 /// Most training images of a class by which a task is known. More cost time, and hardly narrow the
 /// interval of what could be taught.
@@ -184,8 +182,8 @@ pub fn measure(options: &Options, stop: &AtomicBool, observer: &dyn Observer) ->
 
 fn check_numbers(options: &Options) -> Result<(), Error> {
     let Options { images, error, seed, .. } = options;
-    if !(BATCH..=MOST_IMAGES).contains(images) {
-        let text = format!("--images {images}: expected {BATCH} to {MOST_IMAGES} random images");
+    if !(BATCH..=MOST_RANDOM_IMAGES).contains(images) {
+        let text = format!("--images {images}: expected {BATCH} to {MOST_RANDOM_IMAGES} random images");
         return Err(Error::usage(text).hint("with fewer, no slope is known".to_string()));
     }
     if !(0.0..1.0).contains(error) {

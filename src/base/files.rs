@@ -44,9 +44,17 @@ pub fn exists(path: &Path) -> bool {
 /// # Errors
 /// What the system says, as when the folder does not exist; the file is then as it was.
 pub fn write_atomically(path: &Path, content: &[u8]) -> io::Result<()> {
+    write_whole(path, |file| file.write_all(content))
+}
+
+/// The same of what `write` writes to the file, for what need not be in memory.
+///
+/// # Errors
+/// As [`write_atomically`]; what `write` says.
+pub fn write_whole(path: &Path, write: impl FnOnce(&mut File) -> io::Result<()>) -> io::Result<()> {
     // A rename would put an ordinary file in the place of a device or a link.
     if std::fs::metadata(path).is_ok_and(|found| !found.is_file() && !found.is_dir()) {
-        return File::options().write(true).open(path)?.write_all(content);
+        return write(&mut File::options().write(true).open(path)?);
     }
     let path = &path.canonicalize().unwrap_or_else(|_| path.to_path_buf());
     let folder = folder_of(path);
@@ -59,7 +67,7 @@ pub fn write_atomically(path: &Path, content: &[u8]) -> io::Result<()> {
     // that what the system says does not name a file that the user did not ask for.
     let open = |name: &Path| File::options().write(true).create_new(true).open(name);
     let mut file = builder.prefix(&prefix).suffix(TEMPORARY[1]).make_in(folder, open)?;
-    file.as_file_mut().write_all(content)?;
+    write(file.as_file_mut())?;
     file.as_file().sync_all()?;
     file.persist(path).map_err(|error| error.error)?;
     sync_folder(folder)

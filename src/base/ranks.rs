@@ -1,8 +1,8 @@
 //! [`Ranks`]: processes that share the work of one command, by MPI (feature `mpi`).
 //!
 //! Every process, a *rank*, does the same with the same data, and so knows the same; only what takes
-//! time is divided, and its results are exchanged. The first rank leads: it alone writes files and
-//! speaks.
+//! time is divided, and its results are exchanged. The first rank leads: it alone writes results and
+//! speaks. (`validation.json`, which all ranks know, each may write: the same bytes.)
 
 use crate::base::error::Error;
 use serde::Serialize;

@@ -27,17 +27,27 @@ pub fn standard_deviation(values: &[f64]) -> Option<f64> {
     (values.len() > 1).then(|| (squares / (n - 1.0)).sqrt())
 }
 
-/// 95 % interval of the mean: percentiles of the means of resamples (Efron 1979), the same every
-/// time. None of fewer than two values.
-pub fn bootstrap(values: &[f64]) -> Option<[f64; 2]> {
+/// 95 % interval of the mean of all values: percentiles of the means of resamples (Efron 1979), the
+/// same every time. Of several clusters, as robots of several runs, clusters are drawn first, and
+/// then as many values within each (Davison & Hinkley 1997, section 3.8): values of one cluster are
+/// not independent. None of fewer than two values.
+pub fn bootstrap(clusters: &[Vec<f64>]) -> Option<[f64; 2]> {
     const RESAMPLES: usize = 10_000;
-    if values.len() < 2 {
+    let clusters: Vec<&Vec<f64>> = clusters.iter().filter(|values| !values.is_empty()).collect();
+    if clusters.iter().map(|values| values.len()).sum::<usize>() < 2 {
         return None;
     }
     let mut rng = stream(0, Purpose::Bootstrap, 0, 0);
     let mut mean = |_| {
-        let sum: f64 = (0..values.len()).map(|_| values[rng.below(values.len())]).sum();
-        sum / values.len() as f64
+        let (mut sum, mut count) = (0.0, 0);
+        for _ in 0..clusters.len() {
+            // A single cluster needs no draw.
+            let place = if clusters.len() == 1 { 0 } else { rng.below(clusters.len()) };
+            let values = clusters[place];
+            sum += (0..values.len()).map(|_| values[rng.below(values.len())]).sum::<f64>();
+            count += values.len();
+        }
+        sum / count as f64
     };
     let mut means: Vec<f64> = (0..RESAMPLES).map(&mut mean).collect();
     means.sort_by(f64::total_cmp);
@@ -53,11 +63,28 @@ mod tests {
         let values = [0.5, 0.6, 0.7, 0.8, 0.9];
         // √(0.1/4)
         assert!((standard_deviation(&values).unwrap() - 0.158_113_883).abs() < 1e-9);
+        let values = [values.to_vec()];
         let [low, high] = bootstrap(&values).unwrap();
         // The normal approximation: 0.7 ± 1.96·0.1414/√5.
         assert!((low - 0.576).abs() < 0.02 && (high - 0.824).abs() < 0.02, "{low} {high}");
         assert_eq!(bootstrap(&values), bootstrap(&values));
-        assert_eq!((standard_deviation(&[0.5]), bootstrap(&[0.5])), (None, None));
+        assert_eq!((standard_deviation(&[0.5]), bootstrap(&[vec![0.5]])), (None, None));
+    }
+
+    #[test]
+    fn values_of_one_cluster_do_not_count_as_independent() {
+        let width = |clusters: &[Vec<f64>]| {
+            let [low, high] = bootstrap(clusters).unwrap();
+            high - low
+        };
+        // Clusters that differ, values that do not: as wide as one value of each.
+        let alike: Vec<Vec<f64>> = [0.5, 0.6, 0.7, 0.8, 0.9].map(|value| vec![value; 10]).to_vec();
+        let single: Vec<Vec<f64>> = [0.5, 0.6, 0.7, 0.8, 0.9].map(|value| vec![value]).to_vec();
+        assert!((width(&alike) - width(&single)).abs() < 0.02);
+        assert!(width(&alike) > 2.5 * width(&[alike.concat()]));
+        // Values that differ, clusters that do not: no narrower than without clusters.
+        let mixed = vec![vec![0.5, 0.6, 0.7, 0.8, 0.9]; 5];
+        assert!(width(&mixed) > 0.95 * width(&[mixed.concat()]));
     }
 
     #[test]

@@ -55,7 +55,7 @@ from 1); without a value, as in data.train_images=, it has its default again; ma
 
 const EXAMPLES: &str = "\
 Examples:
-  morphcog demo                                about a minute, no download
+  morphcog demo                                a minute or two, no download
   morphcog serve                               draw a digit, and watch a body read it
   morphcog evolve --config quickstart.toml     small robots from nothing
   morphcog replay --robot best                 watch the fittest robot of the newest run

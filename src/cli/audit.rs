@@ -96,7 +96,7 @@ pub(super) fn run(args: AuditArgs, console: &Console, ranks: Ranks) -> Result<()
             Source::Gallery => Path::new("gallery-audit.json").to_path_buf(),
         };
         let robots = match (&source, robots.validated()) {
-            (Source::Archive(path), Some(best)) => validated(&args, path, best, &stop, console)?,
+            (Source::Archive(path), Some(best)) => validated(&args, (path, best), &stop, ranks, console)?,
             _ => robots,
         };
         let options = Options {
@@ -125,9 +125,9 @@ pub(super) fn run(args: AuditArgs, console: &Console, ranks: Ranks) -> Result<()
 /// The best robots on validation images: those found before, or else searched for now.
 fn validated(
     args: &AuditArgs,
-    archive: &Path,
-    best: usize,
+    (archive, best): (&Path, usize),
     stop: &AtomicBool,
+    ranks: Ranks,
     console: &Console,
 ) -> Result<Selection, Error> {
     let options = validation::Options {
@@ -136,7 +136,10 @@ fn validated(
         data: args.data.clone(),
         threads: args.threads.map(usize::from),
     };
-    let Some(found) = validation::validate(&options, stop, &Reporter::new(console))? else {
+    let found = validation::validate(&options, stop, &Reporter::new(console))?;
+    // If one rank was stopped, the others must not wait for its rollouts.
+    let all_know = ranks.share(found.is_some()).into_iter().all(|knows| knows);
+    let Some(found) = found.filter(|_| all_know) else {
         let text = "stopped before the robots were chosen; nothing is audited";
         return Err(Error::stopped(text.to_string()).hint("the same command goes on".to_string()));
     };

@@ -71,7 +71,9 @@ pub(super) fn run(args: SweepArgs, console: &Console) -> Result<(), Error> {
     }
     if args.collect {
         let status = tasks::status(&tasks, &place)?;
-        return sweeps::collected(console, &name, &collect::collect(&tasks, &status, &place)?, &status, &out);
+        let warn = |text: &str| console.warning(text);
+        let collected = collect::collect(&tasks, &status, &place, &warn)?;
+        return sweeps::collected(console, &name, &collected, &status, &out);
     }
     tasks::check_folders(&tasks, &place).map_err(|errors| refused(errors, console))?;
     let stop = signals::stop_flag()?;

@@ -98,7 +98,7 @@ impl Command<'_> {
         std::fs::create_dir_all(out).map_err(|error| Error::writing(out, &error))?;
         let out = std::path::absolute(out).map_err(|error| Error::reading(out, &error))?;
         let (name, line, threads) = (self.name, self.line()?, self.place.threads.unwrap_or(1));
-        let log = out.join("slurm-%a.log");
+        let (name, log) = (in_shell(Path::new(name)), out.join("slurm-%a.log"));
         console.text(&format!(
             r#"#!/bin/bash
 #SBATCH --job-name={name}

@@ -15,6 +15,7 @@ use crate::store::folder;
 use crate::store::folder::IfExists;
 use crate::store::names::{AUDIT_JSON, RUN_JSON};
 use crate::store::robots::Selection;
+use crate::task::grouping::written;
 use crate::view::console::Console;
 use crate::view::reporters::Reporter;
 use crate::view::{summary, verdicts};
@@ -107,23 +108,21 @@ const GAITS: usize = 4;
 
 /// How a training of an archive's gaits is called: after the archive's folder and the task.
 fn name(archive: &Path, task: &Groups, seed: Option<u64>) -> String {
-    let suffix = task.each_ref().map(|group| {
-        let separator = if group.iter().any(|class| *class > 9) { "," } else { "" };
-        group.iter().map(u8::to_string).collect::<Vec<_>>().join(separator)
-    });
+    let [a, b] = task;
     let folder = archive.parent().and_then(Path::file_name).map(|name| name.to_string_lossy());
     let of = match named::name(archive) {
         Some((_, name)) => name,
         None => folder.as_deref().unwrap_or("run"),
     };
     let seed = seed.map_or(String::new(), |seed| format!("-seed{seed}"));
-    format!("{of}-{}{seed}", suffix.join("v"))
+    format!("{of}-{}{seed}", written([a, b], "v"))
 }
 
 /// The training that `evolve --train` does when the gaits of its run have evolved.
 ///
 /// # Errors
-/// If the config has not two groups, or several processes were to share it.
+/// If the config has not two groups, or none that can be trained; if several processes were to share
+/// it, or its folder holds a run already.
 pub(super) fn after_evolution(evolution: &evolve::Options) -> Result<Options, Error> {
     let evolve::Options { config, out, if_exists, data, threads, ranks, .. } = evolution;
     if ranks.size() > 1 {
@@ -136,8 +135,14 @@ pub(super) fn after_evolution(evolution: &evolve::Options) -> Result<Options, Er
     };
     let archive = out.join(RUN_JSON);
     let name = name(&archive, groups, None);
+    let of_training = out.with_file_name(&name);
+    // What would stop the training is said before gaits evolve for an hour.
+    train::config_of(config, groups, None, &[])?;
+    if *if_exists == IfExists::Refuse {
+        folder::vacant(&of_training)?;
+    }
     Ok(Options {
-        out: out.with_file_name(&name),
+        out: of_training,
         archive,
         robots: Selection::Top(GAITS),
         groups: groups.clone(),

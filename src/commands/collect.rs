@@ -78,11 +78,17 @@ pub struct Collected {
     pub archives: Vec<PathBuf>,
 }
 
-/// Collects what the tasks found so far; `status` is of the same tasks.
+/// Collects what the tasks found so far; `status` is of the same tasks. `warn` is told of audits and
+/// tests that cannot be read, or are of another state of their run: these are left out.
 ///
 /// # Errors
-/// If a file of a run is broken.
-pub fn collect(tasks: &[Task], status: &[Status], place: &Place) -> Result<Collected, Error> {
+/// If a run is broken.
+pub fn collect(
+    tasks: &[Task],
+    status: &[Status],
+    place: &Place,
+    warn: &dyn Fn(&str),
+) -> Result<Collected, Error> {
     let mut all = Collected { rows: Vec::new(), progress: Vec::new(), archives: Vec::new() };
     for (task, status) in tasks.iter().zip(status) {
         let folder = place.out.join(&task.name);
@@ -100,7 +106,7 @@ pub fn collect(tasks: &[Task], status: &[Status], place: &Place) -> Result<Colle
         }
         let source = Source::read(&archive)?;
         let run = &source.run;
-        let found = Found::of(&source, &folder)?;
+        let found = Found::of(&source, &folder, warn);
         let grouping = run.config.grouping()?;
         let names = grouping.tasks().iter().filter(|split| !split.is_same_way()).map(|split| split.name());
         for recognises in names {
@@ -122,13 +128,14 @@ struct Found {
 }
 
 impl Found {
-    fn of(source: &Source, folder: &Path) -> Result<Self, Error> {
+    fn of(source: &Source, folder: &Path, warn: &dyn Fn(&str)) -> Self {
         let run = &source.run;
+        let told = |error: Error| warn(&format!("{error}; left out"));
         let existing = |name: &str| Some(folder.join(name)).filter(|path| path.exists());
-        let audit = AuditFile::if_any(run, &source.path)?;
+        let audit = AuditFile::if_any(run, &source.path).map_err(told).ok().flatten();
         let test = existing(EVAL_JSON).or(existing(EVAL_VALIDATION_JSON));
-        let eval = test.map(|path| EvalFile::of_runs(&path, &[run])).transpose()?;
-        Ok(Found { validated: ranking(source).unwrap_or_default(), audit, eval })
+        let eval = test.and_then(|path| EvalFile::of_runs(&path, &[run]).map_err(told).ok());
+        Found { validated: ranking(source).unwrap_or_default(), audit, eval }
     }
 
     fn of_task(&self, run: &RunFile, recognises: String, seconds: f64) -> RunRow {

@@ -147,11 +147,12 @@ pub fn eval(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Re
     let (robots, scores): (Vec<Chosen>, Vec<Validated>) = match options.robots.validated() {
         None => (robots, Vec::new()),
         Some(count) => {
-            let wanted = validation::Wanted { count, images: validated, threshold: options.threshold };
+            let asked = if options.validation.is_some() { "--validation" } else { validation::ASKED };
+            let wanted = validation::Wanted { count, images: validated, asked, threshold: options.threshold };
             // Which images are for validation is known by their indices, in the run's own data
             // only.
             let others = other.map(|_| own(&[Split::Train])).transpose()?;
-            let Some(best) = validation::chosen(
+            let best = validation::chosen(
                 &sources,
                 &robots,
                 &options.robots,
@@ -159,8 +160,10 @@ pub fn eval(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Re
                 &grouping,
                 &wanted,
                 &walker,
-            )?
-            else {
+            )?;
+            // If one rank was stopped, the others must not wait for its rollouts.
+            let all_know = options.ranks.share(best.is_some()).into_iter().all(|knows| knows);
+            let Some(best) = best.filter(|_| all_know) else {
                 report.stopped = true;
                 return Ok(Finished { file: report, unwritten: None });
             };
@@ -178,9 +181,12 @@ pub fn eval(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Re
     // One robot for each rank at a time.
     for robots in robots.chunks(ranks.size()) {
         let own = robots.get(ranks.rank()).and_then(|own| walker.rollouts(own.robot, &shown.stimuli));
+        let before = report.robots.len();
+        let mut is_stopped = false;
         for (Chosen { source, robot }, walked) in robots.iter().zip(ranks.share(own)) {
             let Some((displacements, simulated)) = walked else {
-                return Ok(Finished { file: report, unwritten: unwritten.error() });
+                is_stopped = true;
+                break;
             };
             let split = task_of(&grouping, robot).expect("robots without a task are left out above");
             left -= 1;
@@ -191,8 +197,11 @@ pub fn eval(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Re
             report.robots.push(RobotReport { run: *source, validation, ..of_trial });
             report.conclude();
         }
-        if ranks.leads() {
+        if ranks.leads() && report.robots.len() > before {
             unwritten.tried(write(options, &report), |text| observer.warning(text));
+        }
+        if is_stopped {
+            break;
         }
     }
     Ok(Finished { file: report, unwritten: unwritten.error() })

@@ -4,6 +4,7 @@ use crate::base::error::Error;
 use crate::config::{Settings, differing};
 use crate::store::metrics::{Moment, moments};
 use crate::store::run::RunFile;
+use crate::task::grouping::written;
 use std::collections::BTreeSet;
 use std::path::Path;
 
@@ -64,12 +65,12 @@ pub fn alike(runs: &[Progress]) -> (Vec<String>, Vec<Group<'_>>) {
 
 /// A value of a config for people: groups of classes as 0|1.
 fn spoken(value: &toml::Value) -> String {
-    let digits = |list: &toml::Value| -> Option<String> {
-        list.as_array()?.iter().map(|item| item.as_integer().map(|digit| digit.to_string())).collect()
+    let classes = |list: &toml::Value| -> Option<Vec<u8>> {
+        list.as_array()?.iter().map(|class| class.as_integer().and_then(|c| u8::try_from(c).ok())).collect()
     };
     let groups = || -> Option<String> {
         let [a, b] = value.as_array()?.as_slice() else { return None };
-        Some(format!("{}|{}", digits(a)?, digits(b)?))
+        Some(written([&classes(a)?, &classes(b)?], "|"))
     };
     groups().unwrap_or_else(|| value.as_str().map_or_else(|| value.to_string(), str::to_string))
 }

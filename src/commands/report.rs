@@ -156,7 +156,11 @@ impl Team {
             return Err(wrong("this test was stopped: expected the answers of a whole team"));
         }
         let hashes: Vec<String> = runs.iter().map(|dossier| dossier.run.fingerprint()).collect();
-        let of_member = |member: &Member| hashes.iter().position(|hash| *hash == member.run_sha256);
+        let of_member = |member: &Member| {
+            let run = hashes.iter().position(|hash| *hash == member.run_sha256)?;
+            let is_it = |robot: &Robot| robot.id == member.id && robot.body == member.body;
+            runs[run].run.elites.iter().any(is_it).then_some(run)
+        };
         let of: Option<Vec<usize>> = file.members.iter().map(of_member).collect();
         let of = of.ok_or_else(|| wrong("expected a team of robots of these runs"))?;
         let is_first = |(place, image): &(usize, &ImageRef)| {

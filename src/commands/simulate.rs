@@ -2,7 +2,7 @@
 
 use crate::base::Grid;
 use crate::base::error::Error;
-use crate::base::files::{read_text, write_atomically};
+use crate::base::files::{read_text, write_whole};
 use crate::body::Body;
 use crate::config::reading;
 use crate::sim::{Physics, Start, System, World};
@@ -11,6 +11,7 @@ use crate::task::protocol::{MAX_COLUMN, MAX_ROW, MAX_STEPS};
 use serde::de::{Error as _, IgnoredAny, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer};
 use std::fmt;
+use std::io::{BufWriter, Write};
 use std::path::Path;
 
 /// A body, what it sees, and for how long. The keys of a reference trajectory are understood too;
@@ -275,12 +276,20 @@ pub fn to_file(from: &Path, points: bool, path: &Path) -> Result<(), Error> {
         return Err(Error::usage(text));
     }
     folder::writable(path)?;
-    let mut text = String::new();
-    let outcome = simulate(scenario, points, |line| {
-        text.push_str(&line);
-        Ok(())
+    // Line by line: a long simulation with all points has gigabytes.
+    let mut outcome = Ok(());
+    let written = write_whole(path, |file| {
+        let (mut file, mut failed) = (BufWriter::new(file), None);
+        outcome = simulate(scenario, points, |line| {
+            file.write_all(line.as_bytes()).map_err(|error| {
+                let said = Error::writing(path, &error);
+                failed = Some(error);
+                said
+            })
+        });
+        failed.map_or_else(|| file.flush(), Err)
     });
-    write_atomically(path, text.as_bytes()).map_err(|error| Error::writing(path, &error))?;
+    written.map_err(|error| Error::writing(path, &error))?;
     outcome
 }
 

@@ -10,7 +10,7 @@ use crate::config::{Config, Settings, flatten, reading};
 use crate::search::train;
 use crate::store::folder::{self, first_run};
 use crate::store::robots::Source;
-use crate::task::grouping::Grouping;
+use crate::task::grouping::written;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
@@ -288,7 +288,7 @@ impl SweepPlan {
         };
         let mut varied: Vec<(String, String)> =
             combination.iter().map(|setting| (setting.key.clone(), text(&setting.value))).collect();
-        varied.extend(groups.map(|groups| ("groups".to_string(), written(groups, "|"))));
+        varied.extend(groups.map(|[a, b]| ("groups".to_string(), written([a, b], "|"))));
         varied.push(("seed".to_string(), seed.to_string()));
         Ok(Task { name: name.to_string(), run, steps: self.steps(), varied })
     }
@@ -305,7 +305,7 @@ impl Base {
             }
         };
         let words = combination.iter().map(|setting| setting.word.clone());
-        let groups = groups.map(|groups| written(groups, "v"));
+        let groups = groups.map(|[a, b]| written([a, b], "v"));
         let parts = std::iter::once(base).chain(words).chain(groups).chain([format!("seed{seed}")]);
         parts.collect::<Vec<_>>().join("-")
     }
@@ -315,13 +315,6 @@ impl Base {
 pub(crate) fn beside(folder: &Path, name: &str) -> String {
     let path = folder.join(name);
     if path.exists() { path.to_string_lossy().into_owned() } else { name.to_string() }
-}
-
-/// Two groups of classes, as 0|123.
-fn written(groups: &[Vec<u8>; 2], between: &str) -> String {
-    let [a, b] = groups;
-    let grouping = Grouping::two_groups(a, b).expect("groups are read as a task's");
-    grouping.tasks()[0].name().replace('|', between)
 }
 
 /// A value as text: a text without its quotes.

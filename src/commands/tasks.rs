@@ -9,19 +9,23 @@ use crate::base::ranks::Ranks;
 use crate::commands::{audit, eval};
 use crate::config::audit::Criteria;
 use crate::config::{Config, Settings, differing};
+use crate::search::showing::task_of;
 use crate::search::{evolve, showing, train, validation};
+use crate::store::audit::{AuditFile, RobotAudit};
 use crate::store::eval::EvalFile;
 use crate::store::folder::IfExists;
 use crate::store::images::HeldOut;
 use crate::store::lock::{self, Lock, Refusal};
 use crate::store::names::{AUDIT_JSON, METRICS, RUN_JSON, TASK_JSON};
 use crate::store::robots::{Selection, Source};
+use crate::store::run::Robot;
 use crate::store::setting::RunRef;
 use crate::store::task::{State, TaskFile};
 use crate::task::direction;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
+use std::collections::BTreeSet;
 use std::io::{Read, Seek, SeekFrom};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
@@ -357,9 +361,10 @@ fn steps(task: &Task, place: &Place, stop: &AtomicBool, observer: &dyn Observer)
             threads: place.threads,
             ranks: Ranks::ALONE,
         };
-        let known = EvalFile::read(&options.out).ok();
-        let selected = options.robots.describe();
-        if known.is_some_and(|known| is_of(&known, &sources, &options) && known.selected == selected) {
+        if let Ok(known) = EvalFile::read(&options.out)
+            && is_of(&known, &sources, &options)
+            && is_of_robots(&known, &sources[0], &options)?
+        {
             return Ok(());
         }
         let finished = eval::eval(&options, stop, observer)?;
@@ -387,6 +392,30 @@ pub(crate) fn is_of(known: &EvalFile, sources: &[Source], options: &eval::Option
         == (options.seed, options.split, options.images, options.threshold);
     let is_ours = known.program_version == env!("CARGO_PKG_VERSION");
     is_ours && !known.stopped && known.trained_on.is_none() && known.runs == runs && same
+}
+
+/// Whether an evaluation is of the robots that would be chosen from a run now: verdicts may be others
+/// than they were.
+fn is_of_robots(known: &EvalFile, source: &Source, options: &eval::Options) -> Result<bool, Error> {
+    let run = &source.run;
+    let is_known = |robot: &Robot| known.robots.iter().any(|other| other.id == robot.id);
+    if known.selected != options.robots.describe() {
+        return Ok(false);
+    }
+    if options.robots.validated().is_some() {
+        // Validation images choose the same robots again, of those that are physical now.
+        let audit = AuditFile::if_any(run, &source.path)?;
+        let is_physical = |robot: &Robot| {
+            audit.as_ref().and_then(|audit| audit.robot(&robot.id)).is_some_and(RobotAudit::is_physical)
+        };
+        let wants_physical = matches!(options.robots, Selection::Physical(_));
+        return Ok(!wants_physical || run.elites.iter().filter(|robot| is_known(robot)).all(is_physical));
+    }
+    let grouping = run.config.grouping()?;
+    let chosen = options.robots.of(std::slice::from_ref(source), options.seed)?;
+    let mut ids: BTreeSet<&str> = BTreeSet::new();
+    ids.extend(chosen.iter().filter(|c| task_of(&grouping, c.robot).is_some()).map(|c| c.robot.id.as_str()));
+    Ok(ids == known.robots.iter().map(|robot| robot.id.as_str()).collect())
 }
 
 /// What later steps read from its file, which must be there.

@@ -224,6 +224,9 @@ fn sets(assignment: &str, key: &str) -> bool {
     is_within(set, key) || is_within(key, set)
 }
 
+/// Most parts of a key: many times what any has; tables in tables need the stack.
+const DEEPEST: usize = 16;
+
 /// Changes one key: `map_elites.parents=10`, or `task.groups.2=[1]` for the second of a list;
 /// without a value, `keep=`, it has its default again. What follows the sign is read as TOML, and
 /// as plain text if it is none.
@@ -232,6 +235,9 @@ fn set<T: DeserializeOwned>(root: &mut toml::Value, assignment: &str) -> Result<
         return Err("expected key=value, as in --set map_elites.parents=10".to_string());
     };
     let (key, text) = (key.trim(), text.trim());
+    if key.split('.').count() > DEEPEST {
+        return Err(format!("expected a key of at most {DEEPEST} parts, as in --set map_elites.parents=10"));
+    }
     let value = (!text.is_empty()).then(|| {
         toml::from_str::<toml::Table>(&format!("value = {text}"))
             .ok()

@@ -51,6 +51,12 @@ impl Default for TrainConfig {
 /// Least number of random images: with fewer, nothing can be left out for the cross-validation.
 const LEAST_RANDOM_IMAGES: usize = 20;
 
+/// Most random images of a gait: what is known of each is kept in memory, and more show no more.
+pub(crate) const MOST_RANDOM_IMAGES: usize = 100_000;
+
+/// Most rows by which a start is raised, as in an audit.
+const MOST_ROWS: u32 = 100;
+
 impl TrainConfig {
     /// Whether a file needs not say it.
     pub(crate) fn is_default(&self) -> bool {
@@ -68,6 +74,14 @@ impl TrainConfig {
         match least.into_iter().find(|(_, value, least)| value < least) {
             Some((key, value, least)) => {
                 Err(Error::value(&format!("train.{key}"), value, &format!("{least} or more")))
+            }
+            None if self.random_images > MOST_RANDOM_IMAGES => {
+                let expected = format!("at most {MOST_RANDOM_IMAGES}");
+                Err(Error::value("train.random_images", self.random_images, &expected))
+            }
+            None if self.perturbations.start > MOST_ROWS => {
+                let expected = format!("at most {MOST_ROWS} rows");
+                Err(Error::value("train.perturbations.start", self.perturbations.start, &expected))
             }
             None => Ok(()),
         }

@@ -39,7 +39,7 @@ use crate::task::protocol::{Protocol, RolloutMode};
 use crate::task::refine::Challenge;
 use crate::task::response::{Example, Gait, Response};
 use crate::task::teach::{Image, Plan, Rollouts, Round, Taught, Teacher};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
@@ -129,7 +129,11 @@ pub fn train(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> R
     training.conditions = config.train.perturbations.of(classes);
     let origin = origin(&source, &dataset)?;
     held_out::check(&config, &dataset)?;
-    let walkers = walkers(&source, &options.robots, config.seed)?;
+    let mut walkers = walkers(&source, &options.robots, config.seed)?;
+    if config.train.rounds == 0 {
+        // One of them is refined as it is: the fittest, the first of several.
+        walkers.sort_by(|a, b| b.robot.objective.total_cmp(&a.robot.objective));
+    }
     // A gait's response is the same for every task and every seed of a training.
     let probing = Probing::new(&training.conditions, source.run.config.seed);
     let measured = measured(&source, &config, &probing, &walkers, observer);
@@ -140,6 +144,7 @@ pub fn train(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> R
             Error::occupied(text).hint("write elsewhere with --out, or replace it by --force".to_string())
         );
     }
+    apart(&options.out, &source.path)?;
     let folder = RunFolder::open(&options.out, options.if_exists)?;
     let write = |name: &str, content: &[u8]| {
         let path = folder.path().join(name);
@@ -157,9 +162,8 @@ pub fn train(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> R
     let trainer = Trainer { config: &config, training: &training, probing, measured };
     let taught = pool.install(|| trainer.train(&walkers, &mut log, observer));
     // What was simulated is kept, however it ended.
-    let saved = log.save();
+    log.save()?;
     let (walker, taught) = taught?;
-    saved?;
     let run = run_file(options, &config, &training, origin, walker, &taught)?;
     let seconds = began.elapsed().as_secs_f64();
     let totals = Totals { evaluations: 1, simulated: log.simulated as u64, seconds, ..Totals::default() };
@@ -175,6 +179,18 @@ pub fn train(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> R
         _ => validation::at_end(&archive, &dataset, &pool, stop, observer)?,
     };
     Ok(Finished { run, rollouts: log.simulated, validated })
+}
+
+/// Whether a training has a folder of its own: that of its gaits would be lost.
+fn apart(out: &Path, archive: &Path) -> Result<(), Error> {
+    let of_gaits = archive.parent().map(|folder| Path::new(".").join(folder));
+    let [out_now, of_gaits] =
+        [Some(out), of_gaits.as_deref()].map(|folder| folder.and_then(|folder| folder.canonicalize().ok()));
+    if out_now.is_some() && out_now == of_gaits {
+        let text = format!("--out {}: expected another folder: the gaits are in this one", out.display());
+        return Err(Error::usage(text));
+    }
+    Ok(())
 }
 
 /// The config of the run that is made: that of the walkers' run with another task, perhaps another

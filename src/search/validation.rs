@@ -32,6 +32,9 @@ use std::sync::atomic::{AtomicBool, AtomicU64};
 /// A round: of the images, and of the robots of each task the share that gets so far.
 const ROUNDS: [(f64, f64); 3] = [(0.1, 1.0), (0.3, 1.0 / 3.0), (1.0, 0.1)];
 
+/// Where it stands how many images validate, if no option says it.
+pub(crate) const ASKED: &str = "validation.images =";
+
 /// How robots are to be chosen.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Wanted {
@@ -39,6 +42,8 @@ pub(crate) struct Wanted {
     pub count: usize,
     /// Images in all.
     pub images: usize,
+    /// Where that many were asked for.
+    pub asked: &'static str,
     /// Displacements up to this count as wrong \[voxel lengths\].
     pub threshold: f64,
 }
@@ -106,7 +111,8 @@ fn ranked(
     let chosen = Selection::Validated(count).of(std::slice::from_ref(source), 0)?;
     let skilled = |robot: &&Robot| showing::task_of(&grouping, robot).is_some();
     let robots = chosen.iter().map(|chosen| chosen.robot).filter(skilled).collect();
-    let wanted = Wanted { count, images: config.validation.images, threshold: direction::THRESHOLD };
+    let images = config.validation.images;
+    let wanted = Wanted { count, images, asked: ASKED, threshold: direction::THRESHOLD };
     let best = best(source, dataset, &grouping, robots, &wanted, &walker)?;
     Ok(best.map(|best| best.into_iter().map(|(_, validated)| validated).collect()))
 }
@@ -157,7 +163,7 @@ pub(crate) fn best<'a>(
     walker: &Walker,
 ) -> Result<Option<Vec<(&'a Robot, Validated)>>, Error> {
     let run = &source.run;
-    let images = images(&[run], dataset, "--validation", wanted.images)?;
+    let images = images(&[run], dataset, wanted.asked, wanted.images)?;
     // With fewer asked for than the end of the run has found, the first of those.
     let searched = &Wanted { count: wanted.count.max(run.config.validation.best), ..*wanted };
     let shown = (dataset.fingerprint(Split::Train).expect("its images were drawn just now"), &images[..]);

@@ -16,6 +16,7 @@ use crate::task::judge::Judge;
 use crate::task::protocol::Protocol;
 use crate::task::stimulus::StimulusParams;
 use serde::Serialize;
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant, SystemTime};
@@ -38,7 +39,8 @@ pub struct Collection {
     pub tasks: Vec<String>,
     /// The robots, fittest first.
     pub robots: Vec<Entry>,
-    /// Robots that were in the archive when it was read before: a page may still list them.
+    /// Robots that were in the archive when it was read before, the last of them: a page may still
+    /// list them.
     pub gone: Vec<Entry>,
 }
 
@@ -117,7 +119,8 @@ pub struct Summary {
 /// An archive whose file is looked at again and again.
 struct Watched {
     path: PathBuf,
-    stamp: Option<Stamp>,
+    /// Of the run, and of the audit beside it.
+    stamps: [Option<Stamp>; 2],
     changes: u64,
     collection: Arc<Collection>,
 }
@@ -129,6 +132,14 @@ fn stamp(path: &Path) -> Option<Stamp> {
     let about = path.metadata().ok()?;
     Some((about.modified().ok()?, about.len()))
 }
+
+/// Of a run and of the verdicts on it.
+fn stamps(run_json: &Path) -> [Option<Stamp>; 2] {
+    [stamp(run_json), stamp(&AuditFile::path(run_json))]
+}
+
+/// Most robots that are known though they are in their archive no more.
+const MOST_GONE: usize = 1000;
 
 /// How often files are looked at, however often the page asks.
 const LOOK_EVERY: Duration = Duration::from_millis(500);
@@ -259,22 +270,23 @@ fn is_same(a: &Path, b: &Path) -> bool {
 
 impl Watched {
     fn read(path: &Path, notes: &mut Vec<String>) -> Result<Self, Error> {
-        let stamp = stamp(path);
+        let stamps = stamps(path);
         let collection = Arc::new(archive(path, notes)?);
-        Ok(Watched { path: path.to_path_buf(), stamp, changes: 0, collection })
+        Ok(Watched { path: path.to_path_buf(), stamps, changes: 0, collection })
     }
 
     /// Reads it anew if it has changed; one that cannot be read, perhaps for the moment, stays as it
     /// was.
     fn look(&mut self) {
-        let now = stamp(&self.path);
-        if now != self.stamp
+        let now = stamps(&self.path);
+        if now != self.stamps
             && let Ok(collection) = archive(&self.path, &mut Vec::new())
         {
             let Collection { robots, gone, .. } = &*self.collection;
-            let has_gone = |robot: &&Entry| collection.robots.iter().all(|other| other.id != robot.id);
-            let gone = gone.iter().chain(robots).filter(has_gone).cloned().collect();
-            (self.stamp, self.collection) = (now, Arc::new(Collection { gone, ..collection }));
+            let mut known: HashSet<&str> = collection.robots.iter().map(|robot| robot.id.as_str()).collect();
+            let gone = robots.iter().chain(gone).filter(|robot| known.insert(&robot.id));
+            let gone = gone.take(MOST_GONE).cloned().collect();
+            (self.stamps, self.collection) = (now, Arc::new(Collection { gone, ..collection }));
             self.changes += 1;
         }
     }

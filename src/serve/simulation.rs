@@ -17,7 +17,7 @@ const BATCH: u32 = 20;
 const TICK: Duration = Duration::from_millis(40);
 /// What takes longer is told in parts.
 const MOST_AT_ONCE: Duration = Duration::from_millis(100);
-/// How often a paused simulation sends a sign of simulation; so it notices that the page was closed.
+/// How often a paused simulation says that it is there; so it notices that the page was closed.
 pub(super) const HEARTBEAT: Duration = Duration::from_millis(400);
 /// A simulation that cannot keep its pace does not try to make up for more than this.
 const MOST_BEHIND: f64 = 0.5;

@@ -78,7 +78,7 @@ impl TryFrom<String> for KnownBodies {
 /// Writes a checkpoint; the one before is kept. The first line is the checksum of the second.
 ///
 /// # Errors
-/// If it cannot be written; the checkpoints before are as they were.
+/// If it cannot be written; the good one before stays, perhaps under the name of the previous one.
 pub fn write(folder: &Path, checkpoint: &Checkpoint) -> Result<(), Error> {
     let [newest, previous] = CHECKPOINTS.map(|name| folder.join(name));
     let failed = |path: &Path| {

@@ -103,8 +103,8 @@ pub struct Mean {
     /// Standard deviation of the accuracy over the robots; none of a single one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub standard_deviation: Option<f64>,
-    /// 95 % bootstrap interval of the mean accuracy (percentiles of 10,000 resamples of the
-    /// robots).
+    /// 95 % bootstrap interval of the mean accuracy (percentiles of 10,000 resamples; of
+    /// several runs, of the runs and then of the robots of each).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub interval: Option<[f64; 2]>,
 }
@@ -267,7 +267,10 @@ impl EvalFile {
             let (accuracy, balanced_accuracy) =
                 (mean(&robots, |r| r.accuracy), mean(&robots, |r| r.balanced_accuracy));
             let accuracies: Vec<f64> = robots.iter().map(|robot| robot.accuracy).collect();
-            let (standard_deviation, interval) = (standard_deviation(&accuracies), bootstrap(&accuracies));
+            let mut by_run = BTreeMap::<usize, Vec<f64>>::new();
+            robots.iter().for_each(|robot| by_run.entry(robot.run).or_default().push(robot.accuracy));
+            let by_run: Vec<Vec<f64>> = by_run.into_values().collect();
+            let (standard_deviation, interval) = (standard_deviation(&accuracies), bootstrap(&by_run));
             let robots = robots.len();
             (task.to_string(), Mean { robots, accuracy, balanced_accuracy, standard_deviation, interval })
         });

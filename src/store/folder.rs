@@ -55,12 +55,11 @@ impl RunFolder {
     /// be written.
     pub fn open(path: &Path, if_exists: IfExists) -> Result<Self, Error> {
         std::fs::create_dir_all(path).map_err(|error| Error::writing(path, &error))?;
-        let holds_run = RunFolder::files().iter().any(|name| path.join(name).exists());
-        if holds_run && if_exists == IfExists::Refuse {
-            let text = format!("{}: there is a run in this folder already", path.display());
-            let hint = "go on with it by --resume, write elsewhere with --out, or replace it by --force";
-            return Err(Error::occupied(text).hint(hint.to_string()));
-        }
+        let refuse_run = || match if_exists {
+            IfExists::Refuse => vacant(path),
+            _ => Ok(()),
+        };
+        refuse_run()?;
         let lock = path.join(LOCK);
         let lock = Lock::take(&lock).map_err(|refusal| match refusal {
             Refusal::Held(holder) => {
@@ -70,6 +69,8 @@ impl RunFolder {
             }
             Refusal::Io(error) => Error::writing(&lock, &error),
         })?;
+        // Another process may have left its run while this one waited for the lock.
+        refuse_run()?;
         remove_half_written(path, &RunFolder::files()).map_err(|error| Error::writing(path, &error))?;
         if if_exists == IfExists::Overwrite {
             for name in RunFolder::files() {
@@ -95,6 +96,19 @@ impl RunFolder {
         let [newest, previous] = CHECKPOINTS;
         [RUN_JSON, CONFIG, ELITES, METRICS, DATA_FOLDER, TRAINING_JSON, newest, previous]
     }
+}
+
+/// Whether a folder is free for a new run.
+///
+/// # Errors
+/// If it holds a run.
+pub fn vacant(folder: &Path) -> Result<(), Error> {
+    if !RunFolder::files().iter().any(|name| folder.join(name).exists()) {
+        return Ok(());
+    }
+    let text = format!("{}: there is a run in this folder already", folder.display());
+    let hint = "go on with it by --resume, write elsewhere with --out, or replace it by --force";
+    Err(Error::occupied(text).hint(hint.to_string()))
 }
 
 /// What a run of a config is called: the config's name without folder and ending.

@@ -10,6 +10,7 @@ use crate::store::images::{HeldOut, ImageRef};
 use crate::task::direction::{Assignment, Direction};
 use crate::task::grouping::Group;
 use crate::task::judge::Judge;
+use crate::task::protocol::MAX_STEPS;
 use crate::task::voting::{Accuracy, Ballot};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -20,6 +21,9 @@ use std::path::Path;
 pub const FORMAT: &str = "morphcog-team";
 /// Version of its schema.
 pub const FORMAT_VERSION: u32 = 1;
+
+/// Most cycles that an image is shown for: as many as the longest rollout has by default.
+const MOST_CYCLES: u32 = MAX_STEPS / 50;
 
 /// The content of `team.json`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -83,7 +87,7 @@ pub struct Member {
     pub body: Body,
     /// How it answers the images of its own classes.
     pub own: Accuracy,
-    /// Share of all images under which it moved no farther than the threshold.
+    /// Share of all images under which it moved no farther than the threshold, or was unstable.
     pub not_moved: f64,
     /// Displacement under each image \[voxel lengths\]; none if unstable.
     pub displacements: Vec<Option<f64>>,
@@ -101,7 +105,7 @@ pub struct Answers {
     pub ties: f64,
     /// Mean over images: of the robots that know the answered class, the share that voted for it.
     pub agreement: f64,
-    /// Mean number of robots that moved no farther than the threshold.
+    /// Mean number of robots that moved no farther than the threshold, or were unstable.
     pub not_moved: f64,
 }
 
@@ -253,7 +257,60 @@ impl TeamFile {
     /// What is wrong with it.
     pub fn read(path: &Path) -> Result<Self, Error> {
         let text = read_text(path).map_err(|error| Error::reading(path, &error))?;
-        reading::read_versioned(&text, &path.display().to_string(), FORMAT, FORMAT_VERSION)
+        let name = path.display().to_string();
+        let file: TeamFile = reading::read_versioned(&text, &name, FORMAT, FORMAT_VERSION)?;
+        file.check().map_err(|error| error.within(&name))?;
+        Ok(file)
+    }
+
+    /// Checks what types cannot: that all is about the same classes and images.
+    fn check(&self) -> Result<(), Error> {
+        let (classes, images) = (self.classes.len(), self.images.len());
+        let refuse = |key: &str, expected: String| Err(Error::at(key, format!("expected {expected}")));
+        let mut different = self.classes.clone();
+        different.sort_unstable();
+        different.dedup();
+        if classes < 2 || different != self.classes {
+            return refuse("classes", "two or more, each once, in order".to_string());
+        }
+        if let Some(image) = self.images.iter().find(|image| !self.classes.contains(&image.label)) {
+            return refuse("images", format!("labels among the classes, found {}", image.label));
+        }
+        if !(1..=MOST_CYCLES).contains(&self.cycles) {
+            return refuse("cycles", format!("1 to {MOST_CYCLES}"));
+        }
+        for (place, member) in self.members.iter().enumerate() {
+            let of = |key: &str| format!("members[{place}].{key}");
+            let mut known: Vec<u8> = member.groups.concat();
+            known.sort_unstable();
+            known.dedup();
+            let all = member.groups.concat();
+            if known.len() != all.len() || all.iter().any(|class| !self.classes.contains(class)) {
+                return refuse(&of("groups"), "two groups of the classes, each class once".to_string());
+            }
+            if member.groups.iter().any(Vec::is_empty) {
+                return refuse(&of("groups"), "a class in each group".to_string());
+            }
+            if member.displacements.len() != images {
+                return refuse(&of("displacements"), format!("one for each of {images} images"));
+            }
+        }
+        for decoded in self.answers.iter().flat_map(|answers| [&answers.votes, &answers.walks]) {
+            if decoded.answers.len() != images {
+                return refuse("answers", format!("one for each of {images} images"));
+            }
+            if decoded.answers.iter().any(|answer| !self.classes.contains(answer)) {
+                return refuse("answers", "classes of the team".to_string());
+            }
+            if !decoded.per_class.keys().eq(&self.classes) {
+                return refuse("per_class", "the classes of the team".to_string());
+            }
+            let rows = &decoded.confusion;
+            if rows.len() != classes || rows.iter().any(|row| row.len() != classes) {
+                return refuse("confusion", format!("{classes} rows of {classes} numbers"));
+            }
+        }
+        Ok(())
     }
 
     /// Writes it, and its table beside it.

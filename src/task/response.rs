@@ -454,7 +454,7 @@ impl Example {
     }
 }
 
-/// What the worst answer is worth.
+/// What the worst answer counts.
 const WORST: f64 = -1.0;
 
 fn choice(material: Material) -> usize {
@@ -471,7 +471,7 @@ pub struct Lesson {
     margins: Vec<f64>,
     right: Vec<f64>,
     weights: Vec<f64>,
-    /// What the worst answer is worth: −1, or −∞ while climbing to where answers are not hopeless.
+    /// What the worst answer counts: −1, or −∞ while climbing to where answers are not hopeless.
     floor: f64,
     design: Vec<usize>,
     objective: f64,
@@ -499,11 +499,11 @@ impl Lesson {
 
     /// Counts the objective anew.
     fn count(&mut self) {
-        let worth = |(margin, weight): (&f64, &f64)| weight * (margin / ENOUGH).clamp(self.floor, 1.0);
-        self.objective = self.margins.iter().zip(&self.weights).map(worth).sum();
+        let clipped = |(margin, weight): (&f64, &f64)| weight * (margin / ENOUGH).clamp(self.floor, 1.0);
+        self.objective = self.margins.iter().zip(&self.weights).map(clipped).sum();
     }
 
-    /// The weighted mean [worth](crate::task::fitness::clipped_margin) of the margins: from −1 to 1, the
+    /// The weighted mean [clipped margin](crate::task::fitness::clipped_margin) of the margins: from −1 to 1, the
     /// best.
     pub fn objective(&self) -> f64 {
         self.objective
@@ -536,7 +536,7 @@ impl Lesson {
     }
 
     /// Climbs until no change of one place helps: first with no answer too bad to count, so that a
-    /// body which walks far to one side under every image is led back; then as answers are worth.
+    /// body which walks far to one side under every image is led back; then as answers count.
     pub fn solve(&mut self, random: &mut Stream) {
         for floor in [f64::NEG_INFINITY, WORST] {
             self.floor = floor;
@@ -804,12 +804,12 @@ mod tests {
     /// The objective of a design, from the beginning.
     fn objective(gait: &Gait, examples: &[Example], slopes: &[f64], design: &[Material]) -> f64 {
         let weight: f64 = examples.iter().map(|example| example.weight).sum();
-        let worth = |example: &Example| {
+        let clipped = |example: &Example| {
             let change = dot(slopes, &example.widths(design)) - dot(slopes, &example.widths(&gait.design()));
             example.weight
                 * crate::task::fitness::clipped_margin(example.right * (example.displacement + change))
         };
-        examples.iter().map(worth).sum::<f64>() / weight
+        examples.iter().map(clipped).sum::<f64>() / weight
     }
 
     #[test]

@@ -67,7 +67,7 @@ pub struct Image {
 pub struct Round {
     /// Its number, from 1.
     pub round: usize,
-    /// What the model said of the design: Mean clipped margin of its answers to all training images.
+    /// What the model said of the design: mean clipped margin of its answers to all training images.
     pub predicted: f64,
     /// Mean clipped margin of its answers to the images of the round.
     pub measured: f64,
@@ -181,7 +181,7 @@ impl<'a> Teacher<'a> {
         teacher
     }
 
-    /// What the model says of the latest design: Mean clipped margin of its answers to all training images.
+    /// What the model says of the latest design: mean clipped margin of its answers to all training images.
     pub fn predicted(&self) -> f64 {
         self.predicted
     }
@@ -383,7 +383,7 @@ impl<'a> Teacher<'a> {
             counts[group] += 1.0;
         }
         let means = scores.iter().zip(&counts).filter(|(_, count)| **count > 0.0);
-        let means: Vec<f64> = means.map(|(worth, count)| worth / count).collect();
+        let means: Vec<f64> = means.map(|(sum, count)| sum / count).collect();
         means.iter().sum::<f64>() / means.len().max(1) as f64
     }
 

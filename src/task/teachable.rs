@@ -170,9 +170,9 @@ impl<'a> Half<'a> {
         let estimate = |judged: &dyn Fn(&Answer) -> (f64, f64)| {
             let found: Vec<(f64, f64)> = answers.iter().map(judged).collect();
             let pairs = || answers.iter().zip(&found);
-            let value: f64 = pairs().map(|(answer, (worth, _))| answer.weight * worth).sum();
+            let value: f64 = pairs().map(|(answer, (clipped, _))| answer.weight * clipped).sum();
             // Other images.
-            let by_images = pairs().map(|(answer, (worth, _))| answer.weight * (worth - value));
+            let by_images = pairs().map(|(answer, (clipped, _))| answer.weight * (clipped - value));
             let by_images: f64 = by_images.map(|off| off * off).sum();
             // Other rollouts, to first order: through the slopes, and through the mean
             // displacement.
@@ -188,7 +188,7 @@ impl<'a> Half<'a> {
             Estimate { value, error: (by_images + by_rollouts).sqrt() }
         };
         [
-            estimate(&|answer| expected_worth(answer.margin, answer.scatter, ENOUGH)),
+            estimate(&|answer| expected_clipped_margin(answer.margin, answer.scatter, ENOUGH)),
             estimate(&|answer| right(answer.margin, answer.scatter, threshold)),
         ]
     }
@@ -207,13 +207,13 @@ struct Answer {
     off: Vec<f64>,
 }
 
-/// The Mean clipped margin of margins that scatter normally about one, and by how much it grows with it.
-fn expected_worth(margin: f64, scatter: f64, enough: f64) -> (f64, f64) {
+/// The mean clipped margin of margins that scatter normally about one, and by how much it grows with it.
+fn expected_clipped_margin(margin: f64, scatter: f64, enough: f64) -> (f64, f64) {
     let [low, high] = [-enough, enough].map(|end| (end - margin) / scatter);
     let [below, under] = [low, high].map(normal);
     let inside = under - below;
-    let worth = enough * (1.0 - under - below) + margin * inside + scatter * (density(low) - density(high));
-    (worth / enough, inside / enough)
+    let clipped = enough * (1.0 - under - below) + margin * inside + scatter * (density(low) - density(high));
+    (clipped / enough, inside / enough)
 }
 
 /// The share of margins above a threshold that scatter normally about one, and by how much it grows
@@ -295,28 +295,28 @@ mod tests {
 
         /// What a design is worth in truth, and the share of its answers that are right.
         fn truth(&self, (design, side): &Solved, examples: &[Example]) -> [f64; 2] {
-            let (mut worth, mut share) = (0.0, 0.0);
+            let (mut clipped, mut share) = (0.0, 0.0);
             for example in examples {
                 // By turns under either condition, whose effect is their mean's.
                 let walks = [0, 1].map(|condition| self.walks(&example.widths(design), condition));
                 let margin = side * example.right * (walks[0] + walks[1]) / 2.0;
-                worth += expected_worth(margin, self.noise, ENOUGH).0 / examples.len() as f64;
+                clipped += expected_clipped_margin(margin, self.noise, ENOUGH).0 / examples.len() as f64;
                 share += right(margin, self.noise, THRESHOLD).0 / examples.len() as f64;
             }
-            [worth, share]
+            [clipped, share]
         }
     }
 
     #[test]
-    fn an_expected_worth_is_the_mean_of_worths_and_grows_as_it_says() {
+    fn an_expected_clipped_margin_is_the_mean_of_clipped_margins_and_grows_as_it_says() {
         for (margin, scatter) in [(0.0, 1.0), (4.0, 3.0), (-12.0, 5.0), (9.0, 20.0), (30.0, 2.0)] {
             let steps = || (0..20_000).map(|k| -10.0 + 0.001 * (f64::from(k) + 0.5));
             let mean = |of: &dyn Fn(f64) -> f64| -> f64 {
                 steps().map(|x| 0.001 * density(x) * of(margin + scatter * x)).sum()
             };
-            let (worth, slope) = expected_worth(margin, scatter, 10.0);
+            let (clipped, slope) = expected_clipped_margin(margin, scatter, 10.0);
             assert!(
-                (worth - mean(&|m| crate::task::fitness::clipped_margin(m))).abs() < 1e-6,
+                (clipped - mean(&|m| crate::task::fitness::clipped_margin(m))).abs() < 1e-6,
                 "{margin} {scatter}"
             );
             assert!((slope - mean(&|m| if m.abs() < 10.0 { 0.1 } else { 0.0 })).abs() < 1e-4);

@@ -91,6 +91,8 @@ fn dot(canvas: &mut Canvas, plot: &Plot, robot: &RobotReport, y: f64, named: boo
 }
 
 const MEAN: Pen = Pen { colour: scales::VERMILLION, width: 1.2, dashes: None };
+/// How much covers the interval of the mean.
+const BAND: u8 = 46;
 const LARGER: Pen = Pen { colour: colour::INK, width: 0.9, dashes: Some([3.0, 2.0]) };
 const PIXEL: Pen = Pen { colour: colour::INK, width: 0.9, dashes: Some([0.9, 1.6]) };
 
@@ -99,8 +101,7 @@ fn lines(canvas: &mut Canvas, plot: &Plot, report: &EvalFile, task: &str, [from,
     let x = |share: f64| plot.place([percent(share), 0.0])[0];
     if let Some(mean) = report.means.get(task) {
         if let Some([low, high]) = mean.interval {
-            let band = MEAN.colour.with_opacity(46);
-            canvas.rectangle([x(low), from], [x(high) - x(low), to - from], band);
+            canvas.rectangle([x(low), from], [x(high) - x(low), to - from], MEAN.colour.with_opacity(BAND));
         }
         canvas.line([x(mean.accuracy), from], [x(mean.accuracy), to], MEAN);
     }
@@ -120,16 +121,21 @@ fn legend(canvas: &mut Canvas, report: &EvalFile, top: f64) -> f64 {
     // Of several tasks each has its own numbers.
     let mean = report.means.values().next().filter(|_| report.means.len() == 1);
     let baselines = report.baselines.values().next().filter(|_| report.baselines.len() == 1);
+    let has_interval = report.means.values().any(|mean| mean.interval.is_some());
+    let interval = if has_interval { ", 95 % interval" } else { "" };
     let dot = Pen::new(scales::BLUE, 1.1);
     let lines = [
         (dot, "robot, 95 % interval".to_string()),
-        (MEAN, value("mean", mean.map(|mean| mean.accuracy))),
+        (MEAN, value("mean", mean.map(|mean| mean.accuracy)) + interval),
         (LARGER, value("larger group", baselines.map(|b| b.larger_group))),
         (PIXEL, value("best pixel", baselines.map(|b| b.best_single_pixel))),
     ];
     let column = (COLUMN - 2.0 * MARGIN) / 2.0;
     for (k, (pen, text)) in lines.iter().enumerate() {
         let at = [MARGIN + 4.0 + (k % 2) as f64 * column, top + 6.0 + (k / 2) as f64 * 11.0];
+        if k == 1 && has_interval {
+            canvas.rectangle([at[0], at[1] - 6.0], [14.0, 6.8], MEAN.colour.with_opacity(BAND));
+        }
         canvas.line([at[0], at[1] - 2.6], [at[0] + 14.0, at[1] - 2.6], *pen);
         if k == 0 {
             canvas.dot([at[0] + 7.0, at[1] - 2.6], 2.2, scales::BLUE);

@@ -1,14 +1,19 @@
 //! The words of a report: its title, a methods paragraph, and the commands that make it again.
 
+use crate::base::files::exists;
+use crate::base::hash::short;
 use crate::base::number;
 use crate::base::number::percent;
 use crate::commands::report::Dossier;
 use crate::config::capacity::CapacityConfig;
+use crate::config::train::TrainConfig;
 use crate::search::showing;
 use crate::store::capacity::CapacityFile;
 use crate::store::eval::Mean;
 use crate::store::folder::in_shell;
 use crate::store::names::{CONFIG, EVAL_JSON};
+use crate::store::run::RunFile;
+use crate::store::training::Origin;
 use crate::task::direction;
 use crate::task::fitness::Fitness;
 use crate::task::protocol::RolloutMode;
@@ -40,14 +45,69 @@ pub(super) fn contents(runs: &[Dossier]) -> String {
     format!("<nav aria-label=\"Runs\">\n{}</nav>\n", runs.iter().enumerate().map(link).collect::<String>())
 }
 
+/// What fitness rewards.
+fn rewarded(fitness: Fitness) -> &'static str {
+    match fitness {
+        Fitness::Min => {
+            "the smallest distance walked towards the right side, or minus the largest one towards the wrong side"
+        }
+        Fitness::MeanClipped => {
+            "the mean distance walked towards the right side, clipped at ten voxel lengths, both groups weighing \
+             the same"
+        }
+        Fitness::Response => {
+            "how far apart the two images of a pair, opposites of each other, move the body with all soft voxels \
+             and sensors made expanding sensors, less what it walks anyway; every second pair with a start one \
+             voxel higher and without length limits"
+        }
+    }
+}
+
+/// How the robots came about by evolution.
+fn evolved(dossier: &Dossier) -> String {
+    let run = &dossier.run;
+    let evaluations = dossier
+        .effort()
+        .map_or(String::new(), |(_, count)| format!(" ({} evaluations)", number::fixed(count, 0)));
+    format!(
+        "were encoded by compositional pattern-producing networks and evolved with MAP-Elites for {} \
+         generations{evaluations}, seed {}, using morphcog {}. The archive's dimensions are the numbers of muscle, \
+         sensor and all voxels in seven bins each{}; {} of its {} cells can be filled. Each generation mutated up \
+         to {} elites; an offspring replaced an elite only if it was strictly fitter.",
+        run.generations,
+        run.config.seed,
+        run.program_version,
+        if run.dimensions.tasks.len() > 1 { ", and the task performed" } else { "" },
+        run.stats.num_elites,
+        run.dimensions.possible_cells,
+        run.config.map_elites.parents,
+    )
+}
+
+/// How the robot was trained.
+fn trained(run: &RunFile, origin: &Origin) -> String {
+    let TrainConfig { random_images, rounds, images, final_images, challengers, .. } = run.config.train;
+    let taught = match rounds {
+        0 => "Its soft voxels and sensors were kept".to_string(),
+        _ => format!(
+            "The response of its gait was measured under {random_images} random images, and soft voxels and \
+             sensors were chosen by a linear model of that, in {rounds} rounds of {images} training images"
+        ),
+    };
+    format!(
+        "were encoded by compositional pattern-producing networks and evolved with MAP-Elites. One of the run {} \
+         ({} generations) was trained with morphcog {}, seed {}. {taught}; then {challengers} bodies, changed in \
+         some sensors or voxels, challenged it on {final_images} training images at a time.",
+        origin.name, origin.generations, run.program_version, run.config.seed,
+    )
+}
+
 /// A paragraph that could go into a paper.
 pub(super) fn methods(dossier: &Dossier) -> String {
     let run = &dossier.run;
     let config = &run.config;
     let (height, width) = (config.body.height, config.body.width);
-    let evaluations = dossier
-        .effort()
-        .map_or(String::new(), |(_, count)| format!(" ({} evaluations)", number::fixed(count, 0)));
+    let made = run.origin.as_ref().map_or_else(|| evolved(dossier), |origin| trained(run, origin));
     let encoding = match config.stimulus.encoding {
         Encoding::Intensity => "proportional to the pixel's intensity".to_string(),
         Encoding::Saturated => "1 for any pixel above 0".to_string(),
@@ -63,46 +123,18 @@ pub(super) fn methods(dossier: &Dossier) -> String {
         RolloutMode::Fresh => "a rollout of its own from the initial state",
         RolloutMode::Sequential => "one continuous rollout for all images",
     };
-    let fitness = match run.fitness() {
-        Fitness::Min => {
-            "the smallest distance walked towards the right side, or minus the largest one towards the wrong side"
-        }
-        Fitness::MeanClipped => {
-            "the mean distance walked towards the right side, clipped at ten voxel lengths, both groups weighing \
-             the same"
-        }
-        Fitness::Response => {
-            "how far apart the two images of a pair, opposites of each other, move the body with all soft voxels \
-             and sensors \
-             made expanding sensors, less what it walks anyway; every second pair with a start one voxel higher \
-              and without \
-             length limits"
-        }
-    };
     let counts = |label: u8| run.training_images.iter().filter(|image| image.label == label).count();
     let images: Vec<String> =
         config.classes().into_iter().map(|class| format!("{} of class {class}", counts(class))).collect();
+    let shown = if run.origin.is_some() { "The fitness is that on" } else { "Robots were trained on" };
     let mut text = format!(
         "Bodies of at most {height} × {width} voxels (rigid, soft, two phases of muscle, shrinking and expanding \
-         sensors) were encoded by compositional \
-         pattern-producing networks and evolved with MAP-Elites for {} generations{evaluations}, seed {}, using \
-          morphcog {}. \
-         The archive's dimensions are the numbers of muscle, sensor and all voxels in seven bins each{}; {} of its \
-          {} cells can be filled. \
-         Each generation mutated up to {} elites; an offspring replaced an elite only if it was strictly fitter. \
-         Robots were trained on {} images of {} ({}); each image{margin} was shown for {steps} control steps ({cycles} \
-          actuation cycles) in {rollout}, \
-         a sensor's stimulus being {encoding}. Fitness is {fitness}.",
-        run.generations,
-        config.seed,
-        run.program_version,
-        if run.dimensions.tasks.len() > 1 { ", and the task performed" } else { "" },
-        run.stats.num_elites,
-        run.dimensions.possible_cells,
-        config.map_elites.parents,
+         sensors) {made} {shown} {} images of {} ({}); each image{margin} was shown for {steps} control steps \
+         ({cycles} actuation cycles) in {rollout}, a sensor's stimulus being {encoding}. Fitness is {}.",
         run.training_images.len(),
         run.dataset.name,
         images.join(", "),
+        rewarded(run.fitness()),
     );
     if let Some(report) = dossier.findings.eval.as_ref().filter(|report| !report.means.is_empty()) {
         let mean = |(task, mean): (&String, &Mean)| {
@@ -138,11 +170,10 @@ pub(super) fn methods(dossier: &Dossier) -> String {
 /// The commands that make a run and its tests again; audits with other criteria, and networks
 /// trained with other hyperparameters, need these besides.
 pub(super) fn commands(dossier: &Dossier) -> String {
-    let config = in_shell(&dossier.path.with_file_name(CONFIG));
     let again = format!("again/{}-seed{}", dossier.run.name, dossier.run.config.seed);
     let [again, eval] =
         [again.clone(), format!("{again}/{EVAL_JSON}")].map(|path| in_shell(Path::new(&path)));
-    let mut lines = vec![format!("morphcog evolve --config {config} --out {again}")];
+    let mut lines = made_by(dossier, &again);
     let found = &dossier.findings;
     if let Some(audit) = &found.audit {
         let ids: Vec<&str> = audit.robots.iter().map(|robot| robot.id.as_str()).collect();
@@ -157,6 +188,9 @@ pub(super) fn commands(dossier: &Dossier) -> String {
             "morphcog eval --archive {again} --images {images} --seed {seed} --robots {}",
             ids.join(",")
         );
+        if report.trained_on.is_some() {
+            line += &format!(" --dataset {}", report.dataset);
+        }
         if report.threshold != direction::THRESHOLD {
             line += &format!(" --threshold {}", report.threshold);
         }
@@ -171,6 +205,31 @@ pub(super) fn commands(dossier: &Dossier) -> String {
     }
     lines.push(format!("morphcog report --archive {again}"));
     format!("<pre>{}</pre>\n", escape(&lines.join("\n")))
+}
+
+/// The command that makes the run again, after what is to be known for it.
+fn made_by(dossier: &Dossier, again: &str) -> Vec<String> {
+    let (run, config) = (&dossier.run, dossier.path.with_file_name(CONFIG));
+    let Some(origin) = &run.origin else {
+        let known = exists(&config);
+        let missing = format!("# CONFIG: the key \"config\" of {}", dossier.path.display());
+        let config = if known { in_shell(&config) } else { "CONFIG".to_string() };
+        let line = format!("morphcog evolve --config {config} --out {again}");
+        return if known { vec![line] } else { vec![missing, line] };
+    };
+    let gaits = format!("# GAITS: run {}, SHA-256 of its content {}…", origin.name, short(&origin.sha256));
+    let robot = run.elites.first().and_then(|robot| robot.parent.as_deref());
+    let task = run.dimensions.tasks.join(" ");
+    let mut line = format!("morphcog train --archive GAITS --task '{task}' --seed {}", run.config.seed);
+    line += &robot.map_or(String::new(), |robot| format!(" --robots {robot}"));
+    for (key, value) in run.config.settings() {
+        // The gaits' run may have any of these otherwise.
+        if ["data.dataset", "stimulus.", "train."].iter().any(|section| key.starts_with(section)) {
+            let value = value.as_str().map_or_else(|| value.to_string(), str::to_string);
+            line += &format!(" --set {}", in_shell(Path::new(&format!("{key}={value}"))));
+        }
+    }
+    vec![gaits, format!("{line} --out {again}")]
 }
 
 /// The settings of a capacity, as far as its file has them, where they are not the defaults.
