@@ -19,7 +19,7 @@ mod train;
 use crate::analysis::gallery;
 use crate::base::error::{Error, ErrorKind};
 use crate::base::ranks::Ranks;
-use crate::base::{error, shipped, signals};
+use crate::base::{error, shipped, signals, threads};
 use crate::commands::one_by_one::Named;
 use crate::commands::plan::{PAPER_TOML, Plan};
 use crate::commands::schema::{self, Schema};
@@ -27,9 +27,9 @@ use crate::commands::{bench, data, eval, one_by_one, replay, simulate};
 use crate::config;
 use crate::config::Config;
 use crate::data::catalogue::Catalogue;
-use crate::data::dataset::{BUILTIN, Dataset, Split};
+use crate::data::dataset::{BUILTIN, Dataset, DatasetError, Split};
 use crate::data::fetch::{FetchError, FetchOptions, fetch};
-use crate::data::files::places;
+use crate::data::files::{FilesError, places};
 use crate::search::evolve;
 use crate::sim::InstructionSet;
 use crate::store::capacity::CapacityFile;
@@ -56,6 +56,11 @@ use std::sync::atomic::AtomicBool;
 /// What went wrong; its kind has the exit code.
 pub fn run(cli: Cli, console: &Console, ranks: Ranks) -> Result<(), Error> {
     InstructionSet::asked().map_err(|text| Error::usage(text).hint("or leave it unset".to_string()))?;
+    threads::check_environment()?;
+    if cli.quiet && cli.json {
+        // clap sees it only where both are on the same side of the command's name.
+        return Err(Error::usage("--quiet: expected without --json".to_string()));
+    }
     let is_shared = matches!(cli.command, Command::Evolve(_) | Command::Eval(_) | Command::Audit(_));
     if ranks.size() > 1 && !is_shared {
         let text = "MPI: expected evolve, eval or audit: several processes can share only these";
@@ -350,7 +355,15 @@ fn run_data(command: DataCommand, console: &Console) -> Result<(), Error> {
         }
         DataCommand::Info(DatasetArgs { dataset, data }) => {
             let found = data::info(&dataset, &given(data.as_deref()));
-            summary::dataset(console, &found.map_err(|error| Error::input(error.to_string()))?);
+            let found = found.map_err(|error| Error::input(error.to_string()))?;
+            summary::dataset(console, &found);
+            // A split that is not there is said; one that cannot be used is an error.
+            let is_there = |problem: &DatasetError| {
+                !matches!(problem, DatasetError::Files(FilesError::Missing { content: "images", .. }))
+            };
+            if let Some((split, problem)) = found.problems.iter().find(|(_, problem)| is_there(problem)) {
+                return Err(Error::input(format!("{split}: {problem}")));
+            }
         }
         DataCommand::Sheet { dataset: DatasetArgs { dataset, data }, samples, test, out } => {
             if !out.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("png")) {

@@ -409,6 +409,25 @@ fn broken_data_are_refused_naming_the_file() {
     sandbox.run(run).ended(3, &["train-images-idx3-ubyte"]);
     sandbox.write("data/mnist/train-images-idx3-ubyte", "this is no image");
     sandbox.run(run).ended(3, &["train-images-idx3-ubyte"]);
+    // Also where the other split can be used.
+    sandbox.write("data/mnist/t10k-images-idx3-ubyte", [0u8, 0, 8, 3, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 9]);
+    sandbox.write("data/mnist/t10k-labels-idx1-ubyte", [0u8, 0, 8, 1, 0, 0, 0, 1, 5]);
+    let said = sandbox.run("data info mnist").ended(3, &["error: train: ", "train-images-idx3-ubyte"]);
+    assert!(said.out.contains("test: 1 images"), "{said:?}");
+    for file in ["train-images-idx3-ubyte", "train-labels-idx1-ubyte"] {
+        std::fs::remove_file(sandbox.path("data/mnist").join(file)).unwrap();
+    }
+    sandbox.run("data info mnist").ended(0, &["warning: train: "]);
+}
+
+#[test]
+fn what_contradicts_itself_or_asks_for_too_much_is_refused() {
+    let sandbox = Sandbox::new();
+    sandbox.run("-q data info --json").ended(2, &["--quiet", "--json"]);
+    sandbox.run("data info -q --json").ended(2, &["--quiet", "--json"]);
+    let mut command = sandbox.command(["data", "info"]);
+    command.env("RAYON_NUM_THREADS", "100000");
+    said(command).ended(2, &["RAYON_NUM_THREADS = 100000", "at most 1024"]);
 }
 
 #[test]
@@ -746,10 +765,10 @@ fn a_broken_run_json_is_refused_saying_how() {
     for (content, word) in [
         (String::new(), "run.json"),
         (whole[..whole.len() / 2].to_string(), "run.json:"),
-        ("{\"a\": 1}".to_string(), "not a run.json of morphcog"),
+        ("{\"a\": 1}".to_string(), "not morphcog's run.json"),
         ("[1, 2]".to_string(), "run.json"),
         (replaced("\"format_version\":1", "\"format_version\":2"), "format_version"),
-        (replaced("\"format\":\"morphcog-run\"", "\"format\":\"other\""), "not a run.json of morphcog"),
+        (replaced("\"format\":\"morphcog-run\"", "\"format\":\"other\""), "not morphcog's run.json"),
         (cyclic, "elites[0].genome"),
         (replaced("\"elites\":[", &format!("\"elites\":[\n{},", elite.trim_end_matches(','))), "elite"),
         (replaced("\"displacements\":[", "\"displacements\":[1.0,"), "displacement"),

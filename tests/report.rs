@@ -201,8 +201,22 @@ fn a_training_is_told_as_one_and_its_command_trains() {
 fn what_is_no_run_is_refused() {
     let sandbox = sandbox();
     sandbox.run("report nowhere").ended(3, &["nowhere"]);
-    sandbox.run("report tiny.toml").ended(3, &["tiny.toml"]);
+    sandbox.run("report tiny.toml").ended(2, &["tiny.toml", "expected a run.json, or its folder"]);
     sandbox.run("report runs/3 -o runs").ended(1, &["runs"]);
+    // Nor is what was found of a run, or who is at it; nor a run that a link leads to.
+    sandbox.write("runs/4/audit.json", "{}");
+    for name in ["audit.json", "response.csv", "task.json", ".lock", ".task.lock"] {
+        let over = format!("report runs/3 --rollouts 0 -o runs/4/{name}");
+        sandbox.run(&over).ended(2, &["overwrite a file of a run"]);
+    }
+    #[cfg(unix)]
+    {
+        let link = sandbox.path("latest.json");
+        std::os::unix::fs::symlink(sandbox.path("runs/4/run.json"), link).unwrap();
+        let over = ["overwrite a file of a run"];
+        sandbox.run("report runs/3 --rollouts 0 -o latest.json").ended(2, &over);
+        sandbox.run("eval -a runs/3 --images 2 --cycles 1 -o latest.json").ended(2, &over);
+    }
     // A run is not written over, be it another one.
     let kept = sandbox.read("runs/4/run.json");
     let over = ["overwrite a file of a run"];

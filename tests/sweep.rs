@@ -136,6 +136,10 @@ fn what_is_wrong_is_said_all_at_once_before_anything_starts() {
         ],
     );
     assert_eq!(said.err.matches("error:").count(), 2, "{}", said.err);
+    sandbox.run("sweep plan.toml --set set=[\"seed=3\"]").ended(3, &["set: seed: expected in seeds"]);
+    let mnist = "sweep plan.toml --set set=[\"data.dataset=mnist\"]";
+    let said = sandbox.run(mnist).ended(3, &["data/mnist", "data fetch mnist"]);
+    assert_eq!(said.err.matches("error:").count() + said.err.matches("warning:").count(), 1, "{}", said.err);
     sandbox.write("typo.toml", PLAN.replace("seeds", "seed"));
     sandbox.run("sweep typo.toml").ended(3, &["typo.toml:3", "seed"]);
     sandbox.run("sweep plan.toml --task 5").ended(2, &["--task 5", "1 to 4"]);

@@ -191,6 +191,10 @@ fn what_cannot_be_trained_is_one_clear_error_and_writes_nothing() {
     refused(&format!("--task 0|1 --set {deep}rounds=1"), 2, &["at most 16 parts"]);
     refused("--task 0|1 --set validation.images=100000", 3, &["100000"]);
     refused("--task 0|1 --robots nobody", 3, &["nobody"]);
+    // What is said elsewhere, or is the gaits' own, is no key.
+    refused("--task 0|1 --set body.height=4", 3, &["body = 4 × 5 voxels", "5 × 5", "gaits"]);
+    refused("--task 0|1 --set task.groups=[[3],[4]]", 3, &["task: expected"]);
+    refused("--task 0|1 --seed 4 --set seed=3", 3, &["seed = 3", "expected 4"]);
     // One that no image can move.
     let mut run = sandbox.run_file("walkers");
     let mut blind = run.elites[0].clone();

@@ -2,6 +2,22 @@
 
 use crate::base::error::Error;
 
+/// Most threads.
+pub const MOST_THREADS: usize = 1024;
+
+/// Whether the environment's variable for threads (rayon's) can be followed.
+///
+/// # Errors
+/// If it asks for more than [`MOST_THREADS`].
+pub fn check_environment() -> Result<(), Error> {
+    const NAME: &str = "RAYON_NUM_THREADS";
+    let asked = std::env::var(NAME).ok().and_then(|text| text.parse::<usize>().ok());
+    match asked.filter(|threads| *threads > MOST_THREADS) {
+        Some(threads) => Err(Error::usage(format!("{NAME} = {threads}: expected at most {MOST_THREADS}"))),
+        None => Ok(()),
+    }
+}
+
 /// So many threads; `None`: one per core.
 ///
 /// # Errors

@@ -19,9 +19,9 @@ use std::path::PathBuf;
 pub(super) const EXAMPLES: &str = "\
 Examples:
   morphcog team --images 100                               the team that ships with the program
-  morphcog team --archive runs/pairs/*                     a robot of each run
+  morphcog team --archive runs/pairs/*/                    a robot of each run
   morphcog team --archive runs/0v1 runs/0v2 runs/1v2 --classes 0,1,2
-  morphcog team --archive runs/pairs/* --split validation --images 400
+  morphcog team --archive runs/pairs/*/ --split validation --images 400
 
 A robot votes for the classes of the side it walks to, if it walks farther than 3 voxel lengths;
 most votes win, and of classes with as many votes the one that all robots together walked farthest

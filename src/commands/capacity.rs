@@ -115,7 +115,7 @@ pub fn capacity(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -
         .filter(|split| robots.iter().any(|robot| robot.task == split.name()))
         .collect();
     let per_task = config.networks.len() * config.sizes().count() * config.trainings;
-    let mut known = Trainings::read(&options.out);
+    let mut known = Trainings::read(&options.out)?;
     let jobs = splits.iter().flat_map(|split| config.networks.iter().map(move |&kind| (*split, kind)));
     let key = |split: &grouping::Split, kind: Kind| {
         let hyper = serde_json::to_string(config.of(kind)).expect("JSON has all of it");

@@ -184,6 +184,9 @@ impl SweepPlan {
     /// What is wrong with the plan, or with some of its tasks: all of that at once.
     pub fn tasks(&self, path: &Path) -> Result<Vec<Task>, Vec<Error>> {
         let one = |error: Error| vec![error.within(&path.display().to_string())];
+        if self.set.iter().any(|set| set.split('=').next().is_some_and(|key| key.trim() == "seed")) {
+            return Err(one(Error::at("set", "seed: expected in seeds")));
+        }
         let base = self.base(path).map_err(one)?;
         let (groups, varied) = (self.groups().map_err(one)?, self.varied().map_err(one)?);
         let seeds = match (&base, self.seeds.as_slice()) {

@@ -9,6 +9,7 @@ use crate::base::ranks::Ranks;
 use crate::commands::{audit, eval};
 use crate::config::audit::Criteria;
 use crate::config::{Config, Settings, differing};
+use crate::data::dataset::{BUILTIN, Split};
 use crate::search::showing::task_of;
 use crate::search::{evolve, showing, train, validation};
 use crate::store::audit::{AuditFile, RobotAudit};
@@ -16,11 +17,12 @@ use crate::store::eval::EvalFile;
 use crate::store::folder::IfExists;
 use crate::store::images::HeldOut;
 use crate::store::lock::{self, Lock, Refusal};
-use crate::store::names::{AUDIT_JSON, METRICS, RUN_JSON, TASK_JSON};
+use crate::store::names::{AUDIT_JSON, DATA_FOLDER, METRICS, RUN_JSON, TASK_JSON, TASK_LOCK};
 use crate::store::robots::{Selection, Source};
 use crate::store::run::Robot;
 use crate::store::setting::RunRef;
 use crate::store::task::{State, TaskFile};
+use crate::store::whereabouts::Whereabouts;
 use crate::task::direction;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -33,9 +35,6 @@ use std::sync::Mutex;
 use std::sync::PoisonError;
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::time::Instant;
-
-/// Name of the file that says who is at a task.
-const LOCK: &str = ".task.lock";
 
 /// Bytes at the end of a metrics.csv that hold its last whole row; rows have about 150.
 const ROW: u64 = 4096;
@@ -239,7 +238,7 @@ pub fn check_folders(tasks: &[Task], place: &Place) -> Result<(), Vec<Error>> {
 pub fn run(task: &Task, place: &Place, stop: &AtomicBool, observer: &dyn Observer) -> Result<(), Error> {
     let folder = place.folder(task);
     std::fs::create_dir_all(&folder).map_err(|error| Error::writing(&folder, &error))?;
-    let lock = folder.join(LOCK);
+    let lock = folder.join(TASK_LOCK);
     let _lock = Lock::take(&lock).map_err(|refusal| match refusal {
         Refusal::Held(holder) => {
             let by = holder.map_or(String::new(), |holder| format!(" ({holder})"));
@@ -442,10 +441,29 @@ pub struct Summary {
     pub open: usize,
 }
 
+/// Whether there are images for tasks that have not begun: else all would fail, one after the other.
+///
+/// # Errors
+/// If not.
+fn check_data<'a>(tasks: impl Iterator<Item = &'a Task>, place: &Place) -> Result<(), Error> {
+    let mut known = BTreeSet::new();
+    for task in tasks {
+        let data = match &task.run {
+            Run::Evolve(config, _) => &config.data,
+            Run::Train(training) => &training.config.data,
+        };
+        let has_begun = place.folder(task).join(DATA_FOLDER).exists();
+        if data.dataset != BUILTIN && !has_begun && known.insert((data.dataset.clone(), data.dir.clone())) {
+            Whereabouts::given(place.data.as_deref()).load(data, &[Split::Train])?;
+        }
+    }
+    Ok(())
+}
+
 /// Does all tasks here, `jobs` at once; `None`: one per core. One that fails does not stop others.
 ///
 /// # Errors
-/// If the folder cannot be made.
+/// If the folder cannot be made, or there are no images.
 pub fn run_all(
     tasks: &[Task],
     place: &Place,
@@ -453,12 +471,13 @@ pub fn run_all(
     stop: &AtomicBool,
     observer: &dyn Observer,
 ) -> Result<Summary, Error> {
-    std::fs::create_dir_all(&place.out).map_err(|error| Error::writing(&place.out, &error))?;
     let is_open = |task: &&Task| {
         let known = TaskFile::read(&place.folder(task).join(TASK_JSON)).ok().flatten();
         !is_done(known.as_ref(), task)
     };
     let numbered: Vec<(usize, &Task)> = (1..).zip(tasks).filter(|(_, task)| is_open(task)).collect();
+    check_data(numbered.iter().map(|(_, task)| *task), place)?;
+    std::fs::create_dir_all(&place.out).map_err(|error| Error::writing(&place.out, &error))?;
     let before = tasks.len() - numbered.len();
     let cores = || std::thread::available_parallelism().map_or(1, usize::from);
     let threads = place.threads.unwrap_or_else(cores);
@@ -597,7 +616,7 @@ pub fn status(tasks: &[Task], place: &Place) -> Result<Vec<Status>, Error> {
 
 fn status_of(number: usize, task: &Task, folder: &Path) -> Result<Status, Error> {
     let known = TaskFile::read(&folder.join(TASK_JSON))?;
-    let held = lock::state(&folder.join(LOCK)).unwrap_or(lock::State::Free);
+    let held = lock::state(&folder.join(TASK_LOCK)).unwrap_or(lock::State::Free);
     let (state, about) = match (&known, held) {
         (_, lock::State::Held(holder)) => (State::Running, holder.map(|holder| holder.to_string())),
         (None, _) => (State::Waiting, None),

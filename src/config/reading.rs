@@ -73,7 +73,7 @@ pub(crate) fn read_versioned<T: DeserializeOwned>(
     let head: Head = read_json(text, name)?;
     if head.format.as_deref() != Some(format) {
         let file = format.strip_prefix("morphcog-").unwrap_or(format);
-        let text = format!("{name}: not a {file}.json of morphcog: expected \"format\": \"{format}\"");
+        let text = format!("{name}: not morphcog's {file}.json: expected \"format\": \"{format}\"");
         return Err(Error::input(text));
     }
     if head.format_version.is_none_or(|version| version > newest) {

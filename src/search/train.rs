@@ -15,7 +15,7 @@ use crate::config::evaluation::EvaluationConfig;
 use crate::config::task::TaskConfig;
 use crate::config::train::TrainConfig;
 use crate::config::validation::ValidationConfig;
-use crate::config::{Config, DataConfig, reading};
+use crate::config::{BodyConfig, Config, DataConfig, reading};
 use crate::data::dataset::{Dataset, Split};
 use crate::qd::{Archive, DescriptorSpace, Elite};
 use crate::search::probing::{Probing, response};
@@ -215,7 +215,23 @@ pub(crate) fn config_of(
         validation: ValidationConfig { best: 1, ..of_walkers.validation },
         ..of_walkers.clone()
     };
-    reading::changed(base, set, |config: &Config| config.validate(), |error| error)
+    let (task, seed) = (base.task.clone(), base.seed);
+    let config = reading::changed(base, set, |config: &Config| config.validate(), |error| error)?;
+    let BodyConfig { height, width, .. } = of_walkers.body;
+    if (config.body.height, config.body.width) != (height, width) {
+        let found = format!("{} × {} voxels", config.body.height, config.body.width);
+        return Err(Error::value("body", found, &format!("{height} × {width}, as the gaits have")));
+    }
+    if config.task != task {
+        return Err(Error::at(
+            "task",
+            "expected the groups that are trained to be said once, not as a key, too",
+        ));
+    }
+    if config.seed != seed {
+        return Err(Error::value("seed", config.seed, &format!("{seed}, as said elsewhere")));
+    }
+    Ok(config)
 }
 
 /// The same with as many training images as there are beside those that validate.

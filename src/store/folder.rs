@@ -7,13 +7,11 @@ use crate::store::lock;
 use crate::store::lock::{Lock, Refusal};
 use crate::store::names::{
     AUDIT_JSON, CAPACITY_JSON, CHECKPOINTS, CONFIG, DATA_FOLDER, ELITES, EVAL_JSON, EVAL_VALIDATION_JSON,
-    METRICS, RESPONSE_JSON, RUN_JSON, TEAM_JSON, TRAINING_JSON, VALIDATION_JSON,
+    LOCK, METRICS, RESPONSE_JSON, RUN_JSON, TASK_JSON, TASK_LOCK, TEAM_JSON, TRAINING_JSON, VALIDATION_JSON,
 };
 use crate::store::run::RunFile;
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
-
-const LOCK: &str = ".lock";
 
 /// The folder in the present one that runs go to if nothing else is said.
 pub const RUNS: &str = "runs";
@@ -164,7 +162,7 @@ pub(crate) fn check_out(out: &Path, of: &Path, own: &str) -> Result<(), Error> {
                 "expected another name: this is what {other} and what goes with it are called"
             ));
         }
-        writable(path)?;
+        not_of_run(path)?;
     }
     Ok(())
 }
@@ -174,17 +172,45 @@ fn holds_run(path: &Path) -> bool {
     path.with_file_name(RUN_JSON).exists()
 }
 
-/// Whether a file is, or would be, one of those of a run.
-fn is_of_run(path: &Path) -> bool {
-    holds_run(path) && RunFolder::files().iter().any(|file| path.file_name() == Some(file.as_ref()))
+/// What is meant by a path: also what a link leads to.
+fn meant(path: &Path) -> impl Iterator<Item = PathBuf> {
+    [Some(path.to_path_buf()), path.canonicalize().ok()].into_iter().flatten()
 }
 
-/// Whether a file can be written, and is none of a run: to be known before what goes into it is
-/// made.
+/// Whether a file is, or would be, one of those of a run or a task.
+fn is_of_run(path: &Path) -> bool {
+    let is_name = |path: &Path, name: &str| path.file_name() == Some(name.as_ref());
+    let of_task = |path: &Path| path.with_file_name(TASK_JSON).exists();
+    meant(path).any(|path| {
+        let mut of_any = [TASK_JSON, LOCK, TASK_LOCK].iter();
+        holds_run(&path) && RunFolder::files().iter().any(|name| is_name(&path, name))
+            || (holds_run(&path) || of_task(&path)) && of_any.any(|name| is_name(&path, name))
+    })
+}
+
+/// Whether a file is what a command found of a run.
+fn is_result(path: &Path) -> bool {
+    let is_it = |path: &Path, result: &&str| {
+        let endings =
+            ["json", "csv", "trainings.json"].map(|ending| Path::new(result).with_extension(ending));
+        endings.iter().any(|name| path.file_name() == Some(name.as_ref()))
+    };
+    meant(path).any(|path| holds_run(&path) && RESULTS.iter().any(|result| is_it(&path, result)))
+}
+
+/// Whether a file can be written, and is neither of a run nor what was found of one: to be known
+/// before what goes into it is made.
 ///
 /// # Errors
 /// Why not.
 pub fn writable(path: &Path) -> Result<(), Error> {
+    if is_result(path) {
+        return Err(Error::usage(format!("{}: {OF_RUN}", path.display())));
+    }
+    not_of_run(path)
+}
+
+fn not_of_run(path: &Path) -> Result<(), Error> {
     if is_of_run(path) {
         return Err(Error::usage(format!("{}: {OF_RUN}", path.display())));
     }
@@ -212,11 +238,15 @@ fn before_dot(name: &OsStr) -> Option<&[u8]> {
 /// The run.json that is meant by its path or its folder's; or every one of those that are named together.
 ///
 /// # Errors
-/// If none that ships with the program has that name.
+/// If none that ships with the program has that name; if it is another kind of file.
 pub fn run_json(path: PathBuf) -> Result<Vec<PathBuf>, String> {
     match () {
         () if named::is_named(&path) => named::runs(&path),
         () if path.is_dir() => Ok(vec![path.join(RUN_JSON)]),
+        () if path.is_file() && path.extension().is_none_or(|ending| ending != "json") => {
+            Err("expected a run.json, or its folder (with a slash after the star, as in runs/pairs/*/, only folders are meant)"
+                .to_string())
+        }
         () => Ok(vec![path]),
     }
 }

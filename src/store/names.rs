@@ -44,3 +44,9 @@ pub const METRICS: &str = "metrics.csv";
 
 /// File names of the newest checkpoint and the one before.
 pub const CHECKPOINTS: [&str; 2] = ["checkpoint.json", "checkpoint.previous.json"];
+
+/// Who is at work in a run's folder.
+pub const LOCK: &str = ".lock";
+
+/// Who is at a task of a sweep.
+pub const TASK_LOCK: &str = ".task.lock";

@@ -3,6 +3,7 @@
 use crate::base::error::Error;
 use crate::base::files::{read_text, write_atomically};
 use crate::baseline::Trained;
+use crate::config::reading;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -28,18 +29,25 @@ struct Content {
 }
 
 impl Trainings {
-    /// Those beside a result file: `capacity.trainings.json` beside `capacity.json`. None if there
-    /// are none, or they cannot be read: then all is trained again.
-    pub fn read(results: &Path) -> Self {
+    /// Those beside a result file: `capacity.trainings.json` beside `capacity.json`; none if there is
+    /// no such file.
+    ///
+    /// # Errors
+    /// If the file cannot be read: trainings in it would be lost.
+    pub fn read(results: &Path) -> Result<Self, Error> {
         let path = results.with_extension("trainings.json");
-        let text = read_text(&path).unwrap_or_default();
-        let content: Content = serde_json::from_str(&text).unwrap_or_default();
-        let ours = (content.format.as_str(), content.format_version) == FORMAT;
-        let trainings = if ours { content.trainings } else { BTreeMap::new() };
-        Trainings {
-            path,
-            content: Content { format: FORMAT.0.to_string(), format_version: FORMAT.1, trainings },
-        }
+        let empty =
+            || Content { format: FORMAT.0.to_string(), format_version: FORMAT.1, ..Content::default() };
+        let content = match read_text(&path) {
+            Ok(text) => {
+                let anew = || "move it away, and networks are trained anew".to_string();
+                reading::read_versioned(&text, &path.display().to_string(), FORMAT.0, FORMAT.1)
+                    .map_err(|error| error.hint(anew()))?
+            }
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => empty(),
+            Err(error) => return Err(Error::reading(&path, &error)),
+        };
+        Ok(Trainings { path, content })
     }
 
     /// The trainings of a size: accuracy, parameters.
@@ -69,18 +77,18 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_was_trained_is_known_again_and_anything_else_is_not() {
+    fn what_was_trained_is_known_again_and_never_dropped() {
         let folder = tempfile::tempdir().unwrap();
         let out = folder.path().join("capacity.json");
-        let mut trainings = Trainings::read(&out);
+        let mut trainings = Trainings::read(&out).unwrap();
         let trained = [0.5, 0.75].map(|accuracy| Trained { accuracy, epochs: 9, parameters: 12 });
         trainings.extend("a", 3, &trained[..1]);
         trainings.extend("a", 3, &trained[1..]);
         trainings.write().unwrap();
-        let again = Trainings::read(&out);
+        let again = Trainings::read(&out).unwrap();
         assert_eq!(again.of("a", 3), [(0.5, 12), (0.75, 12)]);
         assert!(again.of("a", 4).is_empty() && again.of("b", 3).is_empty());
         std::fs::write(folder.path().join("capacity.trainings.json"), "{\"format\": 1").unwrap();
-        assert!(Trainings::read(&out).of("a", 3).is_empty(), "a broken file is no reason to fail");
+        assert!(Trainings::read(&out).unwrap_err().message.contains("capacity.trainings.json"));
     }
 }
