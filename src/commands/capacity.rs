@@ -3,7 +3,6 @@
 
 use crate::analysis::gallery;
 use crate::base::error::{Error, ErrorKind};
-use crate::base::files::write_atomically;
 use crate::base::hash::sha256_hex;
 use crate::base::observer::{Observer, Work};
 use crate::base::statistics::standard_deviation;
@@ -17,6 +16,7 @@ use crate::store::eval::{EvalFile, RobotReport};
 use crate::store::folder::check_out;
 use crate::store::images::HeldOut;
 use crate::store::names::{CAPACITY_JSON, RUN_JSON};
+use crate::store::results::write_with_table;
 use crate::store::run::RunFile;
 use crate::store::trainings::Trainings;
 use crate::store::unwritten::Unwritten;
@@ -215,13 +215,7 @@ fn curve_of(kind: Kind, points: Vec<Point>, accuracy: f64) -> Curve {
 }
 
 fn write(options: &Options, file: &CapacityFile) -> Result<(), Error> {
-    let csv = file.to_csv();
-    for (path, content) in
-        [(&options.out, file.to_json().into_bytes()), (&options.out.with_extension("csv"), csv)]
-    {
-        write_atomically(path, &content).map_err(|error| Error::writing(path, &error))?;
-    }
-    Ok(())
+    write_with_table(&options.out, &file.to_json(), &file.to_csv()).map(|_| ())
 }
 
 /// The robots that count.

@@ -2,7 +2,6 @@
 
 use crate::analysis::gallery;
 use crate::base::error::Error;
-use crate::base::files::write_atomically;
 use crate::base::observer::{Observer, Work};
 use crate::base::ranks::Ranks;
 use crate::base::threads::pool;
@@ -16,6 +15,7 @@ use crate::store::eval::{EvalFile, RobotReport, Trial};
 use crate::store::folder::check_out;
 use crate::store::images::HeldOut;
 use crate::store::names::{EVAL_JSON, EVAL_VALIDATION_JSON};
+use crate::store::results::write_with_table;
 use crate::store::robots::{Chosen, Selection, Source};
 use crate::store::run::different;
 use crate::store::unwritten::Unwritten;
@@ -239,12 +239,7 @@ fn same_setting(first: &Source, other: &Source) -> Result<(), Error> {
 }
 
 fn write(options: &Options, report: &EvalFile) -> Result<(), Error> {
-    let csv_path = options.out.with_extension("csv");
-    let csv = report.to_csv();
-    for (path, content) in [(&options.out, report.to_json().into_bytes()), (&csv_path, csv)] {
-        write_atomically(path, &content).map_err(|error| Error::writing(path, &error))?;
-    }
-    Ok(())
+    write_with_table(&options.out, &report.to_json(), &report.to_csv()).map(|_| ())
 }
 
 /// The same, if a robot can be shown an image for so long.

@@ -1,7 +1,7 @@
 //! `audit.json` and `audit.csv`: the verdicts on a run's robots, beside its `run.json`.
 
 use crate::base::error::Error;
-use crate::base::files::{exists, read_text, write_atomically};
+use crate::base::files::{exists, read_text};
 use crate::base::hash;
 use crate::base::table;
 use crate::config::audit::Criteria;
@@ -9,6 +9,7 @@ use crate::config::reading;
 use crate::sim::Energy;
 use crate::store::folder;
 use crate::store::names::AUDIT_JSON;
+use crate::store::results::{by_lines, write_with_table};
 use crate::store::run::RunFile;
 use crate::task::perturbation::Kind;
 use schemars::JsonSchema;
@@ -203,14 +204,7 @@ impl AuditFile {
     /// Its text: the head on one line, then one line per robot.
     pub fn to_json(&self) -> String {
         let head = AuditFile { robots: Vec::new(), ..self.clone() };
-        // Numbers are finite and keys are text: JSON has all of it.
-        let head = serde_json::to_string(&head).expect("JSON has all of it");
-        let lines: Vec<String> = self
-            .robots
-            .iter()
-            .map(|robot| serde_json::to_string(robot).expect("JSON has all of it"))
-            .collect();
-        format!("{}\n{}\n]}}\n", head.strip_suffix("]}").unwrap_or(&head), lines.join(",\n"))
+        by_lines(&head, &self.robots)
     }
 
     /// `audit.csv`: a line per robot and rollout, the unchanged one first.
@@ -251,11 +245,8 @@ impl AuditFile {
     /// # Errors
     /// If they cannot be written.
     pub fn write(&self, path: &Path) -> Result<[PathBuf; 2], Error> {
-        let csv_path = path.with_extension("csv");
-        for (path, content) in [(path, self.to_json().into_bytes()), (&csv_path, self.to_csv())] {
-            write_atomically(path, &content).map_err(|error| Error::writing(path, &error))?;
-        }
-        Ok([path.to_path_buf(), csv_path])
+        let table = write_with_table(path, &self.to_json(), &self.to_csv())?;
+        Ok([path.to_path_buf(), table])
     }
 }
 

@@ -11,6 +11,7 @@ pub mod lock;
 pub mod metrics;
 pub mod names;
 pub mod response;
+pub(crate) mod results;
 pub mod robots;
 pub mod run;
 #[cfg(test)]

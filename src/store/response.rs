@@ -1,11 +1,12 @@
 //! `response.json` and `response.csv`: the responses of robots' gaits, beside the run's `run.json`.
 
 use crate::base::error::Error;
-use crate::base::files::{read_text, write_atomically};
+use crate::base::files::read_text;
 use crate::base::table;
 use crate::body::Body;
 use crate::config::reading;
 use crate::store::images::DatasetRef;
+use crate::store::results::{by_lines, write_with_table};
 use crate::store::run::RunFile;
 use crate::task::perturbation::Condition;
 use crate::task::response::{Gait, Response};
@@ -21,9 +22,6 @@ pub const FORMAT_VERSION: u32 = 1;
 
 /// Endings of a robot's picture beside the results.
 pub const PICTURES: [&str; 2] = ["svg", "png"];
-
-/// Why a value becomes JSON.
-const JSON: &str = "JSON has all of it: keys are texts, and numbers are finite";
 
 /// The content of `response.json`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -239,12 +237,7 @@ impl ResponseFile {
     /// Its text: the head on one line, then one line per robot.
     pub fn to_json(&self) -> String {
         let head = ResponseFile { robots: Vec::new(), ..self.clone() };
-        let head = serde_json::to_string(&head).expect(JSON);
-        let lines: Vec<String> =
-            self.robots.iter().map(|robot| serde_json::to_string(robot).expect(JSON)).collect();
-        // `robots` is the last key.
-        let head = head.strip_suffix("]}").unwrap_or(&head);
-        format!("{head}\n{}\n]}}\n", lines.join(",\n"))
+        by_lines(&head, &self.robots)
     }
 
     /// `response.csv`: a line per robot and place.
@@ -263,11 +256,7 @@ impl ResponseFile {
     /// # Errors
     /// If they cannot be written.
     pub fn write(&self, path: &Path) -> Result<(), Error> {
-        let files = [(path, self.to_json().into_bytes()), (&path.with_extension("csv"), self.to_csv())];
-        for (path, content) in files {
-            write_atomically(path, &content).map_err(|error| Error::writing(path, &error))?;
-        }
-        Ok(())
+        write_with_table(path, &self.to_json(), &self.to_csv()).map(|_| ())
     }
 }
 

@@ -12,6 +12,7 @@ use crate::genome::Genome;
 use crate::qd::descriptor::{count_bin, possible_cells};
 use crate::qd::{Archive, ArchiveStats, DescriptorSpace, Elite};
 use crate::store::images::{DatasetRef, ImageRef, answers};
+use crate::store::results::by_lines;
 use crate::store::training::Origin;
 use crate::task::direction::Assignment;
 use crate::task::fitness::Fitness;
@@ -26,9 +27,6 @@ use std::path::Path;
 pub const FORMAT: &str = "morphcog-run";
 /// Version of its schema; a reader refuses newer ones.
 pub const FORMAT_VERSION: u32 = 1;
-
-/// Why a value becomes JSON.
-const JSON: &str = "JSON has all of it: keys are texts, and nothing fails to be written";
 
 /// A robot: a genome, its body, and what it did on the training images.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -293,12 +291,7 @@ impl RunFile {
     /// Its text: the head on one line, then one line per elite.
     pub fn to_json(&self) -> String {
         let head = RunFile { elites: Vec::new(), ..self.clone() };
-        let head = serde_json::to_string(&head).expect(JSON);
-        let lines: Vec<String> =
-            self.elites.iter().map(|robot| serde_json::to_string(robot).expect(JSON)).collect();
-        // `elites` is the last key.
-        let head = head.strip_suffix("]}").unwrap_or(&head);
-        format!("{head}\n{}\n]}}\n", lines.join(",\n"))
+        by_lines(&head, &self.elites)
     }
 
     /// What identifies it: SHA-256 of the bytes of its file, or of those that would be written, in

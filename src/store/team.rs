@@ -1,12 +1,13 @@
 //! `team.json` and `team.csv`: what robots of several runs answer together.
 
 use crate::base::error::Error;
-use crate::base::files::{read_text, write_atomically};
+use crate::base::files::read_text;
 use crate::base::table;
 use crate::body::Body;
 use crate::config::reading;
 use crate::store::eval::Trial;
 use crate::store::images::{HeldOut, ImageRef};
+use crate::store::results::write_with_table;
 use crate::task::direction::{Assignment, Direction};
 use crate::task::grouping::Group;
 use crate::task::judge::Judge;
@@ -319,11 +320,7 @@ impl TeamFile {
     /// If a file cannot be written.
     pub fn write(&self, path: &Path) -> Result<(), Error> {
         let json = serde_json::to_string(self).expect("keys are text and numbers are finite") + "\n";
-        let csv_path = path.with_extension("csv");
-        for (path, content) in [(path, json.into_bytes()), (&csv_path, self.to_csv())] {
-            write_atomically(path, &content).map_err(|error| Error::writing(path, &error))?;
-        }
-        Ok(())
+        write_with_table(path, &json, &self.to_csv()).map(|_| ())
     }
 
     /// A row per image: its class, both answers, and how far each robot walked.

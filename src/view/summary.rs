@@ -77,8 +77,13 @@ pub fn evolution(console: &Console, finished: &Finished, out: &Path) {
         share(totals.saved_shared_rollouts)
     ));
     if run.elites.is_empty() {
-        return console
-            .warning("the archive is empty: no robot has walked yet and been as fit as the config wants");
+        let unstable = match totals.unstable {
+            0 => String::new(),
+            count => format!("; {count} became unstable ([physics] may ask for too much)"),
+        };
+        return console.warning(&format!(
+            "the archive is empty: no robot has walked yet and been as fit as the config wants{unstable}"
+        ));
     }
     let archive = out.join(RUN_JSON);
     console.info(&format!("next: morphcog replay --robot best --archive {}", in_shell(&archive)));

