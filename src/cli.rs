@@ -220,7 +220,7 @@ fn run_eval(args: EvalArgs, console: &Console, ranks: Ranks) -> Result<(), Error
     };
     let options = eval::Options {
         robots: robots.physical(args.physical_only),
-        images: args.images as usize,
+        images: args.images,
         split: args.split,
         validation: args.validation.map(|images| images as usize),
         seed: args.seed,

@@ -421,6 +421,43 @@ fn broken_data_are_refused_naming_the_file() {
 }
 
 #[test]
+fn every_image_is_shown_if_all_are_asked_for() {
+    let sandbox = Sandbox::tiny();
+    let mut labels = vec![0_u8, 0, 0, 1, 1, 0, 7, 1];
+    let header = |magic: u8, sizes: &[u32]| {
+        let mut bytes = vec![0, 0, 8, magic];
+        sizes.iter().for_each(|size| bytes.extend(size.to_be_bytes()));
+        bytes
+    };
+    for split in ["train", "t10k"] {
+        let count = labels.len() as u32;
+        let pixels: Vec<u8> = (0..count * 64).map(|place| (place * 37 % 251) as u8).collect();
+        let images = [header(3, &[count, 8, 8]), pixels].concat();
+        sandbox.write(&format!("own/{split}-images-idx3-ubyte"), images);
+        sandbox
+            .write(&format!("own/{split}-labels-idx1-ubyte"), [header(1, &[count]), labels.clone()].concat());
+        labels.push(0);
+    }
+    let set = "--set data.dataset=own --set data.train_images=[0,3]";
+    sandbox.run(&format!("evolve -q -c tiny.toml {set} --data own -o run")).ended(0, &[]);
+    sandbox.run("eval -q -a run --data own --images all --cycles 1 --robots top:1").ended(0, &[]);
+    let eval: serde_json::Value = serde_json::from_str(&sandbox.read("run/eval.json")).unwrap();
+    let shown: Vec<u64> =
+        eval["images"].as_array().unwrap().iter().map(|image| image["index"].as_u64().unwrap()).collect();
+    // Class after class; no sevens, which the run does not know.
+    assert_eq!(shown, [0, 1, 2, 5, 8, 3, 4, 7]);
+    // A report's commands ask for the same.
+    sandbox.run("report -q run --rollouts 0 --data own").ended(0, &[]);
+    assert!(sandbox.read("run/report.html").contains("--images all"));
+    sandbox.run("team -q -a run --data own --classes 0,1 --images all -o team.json").ended(0, &[]);
+    let team: serde_json::Value = serde_json::from_str(&sandbox.read("team.json")).unwrap();
+    assert_eq!(team["images"].as_array().unwrap().len(), 8);
+    sandbox
+        .run("eval -q -a run --data own --images most")
+        .ended(2, &["--images", "expected all, or a number"]);
+}
+
+#[test]
 fn what_contradicts_itself_or_asks_for_too_much_is_refused() {
     let sandbox = Sandbox::new();
     sandbox.run("-q data info --json").ended(2, &["--quiet", "--json"]);

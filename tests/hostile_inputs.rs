@@ -23,7 +23,7 @@ use morphcog::serve::server::Server;
 use morphcog::serve::{self, Service};
 use morphcog::store::audit::AuditFile;
 use morphcog::store::folder::IfExists;
-use morphcog::store::images::HeldOut;
+use morphcog::store::images::{HeldOut, HowMany};
 use morphcog::store::robots::Selection;
 use morphcog::store::run::RunFile;
 use morphcog::store::team::TeamFile;
@@ -262,7 +262,7 @@ fn run(world: &World, dice: &mut Dice, case: &mut Case) {
     let options = eval::Options {
         archives: vec![archive.clone()],
         robots: Selection::Top(1),
-        images: 2,
+        images: HowMany::Evenly(2),
         split: HeldOut::Test,
         validation: None,
         seed: 1,

@@ -17,7 +17,7 @@ use crate::commands::replay::Shown;
 use crate::config;
 use crate::data::dataset::BUILTIN;
 use crate::search::showing;
-use crate::store::images::HeldOut;
+use crate::store::images::{HeldOut, HowMany};
 use crate::store::robots::Selection;
 use crate::task::direction;
 use crate::view::console::Mode;
@@ -247,9 +247,9 @@ pub(super) struct EvolveArgs {
 pub(super) struct EvalArgs {
     #[command(flatten)]
     pub(super) archives: Archives,
-    /// Images in all, evenly divided between the classes.
-    #[arg(short = 'n', long, default_value_t = 1000, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
-    pub(super) images: u32,
+    /// Images in all, evenly divided between the classes, or all of the classes.
+    #[arg(short = 'n', long, default_value_t = HowMany::Evenly(1000))]
+    pub(super) images: HowMany,
     /// Which images: test, or validation (of the training split, neither trained on nor chosen
     /// from), to compare robots by and leave the test images unseen.
     #[arg(long, default_value_t = HeldOut::Test, value_name = "SPLIT")]

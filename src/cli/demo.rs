@@ -13,7 +13,7 @@ use crate::search::showing::CYCLES;
 use crate::search::train;
 use crate::store::folder;
 use crate::store::folder::IfExists;
-use crate::store::images::HeldOut;
+use crate::store::images::{HeldOut, HowMany};
 use crate::store::names::{EVAL_JSON, RUN_JSON};
 use crate::store::robots::{BEST, Selection};
 use crate::task::direction::THRESHOLD;
@@ -92,7 +92,7 @@ pub(super) fn run(args: DemoArgs, console: &Console) -> Result<(), Error> {
         out: archive.with_file_name(EVAL_JSON),
         archives: vec![archive],
         robots: options.robots,
-        images: TEST_IMAGES,
+        images: HowMany::Evenly(TEST_IMAGES),
         split: HeldOut::Test,
         validation: None,
         seed: args.seed,

@@ -7,7 +7,7 @@ use crate::cli::choice::{Archives, selected};
 use crate::commands::team;
 use crate::commands::team::Options;
 use crate::store::folder;
-use crate::store::images::HeldOut;
+use crate::store::images::{HeldOut, HowMany};
 use crate::store::names::TEAM_JSON;
 use crate::store::robots::{BEST, Selection};
 use crate::view::console::Console;
@@ -45,9 +45,9 @@ pub(super) struct TeamArgs {
     /// Classes to tell apart, as 0,1,2 (default: all of the dataset).
     #[arg(long, value_delimiter = ',')]
     classes: Vec<u8>,
-    /// Images in all, evenly divided between the classes.
-    #[arg(short = 'n', long, default_value_t = 1000, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
-    images: u32,
+    /// Images in all, evenly divided between the classes, or all of the classes.
+    #[arg(short = 'n', long, default_value_t = HowMany::Evenly(1000))]
+    images: HowMany,
     /// Which images: test, or validation (of the training split, neither trained on nor chosen
     /// from).
     #[arg(long, default_value_t = HeldOut::Test, value_name = "SPLIT")]
@@ -77,7 +77,7 @@ pub(super) fn run(args: TeamArgs, console: &Console) -> Result<(), Error> {
     let options = Options {
         robots: selected(args.robots)?.unwrap_or(Selection::Ids(vec![BEST.to_string()])),
         classes: (!args.classes.is_empty()).then_some(args.classes),
-        images: args.images as usize,
+        images: args.images,
         split: args.split,
         seed: args.seed,
         data: args.data,

@@ -13,7 +13,7 @@ use crate::search::showing::{Walker, control_steps, task_of};
 use crate::search::validation;
 use crate::store::eval::{EvalFile, RobotReport, Trial};
 use crate::store::folder::check_out;
-use crate::store::images::HeldOut;
+use crate::store::images::{HeldOut, HowMany};
 use crate::store::names::{EVAL_JSON, EVAL_VALIDATION_JSON};
 use crate::store::results::write_with_table;
 use crate::store::robots::{Chosen, Selection, Source};
@@ -33,8 +33,8 @@ pub struct Options {
     pub archives: Vec<PathBuf>,
     /// Which of its robots.
     pub robots: Selection,
-    /// Images in all, evenly divided between the classes.
-    pub images: usize,
+    /// How many images.
+    pub images: HowMany,
     /// Which images.
     pub split: HeldOut,
     /// Validation images in all, for a selection by them; `None`: as the config says.

@@ -43,7 +43,7 @@ impl<'a> HeldOutImages<'a> {
         options: &'a Options,
     ) -> Result<Self, Error> {
         let (asked, least) = (options.images, config.classes().len());
-        if asked < least {
+        if !asked.has_each(least) {
             let text = format!("--images {asked}: expected {least} or more, one of each class");
             return Err(Error::usage(text));
         }

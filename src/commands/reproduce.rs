@@ -13,7 +13,7 @@ use crate::search::showing;
 use crate::store::audit::{AuditFile, Verdict};
 use crate::store::capacity::CapacityFile;
 use crate::store::eval::EvalFile;
-use crate::store::images::HeldOut;
+use crate::store::images::{HeldOut, HowMany};
 use crate::store::names::{AUDIT_JSON, RUN_JSON};
 use crate::store::robots::{Chosen, Selection, Source};
 use crate::task::direction;
@@ -247,7 +247,7 @@ impl Job<'_> {
         let options = eval::Options {
             archives: sources.iter().map(|source| source.path.clone()).collect(),
             robots: Selection::Drawn { robots: ids.clone(), about },
-            images: self.plan.images,
+            images: HowMany::Evenly(self.plan.images),
             split: HeldOut::Test,
             validation: None,
             seed: 1,

@@ -15,7 +15,7 @@ use crate::search::{evolve, showing, train, validation};
 use crate::store::audit::{AuditFile, RobotAudit};
 use crate::store::eval::EvalFile;
 use crate::store::folder::IfExists;
-use crate::store::images::HeldOut;
+use crate::store::images::{HeldOut, HowMany};
 use crate::store::lock::{self, Lock, Refusal};
 use crate::store::names::{AUDIT_JSON, DATA_FOLDER, METRICS, RUN_JSON, TASK_JSON, TASK_LOCK};
 use crate::store::robots::{Selection, Source};
@@ -348,7 +348,7 @@ fn steps(task: &Task, place: &Place, stop: &AtomicBool, observer: &dyn Observer)
         let options = eval::Options {
             archives: vec![archive],
             robots: selection("eval.robots", &step.robots)?.physical(step.physical_only),
-            images: step.images,
+            images: HowMany::Evenly(step.images),
             split: step.split,
             validation: None,
             seed: 1,
@@ -387,7 +387,7 @@ fn elsewhere(error: Error) -> Error {
 /// Whether an evaluation is whole, and of these runs and images; its robots are another question.
 pub(crate) fn is_of(known: &EvalFile, sources: &[Source], options: &eval::Options) -> bool {
     let runs: Vec<RunRef> = sources.iter().map(|source| RunRef::new(&source.run)).collect();
-    let same = (known.seed, known.split, known.images.len(), known.threshold)
+    let same = (known.seed, known.split, HowMany::Evenly(known.images.len()), known.threshold)
         == (options.seed, options.split, options.images, options.threshold);
     let is_ours = known.program_version == env!("CARGO_PKG_VERSION");
     is_ours && !known.stopped && known.trained_on.is_none() && known.runs == runs && same

@@ -13,7 +13,7 @@ use crate::search::held_out::{images_besides, test_images};
 use crate::search::showing::{CYCLES, Walker, control_steps, task_of};
 use crate::store::eval::Trial;
 use crate::store::folder::check_out;
-use crate::store::images::{HeldOut, ImageRef};
+use crate::store::images::{HeldOut, HowMany, ImageRef};
 use crate::store::names::TEAM_JSON;
 use crate::store::robots::{BEST, Chosen, Selection, Source};
 use crate::store::run::different;
@@ -39,8 +39,8 @@ pub struct Options {
     pub robots: Selection,
     /// The classes to tell apart; `None`: all of the dataset.
     pub classes: Option<Vec<u8>>,
-    /// Images in all, evenly divided between the classes.
-    pub images: usize,
+    /// How many images.
+    pub images: HowMany,
     /// Which images.
     pub split: HeldOut,
     /// Seed of what is drawn: images, and robots with `random:N`.
@@ -199,7 +199,7 @@ fn classes(options: &Options, dataset: &Dataset) -> Result<Vec<u8>, Error> {
     if classes.len() < 2 {
         return Err(Error::usage("--classes: expected two or more".to_string()));
     }
-    if options.images < classes.len() {
+    if !options.images.has_each(classes.len()) {
         let (asked, least) = (options.images, classes.len());
         return Err(Error::usage(format!("--images {asked}: expected {least} or more, one of each class")));
     }

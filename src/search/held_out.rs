@@ -9,7 +9,7 @@ use crate::config::validation::ValidationConfig;
 use crate::data::dataset::{Dataset, Split};
 use crate::search::training::Training;
 use crate::search::validation::ASKED;
-use crate::store::images::ImageRef;
+use crate::store::images::{HowMany, ImageRef};
 use crate::store::run::RunFile;
 use crate::store::training::Origin;
 use std::collections::BTreeSet;
@@ -90,7 +90,7 @@ pub fn images(
     count: usize,
 ) -> Result<Vec<ImageRef>, Error> {
     let classes = runs.first().map_or(Vec::new(), |run| run.config.classes());
-    images_besides(&BTreeSet::new(), runs, &classes, dataset, asked, count)
+    images_besides(&BTreeSet::new(), runs, &classes, dataset, asked, HowMany::Evenly(count))
 }
 
 /// The same of these classes, none of these images among them.
@@ -103,7 +103,7 @@ pub(crate) fn images_besides(
     classes: &[u8],
     dataset: &Dataset,
     asked: &str,
-    count: usize,
+    how_many: HowMany,
 ) -> Result<Vec<ImageRef>, Error> {
     let first = runs.iter().map(|run| &run.config).min_by_key(|config| config.seed);
     let Some(config) = first else { return Ok(Vec::new()) };
@@ -112,6 +112,7 @@ pub(crate) fn images_besides(
         seen.extend(trained_on(run, dataset)?);
     }
     let left = left(classes, &seen, dataset);
+    let HowMany::Evenly(count) = how_many else { return Ok(left.concat()) };
     let per_class = per_class(classes, &left, asked, count, "")?;
     let draw = |(&label, free): (&u8, Vec<ImageRef>)| -> Vec<ImageRef> {
         let mut random = stream(config.seed, Purpose::Validation, 0, u64::from(label));
@@ -123,17 +124,24 @@ pub(crate) fn images_besides(
     Ok(turns.take(count).collect())
 }
 
-/// `count` test images of these classes, class after class, evenly divided between them; the first
-/// classes get what is left over.
+/// Test images of these classes, class after class: all of them, or so many, evenly divided between
+/// the classes, of which the first get what is left over.
 ///
 /// # Errors
 /// If a class has too few.
 pub(crate) fn test_images(
     classes: &[u8],
     dataset: &Dataset,
-    count: usize,
+    how_many: HowMany,
     seed: u64,
 ) -> Result<Vec<ImageRef>, Error> {
+    let HowMany::Evenly(count) = how_many else {
+        let of_class = |&label: &u8| {
+            let all = dataset.indices_of(Split::Test, label).iter();
+            all.map(move |&index| ImageRef { index, label })
+        };
+        return Ok(classes.iter().flat_map(of_class).collect());
+    };
     let mut images = Vec::new();
     for (place, &label) in classes.iter().enumerate() {
         let share = count / classes.len() + usize::from(place < count % classes.len());

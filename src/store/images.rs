@@ -5,6 +5,7 @@ use crate::data::dataset::Split;
 use crate::task::score::Answer;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 use std::fmt;
 use std::str::FromStr;
 
@@ -66,6 +67,56 @@ impl FromStr for HeldOut {
     fn from_str(text: &str) -> Result<Self, String> {
         let found = [HeldOut::Test, HeldOut::Validation].into_iter().find(|split| split.to_string() == text);
         found.ok_or_else(|| "expected test or validation".to_string())
+    }
+}
+
+/// How many held-out images are shown.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum HowMany {
+    /// All that there are of the classes.
+    All,
+    /// So many in all, evenly divided between the classes.
+    Evenly(usize),
+}
+
+impl HowMany {
+    /// Whether that is an image of each of so many classes.
+    pub(crate) fn has_each(self, classes: usize) -> bool {
+        match self {
+            HowMany::All => true,
+            HowMany::Evenly(count) => count >= classes,
+        }
+    }
+
+    /// What was asked for of a list of images, as a command has it.
+    pub(crate) fn of(images: &[ImageRef]) -> Self {
+        let mut counts = BTreeMap::<u8, usize>::new();
+        images.iter().for_each(|image| *counts.entry(image.label).or_default() += 1);
+        match counts.values().min().zip(counts.values().max()) {
+            Some((least, most)) if most - least > 1 => HowMany::All,
+            _ => HowMany::Evenly(images.len()),
+        }
+    }
+}
+
+impl fmt::Display for HowMany {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            HowMany::All => f.write_str("all"),
+            HowMany::Evenly(count) => count.fmt(f),
+        }
+    }
+}
+
+impl FromStr for HowMany {
+    type Err = String;
+    fn from_str(text: &str) -> Result<Self, String> {
+        const MOST: usize = 1_000_000;
+        match text.parse() {
+            _ if text == "all" => Ok(HowMany::All),
+            Ok(count) if (1..=MOST).contains(&count) => Ok(HowMany::Evenly(count)),
+            _ => Err(format!("expected all, or a number from 1 to {MOST}")),
+        }
     }
 }
 

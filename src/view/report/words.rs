@@ -11,6 +11,7 @@ use crate::search::showing;
 use crate::store::capacity::CapacityFile;
 use crate::store::eval::Mean;
 use crate::store::folder::in_shell;
+use crate::store::images::HowMany;
 use crate::store::names::{CONFIG, EVAL_JSON};
 use crate::store::run::RunFile;
 use crate::store::training::Origin;
@@ -183,7 +184,7 @@ pub(super) fn commands(dossier: &Dossier) -> String {
     }
     if let Some(report) = &found.eval {
         let ids: Vec<&str> = report.robots.iter().map(|robot| robot.id.as_str()).collect();
-        let (images, seed) = (report.images.len(), report.seed);
+        let (images, seed) = (HowMany::of(&report.images), report.seed);
         let mut line = format!(
             "morphcog eval --archive {again} --images {images} --seed {seed} --robots {}",
             ids.join(",")
