@@ -179,12 +179,12 @@ fn meant(path: &Path) -> impl Iterator<Item = PathBuf> {
 
 /// Whether a file is, or would be, one of those of a run or a task.
 fn is_of_run(path: &Path) -> bool {
-    let is_name = |path: &Path, name: &str| path.file_name() == Some(name.as_ref());
-    let of_task = |path: &Path| path.with_file_name(TASK_JSON).exists();
+    let is_one_of =
+        |path: &Path, names: &[&str]| names.iter().any(|name| path.file_name() == Some(name.as_ref()));
     meant(path).any(|path| {
-        let mut of_any = [TASK_JSON, LOCK, TASK_LOCK].iter();
-        holds_run(&path) && RunFolder::files().iter().any(|name| is_name(&path, name))
-            || (holds_run(&path) || of_task(&path)) && of_any.any(|name| is_name(&path, name))
+        let is_beside_task = path.with_file_name(TASK_JSON).exists();
+        holds_run(&path) && is_one_of(&path, &RunFolder::files())
+            || (holds_run(&path) || is_beside_task) && is_one_of(&path, &[TASK_JSON, LOCK, TASK_LOCK])
     })
 }
 
@@ -244,8 +244,8 @@ pub fn run_json(path: PathBuf) -> Result<Vec<PathBuf>, String> {
         () if named::is_named(&path) => named::runs(&path),
         () if path.is_dir() => Ok(vec![path.join(RUN_JSON)]),
         () if path.is_file() && path.extension().is_none_or(|ending| ending != "json") => {
-            Err("expected a run.json, or its folder (with a slash after the star, as in runs/pairs/*/, only folders are meant)"
-                .to_string())
+            let text = "expected a run.json, or its folder (runs/pairs/*/, with a slash at the end, means folders only)";
+            Err(text.to_string())
         }
         () => Ok(vec![path]),
     }
