@@ -355,13 +355,14 @@ fn run_data(command: DataCommand, console: &Console) -> Result<(), Error> {
         }
         DataCommand::Info(DatasetArgs { dataset, data }) => {
             let found = data::info(&dataset, &given(data.as_deref()));
-            let found = found.map_err(|error| Error::input(error.to_string()))?;
-            summary::dataset(console, &found);
+            let mut found = found.map_err(|error| Error::input(error.to_string()))?;
             // A split that is not there is said; one that cannot be used is an error.
-            let is_there = |problem: &DatasetError| {
+            let is_there = |(_, problem): &(Split, DatasetError)| {
                 !matches!(problem, DatasetError::Files(FilesError::Missing { content: "images", .. }))
             };
-            if let Some((split, problem)) = found.problems.iter().find(|(_, problem)| is_there(problem)) {
+            let broken = found.problems.iter().position(is_there).map(|place| found.problems.remove(place));
+            summary::dataset(console, &found);
+            if let Some((split, problem)) = broken {
                 return Err(Error::input(format!("{split}: {problem}")));
             }
         }

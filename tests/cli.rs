@@ -414,6 +414,7 @@ fn broken_data_are_refused_naming_the_file() {
     sandbox.write("data/mnist/t10k-labels-idx1-ubyte", [0u8, 0, 8, 1, 0, 0, 0, 1, 5]);
     let said = sandbox.run("data info mnist").ended(3, &["error: train: ", "train-images-idx3-ubyte"]);
     assert!(said.out.contains("test: 1 images"), "{said:?}");
+    assert!(!said.err.contains("warning"), "{said:?}");
     for file in ["train-images-idx3-ubyte", "train-labels-idx1-ubyte"] {
         std::fs::remove_file(sandbox.path("data/mnist").join(file)).unwrap();
     }

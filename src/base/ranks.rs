@@ -73,6 +73,12 @@ impl Ranks {
         all.iter().map(|bytes| serde_json::from_slice(bytes).expect(WHY)).collect()
     }
 
+    /// Whether it is so for every rank: also where one was stopped, none waits for it. All ranks must
+    /// call it.
+    pub fn all(self, own: bool) -> bool {
+        self.share(own).into_iter().all(|is_so| is_so)
+    }
+
     /// What the leading rank has to say. All ranks must call it.
     pub fn from_lead<T: Serialize + DeserializeOwned>(self, own: Option<T>) -> Option<T> {
         self.share(own).swap_remove(0)

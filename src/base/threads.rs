@@ -3,7 +3,7 @@
 use crate::base::error::Error;
 
 /// Most threads.
-pub const MOST_THREADS: usize = 1024;
+pub const MOST_THREADS: u16 = 1024;
 
 /// Whether the environment's variable for threads (rayon's) can be followed.
 ///
@@ -12,7 +12,7 @@ pub const MOST_THREADS: usize = 1024;
 pub fn check_environment() -> Result<(), Error> {
     const NAME: &str = "RAYON_NUM_THREADS";
     let asked = std::env::var(NAME).ok().and_then(|text| text.parse::<usize>().ok());
-    match asked.filter(|threads| *threads > MOST_THREADS) {
+    match asked.filter(|threads| *threads > usize::from(MOST_THREADS)) {
         Some(threads) => Err(Error::usage(format!("{NAME} = {threads}: expected at most {MOST_THREADS}"))),
         None => Ok(()),
     }

@@ -2,7 +2,7 @@
 
 use crate::cli::audit::AuditArgs;
 use crate::cli::capacity::CapacityArgs;
-use crate::cli::choice::{Archives, ROBOTS, run_json};
+use crate::cli::choice::{Archives, ROBOTS, run_json, threads};
 use crate::cli::demo::DemoArgs;
 use crate::cli::plot::PlotArgs;
 use crate::cli::report::ReportArgs;
@@ -221,7 +221,7 @@ pub(super) struct EvolveArgs {
     #[arg(short, long, value_parser = clap::value_parser!(u64).range(1..=config::MAX_NUMBER))]
     pub(super) generations: Option<u64>,
     /// Threads (default: one per core); the result does not depend on it.
-    #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    #[arg(long, value_parser = threads())]
     pub(super) threads: Option<u16>,
     /// Run folder (default: runs/<config>-seed<seed>).
     #[arg(short, long, value_name = "DIR")]
@@ -282,7 +282,7 @@ pub(super) struct EvalArgs {
     #[arg(short, long, value_name = "FILE")]
     pub(super) out: Option<PathBuf>,
     /// Threads (default: one per core).
-    #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    #[arg(long, value_parser = threads())]
     pub(super) threads: Option<u16>,
 }
 

@@ -5,6 +5,7 @@ use crate::base::error::Error;
 use crate::base::ranks::Ranks;
 use crate::base::signals;
 use crate::cli::choice;
+use crate::cli::choice::threads;
 use crate::cli::choice::{Archives, ROBOTS, selected};
 use crate::commands::audit;
 use crate::commands::audit::{Options, Source};
@@ -56,7 +57,7 @@ pub(super) struct AuditArgs {
     #[arg(short, long, value_name = "FILE")]
     out: Option<PathBuf>,
     /// Threads (default: one per core).
-    #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    #[arg(long, value_parser = threads())]
     threads: Option<u16>,
 }
 
@@ -137,8 +138,7 @@ fn validated(
         threads: args.threads.map(usize::from),
     };
     let found = validation::validate(&options, stop, &Reporter::new(console))?;
-    // If one rank was stopped, the others must not wait for its rollouts.
-    let all_know = ranks.share(found.is_some()).into_iter().all(|knows| knows);
+    let all_know = ranks.all(found.is_some());
     let Some(found) = found.filter(|_| all_know) else {
         let text = "stopped before the robots were chosen; nothing is audited";
         return Err(Error::stopped(text.to_string()).hint("the same command goes on".to_string()));

@@ -2,6 +2,7 @@
 
 use crate::base::error::Error;
 use crate::base::signals;
+use crate::cli::choice::threads;
 use crate::commands::capacity;
 use crate::commands::capacity::Options;
 use crate::config::capacity::CapacityConfig;
@@ -47,7 +48,7 @@ pub(super) struct CapacityArgs {
     #[arg(short, long, value_name = "FILE")]
     out: Option<PathBuf>,
     /// Threads (default: one per core).
-    #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    #[arg(long, value_parser = threads())]
     threads: Option<u16>,
 }
 

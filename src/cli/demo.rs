@@ -3,6 +3,7 @@
 use crate::base::error::{Error, ErrorKind};
 use crate::base::ranks::Ranks;
 use crate::base::{shipped, signals};
+use crate::cli::choice::threads;
 use crate::cli::{replay_best, test};
 use crate::commands::replay::Shown;
 use crate::commands::{eval, replay};
@@ -62,7 +63,7 @@ pub(super) struct DemoArgs {
     #[arg(long)]
     force: bool,
     /// Threads (default: one per core); the result does not depend on it.
-    #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    #[arg(long, value_parser = threads())]
     threads: Option<u16>,
 }
 

@@ -5,6 +5,7 @@ use crate::analysis::{gallery, measure};
 use crate::base::error::Error;
 use crate::base::signals;
 use crate::cli::choice;
+use crate::cli::choice::threads;
 use crate::cli::choice::{ROBOTS, run_json, selected};
 use crate::commands::one_by_one;
 use crate::commands::one_by_one::Named;
@@ -68,7 +69,7 @@ pub(super) struct ResponseArgs {
     #[arg(short, long, value_name = "FILE")]
     out: Option<PathBuf>,
     /// Threads (default: one per core); the result does not depend on it.
-    #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    #[arg(long, value_parser = threads())]
     threads: Option<u16>,
 }
 

@@ -2,6 +2,7 @@
 
 use crate::base::error::Error;
 use crate::base::signals;
+use crate::cli::choice::threads;
 use crate::cli::process;
 use crate::commands::tasks;
 use crate::commands::tasks::{Place, Summary, Task};
@@ -41,10 +42,10 @@ pub(super) struct Where {
     #[arg(long, value_name = "DIR")]
     pub(super) data: Option<PathBuf>,
     /// Tasks at once (default: one per thread).
-    #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    #[arg(long, value_parser = threads())]
     pub(super) jobs: Option<u16>,
     /// Threads of all tasks together (default: one per core; in --list and --slurm one per task).
-    #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    #[arg(long, value_parser = threads())]
     pub(super) threads: Option<u16>,
 }
 

@@ -3,6 +3,7 @@
 use crate::base::error::Error;
 use crate::base::{shipped, signals};
 use crate::cli::choice;
+use crate::cli::choice::threads;
 use crate::cli::choice::{Archives, selected};
 use crate::commands::team;
 use crate::commands::team::Options;
@@ -63,7 +64,7 @@ pub(super) struct TeamArgs {
     #[arg(short, long, value_name = "FILE")]
     out: Option<PathBuf>,
     /// Threads (default: one per core); the result does not depend on it.
-    #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    #[arg(long, value_parser = threads())]
     threads: Option<u16>,
 }
 

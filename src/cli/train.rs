@@ -5,6 +5,7 @@ use crate::base::named;
 use crate::base::ranks::Ranks;
 use crate::base::signals;
 use crate::cli::choice;
+use crate::cli::choice::threads;
 use crate::cli::choice::{ROBOTS, run_json, selected};
 use crate::commands::audit;
 use crate::config;
@@ -15,7 +16,7 @@ use crate::store::folder;
 use crate::store::folder::IfExists;
 use crate::store::names::{AUDIT_JSON, RUN_JSON};
 use crate::store::robots::Selection;
-use crate::task::grouping::written;
+use crate::task::grouping::groups_text;
 use crate::view::console::Console;
 use crate::view::reporters::Reporter;
 use crate::view::{summary, verdicts};
@@ -69,7 +70,7 @@ pub(super) struct TrainArgs {
     #[arg(long)]
     force: bool,
     /// Threads (default: one per core); the result does not depend on it.
-    #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    #[arg(long, value_parser = threads())]
     threads: Option<u16>,
 }
 
@@ -115,7 +116,7 @@ fn name(archive: &Path, task: &Groups, seed: Option<u64>) -> String {
         None => folder.as_deref().unwrap_or("run"),
     };
     let seed = seed.map_or(String::new(), |seed| format!("-seed{seed}"));
-    format!("{of}-{}{seed}", written([a, b], "v"))
+    format!("{of}-{}{seed}", groups_text([a, b], "v"))
 }
 
 /// The training that `evolve --train` does when the gaits of its run have evolved.

@@ -215,7 +215,7 @@ fn curve_of(kind: Kind, points: Vec<Point>, accuracy: f64) -> Curve {
 }
 
 fn write(options: &Options, file: &CapacityFile) -> Result<(), Error> {
-    write_with_table(&options.out, &file.to_json(), &file.to_csv()).map(|_| ())
+    write_with_table(&options.out, &file.to_json(), &file.to_csv())
 }
 
 /// The robots that count.

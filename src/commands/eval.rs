@@ -7,7 +7,7 @@ use crate::base::ranks::Ranks;
 use crate::base::threads::pool;
 use crate::commands::eval_images::HeldOutImages;
 use crate::config::Config;
-use crate::config::validation::LEAST;
+use crate::config::validation::{IMAGES_KEY, LEAST};
 use crate::data::dataset::Split;
 use crate::search::showing::{Walker, control_steps, task_of};
 use crate::search::validation;
@@ -147,7 +147,7 @@ pub fn eval(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Re
     let (robots, scores): (Vec<Chosen>, Vec<Validated>) = match options.robots.validated() {
         None => (robots, Vec::new()),
         Some(count) => {
-            let asked = if options.validation.is_some() { "--validation" } else { validation::ASKED };
+            let asked = if options.validation.is_some() { "--validation" } else { IMAGES_KEY };
             let wanted = validation::Wanted { count, images: validated, asked, threshold: options.threshold };
             // Which images are for validation is known by their indices, in the run's own data
             // only.
@@ -161,8 +161,7 @@ pub fn eval(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Re
                 &wanted,
                 &walker,
             )?;
-            // If one rank was stopped, the others must not wait for its rollouts.
-            let all_know = options.ranks.share(best.is_some()).into_iter().all(|knows| knows);
+            let all_know = options.ranks.all(best.is_some());
             let Some(best) = best.filter(|_| all_know) else {
                 report.stopped = true;
                 return Ok(Finished { file: report, unwritten: None });
@@ -239,7 +238,7 @@ fn same_setting(first: &Source, other: &Source) -> Result<(), Error> {
 }
 
 fn write(options: &Options, report: &EvalFile) -> Result<(), Error> {
-    write_with_table(&options.out, &report.to_json(), &report.to_csv()).map(|_| ())
+    write_with_table(&options.out, &report.to_json(), &report.to_csv())
 }
 
 /// The same, if a robot can be shown an image for so long.

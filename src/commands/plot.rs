@@ -4,7 +4,7 @@ use crate::base::error::Error;
 use crate::config::{Settings, differing};
 use crate::store::metrics::{Moment, moments};
 use crate::store::run::RunFile;
-use crate::task::grouping::written;
+use crate::task::grouping::groups_text;
 use std::collections::BTreeSet;
 use std::path::Path;
 
@@ -70,7 +70,7 @@ fn spoken(value: &toml::Value) -> String {
     };
     let groups = || -> Option<String> {
         let [a, b] = value.as_array()?.as_slice() else { return None };
-        Some(written([&classes(a)?, &classes(b)?], "|"))
+        Some(groups_text([&classes(a)?, &classes(b)?], "|"))
     };
     groups().unwrap_or_else(|| value.as_str().map_or_else(|| value.to_string(), str::to_string))
 }

@@ -10,7 +10,7 @@ use crate::config::{Config, Settings, flatten, reading};
 use crate::search::train;
 use crate::store::folder::{self, first_run};
 use crate::store::robots::Source;
-use crate::task::grouping::written;
+use crate::task::grouping::groups_text;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
@@ -291,7 +291,7 @@ impl SweepPlan {
         };
         let mut varied: Vec<(String, String)> =
             combination.iter().map(|setting| (setting.key.clone(), text(&setting.value))).collect();
-        varied.extend(groups.map(|[a, b]| ("groups".to_string(), written([a, b], "|"))));
+        varied.extend(groups.map(|[a, b]| ("groups".to_string(), groups_text([a, b], "|"))));
         varied.push(("seed".to_string(), seed.to_string()));
         Ok(Task { name: name.to_string(), run, steps: self.steps(), varied })
     }
@@ -308,7 +308,7 @@ impl Base {
             }
         };
         let words = combination.iter().map(|setting| setting.word.clone());
-        let groups = groups.map(|[a, b]| written([a, b], "v"));
+        let groups = groups.map(|[a, b]| groups_text([a, b], "v"));
         let parts = std::iter::once(base).chain(words).chain(groups).chain([format!("seed{seed}")]);
         parts.collect::<Vec<_>>().join("-")
     }

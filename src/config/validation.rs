@@ -6,6 +6,9 @@ use serde::{Deserialize, Serialize};
 /// Least number of validation images.
 pub const LEAST: usize = 40;
 
+/// What messages say of the number of images that the section asks for, before it.
+pub(crate) const IMAGES_KEY: &str = "validation.images =";
+
 /// Validation at a run's end: section `[validation]`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]

@@ -5,10 +5,9 @@
 use crate::base::error::Error;
 use crate::base::random::{Purpose, stream};
 use crate::config::Config;
-use crate::config::validation::ValidationConfig;
+use crate::config::validation::{IMAGES_KEY, ValidationConfig};
 use crate::data::dataset::{Dataset, Split};
 use crate::search::training::Training;
-use crate::search::validation::ASKED;
 use crate::store::images::{HowMany, ImageRef};
 use crate::store::run::RunFile;
 use crate::store::training::Origin;
@@ -73,7 +72,7 @@ pub(crate) fn check(config: &Config, dataset: &Dataset) -> Result<(), Error> {
     let or = ", train on fewer (images_per_class), or choose none (validation.best = 0)";
     let seen = Training::indices(config, dataset)?.into_iter().collect();
     let classes = config.classes();
-    per_class(&classes, &left(&classes, &seen, dataset), ASKED, images, or).map(|_| ())
+    per_class(&classes, &left(&classes, &seen, dataset), IMAGES_KEY, images, or).map(|_| ())
 }
 
 /// `count` validation images of some runs of one experiment together, evenly divided between the

@@ -10,6 +10,7 @@ use crate::base::hash::sha256_hex;
 use crate::base::observer::Observer;
 use crate::base::threads::pool;
 use crate::config::Config;
+use crate::config::validation::IMAGES_KEY;
 use crate::data::dataset::{Dataset, Split};
 use crate::search::held_out::images;
 use crate::search::showing;
@@ -31,9 +32,6 @@ use std::sync::atomic::{AtomicBool, AtomicU64};
 
 /// A round: of the images, and of the robots of each task the share that gets so far.
 const ROUNDS: [(f64, f64); 3] = [(0.1, 1.0), (0.3, 1.0 / 3.0), (1.0, 0.1)];
-
-/// Where it stands how many images validate, if no option says it.
-pub(crate) const ASKED: &str = "validation.images =";
 
 /// How robots are to be chosen.
 #[derive(Clone, Copy, Debug)]
@@ -112,7 +110,7 @@ fn ranked(
     let skilled = |robot: &&Robot| showing::task_of(&grouping, robot).is_some();
     let robots = chosen.iter().map(|chosen| chosen.robot).filter(skilled).collect();
     let images = config.validation.images;
-    let wanted = Wanted { count, images, asked: ASKED, threshold: direction::THRESHOLD };
+    let wanted = Wanted { count, images, asked: IMAGES_KEY, threshold: direction::THRESHOLD };
     let best = best(source, dataset, &grouping, robots, &wanted, &walker)?;
     Ok(best.map(|best| best.into_iter().map(|(_, validated)| validated).collect()))
 }

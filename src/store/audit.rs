@@ -240,13 +240,12 @@ impl AuditFile {
         table::csv(columns, rows)
     }
 
-    /// Writes it, and its CSV beside it; the files written.
+    /// Writes it, and its CSV beside it.
     ///
     /// # Errors
     /// If they cannot be written.
-    pub fn write(&self, path: &Path) -> Result<[PathBuf; 2], Error> {
-        let table = write_with_table(path, &self.to_json(), &self.to_csv())?;
-        Ok([path.to_path_buf(), table])
+    pub fn write(&self, path: &Path) -> Result<(), Error> {
+        write_with_table(path, &self.to_json(), &self.to_csv())
     }
 }
 

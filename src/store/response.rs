@@ -256,7 +256,7 @@ impl ResponseFile {
     /// # Errors
     /// If they cannot be written.
     pub fn write(&self, path: &Path) -> Result<(), Error> {
-        write_with_table(path, &self.to_json(), &self.to_csv()).map(|_| ())
+        write_with_table(path, &self.to_json(), &self.to_csv())
     }
 }
 

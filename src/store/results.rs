@@ -3,7 +3,7 @@
 use crate::base::error::Error;
 use crate::base::files::write_atomically;
 use serde::Serialize;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// Why results are always JSON.
 const JSON: &str = "numbers are finite and keys are text: JSON has all of it";
@@ -17,14 +17,12 @@ pub(crate) fn by_lines(head: &impl Serialize, list: &[impl Serialize]) -> String
     format!("{head}\n{}\n]}}\n", lines.join(",\n"))
 }
 
-/// Writes results and their table beside them, with the ending `csv`; the table's path.
+/// Writes results, and their table beside them with the ending `csv`.
 ///
 /// # Errors
 /// If one of them cannot be written.
-pub(crate) fn write_with_table(path: &Path, json: &str, table: &[u8]) -> Result<PathBuf, Error> {
-    let csv_path = path.with_extension("csv");
-    for (path, content) in [(path, json.as_bytes()), (&csv_path, table)] {
-        write_atomically(path, content).map_err(|error| Error::writing(path, &error))?;
-    }
-    Ok(csv_path)
+pub(crate) fn write_with_table(path: &Path, json: &str, table: &[u8]) -> Result<(), Error> {
+    [(path, json.as_bytes()), (&path.with_extension("csv"), table)].into_iter().try_for_each(
+        |(path, content)| write_atomically(path, content).map_err(|error| Error::writing(path, &error)),
+    )
 }

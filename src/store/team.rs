@@ -320,7 +320,7 @@ impl TeamFile {
     /// If a file cannot be written.
     pub fn write(&self, path: &Path) -> Result<(), Error> {
         let json = serde_json::to_string(self).expect("keys are text and numbers are finite") + "\n";
-        write_with_table(path, &json, &self.to_csv()).map(|_| ())
+        write_with_table(path, &json, &self.to_csv())
     }
 
     /// A row per image: its class, both answers, and how far each robot walked.

@@ -44,13 +44,13 @@ impl Split {
         if self.is_same_way() {
             return "same way".to_string();
         }
-        written([&self.a, &self.b], "|")
+        groups_text([&self.a, &self.b], "|")
     }
 }
 
 /// Two groups of classes with a text between them: `0|123`, or `0v123` in names of files. All classes
 /// are separated by commas if one has several digits.
-pub fn written(groups: [&[u8]; 2], between: &str) -> String {
+pub fn groups_text(groups: [&[u8]; 2], between: &str) -> String {
     let separator = if groups.iter().copied().flatten().all(|class| *class < 10) { "" } else { "," };
     groups.map(|group| group.iter().map(u8::to_string).collect::<Vec<_>>().join(separator)).join(between)
 }
