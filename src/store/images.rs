@@ -5,7 +5,6 @@ use crate::data::dataset::Split;
 use crate::task::score::Answer;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
 use std::fmt;
 use std::str::FromStr;
 
@@ -85,16 +84,6 @@ impl HowMany {
         match self {
             HowMany::All => true,
             HowMany::Evenly(count) => count >= classes,
-        }
-    }
-
-    /// What was asked for of a list of images, as a command has it.
-    pub(crate) fn of(images: &[ImageRef]) -> Self {
-        let mut counts = BTreeMap::<u8, usize>::new();
-        images.iter().for_each(|image| *counts.entry(image.label).or_default() += 1);
-        match counts.values().min().zip(counts.values().max()) {
-            Some((least, most)) if most - least > 1 => HowMany::All,
-            _ => HowMany::Evenly(images.len()),
         }
     }
 }

@@ -11,7 +11,7 @@ use crate::search::showing;
 use crate::store::capacity::CapacityFile;
 use crate::store::eval::Mean;
 use crate::store::folder::in_shell;
-use crate::store::images::HowMany;
+use crate::store::images::{HowMany, ImageRef};
 use crate::store::names::{CONFIG, EVAL_JSON};
 use crate::store::run::RunFile;
 use crate::store::training::Origin;
@@ -20,6 +20,7 @@ use crate::task::fitness::Fitness;
 use crate::task::protocol::RolloutMode;
 use crate::task::stimulus::Encoding;
 use crate::view::html::escape;
+use std::collections::BTreeMap;
 use std::path::Path;
 
 /// A run in short.
@@ -184,7 +185,7 @@ pub(super) fn commands(dossier: &Dossier) -> String {
     }
     if let Some(report) = &found.eval {
         let ids: Vec<&str> = report.robots.iter().map(|robot| robot.id.as_str()).collect();
-        let (images, seed) = (HowMany::of(&report.images), report.seed);
+        let (images, seed) = (how_many(&report.images), report.seed);
         let mut line = format!(
             "morphcog eval --archive {again} --images {images} --seed {seed} --robots {}",
             ids.join(",")
@@ -206,6 +207,17 @@ pub(super) fn commands(dossier: &Dossier) -> String {
     }
     lines.push(format!("morphcog report --archive {again}"));
     format!("<pre>{}</pre>\n", escape(&lines.join("\n")))
+}
+
+/// What was asked for of images that were shown: they tell it, unless all that there are happen to
+/// be evenly divided, and then both are the same.
+fn how_many(images: &[ImageRef]) -> HowMany {
+    let mut counts = BTreeMap::<u8, usize>::new();
+    images.iter().for_each(|image| *counts.entry(image.label).or_default() += 1);
+    match counts.values().min().zip(counts.values().max()) {
+        Some((least, most)) if most - least > 1 => HowMany::All,
+        _ => HowMany::Evenly(images.len()),
+    }
 }
 
 /// The command that makes the run again, after what is to be known for it.
