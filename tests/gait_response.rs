@@ -105,6 +105,34 @@ fn a_measurement_is_the_same_bytes_on_any_threads() {
 }
 
 #[test]
+fn what_could_be_taught_is_said_for_the_config_that_the_training_would_have() {
+    let sandbox = run_of(&[WALKER]);
+    let measured = |out: &str, set: &str| {
+        let line = format!("response -a run --task 3|14 -n 60 --error 0 {set} -o {out}.json");
+        let said = sandbox.run(&line).ended(0, &[]);
+        (said.out, responses(&sandbox, &format!("{out}.json")))
+    };
+    let (said, whole) = measured("whole", "");
+    assert!(!said.contains("stimulus.margin"), "{said}");
+    assert_eq!(whole.robots[0].taught.unwrap().margin, None);
+    let (said, best) = measured("best", "--set train.windows=50");
+    let margin = best.robots[0].taught.unwrap().margin.unwrap();
+    assert!(said.contains("stimulus.margin") && said.contains(&margin.to_string()), "{said}");
+    assert_eq!((best.setting.windows, best.setting.stimulus), (50, whole.setting.stimulus));
+    // Named by hand it could be taught the same; what was measured does not depend on any of it.
+    let (_, hand) =
+        measured("hand", &format!("--set stimulus.margin={}", margin.to_string().replace(' ', "")));
+    assert_eq!(hand.setting.stimulus.unwrap().margin, margin);
+    let [by_hand, found] = [&hand, &best].map(|file| file.robots[0].taught.unwrap());
+    assert_eq!((by_hand.accuracy, by_hand.fitness_interval), (found.accuracy, found.fitness_interval));
+    assert_eq!(best.robots[0].displacements, whole.robots[0].displacements);
+    sandbox.run("response -q -a run --set train.windows=5").ended(2, &["--task"]);
+    sandbox
+        .run("response -q -a run --task 3|14 --set train.windows=5 --set stimulus.reduction=stride")
+        .ended(3, &["train.windows = 5", "area"]);
+}
+
+#[test]
 fn results_and_pictures_lie_beside_the_run_and_say_why_a_measurement_ended() {
     let sandbox = run_of(&[WALKER, BLIND, &WALKER.replace("666", "444")]);
     let said = sandbox.run("response -a run -n 130 --error 0").ended(0, &[]);

@@ -47,8 +47,11 @@ fn skipped() -> bool {
 fn stimuli() -> Vec<Grid<f64>> {
     let given = places(None, std::env::var_os("MORPHCOG_DATA"), None);
     let mnist = Dataset::load("mnist", &given, &[Split::Train]).unwrap();
-    let saturated =
-        StimulusParams { reduction: Reduction::Stride, encoding: Encoding::Saturated, level: 0.5, margin: 0 };
+    let saturated = StimulusParams {
+        reduction: Reduction::Stride,
+        encoding: Encoding::Saturated,
+        ..StimulusParams::default()
+    };
     let see = |(digit, &index): (usize, &usize)| {
         assert_eq!(usize::from(mnist.label(Split::Train, index).unwrap()), digit);
         stimulus(&mnist.image(Split::Train, index).unwrap(), 14, 14, &saturated).unwrap()

@@ -232,8 +232,11 @@ fn bodies_and_scenarios_are_checked_and_pictures_reduced_as_runs_do() {
     let config = gallery::config().unwrap();
     let expected = stimulus(&drawing(), 14, 14, &config.stimulus).unwrap();
     assert_eq!(see(json!({ "archive": 1, "robot": "XFJPI" })), expected);
-    let own =
-        StimulusParams { reduction: Reduction::Area, encoding: Encoding::Intensity, level: 0.5, margin: 0 };
+    let own = StimulusParams {
+        reduction: Reduction::Area,
+        encoding: Encoding::Intensity,
+        ..StimulusParams::default()
+    };
     let expected = stimulus(&drawing(), 2, 3, &own).unwrap();
     assert_eq!(see(json!({ "body": [[3, 3, 6], [4, 4, 5]], "encoding": own })), expected);
 }

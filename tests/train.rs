@@ -136,6 +136,45 @@ fn a_response_that_was_measured_before_is_taken_and_changes_nothing() {
 }
 
 #[test]
+fn the_best_of_many_windows_is_what_a_training_with_that_margin_is() {
+    let sandbox = sandbox();
+    let train = |out: &str, more: &str| {
+        let command = format!("train -a walkers --task 0|1 --robots top:2 {LITTLE} -o {out} {more}");
+        let said = sandbox.run(&command).ended(0, &[]);
+        (said, sandbox.run_file(out))
+    };
+    let (said, found) = train("found", "--set train.windows=60");
+    let margin = found.config.stimulus.margin;
+    assert!(!margin.is_none(), "{said:?}");
+    assert!(said.err.contains(&format!("of 60 windows, stimulus.margin = {margin}")), "{said:?}");
+    // What is asked for is in config.toml, what came of it in run.json.
+    let asked = Config::load(&sandbox.path("found/config.toml").to_string_lossy(), &[]).unwrap();
+    assert_eq!((asked.train.windows, found.config.train.windows), (60, 0));
+    assert_eq!(found.origin.as_ref().unwrap().windows, 60);
+    let parent = found.elites[0].parent.clone().unwrap();
+    // Named by hand, for that gait alone, it gives the same robot.
+    let by_hand = format!(
+        "train -q -a walkers --task 0|1 --robots {parent} {LITTLE} -o hand --set stimulus.reduction=area"
+    );
+    sandbox
+        .run(&format!("{by_hand} --set stimulus.margin={}", margin.to_string().replace(' ', "")))
+        .ended(0, &[]);
+    let hand = sandbox.run_file("hand");
+    assert_eq!((&hand.elites, &hand.training_images), (&found.elites, &found.training_images));
+    assert_eq!(hand.config.stimulus, found.config.stimulus);
+    // Another number of windows is another training.
+    sandbox.run("train -q -a walkers --task 0|1 -o found --resume").ended(2, &["training.json"]);
+    // A robot that keeps its own sensors keeps its window, too.
+    sandbox.run("train -q -a found --task 0|1 --robots all --set train.rounds=0 --set train.windows=60 --set train.challengers=0 --set train.images=10 --set train.final_images=10 --set validation.images=40 -o kept").ended(0, &[]);
+    let kept = sandbox.run_file("kept");
+    assert_eq!(
+        (kept.config.stimulus, kept.elites[0].body.clone()),
+        (found.config.stimulus, found.elites[0].body.clone())
+    );
+    assert_eq!(kept.origin.unwrap().windows, 0);
+}
+
+#[test]
 fn without_rounds_the_fittest_robot_is_refined_as_it_is() {
     let sandbox = sandbox();
     // Of those that have something to train.
@@ -187,6 +226,16 @@ fn what_cannot_be_trained_is_one_clear_error_and_writes_nothing() {
     );
     refused("--task 0|1 --set train.perturbations.start=101", 3, &["train.perturbations.start", "100"]);
     refused("--task 0|1 --set train.round=5", 2, &["rounds"]);
+    let stride = "--task 0|1 --set stimulus.reduction=stride --set train.windows=10";
+    refused(stride, 3, &["train.windows = 10", "stimulus.reduction \"area\""]);
+    refused("--task 0|1 --set train.windows=10001", 3, &["train.windows = 10001", "at most 10000"]);
+    refused(
+        "--task 0|1 --set stimulus.margin=[1,2,3]",
+        2,
+        &["stimulus.margin", "[top, right, bottom, left]"],
+    );
+    let nothing = "--task 0|1 --set stimulus.margin=[20,0,8,0]";
+    refused(nothing, 3, &["stimulus.margin", "[20, 0, 8, 0] leaves nothing of 28 x 28"]);
     let deep = "train.".repeat(10_000);
     refused(&format!("--task 0|1 --set {deep}rounds=1"), 2, &["at most 16 parts"]);
     refused("--task 0|1 --set validation.images=100000", 3, &["100000"]);

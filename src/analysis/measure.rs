@@ -3,10 +3,10 @@
 
 use crate::analysis::gallery;
 use crate::base::Grid;
-use crate::base::error::Error;
+use crate::base::error::{Error, ErrorKind};
 use crate::base::hash::sha256_hex;
 use crate::base::observer::{Observer, Work};
-use crate::base::stop::{Stopped, check};
+use crate::base::stop::check;
 use crate::base::threads::pool;
 use crate::body::Body;
 use crate::config::train::MOST_RANDOM_IMAGES;
@@ -14,12 +14,14 @@ use crate::config::{Config, MAX_NUMBER};
 use crate::data::dataset::{Dataset, DatasetError, Split};
 use crate::search::probing;
 use crate::search::probing::Probing;
+use crate::search::train;
 use crate::search::training::scarcest;
+use crate::search::windows::Windows;
 use crate::store::folder::{check_out, writable};
 use crate::store::images::DatasetRef;
 use crate::store::names::RESPONSE_JSON;
 use crate::store::response::{
-    EndedBy, FORMAT, FORMAT_VERSION, PICTURES, ResponseFile, RobotResponse, Setting, pictures,
+    EndedBy, FORMAT, FORMAT_VERSION, PICTURES, ResponseFile, RobotResponse, Setting, Taught, pictures,
 };
 use crate::store::robots::{Selection, Source};
 use crate::store::unwritten::Unwritten;
@@ -28,7 +30,7 @@ use crate::task::direction;
 use crate::task::evaluation::fresh_rollouts;
 use crate::task::grouping::Grouping;
 use crate::task::perturbation::Condition;
-use crate::task::response::{Example, Gait, Shown};
+use crate::task::response::{Example, Gait, Response, Shown};
 use crate::task::teachable::teachable;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
@@ -57,6 +59,9 @@ pub struct Options {
     pub physical_only: bool,
     /// Two groups of classes, to tell what robots could be taught.
     pub task: Option<[Vec<u8>; 2]>,
+    /// Keys of the config that a training would have otherwise than the run, as
+    /// `stimulus.margin=5`; only with a task.
+    pub set: Vec<String>,
     /// Most rollouts of a robot.
     pub images: usize,
     /// The relative error of the slopes at which a measurement ends.
@@ -121,7 +126,7 @@ pub fn measure(options: &Options, stop: &AtomicBool, observer: &dyn Observer) ->
     }
     check_names(options, &subjects)?;
     let seed = options.seed.unwrap_or(config.seed);
-    let images = images(options, &provenance, seed)?;
+    let task = task(options, &provenance, seed)?;
     let probing = Probing::new(&conditions(config, options.images), seed);
     let pool = pool(options.threads)?;
     let run_seed = config.seed;
@@ -132,14 +137,14 @@ pub fn measure(options: &Options, stop: &AtomicBool, observer: &dyn Observer) ->
         run: provenance.run.clone(),
         run_seed,
         run_sha256: provenance.sha256.clone(),
-        setting: images.setting(options, seed, config, &probing)?,
+        setting: setting(options, seed, config, &probing, task.as_ref())?,
         robots: Vec::new(),
     };
     if !subjects.is_empty() {
         let label = format!("measuring {} robots:", subjects.len());
         observer.begins(&Work::new(label, (subjects.len() * options.images) as u64, "rollouts"));
     }
-    let measuring = Measuring { options, config, probing, images, seed, stop };
+    let measuring = Measuring { options, config, probing, task, stop };
     let mut unwritten = Unwritten::default();
     let mut stopped = false;
     for (number, subject) in subjects.iter().enumerate() {
@@ -154,10 +159,11 @@ pub fn measure(options: &Options, stop: &AtomicBool, observer: &dyn Observer) ->
                 "robot {}: most of its rollouts under random images are unstable, so its response cannot be measured",
                 subject.id
             ))),
-            Err(Stopped) => {
+            Err(error) if error.kind == ErrorKind::Stopped => {
                 stopped = true;
                 break;
             }
+            Err(error) => return Err(error),
         }
         if !file.robots.is_empty() {
             unwritten.tried(file.write(&options.out), |text| observer.warning(text));
@@ -247,31 +253,37 @@ fn conditions(config: &Config, rollouts: usize) -> Vec<Condition> {
     config.train.perturbations.conditions().take(rollouts).collect()
 }
 
-/// Training images of a task.
-#[derive(Default)]
-struct Images {
-    dataset: Option<DatasetRef>,
-    /// Class and what a body sees, as many of each class, class by class.
-    seen: Vec<(u8, Grid<f64>)>,
+/// A task that robots could be taught.
+struct Task {
+    groups: [Vec<u8>; 2],
+    /// The config that its training would have.
+    config: Config,
+    dataset: Dataset,
+    /// Class and index of training images, as many of each class, class by class.
+    images: Vec<(u8, usize)>,
 }
 
-/// The training images of the task's classes; none without a task.
-fn images(options: &Options, provenance: &Provenance, seed: u64) -> Result<Images, Error> {
-    let Some(task) = &options.task else { return Ok(Images::default()) };
-    let config = &provenance.config;
+/// The task that is asked for.
+fn task(options: &Options, provenance: &Provenance, seed: u64) -> Result<Option<Task>, Error> {
+    let Some(groups) = &options.task else { return Ok(None) };
+    let config = train::config_of(&provenance.config, groups, Some(seed), &options.set)?;
     let mut whereabouts = Whereabouts::given(options.data.as_deref());
     if let Some(path) = &options.archive {
         whereabouts = whereabouts.and_of(path);
     }
-    let dataset = load_dataset_of(provenance.dataset.as_ref(), config, &whereabouts, &[Split::Train])?;
-    let classes = task.concat();
+    let of_run =
+        provenance.dataset.as_ref().filter(|_| config.data.dataset == provenance.config.data.dataset);
+    let dataset = load_dataset_of(of_run, &config, &whereabouts, &[Split::Train])?;
+    let classes = groups.concat();
     let per_class = IMAGES_PER_CLASS.min(scarcest(&dataset, &classes, LEAST_PER_CLASS)?);
     let failed = |error: DatasetError| Error::input(error.to_string());
     let drawn = dataset.draw(Split::Train, &classes, per_class, seed, 0).map_err(failed)?;
     let labels = classes.iter().flat_map(|class| std::iter::repeat_n(*class, per_class));
-    let see = |(label, index)| Ok((label, see(config, &dataset, Split::Train, index)?));
-    let seen: Result<Vec<_>, Error> = labels.zip(drawn).map(see).collect();
-    Ok(Images { dataset: Some(reference(&dataset)), seen: seen? })
+    let images = labels.zip(drawn).collect();
+    let task = Task { groups: groups.clone(), config, dataset, images };
+    // Whatever is wrong with how images are seen is said before anything is measured.
+    task.images.first().map_or(Ok(()), |(_, index)| task.seen(&task.config, *index).map(drop))?;
+    Ok(Some(task))
 }
 
 fn reference(dataset: &Dataset) -> DatasetRef {
@@ -279,38 +291,64 @@ fn reference(dataset: &Dataset) -> DatasetRef {
     DatasetRef { name: dataset.name().to_string(), train_sha256 }
 }
 
-impl Images {
-    fn setting(
-        &self,
-        options: &Options,
-        seed: u64,
-        config: &Config,
-        probing: &Probing,
-    ) -> Result<Setting, Error> {
-        let name = |[a, b]: &[Vec<u8>; 2]| {
-            let grouping =
-                Grouping::two_groups(a, b).map_err(|error| Error::usage(format!("--task: {error}")));
-            grouping.map(|grouping| grouping.tasks()[0].name())
-        };
-        Ok(Setting {
-            seed,
-            images: options.images,
-            error: options.error,
-            dataset: self.dataset.clone(),
-            conditions: probing.conditions().to_vec(),
-            control_steps: config.protocol.control_steps,
-            task: options.task.as_ref().map(name).transpose()?,
-        })
+fn setting(
+    options: &Options,
+    seed: u64,
+    config: &Config,
+    probing: &Probing,
+    task: Option<&Task>,
+) -> Result<Setting, Error> {
+    Ok(Setting {
+        seed,
+        images: options.images,
+        error: options.error,
+        dataset: task.map(|task| reference(&task.dataset)),
+        conditions: probing.conditions().to_vec(),
+        control_steps: config.protocol.control_steps,
+        task: task.map(Task::name).transpose()?,
+        stimulus: task.map(|task| task.config.stimulus),
+        windows: task.map_or(0, |task| task.config.train.windows),
+    })
+}
+
+impl Task {
+    fn name(&self) -> Result<String, Error> {
+        let [a, b] = &self.groups;
+        let grouping =
+            Grouping::two_groups(a, b).map_err(|error| Error::usage(format!("--task: {error}")))?;
+        Ok(grouping.tasks()[0].name())
     }
 
-    /// As a gait sees them; the groups weigh the same.
-    fn examples(&self, gait: &Gait, config: &Config, [a, b]: &[Vec<u8>; 2]) -> Vec<Example> {
-        let example = |(class, stimulus): &(u8, Grid<f64>)| {
-            // There are as many of each class.
+    fn seen(&self, config: &Config, index: usize) -> Result<Grid<f64>, Error> {
+        see(config, &self.dataset, Split::Train, index)
+    }
+
+    /// What a gait could be taught, and under which window.
+    fn taught(
+        &self,
+        gait: &Gait,
+        response: &Response,
+        shown: &[Shown],
+        stop: &AtomicBool,
+    ) -> Result<Option<Taught>, Error> {
+        let mut config = self.config.clone();
+        let mut margin = None;
+        if config.train.windows > 0 {
+            let windows = Windows::of(&self.config, &self.dataset, &self.images, &self.groups)?;
+            let found = windows.best(gait, response, stop, &|_| ())?;
+            config.stimulus.margin = found.margins;
+            margin = Some(found.margins);
+        }
+        let [a, b] = &self.groups;
+        let example = |(class, index): &(u8, usize)| {
+            // There are as many of each class; the groups weigh the same.
             let (right, classes) = if a.contains(class) { (1.0, a.len()) } else { (-1.0, b.len()) };
-            Example { right, weight: 1.0 / classes as f64, ..Example::new(gait, stimulus, &config.physics) }
+            let seen = self.seen(&config, *index)?;
+            Ok(Example { right, weight: 1.0 / classes as f64, ..Example::new(gait, &seen, &config.physics) })
         };
-        self.seen.iter().map(example).collect()
+        let examples = self.images.iter().map(example).collect::<Result<Vec<Example>, Error>>()?;
+        let found = teachable(shown, response.scatter, &examples, direction::THRESHOLD, config.seed, stop)?;
+        Ok(found.map(|teachable| Taught { margin, ..teachable.into() }))
     }
 }
 
@@ -319,8 +357,7 @@ struct Measuring<'a> {
     options: &'a Options,
     config: &'a Config,
     probing: Probing,
-    images: Images,
-    seed: u64,
+    task: Option<Task>,
     stop: &'a AtomicBool,
 }
 
@@ -331,7 +368,7 @@ impl Measuring<'_> {
         &self,
         Subject { id, gait }: &Subject,
         progress: &mut dyn FnMut(usize),
-    ) -> Result<Option<RobotResponse>, Stopped> {
+    ) -> Result<Option<RobotResponse>, Error> {
         let Measuring { options, config, probing, stop, .. } = self;
         let mut shown: Vec<Shown> = Vec::new();
         let mut displacements: Vec<Option<f64>> = Vec::new();
@@ -350,7 +387,7 @@ impl Measuring<'_> {
                 )?;
                 let rolled: Vec<Option<f64>> = rolled.into_iter().map(Result::ok).collect();
                 displacements.extend(&rolled);
-                Ok(rolled)
+                Ok::<_, Error>(rolled)
             })?);
             progress(rollouts);
             check(stop)?;
@@ -363,15 +400,9 @@ impl Measuring<'_> {
                 continue;
             };
             progress(options.images);
-            let taught = match &options.task {
-                None => None,
-                Some(task) => {
-                    let examples = self.images.examples(gait, config, task);
-                    let threshold = direction::THRESHOLD;
-                    teachable(&shown, response.scatter, &examples, threshold, self.seed, stop)?
-                }
-            };
-            let taught = taught.map(Into::into);
+            let taught =
+                self.task.as_ref().map(|task| task.taught(gait, &response, &shown, stop)).transpose()?;
+            let taught = taught.flatten();
             return Ok(Some(RobotResponse::new(id, gait, &response, displacements, ended_by, taught)));
         }
     }

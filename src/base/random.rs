@@ -38,6 +38,8 @@ pub enum Purpose {
     RandomImages = 26,
     /// Training of designs: the order in which places are tried, and images shown.
     Training = 27,
+    /// Windows of images that a gait could be taught to look at.
+    Windows = 28,
 }
 
 /// One stream of random numbers.

@@ -50,6 +50,10 @@ pub(super) struct ResponseArgs {
     /// Two groups of classes, as 4|9, 0|123 or 10,11|3: says what robots could be taught, too.
     #[arg(short, long, value_name = "A|B", value_parser = groups)]
     task: Option<Groups>,
+    /// Change a key of the config that a training of the task would have, as in stimulus.margin=5 or
+    /// train.windows=2000; may be given several times.
+    #[arg(long, value_name = "KEY=VALUE", requires = "task")]
+    set: Vec<String>,
     /// Most rollouts of a robot, each under a random image: 60 or more.
     #[arg(short = 'n', long, default_value_t = 1000)]
     images: usize,
@@ -100,6 +104,7 @@ pub(super) fn run(args: ResponseArgs, console: &Console) -> Result<(), Error> {
         robots: robots.into_iter().map(|Named { robot, .. }| robot).collect(),
         physical_only: args.physical_only,
         task: args.task,
+        set: args.set,
         images: args.images,
         error: args.error,
         seed: args.seed,

@@ -5,7 +5,7 @@ use crate::base::Grid;
 use crate::base::error::Error;
 use crate::base::observer::{Observer, Work};
 use crate::base::threads::pool;
-use crate::baseline::linear::{Linear, Moments, nearest_neighbours};
+use crate::baseline::linear::{Labelled, Linear, Moments, nearest_neighbours};
 use crate::commands::eval_images::chosen_by;
 use crate::config::Config;
 use crate::data::dataset::{Dataset, Split};
@@ -151,7 +151,7 @@ pub fn team(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Re
         unwritten.tried(file.write(&options.out), |text| observer.warning(text));
     }
     file.members = members.into_iter().flatten().collect();
-    file.baselines = pool.install(|| baselines(&file, config, &dataset, split))?;
+    file.baselines = pool.install(|| baselines(&file, (&sources, &robots, &splits), &dataset, split))?;
     file.answers = Some(file.decided());
     unwritten.tried(file.write(&options.out), |text| observer.warning(text));
     Ok(Finished { file, unwritten: unwritten.error() })
@@ -269,27 +269,48 @@ fn known(options: &Options, now: &TeamFile) -> Vec<Member> {
     earlier.map_or(Vec::new(), |file| file.members)
 }
 
-/// What answers the same images without bodies, on the pixels that the first robot sees.
+/// The config of the first robot, with the least margins of all: what any of them sees is seen.
+fn seeing_all(sources: &[Source], robots: &[Chosen]) -> Config {
+    let configs = || robots.iter().map(|chosen| &sources[chosen.source].run.config);
+    let mut common = configs().next().expect("every class of a team has a robot").clone();
+    common.stimulus.margin =
+        configs().map(|config| config.stimulus.margin).reduce(|a, b| a.least(&b)).unwrap_or_default();
+    common
+}
+
+/// Linear functions of what robots see, each with the images of the test as it sees them.
+struct Pair {
+    judge: Judge,
+    linear: Linear,
+    /// The images of the test; none where they are those that all see.
+    own: Option<Vec<Grid<f64>>>,
+}
+
+/// What answers the same images without bodies: on the pixels that the robots see, all together; a
+/// pair of classes that a robot tells apart, on its own.
 fn baselines(
     file: &TeamFile,
-    config: &Config,
+    (sources, robots, splits): (&[Source], &[Chosen], &[grouping::Split]),
     dataset: &Dataset,
     split: Split,
 ) -> Result<Option<TeamBaselines>, Error> {
     let Some((place, best_body)) = file.best_body() else { return Ok(None) };
-    let classes = &file.classes;
+    let (common, classes) = (seeing_all(sources, robots), &file.classes);
     let shown: BTreeSet<usize> = match split {
         Split::Test => BTreeSet::new(),
         Split::Train => file.images.iter().map(|image| image.index).collect(),
     };
-    let mut training = Vec::new();
-    for &class in classes {
-        for &index in dataset.indices_of(Split::Train, class).iter().filter(|index| !shown.contains(index)) {
-            training.push((see(config, dataset, Split::Train, index)?, class));
-        }
-    }
-    let known: Vec<(&Grid<f64>, u8)> = training.iter().map(|(stimulus, class)| (stimulus, *class)).collect();
-    let stimuli = seen(config, dataset, split, &file.images)?;
+    let training_of = |config: &Config, classes: &[u8]| {
+        let indices =
+            |class: u8| dataset.indices_of(Split::Train, class).iter().map(move |index| (*index, class));
+        let besides =
+            classes.iter().flat_map(|class| indices(*class)).filter(|(index, _)| !shown.contains(index));
+        let seen = |(index, class)| Ok((see(config, dataset, Split::Train, index)?, class));
+        besides.map(seen).collect::<Result<Vec<(Grid<f64>, u8)>, Error>>()
+    };
+    let training = training_of(&common, classes)?;
+    let known = labelled(&training);
+    let stimuli = seen(&common, dataset, split, &file.images)?;
     let labels = || file.images.iter().map(|image| image.label);
     let moments = Moments::new(&known);
     let against_rest = |class: &u8| {
@@ -304,24 +325,43 @@ fn baselines(
             (1..values.len()).fold(0, |best, next| if values[next] > values[best] { next } else { best });
         classes[best]
     };
-    let mut pairs = Vec::new();
-    for (number, &a) in classes.iter().enumerate() {
-        for &b in &classes[number + 1..] {
-            // A positive value is a walk to the right.
-            pairs.push((Judge { left: vec![b], right: vec![a] }, moments.apart(&[a], &[b])));
+    let pair = |a: u8, b: u8| {
+        // A positive value is a walk to the right.
+        let judge = Judge { left: vec![b], right: vec![a] };
+        let tells = |split: &&grouping::Split| {
+            let mut told = [Group::A, Group::B].map(|group| split.classes(group).to_vec());
+            told.sort();
+            told == [vec![a], vec![b]]
+        };
+        let robot = splits.iter().position(|split| tells(&split));
+        let config = robot.map_or(&common, |robot| &sources[robots[robot].source].run.config);
+        if config.stimulus == common.stimulus {
+            return Ok(Pair { judge, linear: moments.apart(&[a], &[b]), own: None });
         }
-    }
-    let voted = |stimulus: &Grid<f64>| {
-        let walks = pairs.iter().map(|(sides, linear)| (sides, Some(linear.value(stimulus))));
+        let training = training_of(config, &[a, b])?;
+        let linear = Moments::new(&labelled(&training)).apart(&[a], &[b]);
+        Ok(Pair { judge, linear, own: Some(seen(config, dataset, split, &file.images)?) })
+    };
+    let pairs =
+        classes.iter().enumerate().flat_map(|(number, a)| classes[number + 1..].iter().map(|b| (*a, *b)));
+    let pairs: Vec<Pair> = pairs.map(|(a, b)| pair(a, b)).collect::<Result<_, Error>>()?;
+    let voted = |image: usize| {
+        let value =
+            |pair: &Pair| pair.linear.value(pair.own.as_ref().map_or(&stimuli[image], |own| &own[image]));
+        let walks = pairs.iter().map(|pair| (&pair.judge, Some(value(pair))));
         classes[Ballot::count(classes, walks, 0.0, 1.0).by_votes().0]
     };
     let nearest = nearest_neighbours(&known, &stimuli.iter().collect::<Vec<_>>());
     Ok(Some(TeamBaselines {
         training_images: known.len(),
         linear_one_against_rest: Accuracy::of(stimuli.iter().map(largest).zip(labels())),
-        linear_pairs: Accuracy::of(stimuli.iter().map(voted).zip(labels())),
+        linear_pairs: Accuracy::of((0..stimuli.len()).map(voted).zip(labels())),
         nearest_neighbour: Accuracy::of(nearest.into_iter().zip(labels().map(Some))),
         best_body,
         best_body_id: file.members[place].id.clone(),
     }))
+}
+
+fn labelled(training: &[(Grid<f64>, u8)]) -> Vec<Labelled<'_>> {
+    training.iter().map(|(stimulus, class)| (stimulus, *class)).collect()
 }

@@ -25,7 +25,7 @@ use crate::sim::Physics;
 use crate::task::evaluation::Savings;
 use crate::task::grouping::Grouping;
 use crate::task::protocol::{MAX_COLUMN, MAX_ROW, MAX_STEPS, Protocol};
-use crate::task::stimulus::StimulusParams;
+use crate::task::stimulus::{Reduction, StimulusParams};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
@@ -349,6 +349,10 @@ impl Config {
             }
         }
         self.train.validate()?;
+        if self.train.windows > 0 && self.stimulus.reduction == Reduction::Stride {
+            let expected = "0, or the stimulus.reduction \"area\": a stride fits few windows";
+            return refuse("train.windows", self.train.windows.to_string(), expected);
+        }
         if self.body.min_muscles > self.body.height * self.body.width {
             return refuse(
                 "body.min_muscles",

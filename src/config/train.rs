@@ -16,6 +16,10 @@ pub struct TrainConfig {
     /// Rollouts under random images that measure a gait's response. Default 300: with fewer than
     /// two for each soft voxel and sensor the slopes are mostly noise.
     pub random_images: usize,
+    /// Windows of the images that are tried for each gait, that of `stimulus.margin` first: the model
+    /// says which serves the task best, and the robot sees that one. Default 0: only that of
+    /// `stimulus.margin`. More than 0 want the reduction "area". They cost no rollouts.
+    pub windows: usize,
     /// Rounds in which the response is measured around the latest design, and the lesson is solved
     /// again. Default 6: more seldom help. 0: the robot keeps its own soft voxels and sensors, and is
     /// only refined; of several robots, the fittest.
@@ -39,6 +43,7 @@ impl Default for TrainConfig {
         TrainConfig {
             images_per_class: 2000,
             random_images: 300,
+            windows: 0,
             rounds: 6,
             images: 120,
             final_images: 400,
@@ -53,6 +58,9 @@ const LEAST_RANDOM_IMAGES: usize = 20;
 
 /// Most random images of a gait: what is known of each is kept in memory, and more show no more.
 pub(crate) const MOST_RANDOM_IMAGES: usize = 100_000;
+
+/// Most windows of a gait: a minute of a core or so.
+const MOST_WINDOWS: usize = 10_000;
 
 /// Most rows by which a start is raised, as in an audit.
 const MOST_ROWS: u32 = 100;
@@ -78,6 +86,9 @@ impl TrainConfig {
             None if self.random_images > MOST_RANDOM_IMAGES => {
                 let expected = format!("at most {MOST_RANDOM_IMAGES}");
                 Err(Error::value("train.random_images", self.random_images, &expected))
+            }
+            None if self.windows > MOST_WINDOWS => {
+                Err(Error::value("train.windows", self.windows, &format!("at most {MOST_WINDOWS}")))
             }
             None if self.perturbations.start > MOST_ROWS => {
                 let expected = format!("at most {MOST_ROWS} rows");

@@ -10,3 +10,4 @@ pub mod showing;
 pub mod train;
 pub mod training;
 pub mod validation;
+pub(crate) mod windows;

@@ -20,6 +20,7 @@ use crate::data::dataset::{Dataset, Split};
 use crate::qd::{Archive, DescriptorSpace, Elite};
 use crate::search::probing::{Probing, response};
 use crate::search::training::{Training, scarcest};
+use crate::search::windows::{Found, Windows};
 use crate::search::{held_out, validation};
 use crate::store::folder::{IfExists, RunFolder};
 use crate::store::images::ImageRef;
@@ -31,7 +32,7 @@ use crate::store::run::{Dimensions, FORMAT, FORMAT_VERSION, Robot, RunFile};
 use crate::store::training::{Batch, FILE, File, Origin};
 use crate::store::validation::Validated;
 use crate::store::whereabouts;
-use crate::store::whereabouts::Whereabouts;
+use crate::store::whereabouts::{Whereabouts, see};
 use crate::task::evaluation::fresh_rollouts;
 use crate::task::fitness::Fitness;
 use crate::task::perturbation::Condition;
@@ -127,7 +128,7 @@ pub fn train(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> R
     let mut training = Training::of(&config, &dataset)?;
     let classes = training.images.iter().map(|image| image.label);
     training.conditions = config.train.perturbations.of(classes);
-    let origin = origin(&source, &dataset)?;
+    let origin = origin(&source, &config, &dataset)?;
     held_out::check(&config, &dataset)?;
     let mut walkers = walkers(&source, &options.robots, config.seed)?;
     if config.train.rounds == 0 {
@@ -159,11 +160,11 @@ pub fn train(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> R
     let (gaits, images) = (walkers.len(), training.images.len());
     observer
         .note(&format!("training in {}: {gaits} gaits, {images} training images", folder.path().display()));
-    let trainer = Trainer { config: &config, training: &training, probing, measured };
+    let trainer = Trainer { config: &config, dataset: &dataset, training: &training, probing, measured };
     let taught = pool.install(|| trainer.train(&walkers, &mut log, observer));
     // What was simulated is kept, however it ended.
     log.save()?;
-    let (walker, taught) = taught?;
+    let (walker, config, taught) = taught?;
     let run = run_file(options, &config, &training, origin, walker, &taught)?;
     let seconds = began.elapsed().as_secs_f64();
     let totals = Totals { evaluations: 1, simulated: log.simulated as u64, seconds, ..Totals::default() };
@@ -244,8 +245,8 @@ fn with_images(config: Config, dataset: &Dataset) -> Result<Config, Error> {
     Ok(config)
 }
 
-/// What the walkers were trained on: not for validation.
-fn origin(source: &Source, dataset: &Dataset) -> Result<Origin, Error> {
+/// Where the walkers are from, and what they were trained on: not for validation.
+fn origin(source: &Source, config: &Config, dataset: &Dataset) -> Result<Origin, Error> {
     let run = &source.run;
     let is_same = dataset.fingerprint(Split::Train).is_some_and(|sha256| sha256 == run.dataset.train_sha256);
     let trained_on = if is_same { held_out::trained_on(run, dataset)? } else { Default::default() };
@@ -254,6 +255,7 @@ fn origin(source: &Source, dataset: &Dataset) -> Result<Origin, Error> {
         generations: run.generations,
         sha256: run.fingerprint(),
         trained_on: trained_on.into_iter().collect(),
+        windows: if config.train.rounds == 0 { 0 } else { config.train.windows },
     })
 }
 
@@ -420,10 +422,7 @@ impl<'a> Log<'a> {
         self.rolled(known.len() as u64);
         let told = |count| self.rolled(count);
         let found = fresh_rollouts(body, stimuli, conditions, setting, &told, self.stop);
-        let (found, _) = found.map_err(|_| {
-            Error::stopped("stopped; what was simulated is saved".to_string())
-                .hint("the same command with --resume goes on".to_string())
-        })?;
+        let (found, _) = found.map_err(|_| stopped())?;
         let batch: Batch = known.iter().copied().chain(found.into_iter().map(Result::ok)).collect();
         self.batches.push(batch.clone());
         if self.saved.1.elapsed() >= SAVE_EVERY {
@@ -449,9 +448,15 @@ impl<'a> Log<'a> {
     }
 }
 
+fn stopped() -> Error {
+    Error::stopped("stopped; what was simulated is saved".to_string())
+        .hint("the same command with --resume goes on".to_string())
+}
+
 /// What all gaits are trained with.
 struct Trainer<'a> {
     config: &'a Config,
+    dataset: &'a Dataset,
     training: &'a Training,
     probing: Probing,
     /// Displacements of each gait under random images that are known before.
@@ -491,25 +496,53 @@ impl Trainer<'_> {
         Ok(response(&shown, count))
     }
 
-    /// The training images as a gait sees them; both groups weigh the same.
-    fn images(&self, gait: &Gait) -> Vec<Image> {
-        let Trainer { config, training, probing, .. } = self;
+    /// The config with the window under which a gait could be taught most.
+    fn with_window(
+        &self,
+        walker: &Walker,
+        response: &Response,
+        log: &Log,
+        observer: &dyn Observer,
+    ) -> Result<Config, Error> {
+        let Trainer { config, training, .. } = self;
+        let (count, robot) = (config.train.windows, &walker.robot.id);
+        let mut with = (*config).clone();
+        with.train.windows = 0;
+        if count == 0 {
+            return Ok(with);
+        }
+        observer.begins(&Work::new(format!("{robot}: windows:"), count as u64, "windows"));
+        let images: Vec<(u8, usize)> =
+            training.images.iter().map(|image| (image.label, image.index)).collect();
+        let windows = Windows::of(config, self.dataset, &images, self.groups())?;
+        let told = |tried: usize| observer.progress(tried as u64);
+        let found = windows.best(&walker.gait, response, log.stop, &told).map_err(|_| stopped())?;
+        told_window(observer, robot, &found, count);
+        with.stimulus.margin = found.margins;
+        Ok(with)
+    }
+
+    fn groups(&self) -> &[Vec<u8>; 2] {
+        self.config.task.groups.as_ref().expect("a training has two groups")
+    }
+
+    /// The training images as a gait sees them by a config; both groups weigh the same.
+    fn images(&self, gait: &Gait, config: &Config) -> Result<Vec<Image>, Error> {
+        let Trainer { training, probing, .. } = self;
         let all = probing.conditions();
-        let [a, b] = config.task.groups.as_ref().expect("a training has two groups");
+        let [a, b] = self.groups();
         let of =
             |classes: &[u8]| training.images.iter().filter(|image| classes.contains(&image.label)).count();
         let (of_a, of_b) = (of(a) as f64, of(b) as f64);
-        let image = |((image, stimulus), condition): ((&ImageRef, &Grid<f64>), &Condition)| {
+        let image = |(image, condition): (&ImageRef, &Condition)| {
+            let stimulus = see(config, self.dataset, Split::Train, image.index)?;
             let is_a = a.contains(&image.label);
             let (right, weight) = if is_a { (1.0, 0.5 / of_a) } else { (-1.0, 0.5 / of_b) };
             let condition = all.iter().position(|other| other == condition).expect("it is one of all");
-            Image {
-                stimulus: stimulus.clone(),
-                example: Example { right, weight, ..Example::new(gait, stimulus, &config.physics) },
-                condition,
-            }
+            let example = Example { right, weight, ..Example::new(gait, &stimulus, &config.physics) };
+            Ok(Image { stimulus, example, condition })
         };
-        training.images.iter().zip(&training.stimuli).zip(&training.conditions).map(image).collect()
+        training.images.iter().zip(&training.conditions).map(image).collect()
     }
 
     fn plan(&self) -> Plan {
@@ -530,31 +563,37 @@ impl Trainer<'_> {
         walkers: &'w [Walker<'w>],
         log: &mut Log,
         observer: &dyn Observer,
-    ) -> Result<(&'w Walker<'w>, Taught), Error> {
+    ) -> Result<(&'w Walker<'w>, Config, Taught), Error> {
         let plan = self.plan();
         let Trainer { config, probing, .. } = self;
-        let mut best: Option<(&Walker, Teacher)> = None;
+        let mut best: Option<(&Walker, Config, Teacher)> = None;
         for (walker, measured) in walkers.iter().zip(&self.measured) {
             let (gait, robot) = (&walker.gait, &walker.robot.id);
             log.begins(format!("{robot}: response:"), self.config.train.random_images);
             let Some(response) = self.response(gait, measured, log)? else { continue };
             told_response(observer, &walker.robot.id, gait, &response);
-            let mut teacher = Teacher::new(gait, &response, self.images(gait), plan, &config.physics);
+            let seeing = match plan.rounds {
+                // It keeps its own sensors, which are for the images as it sees them.
+                0 => Config { train: TrainConfig { windows: 0, ..config.train }, ..(*config).clone() },
+                _ => self.with_window(walker, &response, log, observer)?,
+            };
+            let images = self.images(gait, &seeing)?;
+            let mut teacher = Teacher::new(gait, &response, images, plan, &config.physics);
             let conditions = probing.conditions();
             log.begins_round(robot, 1, &plan);
             let mut rollouts = Kept { config, conditions, log };
             if plan.rounds == 0 {
                 let fitness = teacher.own(&mut rollouts)?;
                 told_own(observer, &walker.robot.id, fitness);
-                best = Some((walker, teacher));
+                best = Some((walker, seeing, teacher));
                 break;
             }
             told_round(observer, &walker.robot.id, &teacher.round(&mut rollouts)?, &plan);
-            if best.as_ref().is_none_or(|(_, best)| teacher.predicted() > best.predicted()) {
-                best = Some((walker, teacher));
+            if best.as_ref().is_none_or(|(_, _, best)| teacher.predicted() > best.predicted()) {
+                best = Some((walker, seeing, teacher));
             }
         }
-        let Some((walker, mut teacher)) = best else {
+        let Some((walker, seeing, mut teacher)) = best else {
             let text = "none of the chosen robots is stable under random images: there is nothing to train";
             return Err(Error::input(text.to_string()).hint("choose others with --robots".to_string()));
         };
@@ -567,7 +606,7 @@ impl Trainer<'_> {
         let challengers = teacher.challengers();
         rollouts.log.begins_challenges(challengers);
         let told = |challenge: &Challenge| told_challenge(observer, challenge, challengers);
-        Ok((walker, teacher.finish(&mut rollouts, told)?))
+        Ok((walker, seeing, teacher.finish(&mut rollouts, told)?))
     }
 }
 
@@ -577,6 +616,21 @@ fn told_response(observer: &dyn Observer, robot: &str, gait: &Gait, response: &R
     observer.note(&format!(
         "{robot}: {places} soft voxels and sensors explain {share} % of its response; the rest is {noise} voxel lengths"
     ));
+}
+
+fn told_window(observer: &dyn Observer, robot: &str, found: &Found, tried: usize) {
+    let Found { margins, predicted, predicted_before } = found;
+    let [after, before] = [predicted, predicted_before].map(|fitness| number::fixed(*fitness, 2));
+    observer.note(&format!(
+        "{robot}: of {tried} windows, stimulus.margin = {margins} is predicted to be best: fitness {after}, before {before}"
+    ));
+    observer.finding(
+        "window",
+        &serde_json::json!({
+            "robot": robot, "windows": tried, "margin": margins, "predicted": predicted,
+            "predicted_before": predicted_before,
+        }),
+    );
 }
 
 fn told_own(observer: &dyn Observer, robot: &str, fitness: f64) {

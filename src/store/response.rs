@@ -8,8 +8,10 @@ use crate::config::reading;
 use crate::store::images::DatasetRef;
 use crate::store::results::{by_lines, write_with_table};
 use crate::store::run::RunFile;
+use crate::task::margins::Margins;
 use crate::task::perturbation::Condition;
 use crate::task::response::{Gait, Response};
+use crate::task::stimulus::StimulusParams;
 use crate::task::teachable::{Estimate, Teachable};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -67,6 +69,16 @@ pub struct Setting {
     /// The task that robots could be taught, if one was named.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub task: Option<String>,
+    /// How they would see its images.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stimulus: Option<StimulusParams>,
+    /// How many windows of its images were tried for each robot; 0: only that of `stimulus`.
+    #[serde(default, skip_serializing_if = "is_none")]
+    pub windows: usize,
+}
+
+fn is_none(windows: &usize) -> bool {
+    *windows == 0
 }
 
 /// Why a measurement ended.
@@ -152,6 +164,9 @@ pub struct Taught {
     pub accuracy: f64,
     /// Its 95 % interval.
     pub accuracy_interval: [f64; 2],
+    /// The best window of those that were tried, by `stimulus.margin`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub margin: Option<Margins>,
 }
 
 impl From<Teachable> for Taught {
@@ -163,6 +178,7 @@ impl From<Teachable> for Taught {
             fitness_interval: interval(fitness, -1.0),
             accuracy: accuracy.value,
             accuracy_interval: interval(accuracy, 0.0),
+            margin: None,
         }
     }
 }

@@ -124,7 +124,8 @@ pub struct Decoded {
     pub answers: Vec<u8>,
 }
 
-/// Accuracies on the same images, and on the pixels that the first robot sees.
+/// Accuracies on the same images, and on the pixels that the robots see: all together, within the
+/// least of their margins, as the first robot sees them.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TeamBaselines {
@@ -132,7 +133,8 @@ pub struct TeamBaselines {
     pub training_images: usize,
     /// A linear function for each class against all others; the largest wins.
     pub linear_one_against_rest: Accuracy,
-    /// A linear function for each pair of classes, with votes as the team's.
+    /// A linear function for each pair of classes, with votes as the team's; where a robot tells the
+    /// pair apart, on the pixels that it sees.
     pub linear_pairs: Accuracy,
     /// The class of the nearest training image.
     pub nearest_neighbour: Accuracy,

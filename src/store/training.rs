@@ -20,6 +20,14 @@ pub struct Origin {
     /// Indices of the images that its robots were ever trained on, if they are of the same data:
     /// not for validation.
     pub trained_on: Vec<usize>,
+    /// How many windows of the images were tried, of which the run's config has the best; 0 if none
+    /// but the config's own.
+    #[serde(default, skip_serializing_if = "is_none")]
+    pub windows: usize,
+}
+
+fn is_none(windows: &usize) -> bool {
+    *windows == 0
 }
 
 /// Displacements that were simulated together, in the order of the images; `None` where unstable.

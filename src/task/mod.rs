@@ -7,6 +7,7 @@ pub mod evaluation;
 pub mod fitness;
 pub mod grouping;
 pub mod judge;
+pub mod margins;
 pub mod perturbation;
 pub mod protocol;
 pub mod recording;

@@ -497,6 +497,23 @@ impl Lesson {
         lesson
     }
 
+    /// A lesson whose examples have the displacements that the model says of `design`: by the slopes,
+    /// and by an intercept for each example. With a `side` of −1 all walk the other way.
+    pub fn foretold<'a>(
+        examples: impl IntoIterator<Item = (&'a Example, f64)>,
+        slopes: &[f64],
+        design: &[Material],
+        side: f64,
+    ) -> Self {
+        let displaced = |(example, intercept): (&Example, f64)| Example {
+            displacement: intercept + dot(slopes, &example.widths(design)),
+            right: side * example.right,
+            ..example.clone()
+        };
+        let examples: Vec<Example> = examples.into_iter().map(displaced).collect();
+        Lesson::new(&examples.iter().collect::<Vec<_>>(), slopes, design)
+    }
+
     /// Counts the objective anew.
     fn count(&mut self) {
         let clipped = |(margin, weight): (&f64, &f64)| weight * (margin / ENOUGH).clamp(self.floor, 1.0);

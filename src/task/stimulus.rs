@@ -2,6 +2,7 @@
 //! "Task").
 
 use crate::base::Grid;
+use crate::task::margins::Margins;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
@@ -42,20 +43,21 @@ pub struct StimulusParams {
     pub encoding: Encoding,
     /// For the encoding "threshold": the level, from 0 up to but below 1. Default 0.5.
     pub level: f64,
-    /// Rows and columns of pixels left out at every edge, before the reduction. Default 0. MNIST's
-    /// digits lie in the middle 20 × 20 of 28 × 28 pixels: with 4, every sensor sees a part of
-    /// them.
-    #[serde(skip_serializing_if = "is_zero")]
-    pub margin: usize,
-}
-
-fn is_zero(margin: &usize) -> bool {
-    *margin == 0
+    /// Rows and columns of pixels left out at the edges, before the reduction: a number, or [top,
+    /// right, bottom, left]. Default 0. MNIST's digits lie in the middle 20 × 20 of 28 × 28 pixels:
+    /// with 4, every sensor sees a part of them.
+    #[serde(skip_serializing_if = "Margins::is_none")]
+    pub margin: Margins,
 }
 
 impl Default for StimulusParams {
     fn default() -> Self {
-        StimulusParams { reduction: Reduction::Stride, encoding: Encoding::Intensity, level: 0.5, margin: 0 }
+        StimulusParams {
+            reduction: Reduction::Stride,
+            encoding: Encoding::Intensity,
+            level: 0.5,
+            margin: Margins::default(),
+        }
     }
 }
 
@@ -95,11 +97,11 @@ pub enum StimulusError {
     },
     /// Nothing is left between the margins.
     #[error(
-        "a margin of {margin} leaves nothing of {height} x {width} pixels; it must be less than half of both sides"
+        "a margin of {margin} leaves nothing of {height} x {width} pixels; the sum of opposite margins must be less than a side"
     )]
     Margin {
-        /// Pixels at every edge.
-        margin: usize,
+        /// Pixels at the edges.
+        margin: Margins,
         /// Rows of the image.
         height: usize,
         /// Columns of the image.
@@ -139,8 +141,11 @@ pub fn stimulus(
     }
     params.validate()?;
     let middle = match params.margin {
-        0 => Cow::Borrowed(image),
-        margin => Cow::Owned(without_margin(image, margin)?),
+        margin if margin.is_none() => Cow::Borrowed(image),
+        margin => {
+            let (height, width) = (image.height(), image.width());
+            Cow::Owned(margin.cut(image).ok_or(StimulusError::Margin { margin, height, width })?)
+        }
     };
     let reduced = match params.reduction {
         Reduction::Stride => strided(&middle, height, width)?,
@@ -151,18 +156,6 @@ pub fn stimulus(
         Encoding::Saturated => f64::from(value > 0.0),
         Encoding::Threshold => f64::from(value / 255.0 > params.level),
     }))
-}
-
-/// What is left of an image without so many rows and columns at every edge.
-fn without_margin(image: &Grid<u8>, margin: usize) -> Result<Grid<u8>, StimulusError> {
-    let (height, width) = (image.height(), image.width());
-    let left = |side: usize| side.checked_sub(margin.checked_mul(2)?).filter(|left| *left > 0);
-    match (left(height), left(width)) {
-        (Some(rows), Some(columns)) => {
-            Ok(Grid::from_fn(rows, columns, |r, c| image[(r + margin, c + margin)]))
-        }
-        _ => Err(StimulusError::Margin { margin, height, width }),
-    }
 }
 
 fn strided(image: &Grid<u8>, height: usize, width: usize) -> Result<Grid<f64>, StimulusError> {
@@ -284,15 +277,15 @@ mod tests {
         let middle = Grid::from_fn(5, 8, |r, c| image[(r + 2, c + 2)]);
         for (reduction, width) in [(Area, 3), (Stride, 4)] {
             let whole = params(reduction, Intensity);
-            let cut = StimulusParams { margin: 2, ..whole };
+            let cut = StimulusParams { margin: Margins::same(2), ..whole };
             assert_eq!(stimulus(&image, 5, width, &cut), stimulus(&middle, 5, width, &whole));
         }
-        for margin in [5, usize::MAX] {
+        for margin in [5, usize::MAX].map(Margins::same) {
             let cut = StimulusParams { margin, ..params(Area, Intensity) };
             let error = stimulus(&image, 3, 3, &cut).unwrap_err();
             assert_eq!(error, StimulusError::Margin { margin, height: 9, width: 12 });
         }
-        let edge = StimulusParams { margin: 4, ..params(Area, Intensity) };
+        let edge = StimulusParams { margin: Margins::same(4), ..params(Area, Intensity) };
         assert_eq!(stimulus(&image, 1, 1, &edge).unwrap().area(), 1);
     }
 
@@ -305,7 +298,7 @@ mod tests {
         assert_eq!(serde_json::to_string(&Area).unwrap(), "\"area\"");
         let text = |params: &StimulusParams| serde_json::to_string(params).unwrap();
         assert!(!text(&threshold).contains("margin"));
-        let cut = StimulusParams { margin: 4, ..threshold };
+        let cut = StimulusParams { margin: Margins::same(4), ..threshold };
         assert_eq!(read(&text(&cut)), cut);
     }
 }

@@ -390,14 +390,8 @@ impl<'a> Teacher<'a> {
     /// Solves the lesson under the model, from a design on: what the model says of the solution,
     /// and the solution.
     fn solved(&self, from: &[Material], side: f64, solve: impl FnOnce(&mut Lesson)) -> (f64, Design) {
-        let example = |image: &Image| {
-            let moved = dot(&self.slopes, &image.example.widths(from));
-            let displacement = self.intercepts[image.condition] + moved;
-            Example { displacement, right: side * image.example.right, ..image.example.clone() }
-        };
-        let examples: Vec<Example> = self.images.iter().map(example).collect();
-        let examples: Vec<&Example> = examples.iter().collect();
-        let mut lesson = Lesson::new(&examples, &self.slopes, from);
+        let examples = self.images.iter().map(|image| (&image.example, self.intercepts[image.condition]));
+        let mut lesson = Lesson::foretold(examples, &self.slopes, from, side);
         solve(&mut lesson);
         (lesson.objective(), lesson.design())
     }

@@ -133,14 +133,8 @@ impl<'a> Half<'a> {
         let Response { slopes, intercept, .. } = &self.response;
         let soft = vec![Material::Soft; slopes.len()];
         let solved = |side: f64, draw: u64| {
-            let displaced = |example: &&Example| {
-                let moved: f64 = example.widths(&soft).iter().zip(slopes).map(|(w, slope)| w * slope).sum();
-                let right = side * example.right;
-                Example { displacement: intercept + moved, right, ..(*example).clone() }
-            };
-            let examples: Vec<Example> = self.examples.iter().map(displaced).collect();
-            let examples: Vec<&Example> = examples.iter().collect();
-            let mut lesson = Lesson::new(&examples, slopes, &soft);
+            let examples = self.examples.iter().map(|example| (*example, *intercept));
+            let mut lesson = Lesson::foretold(examples, slopes, &soft, side);
             lesson.solve_from_many(&mut stream(seed, Purpose::Training, 0, 2 * number + draw));
             (lesson.objective(), lesson.design())
         };

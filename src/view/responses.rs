@@ -34,8 +34,11 @@ pub fn response(console: &Console, finished: &Finished, out: &Path) {
     if file.setting.task.is_some() {
         headers.extend([fitness.as_str(), accuracy.as_str()]);
     }
+    if file.setting.windows > 0 {
+        headers.push("stimulus.margin");
+    }
     let is_taught = file.setting.task.is_some();
-    let rows = file.robots.iter().map(|robot| row(robot, is_taught));
+    let rows = file.robots.iter().map(|robot| row(robot, is_taught, file.setting.windows > 0));
     console.table(&headers, &rows.collect::<Vec<_>>());
     let count = file.setting.conditions.len();
     console.line(&format!("{count} conditions by turns; voxel lengths, right positive"));
@@ -44,7 +47,7 @@ pub fn response(console: &Console, finished: &Finished, out: &Path) {
     }
 }
 
-fn row(robot: &RobotResponse, is_taught: bool) -> Vec<String> {
+fn row(robot: &RobotResponse, is_taught: bool, has_window: bool) -> Vec<String> {
     let certain = robot.places.iter().filter(|place| !place.is_uncertain()).count();
     let known = robot.intercepts.iter().flatten();
     let (low, high) =
@@ -75,6 +78,10 @@ fn row(robot: &RobotResponse, is_taught: bool) -> Vec<String> {
                 [fitness, format!("{} ({low} to {high})", percent(taught.accuracy))]
             }
         });
+    }
+    if has_window {
+        let margin = robot.taught.and_then(|taught| taught.margin);
+        row.push(margin.map_or("–".to_string(), |margin| margin.to_string()));
     }
     row
 }

@@ -170,6 +170,7 @@ mod tests {
             fitness_interval: interval,
             accuracy: 0.68,
             accuracy_interval: interval,
+            margin: None,
         });
         assert!(response(&still, Some("4|9"), "robot a").svg().contains("4|9: 61–75 % right"));
     }

@@ -17,6 +17,7 @@ use crate::store::run::RunFile;
 use crate::store::training::Origin;
 use crate::task::direction;
 use crate::task::fitness::Fitness;
+use crate::task::margins::Margins;
 use crate::task::protocol::RolloutMode;
 use crate::task::stimulus::Encoding;
 use crate::view::html::escape;
@@ -89,11 +90,15 @@ fn evolved(dossier: &Dossier) -> String {
 /// How the robot was trained.
 fn trained(run: &RunFile, origin: &Origin) -> String {
     let TrainConfig { random_images, rounds, images, final_images, challengers, .. } = run.config.train;
+    let window = match origin.windows {
+        0 => String::new(),
+        windows => format!(" (and one of {windows} windows of the images)"),
+    };
     let taught = match rounds {
         0 => "Its soft voxels and sensors were kept".to_string(),
         _ => format!(
-            "The response of its gait was measured under {random_images} random images, and soft voxels and \
-             sensors were chosen by a linear model of that, in {rounds} rounds of {images} training images"
+            "The response of its gait was measured under {random_images} random images. By a linear model of that, \
+             soft voxels and sensors{window} were chosen, in {rounds} rounds of {images} training images"
         ),
     };
     format!(
@@ -116,8 +121,11 @@ pub(super) fn methods(dossier: &Dossier) -> String {
         Encoding::Threshold => format!("1 for any pixel above {} of full intensity", config.stimulus.level),
     };
     let margin = match config.stimulus.margin {
-        0 => String::new(),
-        margin => format!(" (without a margin of {margin} pixels)"),
+        none if none.is_none() => String::new(),
+        margin if margin == Margins::same(margin.top) => format!(" (without a margin of {margin} pixels)"),
+        Margins { top, right, bottom, left } => format!(
+            " (without its {top} rows of pixels at the top, {bottom} at the bottom, {left} columns on the left and {right} on the right)"
+        ),
     };
     let steps = config.protocol.control_steps;
     let cycles = number::fixed(f64::from(steps) / f64::from(config.physics.cycle_steps), 0);
