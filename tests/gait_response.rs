@@ -133,6 +133,34 @@ fn what_could_be_taught_is_said_for_the_config_that_the_training_would_have() {
 }
 
 #[test]
+fn what_was_measured_before_is_not_simulated_again() {
+    let sandbox = run_of(&[WALKER]);
+    sandbox.run("response -q -a run -n 120 --error 0").ended(0, &[]);
+    let mut first: serde_json::Value = serde_json::from_str(&sandbox.read("run/response.json")).unwrap();
+    let measured = first["robots"][0]["displacements"].clone();
+    // A number that no simulation gives tells what is taken.
+    first["robots"][0]["displacements"][7] = 12.5.into();
+    sandbox.write("run/response.json", first.to_string());
+    let displacements = |out: &str, options: &str| {
+        sandbox.run(&format!("response -q -a run --error 0 {options}")).ended(0, &[]);
+        responses(&sandbox, out).robots[0].displacements.clone()
+    };
+    let more = displacements("more.json", "-n 180 -o more.json --task 3|14");
+    assert!(more.len() == 180 && more[7] == Some(12.5));
+    let same = |number: &usize| measured[*number].as_f64() == more[*number];
+    assert!((0..120).filter(|number| *number != 7).all(|number| same(&number)));
+    // The longest that is known: here that of the results' file, of which fewer are asked for.
+    sandbox.write("run/response.json", "{");
+    assert_eq!(displacements("more.json", "-n 60 -o more.json"), more[..60]);
+    // That of another seed is not; nor is any of it without the files.
+    assert_ne!(displacements("other.json", "-n 60 -o other.json --seed 5")[7], Some(12.5));
+    for file in ["run/response.json", "more.json"] {
+        std::fs::remove_file(sandbox.path(file)).unwrap();
+    }
+    assert_eq!(displacements("more.json", "-n 60 -o more.json")[7], measured[7].as_f64());
+}
+
+#[test]
 fn results_and_pictures_lie_beside_the_run_and_say_why_a_measurement_ended() {
     let sandbox = run_of(&[WALKER, BLIND, &WALKER.replace("666", "444")]);
     let said = sandbox.run("response -a run -n 130 --error 0").ended(0, &[]);

@@ -4,6 +4,7 @@
 use crate::analysis::gallery;
 use crate::base::Grid;
 use crate::base::error::{Error, ErrorKind};
+use crate::base::files::exists;
 use crate::base::hash::sha256_hex;
 use crate::base::observer::{Observer, Work};
 use crate::base::stop::check;
@@ -144,7 +145,9 @@ pub fn measure(options: &Options, stop: &AtomicBool, observer: &dyn Observer) ->
         let label = format!("measuring {} robots:", subjects.len());
         observer.begins(&Work::new(label, (subjects.len() * options.images) as u64, "rollouts"));
     }
-    let measuring = Measuring { options, config, probing, task, stop };
+    let earlier = earlier(options, observer);
+    let measuring =
+        Measuring { options, config, probing, task, earlier, run_sha256: &provenance.sha256, seed, stop };
     let mut unwritten = Unwritten::default();
     let mut stopped = false;
     for (number, subject) in subjects.iter().enumerate() {
@@ -358,10 +361,36 @@ struct Measuring<'a> {
     config: &'a Config,
     probing: Probing,
     task: Option<Task>,
+    /// What was measured before.
+    earlier: Vec<ResponseFile>,
+    run_sha256: &'a str,
+    seed: u64,
     stop: &'a AtomicBool,
 }
 
+/// What was measured before and might be measured again: in the results' file, and beside the run.
+fn earlier(options: &Options, observer: &dyn Observer) -> Vec<ResponseFile> {
+    let beside = options.archive.as_deref().map(|archive| archive.with_file_name(RESPONSE_JSON));
+    let mut paths: Vec<PathBuf> = beside.into_iter().chain([options.out.clone()]).collect();
+    paths.dedup();
+    let read = |path: &PathBuf| match ResponseFile::read(path) {
+        Ok(file) => Some(file),
+        Err(error) => {
+            observer.warning(&format!("{error}; responses are measured again"));
+            None
+        }
+    };
+    paths.iter().filter(|path| exists(path)).filter_map(read).collect()
+}
+
 impl Measuring<'_> {
+    /// What is known of a gait: its displacements under the first random images.
+    fn known(&self, gait: &Gait) -> &[Option<f64>] {
+        let of =
+            |file| ResponseFile::known(file, self.run_sha256, self.seed, self.probing.conditions(), gait);
+        self.earlier.iter().map(of).max_by_key(|known| known.len()).unwrap_or_default()
+    }
+
     /// A robot's response; `None` if most of its rollouts are unstable. `progress` is told how many
     /// rollouts are done.
     fn robot(
@@ -370,22 +399,25 @@ impl Measuring<'_> {
         progress: &mut dyn FnMut(usize),
     ) -> Result<Option<RobotResponse>, Error> {
         let Measuring { options, config, probing, stop, .. } = self;
+        let known = self.known(gait);
         let mut shown: Vec<Shown> = Vec::new();
         let mut displacements: Vec<Option<f64>> = Vec::new();
         let mut rollouts = 0;
         loop {
             let numbers = rollouts..options.images.min(rollouts + BATCH);
             rollouts = numbers.end;
+            let known = &known[numbers.start.min(known.len())..numbers.end.min(known.len())];
             shown.extend(probing.shown(gait, &config.physics, numbers, |probe, stimuli, conditions| {
                 let (rolled, _) = fresh_rollouts(
                     probe,
-                    stimuli,
-                    conditions,
+                    &stimuli[known.len()..],
+                    &conditions[known.len()..],
                     (&config.physics, &config.protocol),
                     &|_| (),
                     stop,
                 )?;
-                let rolled: Vec<Option<f64>> = rolled.into_iter().map(Result::ok).collect();
+                let rolled = known.iter().copied().chain(rolled.into_iter().map(Result::ok));
+                let rolled: Vec<Option<f64>> = rolled.collect();
                 displacements.extend(&rolled);
                 Ok::<_, Error>(rolled)
             })?);

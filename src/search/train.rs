@@ -300,8 +300,8 @@ fn measured(
             return nothing();
         }
     };
-    let (run, seed, conditions) = (&source.run, of_run.seed, probing.conditions());
-    walkers.iter().map(|walker| file.known(run, seed, conditions, &walker.gait).to_vec()).collect()
+    let (run, seed, conditions) = (source.run.fingerprint(), of_run.seed, probing.conditions());
+    walkers.iter().map(|walker| file.known(&run, seed, conditions, &walker.gait).to_vec()).collect()
 }
 
 /// Of all that rollouts depend on; more challengers come after those that there were.

@@ -7,7 +7,6 @@ use crate::body::Body;
 use crate::config::reading;
 use crate::store::images::DatasetRef;
 use crate::store::results::{by_lines, write_with_table};
-use crate::store::run::RunFile;
 use crate::task::margins::Margins;
 use crate::task::perturbation::Condition;
 use crate::task::response::{Gait, Response};
@@ -231,17 +230,16 @@ impl ResponseFile {
     }
 
     /// The displacements of a gait under the first random images of a seed, if they were measured for
-    /// this run as it is, by this version, under these conditions.
+    /// the run with this SHA-256, by this version, under these conditions.
     pub(crate) fn known(
         &self,
-        run: &RunFile,
+        run_sha256: &str,
         seed: u64,
         conditions: &[Condition],
         gait: &Gait,
     ) -> &[Option<f64>] {
         let Setting { seed: own, conditions: shown, .. } = &self.setting;
-        let is_of_it =
-            self.run_sha256 == run.fingerprint() && self.program_version == env!("CARGO_PKG_VERSION");
+        let is_of_it = self.run_sha256 == run_sha256 && self.program_version == env!("CARGO_PKG_VERSION");
         let has_gait =
             |robot: &&RobotResponse| Gait::of(&robot.body).is_some_and(|own| own.probe() == gait.probe());
         match is_of_it && *own == seed && shown == conditions {
