@@ -31,8 +31,9 @@ then
 All soft voxels and sensors of a robot are made wide, narrow or left at rest by random images, each
 independently of the others: by how much does each move the body? A measurement ends when the slopes
 are known well enough (--error), or after --images rollouts. Images of a dataset are only needed
-with --task. `train` takes what is in response.json for its own first rollouts, for any task: if
-many trainings begin with the same gaits, measure these first. Ctrl-C stops it.";
+with --task. What response.json has is taken, not measured again, by this command and by `train` for
+its own first rollouts, for any task: if many trainings begin with the same gaits, measure these
+first. Ctrl-C stops it.";
 
 /// Two groups of classes.
 type Groups = [Vec<u8>; 2];

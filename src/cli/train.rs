@@ -29,6 +29,8 @@ Examples:
   morphcog evolve --config gaits.toml
   morphcog train --archive runs/gaits-seed1 --task \"4|9\"
   morphcog train --task \"0|123\" --robots top:10 --set train.rounds=10
+  morphcog train --task \"4|9\" --set train.windows=2000 --set stimulus.reduction=area    look for the
+                                                                    part of the images that helps most
 then
   morphcog eval --archive runs/gaits-seed1-4v9 --robots best
 
