@@ -5,6 +5,7 @@ mod common;
 
 use common::program::{Sandbox, TINY, files, pairs};
 use morphcog::store::team::TeamFile;
+use morphcog::task::margins::Margins;
 use serde_json::Value;
 use std::collections::BTreeMap;
 
@@ -60,6 +61,43 @@ fn the_answers_are_those_of_the_rules_in_the_documentation() {
     for picture in ["confusion.svg", "confusion.png", "bodies.svg", "bodies.png"] {
         assert!(sandbox.path(&format!("pairs/team-{picture}")).exists(), "{picture}");
     }
+}
+
+#[test]
+fn robots_see_their_own_windows_and_classifiers_what_all_see_together() {
+    let sandbox = pairs();
+    let tested = |name: &str| {
+        sandbox.run(&format!("{TEAM} -q --images 60 -o {name}.json")).ended(0, &[]);
+        read(&sandbox, &format!("{name}.json"))
+    };
+    let before = tested("before");
+    // A robot that images move, and its run.
+    let moves = |walks: &[Option<f64>]| walks.iter().any(|walk| *walk != walks[0]);
+    let seeing = before.members.iter().position(|member| moves(&member.displacements)).unwrap();
+    let [a, b] = [0, 1].map(|group| before.members[seeing].groups[group][0]);
+    let path = format!("pairs/{}v{}", a.min(b), a.max(b));
+    let text = sandbox.read(&format!("{path}/run.json"));
+    let mut run = sandbox.run_file(&path);
+    // All but the two leftmost columns, which are dark, are hidden from it.
+    run.config.stimulus.margin = Margins { right: 26, ..Margins::default() };
+    sandbox.write(&format!("{path}/run.json"), run.to_json());
+    let after = tested("after");
+    for (place, (a, b)) in before.members.iter().zip(&after.members).enumerate() {
+        assert_eq!(a.displacements != b.displacements, place == seeing, "{place}");
+    }
+    assert!(!moves(&after.members[seeing].displacements));
+    let [a, b] = [&before, &after].map(|team| team.baselines.clone().unwrap());
+    assert_eq!(
+        (a.linear_one_against_rest, a.nearest_neighbour),
+        (b.linear_one_against_rest, b.nearest_neighbour)
+    );
+    // Both classes are the same there, and only the linear function of that pair is lost.
+    assert!(b.linear_pairs.accuracy < a.linear_pairs.accuracy - 0.05, "{a:?} {b:?}");
+    assert!(b.linear_pairs.accuracy > 0.5, "{b:?}");
+    // As it was, the test has the bytes that it had.
+    sandbox.write(&format!("{path}/run.json"), text);
+    tested("again");
+    assert_eq!(sandbox.read("before.json"), sandbox.read("again.json"));
 }
 
 #[test]

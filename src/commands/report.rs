@@ -4,6 +4,7 @@ use crate::base::error::Error;
 use crate::base::files::exists;
 use crate::commands::plot::Progress;
 use crate::commands::replay;
+use crate::config::Config;
 use crate::data::dataset::Split;
 use crate::search::showing::control_steps;
 use crate::store::audit::AuditFile;
@@ -18,6 +19,7 @@ use crate::store::whereabouts::{Whereabouts, load_dataset_of, see};
 use crate::task::protocol::{Protocol, RolloutMode};
 use crate::task::recording::{Recording, Seen};
 use crate::task::rollout::record;
+use crate::task::stimulus::StimulusParams;
 use std::path::{Path, PathBuf};
 
 /// Most images in the rollouts of a page: one of each class, if there are more.
@@ -90,6 +92,8 @@ pub struct Team {
     pub images: Vec<usize>,
     /// What the robots of each run see of these.
     pub seen: Vec<Vec<Seen>>,
+    /// What all of them see together.
+    pub together: Vec<Seen>,
 }
 
 /// Everything for a page.
@@ -169,21 +173,30 @@ impl Team {
         let mut images: Vec<usize> =
             file.images.iter().enumerate().filter(is_first).map(|(place, _)| place).collect();
         let (Some(whereabouts), Some(first)) = (whereabouts, of.first()) else {
-            return Ok(Team { file, runs: of, images: Vec::new(), seen: vec![Vec::new(); runs.len()] });
+            return Ok(Team {
+                file,
+                runs: of,
+                images: Vec::new(),
+                seen: vec![Vec::new(); runs.len()],
+                together: Vec::new(),
+            });
         };
         images.sort_by_key(|place| file.images[*place].label);
         let (run, split) = (&runs[*first].run, file.split.split());
         let dataset = load_dataset_of(Some(&run.dataset), &run.config, whereabouts, &[split])?;
-        let seen = |dossier: &Dossier| {
+        let seen = |config: &Config| {
             let one = |place: &usize| {
                 let ImageRef { index, label } = file.images[*place];
-                let stimulus = see(&dossier.run.config, &dataset, split, index)?;
+                let stimulus = see(config, &dataset, split, index)?;
                 Ok(Seen { class: label, label: format!("{label} ({split} {index})"), stimulus })
             };
-            images.iter().map(one).collect()
+            images.iter().map(one).collect::<Result<Vec<Seen>, Error>>()
         };
-        let seen = runs.iter().map(seen).collect::<Result<Vec<Vec<Seen>>, Error>>()?;
-        Ok(Team { file, runs: of, images, seen })
+        let of_members = of.iter().map(|run| runs[*run].run.config.stimulus);
+        let stimulus = StimulusParams::together(of_members).unwrap_or(run.config.stimulus);
+        let together = seen(&Config { stimulus, ..run.config.clone() })?;
+        let seen = runs.iter().map(|dossier| seen(&dossier.run.config)).collect::<Result<_, Error>>()?;
+        Ok(Team { file, runs: of, images, seen, together })
     }
 
     /// The rollout of a member under one of the images to watch it by.

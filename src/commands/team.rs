@@ -24,6 +24,7 @@ use crate::store::whereabouts::{Whereabouts, load_dataset_of, see};
 use crate::task::direction::THRESHOLD;
 use crate::task::grouping::{self, Group};
 use crate::task::judge::Judge;
+use crate::task::stimulus::StimulusParams;
 use crate::task::voting::{Accuracy, Ballot, CLIP};
 use std::collections::BTreeSet;
 use std::path::PathBuf;
@@ -269,13 +270,12 @@ fn known(options: &Options, now: &TeamFile) -> Vec<Member> {
     earlier.map_or(Vec::new(), |file| file.members)
 }
 
-/// The config of the first robot, with the least margins of all: what any of them sees is seen.
+/// The config of the first robot, but images are seen as all see them together.
 fn seeing_all(sources: &[Source], robots: &[Chosen]) -> Config {
     let configs = || robots.iter().map(|chosen| &sources[chosen.source].run.config);
-    let mut common = configs().next().expect("every class of a team has a robot").clone();
-    common.stimulus.margin =
-        configs().map(|config| config.stimulus.margin).reduce(|a, b| a.least(&b)).unwrap_or_default();
-    common
+    let first = configs().next().expect("every class of a team has a robot");
+    let stimulus = StimulusParams::together(configs().map(|config| config.stimulus));
+    Config { stimulus: stimulus.unwrap_or(first.stimulus), ..first.clone() }
 }
 
 /// Linear functions of what robots see, each with the images of the test as it sees them.

@@ -46,8 +46,7 @@ pub fn of_team(event: &TeamEvent) -> String {
                     })
                 };
             let members: Vec<Value> = plan.members.iter().zip(stands).map(member).collect();
-            let first = plan.members.first().map(|(_, _, seen)| seen);
-            let seen = first.map(|seen| looks(0, plan.control_steps, seen));
+            let seen = looks(0, plan.control_steps, &plan.together);
             let words = json!({
                 "id": id, "unit": STEPS, "rate": STEPS_PER_SECOND, "threshold": THRESHOLD, "until": plan.control_steps,
                 "classes": classes, "seen": seen, "members": members,

@@ -12,6 +12,7 @@ use crate::task::direction::THRESHOLD;
 use crate::task::judge::Judge;
 use crate::task::recording::{Frame, VoxelCorners};
 use crate::task::rollout::Rollout;
+use crate::task::stimulus::StimulusParams;
 use crate::task::voting::{CLIP, Tally};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -96,6 +97,8 @@ pub struct TeamRequest {
 pub struct TeamPlan {
     /// The robots, with what each sees; at least two.
     pub members: Vec<(Name, Who, Seen)>,
+    /// What all of them see together.
+    pub together: Seen,
     /// For how many control steps.
     pub control_steps: u32,
     /// How fast.
@@ -117,11 +120,14 @@ impl TeamRequest {
             members.push((name, who, seen));
         }
         let (_, first, _) = members.first().expect("a team ships with the program");
+        let stimuli = members.iter().map(|(_, who, _)| who.encoding);
+        let encoding = StimulusParams::together(stimuli).unwrap_or(first.encoding);
+        let together = self.shown.seen(&Who { encoding, ..first.clone() }, images)?;
         let control_steps = self.control_steps.unwrap_or(first.protocol.control_steps.min(MAX_STEPS));
         if !(1..=MAX_STEPS).contains(&control_steps) {
             return Err(Refusal::Wrong(format!("control_steps: {control_steps}: expected 1 to {MAX_STEPS}")));
         }
-        Ok(TeamPlan { members, control_steps, pace: Pace::of(self.speed.unwrap_or(1.0))? })
+        Ok(TeamPlan { members, together, control_steps, pace: Pace::of(self.speed.unwrap_or(1.0))? })
     }
 }
 
@@ -242,7 +248,6 @@ mod tests {
     use crate::sim::Physics;
     use crate::task::protocol::Protocol;
     use crate::task::rollout::fresh_rollout;
-    use crate::task::stimulus::StimulusParams;
     use crate::task::voting::Ballot;
     use std::sync::atomic::AtomicBool;
 
@@ -261,7 +266,8 @@ mod tests {
             (Name { archive: 0, robot: body.to_string(), task: String::new(), judge }, who, seen)
         };
         let members = vec![member("3434/4345/6363", judge(0, 1)), member("334/463/343", judge(1, 2))];
-        TeamPlan { members, control_steps: 120, pace: Pace::Free }
+        let together = members[0].2.clone();
+        TeamPlan { members, together, control_steps: 120, pace: Pace::Free }
     }
 
     #[test]

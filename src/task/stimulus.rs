@@ -62,6 +62,14 @@ impl Default for StimulusParams {
 }
 
 impl StimulusParams {
+    /// How several bodies see an image together: as the first of them, within the least of their
+    /// margins. `None` of no body.
+    pub fn together(all: impl IntoIterator<Item = StimulusParams>) -> Option<Self> {
+        let least =
+            |first: Self, other: Self| StimulusParams { margin: first.margin.least(&other.margin), ..first };
+        all.into_iter().reduce(least)
+    }
+
     /// Checks the level.
     ///
     /// # Errors
@@ -287,6 +295,20 @@ mod tests {
         }
         let edge = StimulusParams { margin: Margins::same(4), ..params(Area, Intensity) };
         assert_eq!(stimulus(&image, 1, 1, &edge).unwrap().area(), 1);
+    }
+
+    #[test]
+    fn bodies_see_together_what_any_of_them_sees() {
+        let [a, b] = [[1, 5, 3, 0], [4, 2, 2, 2]].map(|[top, right, bottom, left]| StimulusParams {
+            margin: Margins { top, right, bottom, left },
+            ..params(Area, Threshold)
+        });
+        let together = StimulusParams::together([a, StimulusParams { level: 0.2, ..b }]).unwrap();
+        assert_eq!(
+            together,
+            StimulusParams { margin: Margins { top: 1, right: 2, bottom: 2, left: 0 }, ..a }
+        );
+        assert_eq!((StimulusParams::together([a]), StimulusParams::together([])), (Some(a), None));
     }
 
     #[test]

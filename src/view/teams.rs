@@ -108,7 +108,7 @@ pub(super) fn remarks(file: &TeamFile) -> Vec<String> {
             number::fixed(answers.not_moved, 1)
         ),
         format!(
-            "linear classifiers and nearest neighbour: {} training images, the pixels that the first robot sees",
+            "linear classifiers and nearest neighbour: {} training images, the pixels that the robots see",
             baselines.training_images
         ),
     ];

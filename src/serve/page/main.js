@@ -137,7 +137,7 @@ const together = () => {
   who = { team: true, name: "The team", rows: () => [] };
   $("who").textContent = "The team";
   $("about").textContent = `${team.members.length} robots answer together`;
-  $("encoding").textContent = "as the first robot of the team sees it";
+  $("encoding").textContent = "as the robots of the team see it together";
   images.labels = team.classes;
   start();
 };

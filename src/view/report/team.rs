@@ -86,7 +86,7 @@ fn watched(team: &Team, runs: &[Dossier], simulated: &(dyn Fn() + Sync)) -> Resu
         buttons += &button(team, number);
     }
     Ok(format!(
-        "<h3>Watch it</h3>\n<p>The first image of each class, as the first robot sees it.</p>\n\
+        "<h3>Watch it</h3>\n<p>The first image of each class, as all robots see it together.</p>\n\
          <div class=\"watch\">{buttons}</div>\n\
          <div class=\"card\"><div class=\"together\"><div class=\"stages\"></div>\
          <ol class=\"tally\" aria-label=\"Votes for each class\"></ol></div>\n\
@@ -156,7 +156,7 @@ fn button(team: &Team, number: usize) -> String {
         "<button type=\"button\" data-walks=\"team-{number}\" data-right=\"{}\" aria-pressed=\"false\" \
          aria-label=\"{label}\" title=\"{label}\">{}<small>says {answer}</small></button>",
         answer == image.label,
-        thumbnail(&team.seen[team.runs[0]][number].stimulus)
+        thumbnail(&team.together[number].stimulus)
     )
 }
 
