@@ -127,6 +127,12 @@ fn what_could_be_taught_is_said_for_the_config_that_the_training_would_have() {
     assert_eq!((by_hand.accuracy, by_hand.fitness_interval), (found.accuracy, found.fitness_interval));
     assert_eq!(best.robots[0].displacements, whole.robots[0].displacements);
     sandbox.run("response -q -a run --set train.windows=5").ended(2, &["--task"]);
+    // What is simulated is the run's own.
+    for key in ["physics.gravity=90", "protocol.control_steps=9", "train.perturbations.start=1"] {
+        let section = format!("--set {}", key.rsplit_once('.').unwrap().0);
+        let set = format!("response -q -a run --task 3|14 --set {key}");
+        sandbox.run(&set).ended(2, &[&section, "rollouts are those of the run"]);
+    }
     sandbox
         .run("response -q -a run --task 3|14 --set train.windows=5 --set stimulus.reduction=stride")
         .ended(3, &["train.windows = 5", "area"]);
@@ -149,15 +155,37 @@ fn what_was_measured_before_is_not_simulated_again() {
     assert!(more.len() == 180 && more[7] == Some(12.5));
     let same = |number: &usize| measured[*number].as_f64() == more[*number];
     assert!((0..120).filter(|number| *number != 7).all(|number| same(&number)));
-    // The longest that is known: here that of the results' file, of which fewer are asked for.
+    // The longest that is known: here that of the results' file. It is taken whole.
     sandbox.write("run/response.json", "{");
-    assert_eq!(displacements("more.json", "-n 60 -o more.json"), more[..60]);
+    assert_eq!(displacements("more.json", "-n 60 -o more.json"), more);
     // That of another seed is not; nor is any of it without the files.
     assert_ne!(displacements("other.json", "-n 60 -o other.json --seed 5")[7], Some(12.5));
     for file in ["run/response.json", "more.json"] {
         std::fs::remove_file(sandbox.path(file)).unwrap();
     }
     assert_eq!(displacements("more.json", "-n 60 -o more.json")[7], measured[7].as_f64());
+}
+
+#[test]
+fn a_file_keeps_what_it_has_of_other_robots() {
+    let other = WALKER.replace("666", "444");
+    let sandbox = run_of(&[WALKER, &other]);
+    let ids: Vec<String> = sandbox.run_file("run").elites.into_iter().map(|robot| robot.id).collect();
+    sandbox.run("response -q -a run --robots all -n 120 --error 0 --task 3|14").ended(0, &[]);
+    let both = responses(&sandbox, "run/response.json");
+    let said = sandbox.run(&format!("response -a run --robots {} -n 60 --error 0 --task 0|1", ids[1]));
+    assert!(!said.ended(0, &[]).out.contains(&ids[0]));
+    let file = responses(&sandbox, "run/response.json");
+    let [second, first] = &file.robots[..] else { panic!("{} robots", file.robots.len()) };
+    assert_eq!((&second.id, &first.id), (&ids[1], &ids[0]));
+    let measured = |id: &str| both.robots.iter().find(|robot| robot.id == id).unwrap();
+    assert_eq!(second.displacements, measured(&ids[1]).displacements);
+    assert_eq!(first.displacements, measured(&ids[0]).displacements);
+    // What could be taught was another task.
+    assert!(first.taught.is_none() && second.taught.is_some() && measured(&ids[0]).taught.is_some());
+    // Random images of another seed are others: nothing of them goes together.
+    sandbox.run(&format!("response -q -a run --robots {} -n 60 --seed 8", ids[0])).ended(0, &[]);
+    assert_eq!(responses(&sandbox, "run/response.json").robots.len(), 1);
 }
 
 #[test]

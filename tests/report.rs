@@ -184,6 +184,10 @@ fn a_training_is_told_as_one_and_its_command_trains() {
         command.starts_with("morphcog train --archive GAITS --task '0|1' --seed 1 --robots "),
         "{command}"
     );
+    // Gaits may have other pixels, windows and rounds: what the run had is said, defaults too.
+    for set in ["stimulus.margin=0", "stimulus.level=0.5", "train.windows=0", "train.rounds=6"] {
+        assert!(command.contains(&format!(" --set '{set}' ")), "{set}: {command}");
+    }
     // All of its flags are understood; it ends at the archive.
     let line = command.replace("morphcog", common::program::PROGRAM);
     let ended = std::process::Command::new("sh").args(["-c", &line]).current_dir(sandbox.path("")).output();

@@ -58,7 +58,9 @@ fn a_training_is_a_run_that_every_command_understands() {
 fn a_training_ends_with_the_same_bytes_on_any_threads_and_after_any_stop() {
     let sandbox = sandbox();
     let train = |out: &str, more: &str| {
-        format!("train -q -a walkers --task 0|1 --robots top:2 {LITTLE} -o {out} {more}")
+        format!(
+            "train -q -a walkers --task 0|1 --robots top:2 {LITTLE} --set train.windows=50 -o {out} {more}"
+        )
     };
     sandbox.run(&train("one", "--threads 1")).ended(0, &[]);
     sandbox.run(&train("two", "--threads 2")).ended(0, &[]);
@@ -163,7 +165,9 @@ fn the_best_of_many_windows_is_what_a_training_with_that_margin_is() {
     assert_eq!((&hand.elites, &hand.training_images), (&found.elites, &found.training_images));
     assert_eq!(hand.config.stimulus, found.config.stimulus);
     // Another number of windows is another training.
-    sandbox.run("train -q -a walkers --task 0|1 -o found --resume").ended(2, &["training.json"]);
+    let other =
+        format!("train -q -a walkers --task 0|1 --robots top:2 {LITTLE} --set train.windows=61 -o found");
+    sandbox.run(&format!("{other} --resume")).ended(2, &["training.json"]);
     // A robot that keeps its own sensors keeps its window, too.
     sandbox.run("train -q -a found --task 0|1 --robots all --set train.rounds=0 --set train.windows=60 --set train.challengers=0 --set train.images=10 --set train.final_images=10 --set validation.images=40 -o kept").ended(0, &[]);
     let kept = sandbox.run_file("kept");

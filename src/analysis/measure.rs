@@ -11,7 +11,7 @@ use crate::base::stop::check;
 use crate::base::threads::pool;
 use crate::body::Body;
 use crate::config::train::MOST_RANDOM_IMAGES;
-use crate::config::{Config, MAX_NUMBER};
+use crate::config::{Config, DataConfig, MAX_NUMBER};
 use crate::data::dataset::{Dataset, DatasetError, Split};
 use crate::search::probing;
 use crate::search::probing::Probing;
@@ -31,6 +31,7 @@ use crate::task::direction;
 use crate::task::evaluation::fresh_rollouts;
 use crate::task::grouping::Grouping;
 use crate::task::perturbation::Condition;
+use crate::task::protocol::{Protocol, RolloutMode};
 use crate::task::response::{Example, Gait, Response, Shown};
 use crate::task::teachable::teachable;
 use std::path::{Path, PathBuf};
@@ -169,7 +170,9 @@ pub fn measure(options: &Options, stop: &AtomicBool, observer: &dyn Observer) ->
             Err(error) => return Err(error),
         }
         if !file.robots.is_empty() {
-            unwritten.tried(file.write(&options.out), |text| observer.warning(text));
+            let before = measuring.earlier.iter().find(|(path, _)| *path == options.out);
+            let whole = before.map_or_else(|| file.clone(), |(_, before)| file.with_others_of(before));
+            unwritten.tried(whole.write(&options.out), |text| observer.warning(text));
         }
     }
     if file.robots.is_empty() && !stopped {
@@ -274,8 +277,12 @@ fn task(options: &Options, provenance: &Provenance, seed: u64) -> Result<Option<
     if let Some(path) = &options.archive {
         whereabouts = whereabouts.and_of(path);
     }
-    let of_run =
-        provenance.dataset.as_ref().filter(|_| config.data.dataset == provenance.config.data.dataset);
+    same_walks(&provenance.config, &config)?;
+    let data = |config: &Config| {
+        let DataConfig { dataset, dir, builtin, .. } = &config.data;
+        (dataset.clone(), dir.clone(), builtin.clone())
+    };
+    let of_run = provenance.dataset.as_ref().filter(|_| data(&config) == data(&provenance.config));
     let dataset = load_dataset_of(of_run, &config, &whereabouts, &[Split::Train])?;
     let classes = groups.concat();
     let per_class = IMAGES_PER_CLASS.min(scarcest(&dataset, &classes, LEAST_PER_CLASS)?);
@@ -287,6 +294,24 @@ fn task(options: &Options, provenance: &Provenance, seed: u64) -> Result<Option<
     // Whatever is wrong with how images are seen is said before anything is measured.
     task.images.first().map_or(Ok(()), |(_, index)| task.seen(&task.config, *index).map(drop))?;
     Ok(Some(task))
+}
+
+/// Whether a training would simulate as the run did: what is measured here holds for no other.
+fn same_walks(of_run: &Config, training: &Config) -> Result<(), Error> {
+    let steps = |config: &Config| Protocol { rollout: RolloutMode::Fresh, ..config.protocol.clone() };
+    let differing = [
+        ("physics", of_run.physics != training.physics),
+        ("protocol", steps(of_run) != steps(training)),
+        ("train.perturbations", of_run.train.perturbations != training.train.perturbations),
+    ];
+    match differing.into_iter().find(|(_, differs)| *differs) {
+        None => Ok(()),
+        Some((section, _)) => {
+            let text = format!("--set {section}: expected keys that say what robots see");
+            Err(Error::usage(text)
+                .hint("rollouts are those of the run: no other can be measured here".to_string()))
+        }
+    }
 }
 
 fn reference(dataset: &Dataset) -> DatasetRef {
@@ -361,34 +386,35 @@ struct Measuring<'a> {
     config: &'a Config,
     probing: Probing,
     task: Option<Task>,
-    /// What was measured before.
-    earlier: Vec<ResponseFile>,
+    /// What was measured before, and where that is.
+    earlier: Vec<(PathBuf, ResponseFile)>,
     run_sha256: &'a str,
     seed: u64,
     stop: &'a AtomicBool,
 }
 
 /// What was measured before and might be measured again: in the results' file, and beside the run.
-fn earlier(options: &Options, observer: &dyn Observer) -> Vec<ResponseFile> {
+fn earlier(options: &Options, observer: &dyn Observer) -> Vec<(PathBuf, ResponseFile)> {
     let beside = options.archive.as_deref().map(|archive| archive.with_file_name(RESPONSE_JSON));
     let mut paths: Vec<PathBuf> = beside.into_iter().chain([options.out.clone()]).collect();
     paths.dedup();
-    let read = |path: &PathBuf| match ResponseFile::read(path) {
-        Ok(file) => Some(file),
+    let read = |path: PathBuf| match ResponseFile::read(&path) {
+        Ok(file) => Some((path, file)),
         Err(error) => {
             observer.warning(&format!("{error}; responses are measured again"));
             None
         }
     };
-    paths.iter().filter(|path| exists(path)).filter_map(read).collect()
+    paths.into_iter().filter(|path| exists(path)).filter_map(read).collect()
 }
 
 impl Measuring<'_> {
     /// What is known of a gait: its displacements under the first random images.
     fn known(&self, gait: &Gait) -> &[Option<f64>] {
+        let conditions = self.probing.conditions();
         let of =
-            |file| ResponseFile::known(file, self.run_sha256, self.seed, self.probing.conditions(), gait);
-        self.earlier.iter().map(of).max_by_key(|known| known.len()).unwrap_or_default()
+            self.earlier.iter().map(|(_, file)| file.known(self.run_sha256, self.seed, conditions, gait));
+        of.max_by_key(|known| known.len()).unwrap_or_default()
     }
 
     /// A robot's response; `None` if most of its rollouts are unstable. `progress` is told how many
@@ -402,11 +428,13 @@ impl Measuring<'_> {
         let known = self.known(gait);
         let mut shown: Vec<Shown> = Vec::new();
         let mut displacements: Vec<Option<f64>> = Vec::new();
+        // What is known costs nothing: it is taken whole, and first.
+        let most = options.images.max(known.len());
         let mut rollouts = 0;
         loop {
-            let numbers = rollouts..options.images.min(rollouts + BATCH);
+            let numbers = rollouts..most.min(known.len().max(rollouts + BATCH));
             rollouts = numbers.end;
-            let known = &known[numbers.start.min(known.len())..numbers.end.min(known.len())];
+            let known = if numbers.start == 0 { known } else { &[] };
             shown.extend(probing.shown(gait, &config.physics, numbers, |probe, stimuli, conditions| {
                 let (rolled, _) = fresh_rollouts(
                     probe,
@@ -421,12 +449,12 @@ impl Measuring<'_> {
                 displacements.extend(&rolled);
                 Ok::<_, Error>(rolled)
             })?);
-            progress(rollouts);
+            progress(rollouts.min(options.images));
             check(stop)?;
             let Some(response) = probing::response(&shown, rollouts) else { return Ok(None) };
             let ended_by = if response.relative_error() <= options.error {
                 EndedBy::Error
-            } else if rollouts == options.images {
+            } else if rollouts == most {
                 EndedBy::Images
             } else {
                 continue;

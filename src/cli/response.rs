@@ -55,7 +55,8 @@ pub(super) struct ResponseArgs {
     /// train.windows=2000; may be given several times.
     #[arg(long, value_name = "KEY=VALUE", requires = "task")]
     set: Vec<String>,
-    /// Most rollouts of a robot, each under a random image: 60 or more.
+    /// Most rollouts of a robot, each under a random image: 60 or more; what is known of it is
+    /// taken whole.
     #[arg(short = 'n', long, default_value_t = 1000)]
     images: usize,
     /// The error of the slopes, relative to them, at which a robot's measurement ends; 0: never

@@ -278,14 +278,6 @@ fn seeing_all(sources: &[Source], robots: &[Chosen]) -> Config {
     Config { stimulus: stimulus.unwrap_or(first.stimulus), ..first.clone() }
 }
 
-/// Linear functions of what robots see, each with the images of the test as it sees them.
-struct Pair {
-    judge: Judge,
-    linear: Linear,
-    /// The images of the test; none where they are those that all see.
-    own: Option<Vec<Grid<f64>>>,
-}
-
 /// What answers the same images without bodies: on the pixels that the robots see, all together; a
 /// pair of classes that a robot tells apart, on its own.
 fn baselines(
@@ -335,20 +327,22 @@ fn baselines(
         };
         let robot = splits.iter().position(|split| tells(&split));
         let config = robot.map_or(&common, |robot| &sources[robots[robot].source].run.config);
-        if config.stimulus == common.stimulus {
-            return Ok(Pair { judge, linear: moments.apart(&[a], &[b]), own: None });
+        let seeing = |config: &Config| (config.stimulus, config.body.height, config.body.width);
+        if seeing(config) == seeing(&common) {
+            let linear = moments.apart(&[a], &[b]);
+            return Ok((judge, stimuli.iter().map(|stimulus| linear.value(stimulus)).collect()));
         }
         let training = training_of(config, &[a, b])?;
         let linear = Moments::new(&labelled(&training)).apart(&[a], &[b]);
-        Ok(Pair { judge, linear, own: Some(seen(config, dataset, split, &file.images)?) })
+        let value = |image: &ImageRef| Ok(linear.value(&see(config, dataset, split, image.index)?));
+        Ok((judge, file.images.iter().map(value).collect::<Result<_, Error>>()?))
     };
     let pairs =
         classes.iter().enumerate().flat_map(|(number, a)| classes[number + 1..].iter().map(|b| (*a, *b)));
-    let pairs: Vec<Pair> = pairs.map(|(a, b)| pair(a, b)).collect::<Result<_, Error>>()?;
+    // Of each pair the values of its function, image by image.
+    let pairs: Vec<(Judge, Vec<f64>)> = pairs.map(|(a, b)| pair(a, b)).collect::<Result<_, Error>>()?;
     let voted = |image: usize| {
-        let value =
-            |pair: &Pair| pair.linear.value(pair.own.as_ref().map_or(&stimuli[image], |own| &own[image]));
-        let walks = pairs.iter().map(|pair| (&pair.judge, Some(value(pair))));
+        let walks = pairs.iter().map(|(judge, values)| (judge, Some(values[image])));
         classes[Ballot::count(classes, walks, 0.0, 1.0).by_votes().0]
     };
     let nearest = nearest_neighbours(&known, &stimuli.iter().collect::<Vec<_>>());

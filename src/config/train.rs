@@ -19,6 +19,7 @@ pub struct TrainConfig {
     /// Windows of the images that are tried for each gait, that of `stimulus.margin` first: the model
     /// says which serves the task best, and the robot sees that one. Default 0: only that of
     /// `stimulus.margin`. More than 0 want the reduction "area". They cost no rollouts.
+    #[serde(skip_serializing_if = "is_none")]
     pub windows: usize,
     /// Rounds in which the response is measured around the latest design, and the lesson is solved
     /// again. Default 6: more seldom help. 0: the robot keeps its own soft voxels and sensors, and is
@@ -36,6 +37,10 @@ pub struct TrainConfig {
     /// Under what images are shown by turns, so that designs do not depend on the first touch of
     /// the ground or exploit length limits.
     pub perturbations: ByTurns,
+}
+
+fn is_none(windows: &usize) -> bool {
+    *windows == 0
 }
 
 impl Default for TrainConfig {

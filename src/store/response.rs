@@ -54,7 +54,7 @@ pub struct ResponseFile {
 pub struct Setting {
     /// Seed of the random images.
     pub seed: u64,
-    /// Most rollouts of a robot.
+    /// Most rollouts of a robot, those left aside that were known before.
     pub images: usize,
     /// The relative error of the slopes at which a measurement ends.
     pub error: f64,
@@ -238,14 +238,34 @@ impl ResponseFile {
         conditions: &[Condition],
         gait: &Gait,
     ) -> &[Option<f64>] {
-        let Setting { seed: own, conditions: shown, .. } = &self.setting;
-        let is_of_it = self.run_sha256 == run_sha256 && self.program_version == env!("CARGO_PKG_VERSION");
         let has_gait =
             |robot: &&RobotResponse| Gait::of(&robot.body).is_some_and(|own| own.probe() == gait.probe());
-        match is_of_it && *own == seed && shown == conditions {
+        match self.is_of(run_sha256, seed, conditions) {
             true => self.robots.iter().find(has_gait).map_or(&[], |robot| &robot.displacements),
             false => &[],
         }
+    }
+
+    /// Whether it was measured for the run with this SHA-256, by this version, under these
+    /// conditions and random images.
+    fn is_of(&self, run_sha256: &str, seed: u64, conditions: &[Condition]) -> bool {
+        let by_this = self.program_version == env!("CARGO_PKG_VERSION");
+        let Setting { seed: own, conditions: shown, .. } = &self.setting;
+        self.run_sha256 == run_sha256 && by_this && *own == seed && shown == conditions
+    }
+
+    /// With the other robots of an earlier file, if that holds for the same run, seed and conditions;
+    /// what these could be taught is left out if it was another task.
+    pub(crate) fn with_others_of(&self, earlier: &ResponseFile) -> Self {
+        let mut all = self.clone();
+        if earlier.is_of(&self.run_sha256, self.setting.seed, &self.setting.conditions) {
+            let is_other = |robot: &&RobotResponse| self.robots.iter().all(|own| own.id != robot.id);
+            for robot in earlier.robots.iter().filter(is_other) {
+                let taught = robot.taught.filter(|_| earlier.setting == self.setting);
+                all.robots.push(RobotResponse { taught, ..robot.clone() });
+            }
+        }
+        all
     }
 
     /// Its text: the head on one line, then one line per robot.

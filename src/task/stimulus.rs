@@ -63,10 +63,12 @@ impl Default for StimulusParams {
 
 impl StimulusParams {
     /// How several bodies see an image together: as the first of them, within the least of their
-    /// margins. `None` of no body.
+    /// margins; by areas, if these are not its own. `None` of no body.
     pub fn together(all: impl IntoIterator<Item = StimulusParams>) -> Option<Self> {
-        let least =
-            |first: Self, other: Self| StimulusParams { margin: first.margin.least(&other.margin), ..first };
+        let least = |first: Self, other: Self| match first.margin.least(&other.margin) {
+            own if own == first.margin => first,
+            margin => StimulusParams { margin, reduction: Reduction::Area, ..first },
+        };
         all.into_iter().reduce(least)
     }
 
@@ -309,6 +311,11 @@ mod tests {
             StimulusParams { margin: Margins { top: 1, right: 2, bottom: 2, left: 0 }, ..a }
         );
         assert_eq!((StimulusParams::together([a]), StimulusParams::together([])), (Some(a), None));
+        // A stride goes with its own margin only.
+        let [whole, cut] = [0, 4]
+            .map(|margin| StimulusParams { margin: Margins::same(margin), ..params(Stride, Intensity) });
+        assert_eq!(StimulusParams::together([whole, cut]), Some(whole));
+        assert_eq!(StimulusParams::together([cut, whole]), Some(params(Area, Intensity)));
     }
 
     #[test]

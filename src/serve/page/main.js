@@ -103,7 +103,8 @@ const choose = (robot, from) => {
     rows: () => rows(robot), steps: () => Math.min(from.control_steps, 5000),
   };
   const way = { saturated: "1 where there is any ink", intensity: "as dark as the ink", threshold: `1 above ${level}` }[encoding];
-  $("encoding").textContent = `${robot.body.length} × ${robot.body[0].length} pixels, ${way}`;
+  const margins = [from.encoding.margin ?? 0].flat(), part = margins.some((margin) => margin > 0) ? "a part of it, " : "";
+  $("encoding").textContent = `${part}${robot.body.length} × ${robot.body[0].length} pixels, ${way}`;
   $("who").textContent = robot.id;
   const audit = robot.audit ? ` · audit: ${robot.audit.conclusion}` : "";
   $("about").textContent = `${from.name} · task ${robot.task} · fitness ${signed(robot.fitness, 2)} · ${robot.voxels.total} voxels${audit}`;

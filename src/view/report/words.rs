@@ -243,12 +243,11 @@ fn made_by(dossier: &Dossier, again: &str) -> Vec<String> {
     let task = run.dimensions.tasks.join(" ");
     let mut line = format!("morphcog train --archive GAITS --task '{task}' --seed {}", run.config.seed);
     line += &robot.map_or(String::new(), |robot| format!(" --robots {robot}"));
-    for (key, value) in run.config.settings() {
-        // The gaits' run may have any of these otherwise.
-        if ["data.dataset", "stimulus.", "train."].iter().any(|section| key.starts_with(section)) {
-            let value = value.as_str().map_or_else(|| value.to_string(), str::to_string);
-            line += &format!(" --set {}", in_shell(Path::new(&format!("{key}={value}"))));
-        }
+    // The gaits' run may have any of these otherwise.
+    line += &format!(" --set data.dataset={}", run.config.data.dataset);
+    for (key, value) in run.config.seeing_and_training() {
+        let value = value.as_str().map_or_else(|| value.to_string(), str::to_string);
+        line += &format!(" --set {}", in_shell(Path::new(&format!("{key}={value}"))));
     }
     vec![gaits, format!("{line} --out {again}")]
 }
