@@ -232,7 +232,10 @@ fn same_setting(first: &Source, other: &Source) -> Result<(), Error> {
         Some((section, _)) => {
             let (other, first) = (other.path.display(), first.path.display());
             let text = format!("{other}: expected the same [{section}] in its config as {first}");
-            Err(Error::input(text).hint("evaluate runs of different experiments, or that see different pixels, one by one".to_string()))
+            Err(Error::input(text).hint(
+                "evaluate runs of different experiments, or that see different pixels, one by one"
+                    .to_string(),
+            ))
         }
     }
 }
