@@ -310,25 +310,6 @@ impl Config {
         settings
     }
 
-    /// The keys of `[stimulus]` and `[train]` with their values, those at their defaults too.
-    pub(crate) fn seeing_and_training(&self) -> Settings {
-        let mut settings = Settings::new();
-        for (section, keys) in
-            [("stimulus", toml::Value::try_from(self.stimulus)), ("train", toml::Value::try_from(self.train))]
-        {
-            flatten(
-                section,
-                keys.expect("every field is a number, text or table, which TOML has"),
-                &mut settings,
-            );
-        }
-        // Files leave these out where they are 0.
-        for key in ["stimulus.margin", "train.windows"] {
-            settings.entry(key.to_string()).or_insert(toml::Value::Integer(0));
-        }
-        settings
-    }
-
     /// What bodies evolution makes.
     pub fn body_spec(&self) -> BodySpec {
         let BodyConfig { height, width, min_muscles } = self.body;

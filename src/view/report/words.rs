@@ -7,6 +7,7 @@ use crate::base::number::percent;
 use crate::commands::report::Dossier;
 use crate::config::capacity::CapacityConfig;
 use crate::config::train::TrainConfig;
+use crate::config::{Config, Settings, flatten};
 use crate::search::showing;
 use crate::store::capacity::CapacityFile;
 use crate::store::eval::Mean;
@@ -245,11 +246,30 @@ fn made_by(dossier: &Dossier, again: &str) -> Vec<String> {
     line += &robot.map_or(String::new(), |robot| format!(" --robots {robot}"));
     // The gaits' run may have any of these otherwise.
     line += &format!(" --set data.dataset={}", run.config.data.dataset);
-    for (key, value) in run.config.seeing_and_training() {
+    for (key, value) in seeing_and_training(&run.config) {
         let value = value.as_str().map_or_else(|| value.to_string(), str::to_string);
         line += &format!(" --set {}", in_shell(Path::new(&format!("{key}={value}"))));
     }
     vec![gaits, format!("{line} --out {again}")]
+}
+
+/// The keys of `[stimulus]` and `[train]` with their values, those at their defaults too.
+fn seeing_and_training(config: &Config) -> Settings {
+    let mut settings = Settings::new();
+    for (section, keys) in
+        [("stimulus", toml::Value::try_from(config.stimulus)), ("train", toml::Value::try_from(config.train))]
+    {
+        flatten(
+            section,
+            keys.expect("every field is a number, text or table, which TOML has"),
+            &mut settings,
+        );
+    }
+    // Files leave these out where they are 0.
+    for key in ["stimulus.margin", "train.windows"] {
+        settings.entry(key.to_string()).or_insert(toml::Value::Integer(0));
+    }
+    settings
 }
 
 /// The settings of a capacity, as far as its file has them, where they are not the defaults.
