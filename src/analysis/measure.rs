@@ -4,7 +4,6 @@
 use crate::analysis::gallery;
 use crate::base::Grid;
 use crate::base::error::{Error, ErrorKind};
-use crate::base::files::exists;
 use crate::base::hash::sha256_hex;
 use crate::base::observer::{Observer, Work};
 use crate::base::stop::check;
@@ -19,20 +18,21 @@ use crate::search::train;
 use crate::search::training::scarcest;
 use crate::search::windows::Windows;
 use crate::store::folder::{check_out, writable};
-use crate::store::images::DatasetRef;
+use crate::store::images::{DatasetRef, ImageRef};
 use crate::store::names::RESPONSE_JSON;
 use crate::store::response::{
     EndedBy, FORMAT, FORMAT_VERSION, PICTURES, ResponseFile, RobotResponse, Setting, Taught, pictures,
 };
 use crate::store::robots::{Selection, Source};
 use crate::store::unwritten::Unwritten;
-use crate::store::whereabouts::{Whereabouts, load_dataset_of, see};
+use crate::store::whereabouts::{Whereabouts, load_dataset_of, seen};
 use crate::task::direction;
 use crate::task::evaluation::fresh_rollouts;
 use crate::task::grouping::Grouping;
 use crate::task::perturbation::Condition;
 use crate::task::protocol::{Protocol, RolloutMode};
 use crate::task::response::{Example, Gait, Response, Shown};
+use crate::task::stimulus::StimulusParams;
 use crate::task::teachable::teachable;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
@@ -265,8 +265,8 @@ struct Task {
     /// The config that its training would have.
     config: Config,
     dataset: Dataset,
-    /// Class and index of training images, as many of each class, class by class.
-    images: Vec<(u8, usize)>,
+    /// Training images, as many of each class, class by class.
+    images: Vec<ImageRef>,
 }
 
 /// The task that is asked for.
@@ -289,10 +289,10 @@ fn task(options: &Options, provenance: &Provenance, seed: u64) -> Result<Option<
     let failed = |error: DatasetError| Error::input(error.to_string());
     let drawn = dataset.draw(Split::Train, &classes, per_class, seed, 0).map_err(failed)?;
     let labels = classes.iter().flat_map(|class| std::iter::repeat_n(*class, per_class));
-    let images = labels.zip(drawn).collect();
+    let images = labels.zip(drawn).map(|(label, index)| ImageRef { index, label }).collect();
     let task = Task { groups: groups.clone(), config, dataset, images };
     // Whatever is wrong with how images are seen is said before anything is measured.
-    task.images.first().map_or(Ok(()), |(_, index)| task.seen(&task.config, *index).map(drop))?;
+    task.images.first().map_or(Ok(()), |image| task.seen(&task.config.stimulus, image).map(drop))?;
     Ok(Some(task))
 }
 
@@ -347,8 +347,8 @@ impl Task {
         Ok(grouping.tasks()[0].name())
     }
 
-    fn seen(&self, config: &Config, index: usize) -> Result<Grid<f64>, Error> {
-        see(config, &self.dataset, Split::Train, index)
+    fn seen(&self, stimulus: &StimulusParams, image: &ImageRef) -> Result<Grid<f64>, Error> {
+        seen(&self.config.body, stimulus, &self.dataset, Split::Train, image.index)
     }
 
     /// What a gait could be taught, and under which window.
@@ -359,19 +359,19 @@ impl Task {
         shown: &[Shown],
         stop: &AtomicBool,
     ) -> Result<Option<Taught>, Error> {
-        let mut config = self.config.clone();
-        let mut margin = None;
+        let config = &self.config;
+        let (mut stimulus, mut margin) = (config.stimulus, None);
         if config.train.windows > 0 {
-            let windows = Windows::of(&self.config, &self.dataset, &self.images, &self.groups)?;
+            let windows = Windows::of(config, &self.dataset, &self.images, &self.groups)?;
             let found = windows.best(gait, response, stop, &|_| ())?;
-            config.stimulus.margin = found.margins;
+            stimulus.margin = found.margins;
             margin = Some(found.margins);
         }
         let [a, b] = &self.groups;
-        let example = |(class, index): &(u8, usize)| {
+        let example = |image: &ImageRef| {
             // There are as many of each class; the groups weigh the same.
-            let (right, classes) = if a.contains(class) { (1.0, a.len()) } else { (-1.0, b.len()) };
-            let seen = self.seen(&config, *index)?;
+            let (right, classes) = if a.contains(&image.label) { (1.0, a.len()) } else { (-1.0, b.len()) };
+            let seen = self.seen(&stimulus, image)?;
             Ok(Example { right, weight: 1.0 / classes as f64, ..Example::new(gait, &seen, &config.physics) })
         };
         let examples = self.images.iter().map(example).collect::<Result<Vec<Example>, Error>>()?;
@@ -398,14 +398,8 @@ fn earlier(options: &Options, observer: &dyn Observer) -> Vec<(PathBuf, Response
     let beside = options.archive.as_deref().map(|archive| archive.with_file_name(RESPONSE_JSON));
     let mut paths: Vec<PathBuf> = beside.into_iter().chain([options.out.clone()]).collect();
     paths.dedup();
-    let read = |path: PathBuf| match ResponseFile::read(&path) {
-        Ok(file) => Some((path, file)),
-        Err(error) => {
-            observer.warning(&format!("{error}; responses are measured again"));
-            None
-        }
-    };
-    paths.into_iter().filter(|path| exists(path)).filter_map(read).collect()
+    let found = |path: PathBuf| ResponseFile::found(&path, observer).map(|file| (path, file));
+    paths.into_iter().filter_map(found).collect()
 }
 
 impl Measuring<'_> {

@@ -1,5 +1,10 @@
 //! Numbers for people: the one place where tables, labels and messages get theirs from.
 
+/// Whether it is 0, for files that leave it out then.
+pub(crate) fn is_zero(number: &usize) -> bool {
+    *number == 0
+}
+
 /// A number with a fixed number of decimals. What rounds to 0 has no sign: there is no −0.00.
 pub fn fixed(value: f64, decimals: usize) -> String {
     unsigned_zero(format!("{value:.decimals$}"))

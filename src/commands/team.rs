@@ -320,12 +320,12 @@ fn baselines(
     let pair = |a: u8, b: u8| {
         // A positive value is a walk to the right.
         let judge = Judge { left: vec![b], right: vec![a] };
-        let tells = |split: &&grouping::Split| {
+        let is_pair = |split: &grouping::Split| {
             let mut told = [Group::A, Group::B].map(|group| split.classes(group).to_vec());
             told.sort();
             told == [vec![a], vec![b]]
         };
-        let robot = splits.iter().position(|split| tells(&split));
+        let robot = splits.iter().position(is_pair);
         let config = robot.map_or(&common, |robot| &sources[robots[robot].source].run.config);
         let seeing = |config: &Config| (config.stimulus, config.body.height, config.body.width);
         if seeing(config) == seeing(&common) {

@@ -1,6 +1,7 @@
 //! [`TrainConfig`]: a config's section `[train]`.
 
 use crate::base::error::Error;
+use crate::base::number::is_zero;
 use crate::task::perturbation::ByTurns;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -19,7 +20,7 @@ pub struct TrainConfig {
     /// Windows of the images that are tried for each gait, that of `stimulus.margin` first: the model
     /// says which serves the task best, and the robot sees that one. Default 0: only that of
     /// `stimulus.margin`. More than 0 want the reduction "area". They cost no rollouts.
-    #[serde(skip_serializing_if = "is_none")]
+    #[serde(skip_serializing_if = "is_zero")]
     pub windows: usize,
     /// Rounds in which the response is measured around the latest design, and the lesson is solved
     /// again. Default 6: more seldom help. 0: the robot keeps its own soft voxels and sensors, and is
@@ -37,10 +38,6 @@ pub struct TrainConfig {
     /// Under what images are shown by turns, so that designs do not depend on the first touch of
     /// the ground or exploit length limits.
     pub perturbations: ByTurns,
-}
-
-fn is_none(windows: &usize) -> bool {
-    *windows == 0
 }
 
 impl Default for TrainConfig {

@@ -5,7 +5,7 @@
 //! it ends with the same bits.
 
 use crate::base::error::Error;
-use crate::base::files::{exists, read_text, write_atomically};
+use crate::base::files::{read_text, write_atomically};
 use crate::base::hash::sha256_hex;
 use crate::base::observer::{Observer, Work};
 use crate::base::threads::pool;
@@ -290,16 +290,10 @@ fn measured(
     let nothing = || vec![Vec::new(); walkers.len()];
     let path = source.path.with_file_name(RESPONSE_JSON);
     let of_run = &source.run.config;
-    if !exists(&path) || (&config.physics, &config.protocol) != (&of_run.physics, &of_run.protocol) {
+    if (&config.physics, &config.protocol) != (&of_run.physics, &of_run.protocol) {
         return nothing();
     }
-    let file = match ResponseFile::read(&path) {
-        Ok(file) => file,
-        Err(error) => {
-            observer.warning(&format!("{error}; responses are measured again"));
-            return nothing();
-        }
-    };
+    let Some(file) = ResponseFile::found(&path, observer) else { return nothing() };
     let (run, seed, conditions) = (source.run.fingerprint(), of_run.seed, probing.conditions());
     walkers.iter().map(|walker| file.known(&run, seed, conditions, &walker.gait).to_vec()).collect()
 }
@@ -512,9 +506,7 @@ impl Trainer<'_> {
             return Ok(with);
         }
         observer.begins(&Work::new(format!("{robot}: windows:"), count as u64, "windows"));
-        let images: Vec<(u8, usize)> =
-            training.images.iter().map(|image| (image.label, image.index)).collect();
-        let windows = Windows::of(config, self.dataset, &images, self.groups())?;
+        let windows = Windows::of(config, self.dataset, &training.images, self.groups())?;
         let told = |tried: usize| observer.progress(tried as u64);
         let found = windows.best(&walker.gait, response, log.stop, &told).map_err(|_| stopped())?;
         told_window(observer, robot, &found, count);

@@ -11,6 +11,7 @@ use crate::base::stop::{Stopped, check};
 use crate::body::Material;
 use crate::config::Config;
 use crate::data::dataset::{Dataset, Split};
+use crate::store::images::ImageRef;
 use crate::task::margins::Margins;
 use crate::task::response::{Example, Gait, Lesson, Response};
 use crate::task::stimulus::{StimulusParams, stimulus};
@@ -50,7 +51,7 @@ pub(crate) struct Found {
 }
 
 impl<'a> Windows<'a> {
-    /// Windows of some of these training images, given class by class by their indices; as many as
+    /// Windows of some of these training images, which are given class by class; as many as
     /// `train.windows` says.
     ///
     /// # Errors
@@ -58,19 +59,18 @@ impl<'a> Windows<'a> {
     pub(crate) fn of(
         config: &'a Config,
         dataset: &Dataset,
-        images: &[(u8, usize)],
+        images: &[ImageRef],
         [a, b]: &[Vec<u8>; 2],
     ) -> Result<Self, Error> {
-        let some: Vec<(u8, usize)> =
-            images.iter().step_by(images.len().div_ceil(IMAGES).max(1)).copied().collect();
-        let of = |classes: &[u8]| some.iter().filter(|(class, _)| classes.contains(class)).count() as f64;
+        let some = || images.iter().step_by(images.len().div_ceil(IMAGES).max(1));
+        let of = |classes: &[u8]| some().filter(|image| classes.contains(&image.label)).count() as f64;
         let (of_a, of_b) = (of(a), of(b));
-        let image = |(class, index): &(u8, usize)| {
-            let image =
-                dataset.image(Split::Train, *index).map_err(|error| Error::input(error.to_string()))?;
-            Ok(if a.contains(class) { (1.0, 0.5 / of_a, image) } else { (-1.0, 0.5 / of_b, image) })
+        let image = |image: &ImageRef| {
+            let pixels = dataset.image(Split::Train, image.index);
+            let pixels = pixels.map_err(|error| Error::input(error.to_string()))?;
+            Ok(if a.contains(&image.label) { (1.0, 0.5 / of_a, pixels) } else { (-1.0, 0.5 / of_b, pixels) })
         };
-        Ok(Windows { images: some.iter().map(image).collect::<Result<_, Error>>()?, config })
+        Ok(Windows { images: some().map(image).collect::<Result<_, Error>>()?, config })
     }
 
     /// The window under which a gait could be taught most, of that of the config, windows anywhere,

@@ -1,7 +1,9 @@
 //! `response.json` and `response.csv`: the responses of robots' gaits, beside the run's `run.json`.
 
 use crate::base::error::Error;
-use crate::base::files::read_text;
+use crate::base::files::{exists, read_text};
+use crate::base::number::is_zero;
+use crate::base::observer::Observer;
 use crate::base::table;
 use crate::body::Body;
 use crate::config::reading;
@@ -72,12 +74,8 @@ pub struct Setting {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stimulus: Option<StimulusParams>,
     /// How many windows of its images were tried for each robot; 0: only that of `stimulus`.
-    #[serde(default, skip_serializing_if = "is_none")]
+    #[serde(default, skip_serializing_if = "is_zero")]
     pub windows: usize,
-}
-
-fn is_none(windows: &usize) -> bool {
-    *windows == 0
 }
 
 /// Why a measurement ended.
@@ -227,6 +225,15 @@ impl ResponseFile {
     pub fn read(path: &Path) -> Result<Self, Error> {
         let text = read_text(path).map_err(|error| Error::reading(path, &error))?;
         reading::read_versioned(&text, &path.display().to_string(), FORMAT, FORMAT_VERSION)
+    }
+
+    /// The file at a path, if there is one. One that cannot be read is told, and left aside.
+    pub(crate) fn found(path: &Path, observer: &dyn Observer) -> Option<Self> {
+        if !exists(path) {
+            return None;
+        }
+        let told = |error| observer.warning(&format!("{error}; responses are measured again"));
+        ResponseFile::read(path).map_err(told).ok()
     }
 
     /// The displacements of a gait under the first random images of a seed, if they were measured for

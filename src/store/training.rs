@@ -1,6 +1,7 @@
 //! `training.json`: every rollout of a training, so that it goes on where it was stopped; and which
 //! run its gaits are from.
 
+use crate::base::number::is_zero;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -22,12 +23,8 @@ pub struct Origin {
     pub trained_on: Vec<usize>,
     /// How many windows of the images were tried, of which the run's config has the best; 0 if none
     /// but the config's own.
-    #[serde(default, skip_serializing_if = "is_none")]
+    #[serde(default, skip_serializing_if = "is_zero")]
     pub windows: usize,
-}
-
-fn is_none(windows: &usize) -> bool {
-    *windows == 0
 }
 
 /// Displacements that were simulated together, in the order of the images; `None` where unstable.

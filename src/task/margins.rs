@@ -2,7 +2,7 @@
 
 use crate::base::Grid;
 use schemars::JsonSchema;
-use serde::de::{Error, SeqAccess, Visitor};
+use serde::de::{Error, SeqAccess, Unexpected, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::fmt;
 
@@ -103,14 +103,15 @@ impl<'de> Visitor<'de> for Reader {
     }
 
     fn visit_u64<E: Error>(self, margin: u64) -> Result<Margins, E> {
-        let pixels = usize::try_from(margin).map_err(|_| E::invalid_value(unsigned(margin), &self))?;
+        let pixels =
+            usize::try_from(margin).map_err(|_| E::invalid_value(Unexpected::Unsigned(margin), &self))?;
         Ok(Margins::same(pixels))
     }
 
     fn visit_i64<E: Error>(self, margin: i64) -> Result<Margins, E> {
         match u64::try_from(margin) {
             Ok(margin) => self.visit_u64(margin),
-            Err(_) => Err(E::invalid_value(serde::de::Unexpected::Signed(margin), &self)),
+            Err(_) => Err(E::invalid_value(Unexpected::Signed(margin), &self)),
         }
     }
 
@@ -125,10 +126,6 @@ impl<'de> Visitor<'de> for Reader {
         let [top, right, bottom, left] = margins;
         Ok(Margins { top, right, bottom, left })
     }
-}
-
-fn unsigned(number: u64) -> serde::de::Unexpected<'static> {
-    serde::de::Unexpected::Unsigned(number)
 }
 
 #[cfg(test)]
