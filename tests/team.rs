@@ -4,8 +4,10 @@
 mod common;
 
 use common::program::{Sandbox, TINY, files, pairs};
+use morphcog::store::eval::EvalFile;
 use morphcog::store::team::TeamFile;
 use morphcog::task::margins::Margins;
+use morphcog::task::stimulus::Reduction;
 use serde_json::Value;
 use std::collections::BTreeMap;
 
@@ -98,6 +100,37 @@ fn robots_see_their_own_windows_and_classifiers_what_all_see_together() {
     sandbox.write(&format!("{path}/run.json"), text);
     tested("again");
     assert_eq!(sandbox.read("before.json"), sandbox.read("again.json"));
+}
+
+#[test]
+fn eval_shows_robots_of_several_runs_their_own_windows_and_judges_pixels_by_what_all_see() {
+    let sandbox = pairs();
+    let mut run = sandbox.run_file("pairs/0v1");
+    run.config.stimulus.reduction = Reduction::Area;
+    sandbox.write("whole/run.json", run.to_json());
+    run.config.stimulus.margin = Margins { right: 9, ..Margins::default() };
+    sandbox.write("left/run.json", run.to_json());
+    run.config.stimulus.margin = Margins { left: 9, ..Margins::default() };
+    sandbox.write("right/run.json", run.to_json());
+    let tested = |archives: &str, count: usize, name: &str| -> EvalFile {
+        sandbox
+            .run(&format!("eval -q -a {archives} --robots top:{count} --images 60 -o {name}.json"))
+            .ended(0, &[]);
+        serde_json::from_str(&sandbox.read(&format!("{name}.json"))).unwrap()
+    };
+    let [whole, left, right] = ["whole", "left", "right"].map(|run| tested(run, 1, run));
+    let walks =
+        |file: &EvalFile| -> Vec<_> { file.robots.iter().map(|robot| robot.displacements.clone()).collect() };
+    let both = tested("left right", 2, "both");
+    assert_eq!(walks(&both), [walks(&left), walks(&right)].concat());
+    assert!(walks(&left) != walks(&right) && walks(&left) != walks(&whole));
+    assert_eq!(both.setting.unwrap().stimulus, whole.setting.unwrap().stimulus);
+    assert_eq!(both.baselines, whole.baselines);
+    assert_ne!(both.baselines, left.baselines);
+    // Another encoding is another experiment.
+    run.config.stimulus.level = 0.3;
+    sandbox.write("right/run.json", run.to_json());
+    sandbox.run("eval -q -a left right").ended(3, &["right/run.json", "[stimulus], but for margin"]);
 }
 
 #[test]

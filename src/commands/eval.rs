@@ -22,14 +22,15 @@ use crate::store::unwritten::Unwritten;
 use crate::store::validation::Validated;
 use crate::store::whereabouts::{Whereabouts, load_dataset_of};
 use crate::task::protocol::MAX_STEPS;
+use crate::task::stimulus::StimulusParams;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, AtomicU64};
 
 /// What to evaluate, and on what.
 #[derive(Clone, Debug)]
 pub struct Options {
-    /// The run.json, or those of several runs that differ in their seeds only; none: the published
-    /// robots.
+    /// The run.json, or those of several runs that differ in their seeds and windows only; none: the
+    /// published robots.
     pub archives: Vec<PathBuf>,
     /// Which of its robots.
     pub robots: Selection,
@@ -88,7 +89,11 @@ pub fn eval(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Re
         same_setting(first, source)?;
     }
     different(sources.iter().map(|source| (source.path.as_path(), &source.run)))?;
-    let config = &first.run.config;
+    // Several trainings may have found different windows: what takes no body is on what they see
+    // together.
+    let stimulus = StimulusParams::together(sources.iter().map(|source| source.run.config.stimulus));
+    let stimulus = stimulus.expect("there is a run, or the published robots");
+    let config = &Config { stimulus, ..first.run.config.clone() };
     if options.validation.is_some() && options.robots.validated().is_none() {
         let text =
             "--validation: expected with --robots best-validation:N: only those are chosen by such images";
@@ -135,7 +140,7 @@ pub fn eval(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Re
     let test_sha256 = dataset.fingerprint(Split::Test).expect("both splits are loaded");
     let steps = checked_steps(config, options.cycles)?;
     let asked = (options.robots.describe(), options.split, options.seed, options.threshold);
-    let mut report = EvalFile::new(&sources, asked, steps, &shown.images, test_sha256);
+    let mut report = EvalFile::new((&sources, stimulus), asked, steps, &shown.images, test_sha256);
     if let Some(name) = other {
         report.transfer(name, &dataset);
     }
@@ -179,7 +184,13 @@ pub fn eval(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Re
     let mut unwritten = Unwritten::default();
     // One robot for each rank at a time.
     for robots in robots.chunks(ranks.size()) {
-        let own = robots.get(ranks.rank()).and_then(|own| walker.rollouts(own.robot, &shown.stimuli));
+        let own = match robots.get(ranks.rank()) {
+            None => None,
+            Some(Chosen { source, robot }) => {
+                let stimuli = shown.seen_by(&sources[*source].run.config)?;
+                walker.rollouts(robot, &stimuli)
+            }
+        };
         let before = report.robots.len();
         let mut is_stopped = false;
         for (Chosen { source, robot }, walked) in robots.iter().zip(ranks.share(own)) {
@@ -215,14 +226,14 @@ pub fn own_name(split: HeldOut) -> &'static str {
 }
 
 /// Whether robots of two runs can be tested together: what they are shown, and where they live, is
-/// the same.
+/// the same. They may look at different windows of it.
 fn same_setting(first: &Source, other: &Source) -> Result<(), Error> {
     let (a, b) = (&first.run.config, &other.run.config);
     let of_data = |config: &Config| (config.data.dataset.clone(), config.data.builtin.clone());
     let differing = [
         ("task", a.task != b.task),
         ("body", a.body != b.body),
-        ("stimulus", a.stimulus != b.stimulus),
+        ("stimulus", StimulusParams { margin: b.stimulus.margin, ..a.stimulus } != b.stimulus),
         ("protocol", a.protocol != b.protocol),
         ("physics", a.physics != b.physics),
         ("data", of_data(a) != of_data(b) || first.run.dataset != other.run.dataset),
@@ -231,11 +242,9 @@ fn same_setting(first: &Source, other: &Source) -> Result<(), Error> {
         None => Ok(()),
         Some((section, _)) => {
             let (other, first) = (other.path.display(), first.path.display());
-            let text = format!("{other}: expected the same [{section}] in its config as {first}");
-            Err(Error::input(text).hint(
-                "evaluate runs of different experiments, or that see different pixels, one by one"
-                    .to_string(),
-            ))
+            let but = if section == "stimulus" { ", but for margin," } else { "" };
+            let text = format!("{other}: expected the same [{section}]{but} in its config as {first}");
+            Err(Error::input(text).hint("evaluate runs of different experiments one by one".to_string()))
         }
     }
 }

@@ -14,6 +14,7 @@ use crate::store::validation::shown as shown_for_validation;
 use crate::store::whereabouts::see;
 use crate::task::baselines::{Labelled, best_pixel, larger_group, nearest_training_image};
 use crate::task::grouping;
+use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Training images per class on which the single-pixel baseline is chosen.
@@ -26,13 +27,13 @@ pub(crate) struct HeldOutImages<'a> {
     options: &'a Options,
     /// The images.
     pub images: Vec<ImageRef>,
-    /// Of each.
-    pub stimuli: Vec<Grid<f64>>,
+    /// Of each, as all robots see it together.
+    stimuli: Vec<Grid<f64>>,
 }
 
 impl<'a> HeldOutImages<'a> {
     /// As many as asked for, evenly divided between the classes; the first classes get what is left
-    /// over.
+    /// over. `config`: of the runs, with what their robots see together.
     ///
     /// # Errors
     /// If there are not enough images, or not one of each class is asked for.
@@ -61,10 +62,25 @@ impl<'a> HeldOutImages<'a> {
                 images_besides(&besides, &runs, &classes, dataset, "--images", asked)?
             }
         };
-        let split = options.split.split();
-        let stimuli = images.iter().map(|image| see(config, dataset, split, image.index));
-        let stimuli = stimuli.collect::<Result<_, _>>()?;
-        Ok(HeldOutImages { config, dataset, options, images, stimuli })
+        let mut shown = HeldOutImages { config, dataset, options, images, stimuli: Vec::new() };
+        shown.stimuli = shown.seen(config)?;
+        Ok(shown)
+    }
+
+    /// As robots of a run see them, in the order of the images.
+    ///
+    /// # Errors
+    /// If an image cannot be drawn or seen.
+    pub fn seen_by(&self, config: &Config) -> Result<Cow<'_, [Grid<f64>]>, Error> {
+        match config.stimulus == self.config.stimulus {
+            true => Ok(Cow::Borrowed(&self.stimuli)),
+            false => Ok(Cow::Owned(self.seen(config)?)),
+        }
+    }
+
+    fn seen(&self, config: &Config) -> Result<Vec<Grid<f64>>, Error> {
+        let split = self.options.split.split();
+        self.images.iter().map(|image| see(config, self.dataset, split, image.index)).collect()
     }
 
     /// The baselines of each of these tasks.

@@ -15,6 +15,7 @@ use crate::store::setting::{RunRef, Setting};
 use crate::store::validation::Validated;
 use crate::task::direction::Assignment;
 use crate::task::grouping::{Group, Split};
+use crate::task::stimulus::StimulusParams;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -44,7 +45,7 @@ pub struct EvalFile {
     /// All runs the robots are from.
     #[serde(default)]
     pub runs: Vec<RunRef>,
-    /// What robots were shown.
+    /// What robots were shown; if they look at different windows of it, what all of them see.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub setting: Option<Setting>,
     /// How the robots were selected.
@@ -211,8 +212,9 @@ impl RobotReport {
 }
 
 impl EvalFile {
+    /// Of robots of these runs, all of which see images together as said.
     pub(crate) fn new(
-        sources: &[Source],
+        (sources, stimulus): (&[Source], StimulusParams),
         (selected, split, seed, threshold): (String, HeldOut, u64, f64),
         control_steps: u32,
         images: &[ImageRef],
@@ -226,7 +228,7 @@ impl EvalFile {
             run: first.map_or(String::new(), |run| run.name.clone()),
             run_seed: first.map_or(0, |run| run.config.seed),
             runs: sources.iter().map(|source| RunRef::new(&source.run)).collect(),
-            setting: first.map(Setting::new),
+            setting: first.map(|run| Setting { stimulus, ..Setting::new(run) }),
             selected,
             dataset: first.map_or(String::new(), |run| run.dataset.name.clone()),
             test_sha256,
