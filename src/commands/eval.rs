@@ -21,6 +21,7 @@ use crate::store::run::different;
 use crate::store::unwritten::Unwritten;
 use crate::store::validation::Validated;
 use crate::store::whereabouts::{Whereabouts, load_dataset_of};
+use crate::task::grouping::Grouping;
 use crate::task::protocol::MAX_STEPS;
 use crate::task::stimulus::StimulusParams;
 use std::path::PathBuf;
@@ -73,37 +74,18 @@ pub struct Finished {
 /// # Errors
 /// What is wrong with archive, data or selection.
 pub fn eval(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Result<Finished, Error> {
-    if !(options.threshold >= 0.0 && options.threshold.is_finite()) {
-        return Err(Error::usage(format!(
-            "--threshold {}: expected 0 or more voxel lengths",
-            options.threshold
-        )));
+    let threshold = options.threshold;
+    if !(threshold >= 0.0 && threshold.is_finite()) {
+        return Err(Error::usage(format!("--threshold {threshold}: expected 0 or more voxel lengths")));
     }
-    let sources: Vec<Source> = match options.archives.as_slice() {
-        [] => vec![gallery::source(options.data.as_deref(), options.dataset.as_deref())?],
-        archives => archives.iter().map(|path| Source::read(path)).collect::<Result<_, _>>()?,
-    };
+    let sources = sources(options)?;
     let first = &sources[0];
-    for source in &sources {
-        check_out(&options.out, &source.path, own_name(options.split))?;
-        same_setting(first, source)?;
-    }
-    different(sources.iter().map(|source| (source.path.as_path(), &source.run)))?;
     // Several trainings may have found different windows: what takes no body is on what they see
     // together.
     let stimulus = StimulusParams::together(sources.iter().map(|source| source.run.config.stimulus));
     let stimulus = stimulus.expect("there is a run, or the published robots");
     let config = &Config { stimulus, ..first.run.config.clone() };
-    if options.validation.is_some() && options.robots.validated().is_none() {
-        let text =
-            "--validation: expected with --robots best-validation:N: only those are chosen by such images";
-        return Err(Error::usage(text.to_string()));
-    }
-    let validated = options.validation.unwrap_or(config.validation.images);
-    if options.robots.validated().is_some() && validated < LEAST {
-        let least = LEAST;
-        return Err(Error::usage(format!("--validation {validated}: expected {least} or more images")));
-    }
+    let wanted = wanted(options, config)?;
     let grouping = config.grouping()?;
     let other = options.dataset.as_deref().filter(|name| *name != config.data.dataset);
     if other.is_some() && options.split == HeldOut::Validation {
@@ -125,21 +107,11 @@ pub fn eval(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Re
         None => own(&Split::ALL)?,
         Some(name) => whereabouts.load(&config.data.of(name), &Split::ALL)?,
     };
-    let robots = options.robots.of(&sources, options.seed)?;
-    let (robots, unskilled): (Vec<Chosen>, Vec<Chosen>) =
-        robots.into_iter().partition(|chosen| task_of(&grouping, chosen.robot).is_some());
-    if let Some(chosen) = unskilled.first().filter(|_| !robots.is_empty()) {
-        let (count, id) = (unskilled.len(), &chosen.robot.id);
-        observer.warning(&format!("{count} robots ({id} …) walk the same way for every class; left out"));
-    }
-    if robots.is_empty() {
-        let text = "there is no robot to evaluate: those selected walk the same way for every class";
-        return Err(Error::input(text.to_string()));
-    }
+    let robots = skilled(options.robots.of(&sources, options.seed)?, &grouping, observer)?;
     let shown = HeldOutImages::draw(config, &sources, &dataset, options)?;
     let test_sha256 = dataset.fingerprint(Split::Test).expect("both splits are loaded");
     let steps = checked_steps(config, options.cycles)?;
-    let asked = (options.robots.describe(), options.split, options.seed, options.threshold);
+    let asked = (options.robots.describe(), options.split, options.seed, threshold);
     let mut report = EvalFile::new((&sources, stimulus), asked, steps, &shown.images, test_sha256);
     if let Some(name) = other {
         report.transfer(name, &dataset);
@@ -149,23 +121,15 @@ pub fn eval(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Re
     let pool = pool(options.threads)?;
     let walker =
         || Walker { config, control_steps: steps, pool: &pool, stop, observer, done: AtomicU64::new(0) };
-    let (robots, scores): (Vec<Chosen>, Vec<Validated>) = match options.robots.validated() {
+    let (robots, scores): (Vec<Chosen>, Vec<Validated>) = match wanted {
         None => (robots, Vec::new()),
-        Some(count) => {
-            let asked = if options.validation.is_some() { "--validation" } else { IMAGES_KEY };
-            let wanted = validation::Wanted { count, images: validated, asked, threshold: options.threshold };
+        Some(wanted) => {
             // Which images are for validation is known by their indices, in the run's own data
             // only.
             let others = other.map(|_| own(&[Split::Train])).transpose()?;
-            let best = validation::chosen(
-                &sources,
-                &robots,
-                &options.robots,
-                others.as_ref().unwrap_or(&dataset),
-                &grouping,
-                &wanted,
-                &walker,
-            )?;
+            let of_runs = others.as_ref().unwrap_or(&dataset);
+            let best =
+                validation::chosen(&sources, &robots, &options.robots, of_runs, &grouping, &wanted, &walker)?;
             let all_know = options.ranks.all(best.is_some());
             let Some(best) = best.filter(|_| all_know) else {
                 report.stopped = true;
@@ -202,7 +166,7 @@ pub fn eval(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Re
             left -= 1;
             report.stopped = left > 0;
             let run = &sources[*source].run;
-            let trial = Trial { run, robot, split, images: &shown.images, threshold: options.threshold };
+            let trial = Trial { run, robot, split, images: &shown.images, threshold };
             let (validation, of_trial) = (scores.next(), RobotReport::new(&trial, displacements, simulated));
             report.robots.push(RobotReport { run: *source, validation, ..of_trial });
             report.conclude();
@@ -215,6 +179,59 @@ pub fn eval(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Re
         }
     }
     Ok(Finished { file: report, unwritten: unwritten.error() })
+}
+
+/// The runs, if they can be tested together and their results written; the published robots, if none
+/// is named.
+fn sources(options: &Options) -> Result<Vec<Source>, Error> {
+    let sources: Vec<Source> = match options.archives.as_slice() {
+        [] => vec![gallery::source(options.data.as_deref(), options.dataset.as_deref())?],
+        archives => archives.iter().map(|path| Source::read(path)).collect::<Result<_, _>>()?,
+    };
+    for source in &sources {
+        check_out(&options.out, &source.path, own_name(options.split))?;
+        same_setting(&sources[0], source)?;
+    }
+    different(sources.iter().map(|source| (source.path.as_path(), &source.run)))?;
+    Ok(sources)
+}
+
+/// How robots are to be chosen by validation images, if they are; the same threshold counts there.
+fn wanted(options: &Options, config: &Config) -> Result<Option<validation::Wanted>, Error> {
+    let Some(count) = options.robots.validated() else {
+        return match options.validation {
+            None => Ok(None),
+            Some(_) => {
+                let text = "--validation: expected with --robots best-validation:N: only those are so chosen";
+                Err(Error::usage(text.to_string()))
+            }
+        };
+    };
+    let images = options.validation.unwrap_or(config.validation.images);
+    if images < LEAST {
+        return Err(Error::usage(format!("--validation {images}: expected {LEAST} or more images")));
+    }
+    let asked = if options.validation.is_some() { "--validation" } else { IMAGES_KEY };
+    Ok(Some(validation::Wanted { count, images, asked, threshold: options.threshold }))
+}
+
+/// The robots that have a task; others are left out with a warning.
+fn skilled<'a>(
+    robots: Vec<Chosen<'a>>,
+    grouping: &Grouping,
+    observer: &dyn Observer,
+) -> Result<Vec<Chosen<'a>>, Error> {
+    let (robots, unskilled): (Vec<Chosen>, Vec<Chosen>) =
+        robots.into_iter().partition(|chosen| task_of(grouping, chosen.robot).is_some());
+    if robots.is_empty() {
+        let text = "there is no robot to evaluate: those selected walk the same way for every class";
+        return Err(Error::input(text.to_string()));
+    }
+    if let Some(chosen) = unskilled.first() {
+        let (count, id) = (unskilled.len(), &chosen.robot.id);
+        observer.warning(&format!("{count} robots ({id} …) walk the same way for every class; left out"));
+    }
+    Ok(robots)
 }
 
 /// The default name of the results beside a run.json.
