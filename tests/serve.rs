@@ -12,10 +12,13 @@ use common::program::Sandbox;
 use common::server::{Answer, Server};
 use morphcog::analysis::gallery;
 use morphcog::base::Grid;
+use morphcog::base::shipped::TEAM;
+use morphcog::base::stop::NEVER;
 use morphcog::data::dataset::{BUILTIN, Dataset, Split};
 use morphcog::serve::simulations::MAX_SIMULATIONS;
 use morphcog::sim::Physics;
 use morphcog::task::direction::Direction;
+use morphcog::task::evaluation::fresh_rollouts;
 use morphcog::task::protocol::Protocol;
 use morphcog::task::recording::{Frame, Seen};
 use morphcog::task::rollout::record;
@@ -386,6 +389,48 @@ fn robots_of_several_tasks_walk_together_as_a_team_and_are_counted() {
     let members = team["members"].as_array().unwrap();
     assert!(members.len() == 45 && members.iter().all(|member| member["archive"] == 2), "{members:?}");
     assert_eq!(team["classes"], json!([0, 1, 2, 3, 4, 5, 6, 7, 8, 9]));
+}
+
+#[test]
+fn each_robot_of_the_team_that_ships_sees_and_walks_as_its_own_run_says() {
+    let sandbox = Sandbox::new();
+    let server = Server::start(&sandbox, "");
+    let team = gallery::trained(TEAM).unwrap();
+    let first = &team[0].0.config;
+    assert!(team.iter().any(|(run, _)| run.config.stimulus != first.stimulus), "all have one window");
+    let drawing = Grid::from_fn(28, 28, |r, c| if (r + 2 * c) % 7 < 3 { 255 } else { 0 });
+    let steps = 30;
+    let expected: Vec<f64> = team
+        .iter()
+        .map(|(run, _)| {
+            let (config, body) = (&run.config, &run.elites[0].body);
+            assert_eq!((&config.physics, &config.protocol), (&first.physics, &first.protocol), "one world");
+            let seen = stimulus(&drawing, body.height(), body.width(), &config.stimulus).unwrap();
+            let protocol = Protocol { control_steps: steps, ..config.protocol.clone() };
+            fresh_rollouts(body, &[seen], &[], (&config.physics, &protocol), &|_| (), &NEVER).unwrap().0[0]
+                .unwrap()
+        })
+        .collect();
+    let request = json!({ "shown": { "drawing": drawing }, "control_steps": steps, "speed": 0 });
+    let events: Vec<(String, Value)> = server.events("/api/team", &request).collect();
+    let moved: Vec<f64> =
+        serde_json::from_value(events[events.len() - 1].1["tally"]["moved"].clone()).unwrap();
+    assert_eq!(moved, expected);
+    // And by itself, with its own pixels in the list of robots.
+    let listed = json_of(&server.get("/api/archives/2"));
+    for (place, (run, _)) in
+        team.iter().enumerate().filter(|(_, (run, _))| run.config.stimulus != first.stimulus).take(3)
+    {
+        let id = &run.elites[0].id;
+        let robot = listed["robots"].as_array().unwrap().iter().find(|robot| robot["id"] == **id).unwrap();
+        assert_eq!(robot["encoding"], json!(run.config.stimulus));
+        let request = json!({
+            "subject": { "archive": 2, "robot": id }, "shown": { "drawing": drawing },
+            "control_steps": steps, "speed": 0,
+        });
+        let alone: Vec<(String, Value)> = server.events("/api/simulations", &request).collect();
+        assert_eq!(alone[alone.len() - 1].1["answer"]["moved"], json!(expected[place]));
+    }
 }
 
 #[test]

@@ -309,9 +309,9 @@ fn the_team_that_ships_reads_a_drawn_zero_and_a_drawn_one() {
         draw(&mut tab, &line);
         tab.wait("document.querySelectorAll('#stages figure').length === 45");
         at_end(&mut tab);
+        keep_picture("team-ten.png", &tab.screenshot());
         assert_eq!(tab.text("#says"), digit);
     }
-    keep_picture("team-ten.png", &tab.screenshot());
     assert_eq!(tab.complaints(), Vec::<String>::new());
 }
 

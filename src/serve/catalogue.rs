@@ -21,13 +21,14 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant, SystemTime};
 
-/// Robots from one source, all with the same config.
+/// Robots from one source. They live in the same world; robots that ship together may look at
+/// different windows of an image.
 pub struct Collection {
     /// What it is called.
     pub name: String,
     /// Where it is from; none: built in.
     pub path: Option<PathBuf>,
-    /// How its robots were evolved.
+    /// How its robots were evolved, but for how each sees.
     pub config: Config,
     /// On which data; none: published ones.
     pub dataset: Option<DatasetRef>,
@@ -59,6 +60,8 @@ pub struct Entry {
     pub cell: Vec<usize>,
     /// Generation it was born in.
     pub generation: Option<u64>,
+    /// How it sees.
+    pub encoding: StimulusParams,
     /// What its walks say; none if all classes walk the same way.
     pub judge: Option<Judge>,
     /// What an audit found, if one is beside the archive.
@@ -312,7 +315,7 @@ impl Collection {
             body: robot.body.clone(),
             physics: config.physics.clone(),
             protocol: config.protocol.clone(),
-            encoding: config.stimulus,
+            encoding: robot.encoding,
             judge: robot.judge.clone(),
         })
     }
@@ -330,6 +333,7 @@ fn published() -> Result<Collection, Error> {
         voxels: robot.body.counts(),
         cell: Vec::new(),
         generation: None,
+        encoding: config.stimulus,
         audit: None,
         body: robot.body,
     };
@@ -349,7 +353,8 @@ fn published() -> Result<Collection, Error> {
     })
 }
 
-/// The robots of a set that ships with the program. All see and walk alike.
+/// The robots of a set that ships with the program. All walk in the same world (which a test
+/// holds).
 fn trained(set: &str, name: &str) -> Result<Collection, Error> {
     let mut all = Vec::new();
     for (run, audit) in gallery::trained(set)? {
@@ -385,6 +390,7 @@ fn of_run(run: RunFile, audit: Option<&AuditFile>) -> Result<Collection, Error> 
         voxels: robot.voxels,
         cell: robot.cell.clone(),
         generation: Some(robot.generation),
+        encoding: run.config.stimulus,
         judge: run.judge(robot),
         audit: audited(robot),
         body: robot.body.clone(),

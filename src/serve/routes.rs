@@ -139,7 +139,6 @@ fn archive(service: &Service, index: &str) -> Result<Response, Refusal> {
         "name": collection.name,
         "bins": collection.bins,
         "tasks": collection.tasks,
-        "encoding": collection.config.stimulus,
         "control_steps": collection.config.protocol.control_steps,
         "dataset": collection.config.data.dataset,
         "robots": collection.robots,

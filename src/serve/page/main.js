@@ -96,14 +96,14 @@ const pad = new Pad($("pad"), (done) => {
 const images = new Images(({ image, about }) => show({ shown: { image }, about }, 0));
 
 const choose = (robot, from) => {
-  const { encoding, level } = from.encoding;
+  const { encoding, level } = robot.encoding;
   who = {
     robot, from, name: robot.id,
     subject: () => ({ archive: from.index, robot: robot.id }),
     rows: () => rows(robot), steps: () => Math.min(from.control_steps, 5000),
   };
   const way = { saturated: "1 where there is any ink", intensity: "as dark as the ink", threshold: `1 above ${level}` }[encoding];
-  const margins = [from.encoding.margin ?? 0].flat(), part = margins.some((margin) => margin > 0) ? "a part of it, " : "";
+  const margins = [robot.encoding.margin ?? 0].flat(), part = margins.some((margin) => margin > 0) ? "a part of it, " : "";
   $("encoding").textContent = `${part}${robot.body.length} × ${robot.body[0].length} pixels, ${way}`;
   $("who").textContent = robot.id;
   const audit = robot.audit ? ` · audit: ${robot.audit.conclusion}` : "";
@@ -117,7 +117,7 @@ const robots = new Robots(materials, choose);
 
 const editor = new Editor(materials, {
   say,
-  chosen: () => robots.robot && { robot: robots.robot, encoding: robots.from.encoding },
+  chosen: () => robots.robot && { robot: robots.robot, encoding: robots.robot.encoding },
   see: () => (editor.stimulus ? { stimulus: editor.stimulus } : picture.shown),
   live: () => {
     who = { own: true, name: "Your body", subject: () => editor.subject, rows: () => editor.cells.map((row) => row.join("")), steps: () => editor.steps };
