@@ -36,8 +36,11 @@ on digits that the program draws itself. Then the robot is shown 200 digits that
 Ctrl-C stops it; the same command goes on.";
 
 /// A little of everything, for two cores and a minute.
-const LITTLE: [&str; 8] = [
+const LITTLE: [&str; 11] = [
     "data.dataset=builtin",
+    "stimulus.encoding=threshold",
+    "stimulus.level=0.25",
+    "train.windows=500",
     "train.rounds=3",
     "train.images=80",
     "train.final_images=100",
