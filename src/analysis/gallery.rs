@@ -184,6 +184,8 @@ pub fn source(data: Option<&Path>, dataset: Option<&str>) -> Result<Source, Erro
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::task::margins::Margins;
+    use crate::task::stimulus::StimulusParams;
     use std::collections::BTreeSet;
 
     #[test]
@@ -198,12 +200,13 @@ mod tests {
     }
 
     #[test]
-    fn the_trained_robots_are_physical_and_see_and_walk_alike() {
+    fn the_trained_robots_are_physical_and_live_in_one_world_and_see_alike_but_for_their_windows() {
         for (set, pairs) in [(shipped::ZERO_ONE, 1), (shipped::TEAM, 45)] {
             let trained = trained(set).unwrap();
             let like = |run: &RunFile| {
                 let Config { stimulus, protocol, physics, .. } = &run.config;
-                let world = (*stimulus, protocol.clone(), physics.clone());
+                let stimulus = StimulusParams { margin: Margins::default(), ..*stimulus };
+                let world = (stimulus, protocol.clone(), physics.clone());
                 (run.config.body_spec(), world, run.dataset.clone())
             };
             for (run, audit) in &trained {
