@@ -64,6 +64,12 @@ impl<'a> HeldOutImages<'a> {
         };
         let mut shown = HeldOutImages { config, dataset, options, images, stimuli: Vec::new() };
         shown.stimuli = shown.seen(config)?;
+        // What a run's robots cannot see is found before any is shown one, by every rank.
+        if let Some(first) = shown.images.first() {
+            for source in sources {
+                see(&source.run.config, dataset, options.split.split(), first.index)?;
+            }
+        }
         Ok(shown)
     }
 
