@@ -82,9 +82,8 @@ pub fn eval(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Re
     let first = &sources[0];
     // Several trainings may have found different windows: what takes no body is on what they see
     // together.
-    let stimulus = StimulusParams::together(sources.iter().map(|source| source.run.config.stimulus));
-    let stimulus = stimulus.expect("there is a run, or the published robots");
-    let config = &Config { stimulus, ..first.run.config.clone() };
+    let config = Config::together(sources.iter().map(|source| &source.run.config));
+    let config = &config.expect("there is a run, or the published robots");
     let wanted = wanted(options, config)?;
     let grouping = config.grouping()?;
     let other = options.dataset.as_deref().filter(|name| *name != config.data.dataset);
@@ -112,7 +111,7 @@ pub fn eval(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Re
     let test_sha256 = dataset.fingerprint(Split::Test).expect("both splits are loaded");
     let steps = checked_steps(config, options.cycles)?;
     let asked = (options.robots.describe(), options.split, options.seed, threshold);
-    let mut report = EvalFile::new((&sources, stimulus), asked, steps, &shown.images, test_sha256);
+    let mut report = EvalFile::new((&sources, config.stimulus), asked, steps, &shown.images, test_sha256);
     if let Some(name) = other {
         report.transfer(name, &dataset);
     }

@@ -11,7 +11,7 @@ use crate::store::eval::Baselines;
 use crate::store::images::{HeldOut, ImageRef};
 use crate::store::robots::Source;
 use crate::store::validation::shown as shown_for_validation;
-use crate::store::whereabouts::see;
+use crate::store::whereabouts::{see, see_all};
 use crate::task::baselines::{Labelled, best_pixel, larger_group, nearest_training_image};
 use crate::task::grouping;
 use std::borrow::Cow;
@@ -62,15 +62,15 @@ impl<'a> HeldOutImages<'a> {
                 images_besides(&besides, &runs, &classes, dataset, "--images", asked)?
             }
         };
-        let mut shown = HeldOutImages { config, dataset, options, images, stimuli: Vec::new() };
-        shown.stimuli = shown.seen(config)?;
+        let split = options.split.split();
+        let stimuli = see_all(config, dataset, split, &images)?;
         // What a run's robots cannot see is found before any is shown one, by every rank.
-        if let Some(first) = shown.images.first() {
+        if let Some(first) = images.first() {
             for source in sources {
-                see(&source.run.config, dataset, options.split.split(), first.index)?;
+                see(&source.run.config, dataset, split, first.index)?;
             }
         }
-        Ok(shown)
+        Ok(HeldOutImages { config, dataset, options, images, stimuli })
     }
 
     /// As robots of a run see them, in the order of the images.
@@ -80,13 +80,8 @@ impl<'a> HeldOutImages<'a> {
     pub fn seen_by(&self, config: &Config) -> Result<Cow<'_, [Grid<f64>]>, Error> {
         match config.stimulus == self.config.stimulus {
             true => Ok(Cow::Borrowed(&self.stimuli)),
-            false => Ok(Cow::Owned(self.seen(config)?)),
+            false => see_all(config, self.dataset, self.options.split.split(), &self.images).map(Cow::Owned),
         }
-    }
-
-    fn seen(&self, config: &Config) -> Result<Vec<Grid<f64>>, Error> {
-        let split = self.options.split.split();
-        self.images.iter().map(|image| see(config, self.dataset, split, image.index)).collect()
     }
 
     /// The baselines of each of these tasks.

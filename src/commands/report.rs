@@ -19,7 +19,6 @@ use crate::store::whereabouts::{Whereabouts, load_dataset_of, see};
 use crate::task::protocol::{Protocol, RolloutMode};
 use crate::task::recording::{Recording, Seen};
 use crate::task::rollout::record;
-use crate::task::stimulus::StimulusParams;
 use std::path::{Path, PathBuf};
 
 /// Most images in the rollouts of a page: one of each class, if there are more.
@@ -192,9 +191,8 @@ impl Team {
             };
             images.iter().map(one).collect::<Result<Vec<Seen>, Error>>()
         };
-        let of_members = of.iter().map(|run| runs[*run].run.config.stimulus);
-        let stimulus = StimulusParams::together(of_members).unwrap_or(run.config.stimulus);
-        let together = seen(&Config { stimulus, ..run.config.clone() })?;
+        let of_members = of.iter().map(|run| &runs[*run].run.config);
+        let together = seen(&Config::together(of_members).expect("the first member's is among them"))?;
         let seen = runs.iter().map(|dossier| seen(&dossier.run.config)).collect::<Result<_, Error>>()?;
         Ok(Team { file, runs: of, images, seen, together })
     }

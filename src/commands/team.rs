@@ -20,11 +20,10 @@ use crate::store::run::different;
 use crate::store::team::{FORMAT, FORMAT_VERSION, Member, TeamBaselines, TeamFile};
 use crate::store::unwritten::Unwritten;
 use crate::store::validation::shown as shown_for_validation;
-use crate::store::whereabouts::{Whereabouts, load_dataset_of, see};
+use crate::store::whereabouts::{Whereabouts, load_dataset_of, see, see_all};
 use crate::task::direction::THRESHOLD;
 use crate::task::grouping::{self, Group};
 use crate::task::judge::Judge;
-use crate::task::stimulus::StimulusParams;
 use crate::task::voting::{Accuracy, Ballot, CLIP};
 use std::collections::BTreeSet;
 use std::path::PathBuf;
@@ -136,7 +135,7 @@ pub fn team(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Re
             continue;
         }
         let run = &sources[chosen.source].run;
-        let stimuli = seen(&run.config, &dataset, split, &images)?;
+        let stimuli = see_all(&run.config, &dataset, split, &images)?;
         let control_steps = control_steps(&run.config, CYCLES);
         let (config, done_before) = (&run.config, AtomicU64::new(done));
         let walker = Walker { config, control_steps, pool: &pool, stop, observer, done: done_before };
@@ -250,16 +249,6 @@ fn validation_images(
     images_besides(&besides, &runs, classes, dataset, "--images", options.images)
 }
 
-/// Images as robots of a config see them.
-fn seen(
-    config: &Config,
-    dataset: &Dataset,
-    split: Split,
-    images: &[ImageRef],
-) -> Result<Vec<Grid<f64>>, Error> {
-    images.iter().map(|image| see(config, dataset, split, image.index)).collect()
-}
-
 /// Robots that an earlier test on the same images, stopped or with fewer of them, has shown these.
 fn known(options: &Options, now: &TeamFile) -> Vec<Member> {
     let about = |file: &TeamFile| {
@@ -268,14 +257,6 @@ fn known(options: &Options, now: &TeamFile) -> Vec<Member> {
     };
     let earlier = TeamFile::read(&options.out).ok().filter(|file| about(file) == about(now));
     earlier.map_or(Vec::new(), |file| file.members)
-}
-
-/// The config of the first robot, but images are seen as all see them together.
-fn seeing_all(sources: &[Source], robots: &[Chosen]) -> Config {
-    let configs = || robots.iter().map(|chosen| &sources[chosen.source].run.config);
-    let first = configs().next().expect("every class of a team has a robot");
-    let stimulus = StimulusParams::together(configs().map(|config| config.stimulus));
-    Config { stimulus: stimulus.unwrap_or(first.stimulus), ..first.clone() }
 }
 
 /// What answers the same images without bodies: on the pixels that the robots see, all together; a
@@ -287,7 +268,9 @@ fn baselines(
     split: Split,
 ) -> Result<Option<TeamBaselines>, Error> {
     let Some((place, best_body)) = file.best_body() else { return Ok(None) };
-    let (common, classes) = (seeing_all(sources, robots), &file.classes);
+    let configs = robots.iter().map(|chosen| &sources[chosen.source].run.config);
+    let common = Config::together(configs).expect("every class of a team has a robot");
+    let classes = &file.classes;
     let shown: BTreeSet<usize> = match split {
         Split::Test => BTreeSet::new(),
         Split::Train => file.images.iter().map(|image| image.index).collect(),
@@ -302,7 +285,7 @@ fn baselines(
     };
     let training = training_of(&common, classes)?;
     let known = labelled(&training);
-    let stimuli = seen(&common, dataset, split, &file.images)?;
+    let stimuli = see_all(&common, dataset, split, &file.images)?;
     let labels = || file.images.iter().map(|image| image.label);
     let moments = Moments::new(&known);
     let against_rest = |class: &u8| {

@@ -310,6 +310,13 @@ impl Config {
         settings
     }
 
+    /// How several robots see images together: the first one's config, but with the
+    /// [`StimulusParams::together`] of all. `None` of no config.
+    pub(crate) fn together<'a>(all: impl IntoIterator<Item = &'a Config> + Clone) -> Option<Self> {
+        let stimulus = StimulusParams::together(all.clone().into_iter().map(|config| config.stimulus))?;
+        all.into_iter().next().map(|first| Config { stimulus, ..first.clone() })
+    }
+
     /// What bodies evolution makes.
     pub fn body_spec(&self) -> BodySpec {
         let BodyConfig { height, width, min_muscles } = self.body;

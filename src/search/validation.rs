@@ -21,7 +21,7 @@ use crate::store::names::VALIDATION_JSON;
 use crate::store::robots::{Chosen, Selection, Source, first_physical};
 use crate::store::run::{Robot, RunFile};
 use crate::store::validation::{FORMAT, Validated, ValidationFile};
-use crate::store::whereabouts::{Whereabouts, load_dataset_of, see};
+use crate::store::whereabouts::{Whereabouts, load_dataset_of, see_all};
 use crate::task::direction;
 use crate::task::grouping;
 use crate::task::grouping::Grouping;
@@ -239,9 +239,7 @@ fn screened(
     walker: &Walker,
 ) -> Result<Option<Vec<Validated>>, Error> {
     let config: &Config = &run.config;
-    let stimuli: Result<Vec<_>, Error> =
-        images.iter().map(|image| see(config, dataset, Split::Train, image.index)).collect();
-    let stimuli = stimuli?;
+    let stimuli = see_all(config, dataset, Split::Train, images)?;
     let split_of = |robot: &Robot| -> Option<&grouping::Split> {
         grouping.tasks().iter().find(|split| split.name() == robot.task)
     };

@@ -121,7 +121,7 @@ impl TeamRequest {
         }
         let (_, first, _) = members.first().expect("a team ships with the program");
         let stimuli = members.iter().map(|(_, who, _)| who.encoding);
-        let encoding = StimulusParams::together(stimuli).unwrap_or(first.encoding);
+        let encoding = StimulusParams::together(stimuli).expect("the first member's is among them");
         let together = self.shown.seen(&Who { encoding, ..first.clone() }, images)?;
         let control_steps = self.control_steps.unwrap_or(first.protocol.control_steps.min(MAX_STEPS));
         if !(1..=MAX_STEPS).contains(&control_steps) {

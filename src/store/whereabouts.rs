@@ -8,7 +8,7 @@ use crate::config::{BodyConfig, Config, DataConfig, reading};
 use crate::data::dataset::{BUILTIN, Dataset, DatasetError, Split};
 use crate::data::files::{Place, places};
 use crate::store::folder::RunFolder;
-use crate::store::images::DatasetRef;
+use crate::store::images::{DatasetRef, ImageRef};
 use crate::store::names::DATA_FOLDER;
 use crate::task::stimulus::{StimulusParams, stimulus};
 use serde::{Deserialize, Serialize};
@@ -178,6 +178,19 @@ pub fn load_dataset_of(
 /// If the image does not go with the body's size.
 pub fn see(config: &Config, dataset: &Dataset, split: Split, index: usize) -> Result<Grid<f64>, Error> {
     seen(&config.body, &config.stimulus, dataset, split, index)
+}
+
+/// What a robot of a config sees of several images, in their order.
+///
+/// # Errors
+/// As [`see`].
+pub(crate) fn see_all(
+    config: &Config,
+    dataset: &Dataset,
+    split: Split,
+    images: &[ImageRef],
+) -> Result<Vec<Grid<f64>>, Error> {
+    images.iter().map(|image| see(config, dataset, split, image.index)).collect()
 }
 
 /// What a robot of this size sees of an image.
