@@ -28,7 +28,7 @@ use crate::store::unwritten::Unwritten;
 use crate::store::whereabouts::{Whereabouts, load_dataset_of, seen};
 use crate::task::direction;
 use crate::task::evaluation::fresh_rollouts;
-use crate::task::grouping::Grouping;
+use crate::task::grouping::{Grouping, balanced};
 use crate::task::perturbation::Condition;
 use crate::task::protocol::{Protocol, RolloutMode};
 use crate::task::response::{Example, Gait, Response, Shown};
@@ -367,14 +367,13 @@ impl Task {
             stimulus.margin = found.margins;
             margin = Some(found.margins);
         }
-        let [a, b] = &self.groups;
-        let example = |image: &ImageRef| {
-            // There are as many of each class; the groups weigh the same.
-            let (right, classes) = if a.contains(&image.label) { (1.0, a.len()) } else { (-1.0, b.len()) };
+        let [first, _] = &self.groups;
+        let ways = balanced(self.images.iter().map(|image| image.label), first);
+        let example = |(image, (right, weight)): (&ImageRef, (f64, f64))| {
             let seen = self.seen(&stimulus, image)?;
-            Ok(Example { right, weight: 1.0 / classes as f64, ..Example::new(gait, &seen, &config.physics) })
+            Ok(Example { right, weight, ..Example::new(gait, &seen, &config.physics) })
         };
-        let examples = self.images.iter().map(example).collect::<Result<Vec<Example>, Error>>()?;
+        let examples = self.images.iter().zip(ways).map(example).collect::<Result<Vec<Example>, Error>>()?;
         let found = teachable(shown, response.scatter, &examples, direction::THRESHOLD, config.seed, stop)?;
         Ok(found.map(|teachable| Taught { margin, ..teachable.into() }))
     }

@@ -35,6 +35,7 @@ use crate::store::whereabouts;
 use crate::store::whereabouts::{Whereabouts, see};
 use crate::task::evaluation::fresh_rollouts;
 use crate::task::fitness::Fitness;
+use crate::task::grouping::balanced;
 use crate::task::perturbation::Condition;
 use crate::task::protocol::{Protocol, RolloutMode};
 use crate::task::refine::Challenge;
@@ -522,19 +523,15 @@ impl Trainer<'_> {
     fn images(&self, gait: &Gait, config: &Config) -> Result<Vec<Image>, Error> {
         let Trainer { training, probing, .. } = self;
         let all = probing.conditions();
-        let [a, b] = self.groups();
-        let of =
-            |classes: &[u8]| training.images.iter().filter(|image| classes.contains(&image.label)).count();
-        let (of_a, of_b) = (of(a) as f64, of(b) as f64);
-        let image = |(image, condition): (&ImageRef, &Condition)| {
+        let [first, _] = self.groups();
+        let ways = balanced(training.images.iter().map(|image| image.label), first);
+        let image = |((image, condition), (right, weight)): ((&ImageRef, &Condition), (f64, f64))| {
             let stimulus = see(config, self.dataset, Split::Train, image.index)?;
-            let is_a = a.contains(&image.label);
-            let (right, weight) = if is_a { (1.0, 0.5 / of_a) } else { (-1.0, 0.5 / of_b) };
             let condition = all.iter().position(|other| other == condition).expect("it is one of all");
             let example = Example { right, weight, ..Example::new(gait, &stimulus, &config.physics) };
             Ok(Image { stimulus, example, condition })
         };
-        training.images.iter().zip(&training.conditions).map(image).collect()
+        training.images.iter().zip(&training.conditions).zip(ways).map(image).collect()
     }
 
     fn plan(&self) -> Plan {

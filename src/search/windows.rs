@@ -12,6 +12,7 @@ use crate::body::Material;
 use crate::config::Config;
 use crate::data::dataset::{Dataset, Split};
 use crate::store::images::ImageRef;
+use crate::task::grouping::balanced;
 use crate::task::margins::Margins;
 use crate::task::response::{Example, Gait, Lesson, Response};
 use crate::task::stimulus::{StimulusParams, stimulus};
@@ -60,17 +61,16 @@ impl<'a> Windows<'a> {
         config: &'a Config,
         dataset: &Dataset,
         images: &[ImageRef],
-        [a, b]: &[Vec<u8>; 2],
+        [first, _]: &[Vec<u8>; 2],
     ) -> Result<Self, Error> {
         let some = || images.iter().step_by(images.len().div_ceil(IMAGES).max(1));
-        let of = |classes: &[u8]| some().filter(|image| classes.contains(&image.label)).count() as f64;
-        let (of_a, of_b) = (of(a), of(b));
-        let image = |image: &ImageRef| {
+        let image = |(image, (right, weight)): (&ImageRef, (f64, f64))| {
             let pixels = dataset.image(Split::Train, image.index);
             let pixels = pixels.map_err(|error| Error::input(error.to_string()))?;
-            Ok(if a.contains(&image.label) { (1.0, 0.5 / of_a, pixels) } else { (-1.0, 0.5 / of_b, pixels) })
+            Ok((right, weight, pixels))
         };
-        Ok(Windows { images: some().map(image).collect::<Result<_, Error>>()?, config })
+        let images = some().zip(balanced(some().map(|image| image.label), first)).map(image);
+        Ok(Windows { images: images.collect::<Result<_, Error>>()?, config })
     }
 
     /// The window under which a gait could be taught most, of that of the config, windows anywhere,

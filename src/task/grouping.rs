@@ -55,6 +55,21 @@ pub fn groups_text(groups: [&[u8]; 2], between: &str) -> String {
     groups.map(|group| group.iter().map(u8::to_string).collect::<Vec<_>>().join(separator)).join(between)
 }
 
+/// Which way is right for images with these labels, and what each weighs: 1, right, for the first
+/// group and −1, left, for every other class; the images of either side weigh a half together.
+pub fn balanced<'a>(
+    labels: impl Iterator<Item = u8> + Clone + 'a,
+    first: &'a [u8],
+) -> impl Iterator<Item = (f64, f64)> + 'a {
+    let is_first = |label: u8| first.contains(&label);
+    let of_first = labels.clone().filter(|label| is_first(*label)).count();
+    let of_other = labels.clone().count() - of_first;
+    let way = move |label| {
+        if is_first(label) { (1.0, 0.5 / of_first as f64) } else { (-1.0, 0.5 / of_other as f64) }
+    };
+    labels.map(way)
+}
+
 /// The tasks of a run: one division of classes into two groups, or all there are. With more than
 /// one, the task a robot performs is a dimension of the archive (paper, sections "Fitness" and
 /// "MAP-Elites").
@@ -160,6 +175,13 @@ fn check_unique(classes: &[u8]) -> Result<(), GroupingError> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn both_groups_weigh_a_half_however_many_images_they_have() {
+        let ways: Vec<(f64, f64)> = balanced([7, 1, 2, 7, 3].into_iter(), &[1, 3]).collect();
+        let (first, other) = ((1.0, 0.25), (-1.0, 0.5 / 3.0));
+        assert_eq!(ways, [other, first, other, other, first]);
+    }
 
     fn names(grouping: &Grouping) -> Vec<String> {
         grouping.tasks().iter().map(Split::name).collect()
