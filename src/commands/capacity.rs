@@ -18,6 +18,7 @@ use crate::store::images::HeldOut;
 use crate::store::names::{CAPACITY_JSON, RUN_JSON};
 use crate::store::results::write_with_table;
 use crate::store::run::RunFile;
+use crate::store::setting::Setting;
 use crate::store::trainings::Trainings;
 use crate::store::unwritten::Unwritten;
 use crate::task::grouping;
@@ -61,6 +62,71 @@ pub struct Finished {
 /// What is wrong with the evaluation, the data or the settings.
 pub fn capacity(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Result<Finished, Error> {
     let report = EvalFile::read(&options.eval)?;
+    let setting = comparable(&report, options, observer)?;
+    let config = &options.config;
+    kernel_fits(config, setting)?;
+    check_out(&options.out, &options.eval, CAPACITY_JSON)?;
+    if FIGURES.iter().any(|ending| options.out.with_extension(ending) == options.out) {
+        let text = format!("--out {}: expected another ending", options.out.display());
+        return Err(Error::usage(format!("{text}: the figure beside the results has that name")));
+    }
+    let robots = robots(&report, options)?;
+    let images = Images::of(&report, setting, options)?;
+    let grouping = setting.task.grouping()?;
+    let accuracies = |split: &grouping::Split| -> Vec<f64> {
+        robots.iter().filter(|robot| robot.task == split.name()).map(|robot| robot.accuracy).collect()
+    };
+    let splits: Vec<&grouping::Split> =
+        grouping.tasks().iter().filter(|split| !accuracies(split).is_empty()).collect();
+    let known = Trainings::read(&options.out)?;
+    let mut networks = Networks {
+        config,
+        images: &images,
+        known,
+        unkept: Unwritten::default(),
+        done: AtomicU64::new(0),
+        pool: pool(options.threads)?,
+        stop,
+        observer,
+    };
+    networks.begin(&splits);
+    let mut file = CapacityFile {
+        format: FORMAT.to_string(),
+        format_version: FORMAT_VERSION,
+        program_version: env!("CARGO_PKG_VERSION").to_string(),
+        run: report.run.clone(),
+        selected: report.selected.clone(),
+        dataset: report.dataset.clone(),
+        patience_on: if config.clean { "validation" } else { "test" }.to_string(),
+        trainings: config.trainings,
+        physical_only: options.physical_only,
+        stopped: false,
+        tasks: Vec::new(),
+    };
+    let mut unwritten = Unwritten::default();
+    for split in splits {
+        let of_task = accuracies(split);
+        let accuracy = of_task.iter().sum::<f64>() / of_task.len() as f64;
+        let Some(curves) = networks.curves(split, accuracy)? else {
+            file.stopped = true;
+            break;
+        };
+        file.tasks.push(TaskCapacity { task: split.name(), robots: of_task.len(), accuracy, curves });
+        unwritten.tried(write(options, &file), |text| observer.warning(text));
+    }
+    // What was found before it was stopped is better than nothing.
+    if file.stopped && !file.tasks.is_empty() {
+        unwritten.tried(write(options, &file), |text| observer.warning(text));
+    }
+    Ok(Finished { file, unwritten: unwritten.error().or(networks.unkept.error()) })
+}
+
+/// What the robots of an evaluation saw and did, if networks can be trained for the same.
+fn comparable<'a>(
+    report: &'a EvalFile,
+    options: &Options,
+    observer: &dyn Observer,
+) -> Result<&'a Setting, Error> {
     let name = options.eval.display();
     let Some(setting) = &report.setting else {
         let text = format!("{name}: expected \"setting\": an earlier version wrote it");
@@ -92,111 +158,109 @@ pub fn capacity(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -
     if report.stopped {
         observer.warning(&format!("{name}: the evaluation was stopped before its last robot"));
     }
-    let config = &options.config;
+    Ok(setting)
+}
+
+/// Whether the kernels of the networks leave something of the images to pool.
+fn kernel_fits(config: &CapacityConfig, setting: &Setting) -> Result<(), Error> {
     let side = setting.body.height.min(setting.body.width);
     let (kernel, pooling) = (config.cnn.kernel, config.cnn.pooling);
-    // Something must be left to pool.
     let most = if pooling == Pooling::Max2 { side.saturating_sub(1) } else { side };
     if kernel > most && config.networks.contains(&Kind::Cnn) {
         let of = format!("with images of {side} pixels and pooling {pooling:?}").to_lowercase();
         return Err(Error::input(format!("capacity: cnn.kernel = {kernel}: expected up to {most}, {of}")));
     }
-    check_out(&options.out, &options.eval, CAPACITY_JSON)?;
-    if FIGURES.iter().any(|ending| options.out.with_extension(ending) == options.out) {
-        let text = format!("--out {}: expected another ending", options.out.display());
-        return Err(Error::usage(format!("{text}: the figure beside the results has that name")));
+    Ok(())
+}
+
+/// The networks that robots are compared with.
+struct Networks<'a> {
+    config: &'a CapacityConfig,
+    images: &'a Images,
+    /// What was trained so far.
+    known: Trainings,
+    /// How keeping it went.
+    unkept: Unwritten,
+    /// Trainings that are done.
+    done: AtomicU64,
+    pool: rayon::ThreadPool,
+    stop: &'a AtomicBool,
+    observer: &'a dyn Observer,
+}
+
+impl Networks<'_> {
+    /// Names what is trained on what.
+    fn key(&self, split: &grouping::Split, kind: Kind) -> String {
+        let hyper = serde_json::to_string(self.config.of(kind)).expect("JSON has all of it");
+        let (images, seed) = (&self.images.key, self.config.seed);
+        sha256_hex(format!("{} {} {hyper} {images} {seed}", split.name(), kind.name()).as_bytes())
     }
-    let robots = robots(&report, options)?;
-    let images = Images::of(&report, setting, options)?;
-    let grouping = setting.task.grouping()?;
-    let splits: Vec<&grouping::Split> = grouping
-        .tasks()
-        .iter()
-        .filter(|split| robots.iter().any(|robot| robot.task == split.name()))
-        .collect();
-    let per_task = config.networks.len() * config.sizes().count() * config.trainings;
-    let mut known = Trainings::read(&options.out)?;
-    let jobs = splits.iter().flat_map(|split| config.networks.iter().map(move |&kind| (*split, kind)));
-    let key = |split: &grouping::Split, kind: Kind| {
-        let hyper = serde_json::to_string(config.of(kind)).expect("JSON has all of it");
-        sha256_hex(
-            format!("{} {} {hyper} {} {}", split.name(), kind.name(), images.key, config.seed).as_bytes(),
-        )
-    };
-    let already = jobs.flat_map(|(split, kind)| {
-        let key = key(split, kind);
-        let known = &known;
-        config.sizes().map(move |size| known.of(&key, size).len().min(config.trainings)).collect::<Vec<_>>()
-    });
-    let done = AtomicU64::new(already.sum::<usize>() as u64);
-    let (total, before) = ((splits.len() * per_task) as u64, done.load(Ordering::Relaxed));
-    let kept = if before > 0 { format!(" ({before} known from before)") } else { String::new() };
-    let label = format!("training {total} networks{kept}:");
-    observer.begins(&Work { label, total, known: before, unit: "trainings" });
-    let pool = pool(options.threads)?;
-    let mut file = CapacityFile {
-        format: FORMAT.to_string(),
-        format_version: FORMAT_VERSION,
-        program_version: env!("CARGO_PKG_VERSION").to_string(),
-        run: report.run.clone(),
-        selected: report.selected.clone(),
-        dataset: report.dataset.clone(),
-        patience_on: if config.clean { "validation" } else { "test" }.to_string(),
-        trainings: config.trainings,
-        physical_only: options.physical_only,
-        stopped: false,
-        tasks: Vec::new(),
-    };
-    let [mut unkept, mut unwritten] = <[Unwritten; 2]>::default();
-    'tasks: for split in splits {
-        let of_task: Vec<f64> =
-            robots.iter().filter(|robot| robot.task == split.name()).map(|robot| robot.accuracy).collect();
-        let accuracy = of_task.iter().sum::<f64>() / of_task.len() as f64;
+
+    /// Says how many there are to train, and how many are known.
+    fn begin(&mut self, splits: &[&grouping::Split]) {
+        let Networks { config, known, .. } = &*self;
+        let of_one = |(split, kind): (&grouping::Split, Kind)| -> usize {
+            let key = self.key(split, kind);
+            config.sizes().map(|size| known.of(&key, size).len().min(config.trainings)).sum()
+        };
+        let kinds = |split| config.networks.iter().map(move |kind| (split, *kind));
+        let before = splits.iter().copied().flat_map(kinds).map(of_one).sum::<usize>() as u64;
+        let per_task = config.networks.len() * config.sizes().count() * config.trainings;
+        let total = (splits.len() * per_task) as u64;
+        let kept = if before > 0 { format!(" ({before} known from before)") } else { String::new() };
+        let label = format!("training {total} networks{kept}:");
+        self.observer.begins(&Work { label, total, known: before, unit: "trainings" });
+        self.done = AtomicU64::new(before);
+    }
+
+    /// The curves of a task, whose robots have this accuracy; `None` if it was stopped.
+    fn curves(&mut self, split: &grouping::Split, accuracy: f64) -> Result<Option<Vec<Curve>>, Error> {
+        let config = self.config;
         let mut curves = Vec::new();
         for &kind in &config.networks {
-            let key = key(split, kind);
-            let samples = Task::new(split, kind, config, &images)?;
+            let key = self.key(split, kind);
+            let samples = Task::new(split, kind, config, self.images)?;
             let mut points = Vec::new();
             for size in config.sizes() {
-                let open = known.of(&key, size).len()..config.trainings;
-                let train = |number: usize| {
-                    let trained = samples.train(size, config, number, stop)?;
-                    observer.progress(done.fetch_add(1, Ordering::Relaxed) + 1);
-                    Ok(trained)
-                };
-                let trained: Vec<Result<Trained, Error>> =
-                    pool.install(|| open.into_par_iter().map(train).collect());
-                // Trainings are kept in their order: those before the first that was stopped.
-                let mut finished = Vec::new();
-                for trained in trained {
-                    match trained {
-                        Ok(trained) => finished.push(trained),
-                        Err(error) if error.kind == ErrorKind::Stopped => {
-                            file.stopped = true;
-                            break;
-                        }
-                        Err(error) => return Err(error),
-                    }
+                if !self.train(&samples, &key, size)? {
+                    return Ok(None);
                 }
-                if !finished.is_empty() {
-                    known.extend(&key, size, &finished);
-                    unkept.tried(known.write(), |text| observer.warning(text));
-                }
-                if file.stopped {
-                    break 'tasks;
-                }
-                points.push(point(size, &known.of(&key, size)[..config.trainings]));
+                points.push(point(size, &self.known.of(&key, size)[..config.trainings]));
             }
             curves.push(curve_of(kind, points, accuracy));
         }
-        file.tasks.push(TaskCapacity { task: split.name(), robots: of_task.len(), accuracy, curves });
-        unwritten.tried(write(options, &file), |text| observer.warning(text));
+        Ok(Some(curves))
     }
-    // What was found before is better than nothing.
-    if !file.tasks.is_empty() {
-        unwritten.tried(write(options, &file), |text| observer.warning(text));
+
+    /// Trains the networks of a size that are not known yet, and keeps them; whether it was not
+    /// stopped.
+    fn train(&mut self, samples: &Task, key: &str, size: usize) -> Result<bool, Error> {
+        let Networks { config, stop, observer, done, pool, .. } = &*self;
+        let open = self.known.of(key, size).len()..config.trainings;
+        let train = |number: usize| {
+            let trained = samples.train(size, config, number, stop)?;
+            observer.progress(done.fetch_add(1, Ordering::Relaxed) + 1);
+            Ok(trained)
+        };
+        let trained: Vec<Result<Trained, Error>> = pool.install(|| open.into_par_iter().map(train).collect());
+        // Trainings are kept in their order: those before the first that was stopped.
+        let (mut finished, mut goes_on) = (Vec::new(), true);
+        for trained in trained {
+            match trained {
+                Ok(trained) => finished.push(trained),
+                Err(error) if error.kind == ErrorKind::Stopped => {
+                    goes_on = false;
+                    break;
+                }
+                Err(error) => return Err(error),
+            }
+        }
+        if !finished.is_empty() {
+            self.known.extend(key, size, &finished);
+            self.unkept.tried(self.known.write(), |text| self.observer.warning(text));
+        }
+        Ok(goes_on)
     }
-    Ok(Finished { file, unwritten: unwritten.error().or(unkept.error()) })
 }
 
 fn point(size: usize, trained: &[(f64, usize)]) -> Point {

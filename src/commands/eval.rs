@@ -137,47 +137,73 @@ pub fn eval(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Re
             best.into_iter().unzip()
         }
     };
-    let (count, images, ranks) = (robots.len(), shown.images.len(), options.ranks);
+    let (count, images) = (robots.len(), shown.images.len());
     let label = format!("evaluating {count} robots on {images} images:");
-    observer.begins(&Work::new(label, (count.div_ceil(ranks.size()) * images) as u64, "rollouts"));
-    let walker = walker();
-    let mut scores = scores.into_iter();
-    let mut left = count;
-    report.stopped = left > 0;
-    let mut unwritten = Unwritten::default();
-    // One robot for each rank at a time.
-    for robots in robots.chunks(ranks.size()) {
-        let own = match robots.get(ranks.rank()) {
-            None => None,
-            Some(Chosen { source, robot }) => {
-                let stimuli = shown.seen_by(&sources[*source].run.config)?;
-                walker.rollouts(robot, &stimuli)
-            }
-        };
-        let before = report.robots.len();
-        let mut is_stopped = false;
-        for (Chosen { source, robot }, walked) in robots.iter().zip(ranks.share(own)) {
-            let Some((displacements, simulated)) = walked else {
-                is_stopped = true;
-                break;
-            };
-            let split = task_of(&grouping, robot).expect("robots without a task are left out above");
-            left -= 1;
-            report.stopped = left > 0;
-            let run = &sources[*source].run;
-            let trial = Trial { run, robot, split, images: &shown.images, threshold };
-            let (validation, of_trial) = (scores.next(), RobotReport::new(&trial, displacements, simulated));
-            report.robots.push(RobotReport { run: *source, validation, ..of_trial });
-            report.conclude();
-        }
-        if ranks.leads() && report.robots.len() > before {
-            unwritten.tried(write(options, &report), |text| observer.warning(text));
-        }
-        if is_stopped {
-            break;
-        }
-    }
+    let own_share = count.div_ceil(options.ranks.size());
+    observer.begins(&Work::new(label, (own_share * images) as u64, "rollouts"));
+    let testing = Testing { options, sources: &sources, grouping: &grouping, shown: &shown };
+    let unwritten = testing.test(&robots, scores, &walker(), &mut report)?;
     Ok(Finished { file: report, unwritten: unwritten.error() })
+}
+
+/// What all robots are tested with.
+struct Testing<'a> {
+    options: &'a Options,
+    sources: &'a [Source],
+    grouping: &'a Grouping,
+    shown: &'a HeldOutImages<'a>,
+}
+
+impl Testing<'_> {
+    /// Tests robots, one for each process at a time, and writes the report after each; `scores` are
+    /// theirs on validation images, if they were chosen by these. How writing went.
+    fn test(
+        &self,
+        robots: &[Chosen],
+        scores: Vec<Validated>,
+        walker: &Walker,
+        report: &mut EvalFile,
+    ) -> Result<Unwritten, Error> {
+        let Testing { options, sources, grouping, shown } = self;
+        let Options { ranks, threshold, .. } = options;
+        let mut scores = scores.into_iter();
+        let mut left = robots.len();
+        report.stopped = left > 0;
+        let mut unwritten = Unwritten::default();
+        for robots in robots.chunks(ranks.size()) {
+            let own = match robots.get(ranks.rank()) {
+                None => None,
+                Some(Chosen { source, robot }) => {
+                    let stimuli = shown.seen_by(&sources[*source].run.config)?;
+                    walker.rollouts(robot, &stimuli)
+                }
+            };
+            let before = report.robots.len();
+            let mut is_stopped = false;
+            for (Chosen { source, robot }, walked) in robots.iter().zip(ranks.share(own)) {
+                let Some((displacements, simulated)) = walked else {
+                    is_stopped = true;
+                    break;
+                };
+                let split = task_of(grouping, robot).expect("robots without a task are left out before");
+                left -= 1;
+                report.stopped = left > 0;
+                let run = &sources[*source].run;
+                let trial = Trial { run, robot, split, images: &shown.images, threshold: *threshold };
+                let (validation, of_trial) =
+                    (scores.next(), RobotReport::new(&trial, displacements, simulated));
+                report.robots.push(RobotReport { run: *source, validation, ..of_trial });
+                report.conclude();
+            }
+            if ranks.leads() && report.robots.len() > before {
+                unwritten.tried(write(options, report), |text| walker.observer.warning(text));
+            }
+            if is_stopped {
+                break;
+            }
+        }
+        Ok(unwritten)
+    }
 }
 
 /// The runs, if they can be tested together and their results written; the published robots, if none
