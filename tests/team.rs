@@ -134,6 +134,56 @@ fn eval_shows_robots_of_several_runs_their_own_windows_and_judges_pixels_by_what
 }
 
 #[test]
+fn eval_shows_robots_of_several_tasks_the_same_images_if_these_split_the_same_classes() {
+    let sandbox = Sandbox::new();
+    for (name, task) in [
+        ("zero", "groups = [[0], [1, 4]]"),
+        ("four", "groups = [[4], [0, 1]]"),
+        ("all", "splits = [0, 1, 4]"),
+        ("pair", "groups = [[0], [1]]"),
+    ] {
+        let config = TINY.replace("groups = [[0], [1]]", task).replace("train_images = [0, 1]", "");
+        let config = config.replace("generations = 12", "generations = 3");
+        sandbox.write("run.toml", config);
+        sandbox.run(&format!("evolve -q -c run.toml -o {name}")).ended(0, &[]);
+    }
+    let tested = |archives: &str, robots: &str, name: &str| -> EvalFile {
+        let archives = format!("-a {archives} --robots {robots}");
+        sandbox.run(&format!("eval -q {archives} --images 12 -o {name}.json")).ended(0, &[]);
+        EvalFile::read(&sandbox.path(&format!("{name}.json"))).unwrap()
+    };
+    let [zero, four, all] = ["zero", "four", "all"].map(|name| tested(name, "top:1", name));
+    let together = tested("zero four all", "all", "together");
+    let tasks: Vec<&str> = together.means.keys().map(String::as_str).collect();
+    assert_eq!(tasks, ["0|14", "1|04", "4|01"]);
+    for (file, run) in [(&zero, 0), (&four, 1), (&all, 2)] {
+        for alone in &file.robots {
+            let same = together.robots.iter().find(|robot| robot.run == run && robot.id == alone.id);
+            let same = same.unwrap_or_else(|| panic!("{}: not tested", alone.id));
+            assert_eq!((&same.task, same.right, same.images), (&alone.task, alone.right, alone.images));
+            let of = |file: &EvalFile| {
+                let mut walks: Vec<(usize, u8)> =
+                    file.images.iter().map(|image| (image.index, image.label)).collect();
+                walks.sort_unstable();
+                walks
+            };
+            assert_eq!(of(file), of(&together));
+        }
+    }
+    // The nearest training image is of the runs that have a task: of this one, one has it by itself.
+    let nearest = |file: &EvalFile, task: &str| file.baselines[task].nearest_training_image.unwrap();
+    let mean = f64::midpoint(nearest(&zero, "0|14"), nearest(&all, "0|14"));
+    assert!((nearest(&together, "0|14") - mean).abs() < 1e-12);
+    assert_eq!(nearest(&together, "1|04"), nearest(&all, "1|04"));
+    let few = "--set networks=[\"mlp\"] --set trainings=1 --set sizes=[1,2] --set mlp.epochs=1";
+    let of_all = format!("capacity -q --eval together.json {few} -o capacity.json");
+    let capacity = sandbox.run(&of_all).ended(0, &[]);
+    assert!(tasks.iter().all(|task| capacity.out.contains(task)), "{}", capacity.out);
+    // Other classes are another experiment.
+    sandbox.run("eval -q -a zero pair").ended(3, &["pair/run.json", "[task]"]);
+}
+
+#[test]
 fn a_team_shows_the_same_walks_as_eval() {
     let sandbox = pairs();
     sandbox.run("eval -q -a pairs/0v1 --robots best --images 40 -o eval.json").ended(0, &[]);

@@ -6,8 +6,8 @@ use crate::base::observer::{Observer, Work};
 use crate::base::ranks::Ranks;
 use crate::base::threads::pool;
 use crate::commands::eval_images::HeldOutImages;
-use crate::config::Config;
 use crate::config::validation::{IMAGES_KEY, LEAST};
+use crate::config::{Config, TaskConfig};
 use crate::data::dataset::Split;
 use crate::search::showing::{Walker, control_steps, task_of};
 use crate::search::validation;
@@ -82,8 +82,10 @@ pub fn eval(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Re
     let first = &sources[0];
     // Several trainings may have found different windows: what takes no body is on what they see
     // together.
-    let config = Config::together(sources.iter().map(|source| &source.run.config));
-    let config = &config.expect("there is a run, or the published robots");
+    let configs = || sources.iter().map(|source| &source.run.config);
+    let config = Config::together(configs()).expect("there is a run, or the published robots");
+    let task = TaskConfig::together(configs().map(|config| &config.task));
+    let config = &Config { task: task.expect("the tasks of all runs were compared"), ..config };
     let wanted = wanted(options, config)?;
     let grouping = config.grouping()?;
     let other = options.dataset.as_deref().filter(|name| *name != config.data.dataset);
@@ -111,7 +113,7 @@ pub fn eval(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Re
     let test_sha256 = dataset.fingerprint(Split::Test).expect("both splits are loaded");
     let steps = checked_steps(config, options.cycles)?;
     let asked = (options.robots.describe(), options.split, options.seed, threshold);
-    let mut report = EvalFile::new((&sources, config.stimulus), asked, steps, &shown.images, test_sha256);
+    let mut report = EvalFile::new((&sources, config), asked, steps, &shown.images, test_sha256);
     if let Some(name) = other {
         report.transfer(name, &dataset);
     }
@@ -268,12 +270,12 @@ pub fn own_name(split: HeldOut) -> &'static str {
 }
 
 /// Whether robots of two runs can be tested together: what they are shown, and where they live, is
-/// the same. They may look at different windows of it.
+/// the same. They may look at different windows of it, and tell the same classes apart in other ways.
 fn same_setting(first: &Source, other: &Source) -> Result<(), Error> {
     let (a, b) = (&first.run.config, &other.run.config);
     let of_data = |config: &Config| (config.data.dataset.clone(), config.data.builtin.clone());
     let differing = [
-        ("task", a.task != b.task),
+        ("task", TaskConfig::together([&a.task, &b.task]).is_none()),
         ("body", a.body != b.body),
         ("stimulus", StimulusParams { margin: b.stimulus.margin, ..a.stimulus } != b.stimulus),
         ("protocol", a.protocol != b.protocol),

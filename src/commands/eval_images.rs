@@ -102,7 +102,9 @@ impl<'a> HeldOutImages<'a> {
         let is_own = self.dataset.name() == self.config.data.dataset;
         let of_runs = sources.iter().map(|source| {
             let path = source.path.display().to_string();
-            seen(&source.run.training_images).map_err(|error| error.within("training_images").within(&path))
+            let own = seen(&source.run.training_images);
+            let own = own.map_err(|error| error.within("training_images").within(&path))?;
+            Ok((source.run.config.grouping()?, own))
         });
         let of_runs = is_own.then(|| of_runs.collect::<Result<Vec<_>, Error>>()).transpose()?;
         let shown = self.stimuli.iter().zip(&self.images);
@@ -114,9 +116,13 @@ impl<'a> HeldOutImages<'a> {
                 continue;
             }
             let rule = best_pixel(task, &labelled(&choice));
-            let nearest = |of_run: &Vec<_>| nearest_training_image(task, &labelled(of_run), &shown);
-            let nearest_of_all =
-                of_runs.as_ref().map(|all| all.iter().map(nearest).sum::<f64>() / all.len() as f64);
+            let nearest_of_all = of_runs.as_ref().map(|all| {
+                // Of the runs that have the task.
+                let having = all.iter().filter(|(grouping, _)| grouping.tasks().contains(task));
+                let nearest = having.map(|(_, own)| nearest_training_image(task, &labelled(own), &shown));
+                let nearest: Vec<f64> = nearest.collect();
+                nearest.iter().sum::<f64>() / nearest.len() as f64
+            });
             let baselines = Baselines {
                 larger_group: larger_group(task, &shown),
                 best_single_pixel: rule.map_or(0.0, |rule| rule.accuracy(task, &shown)),

@@ -48,4 +48,49 @@ impl TaskConfig {
         let TaskConfig { groups, splits, .. } = self;
         groups.iter().flatten().chain(splits).flatten().copied().collect()
     }
+
+    /// The tasks of several runs: their own, if these are the same, else all splits of their classes,
+    /// if each has some of these. `None` if they tell other classes apart, or of no run.
+    pub(crate) fn together<'a>(all: impl IntoIterator<Item = &'a TaskConfig> + Clone) -> Option<Self> {
+        let first = all.clone().into_iter().next()?;
+        if all.clone().into_iter().all(|task| task == first) {
+            return Some(first.clone());
+        }
+        let mut classes = first.classes();
+        classes.sort_unstable();
+        let same_way_bin = all.clone().into_iter().any(|task| task.same_way_bin);
+        let together = TaskConfig { groups: None, splits: Some(classes), same_way_bin };
+        let splits = together.grouping().ok()?;
+        let has = |task: &TaskConfig| {
+            let own = task.grouping().ok();
+            own.is_some_and(|own| own.tasks().iter().all(|split| splits.tasks().contains(split)))
+        };
+        all.into_iter().all(has).then_some(together)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn groups(a: &[u8], b: &[u8]) -> TaskConfig {
+        TaskConfig { groups: Some([a.to_vec(), b.to_vec()]), ..TaskConfig::default() }
+    }
+
+    fn splits(classes: &[u8], same_way_bin: bool) -> TaskConfig {
+        TaskConfig { groups: None, splits: Some(classes.to_vec()), same_way_bin }
+    }
+
+    #[test]
+    fn tasks_of_the_same_classes_are_all_splits_of_these_together() {
+        let (three, even) = (groups(&[3], &[0, 1, 2]), groups(&[0, 2], &[1, 3]));
+        assert_eq!(TaskConfig::together([&three, &three]), Some(three.clone()));
+        assert_eq!(TaskConfig::together([&three, &even]), Some(splits(&[0, 1, 2, 3], false)));
+        let published = splits(&[0, 1, 2, 3], true);
+        assert_eq!(TaskConfig::together([&three, &published]), Some(published.clone()));
+        assert_eq!(TaskConfig::together([]), None);
+        // Other classes, and groups the other way round, whose names are no splits'.
+        assert_eq!(TaskConfig::together([&three, &groups(&[0], &[1])]), None);
+        assert_eq!(TaskConfig::together([&three, &groups(&[1, 3], &[0, 2])]), None);
+    }
 }

@@ -5,7 +5,7 @@ use crate::base::files::read_text;
 use crate::base::hash;
 use crate::base::statistics::{bootstrap, standard_deviation, wilson};
 use crate::base::table;
-use crate::config::reading;
+use crate::config::{Config, reading};
 use crate::data::dataset;
 use crate::data::dataset::Dataset;
 use crate::store::images::{DatasetRef, HeldOut, ImageRef};
@@ -15,7 +15,6 @@ use crate::store::setting::{RunRef, Setting};
 use crate::store::validation::Validated;
 use crate::task::direction::Assignment;
 use crate::task::grouping::{Group, Split};
-use crate::task::stimulus::StimulusParams;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -212,9 +211,9 @@ impl RobotReport {
 }
 
 impl EvalFile {
-    /// Of robots of these runs, all of which see images together as said.
+    /// Of robots of these runs; together they see images and have tasks as a config says.
     pub(crate) fn new(
-        (sources, stimulus): (&[Source], StimulusParams),
+        (sources, together): (&[Source], &Config),
         (selected, split, seed, threshold): (String, HeldOut, u64, f64),
         control_steps: u32,
         images: &[ImageRef],
@@ -228,7 +227,11 @@ impl EvalFile {
             run: first.map_or(String::new(), |run| run.name.clone()),
             run_seed: first.map_or(0, |run| run.config.seed),
             runs: sources.iter().map(|source| RunRef::new(&source.run)).collect(),
-            setting: first.map(|run| Setting { stimulus, ..Setting::new(run) }),
+            setting: first.map(|run| Setting {
+                stimulus: together.stimulus,
+                task: together.task.clone(),
+                ..Setting::new(run)
+            }),
             selected,
             dataset: first.map_or(String::new(), |run| run.dataset.name.clone()),
             test_sha256,

@@ -174,9 +174,14 @@ impl Selection {
         seed: u64,
     ) -> Result<Vec<Chosen<'a>>, Error> {
         let by_task = || {
-            let tasks = sources.first().map_or(&[][..], |source| &source.run.dimensions.tasks);
+            let mut tasks: Vec<&String> = Vec::new();
+            for task in sources.iter().flat_map(|source| &source.run.dimensions.tasks) {
+                if !tasks.contains(&task) {
+                    tasks.push(task);
+                }
+            }
             let of = |task: &String| fittest.iter().filter(|c| c.robot.task == *task).copied().collect();
-            tasks.iter().map(of).collect::<Vec<Vec<Chosen>>>()
+            tasks.into_iter().map(of).collect::<Vec<Vec<Chosen>>>()
         };
         match self {
             Selection::All | Selection::Validated(_) => Ok(fittest),
