@@ -4,11 +4,10 @@
 use crate::base::observer::Generation;
 use crate::base::text::one_line;
 use crate::view::console::{Console, Mode, lock};
-use crate::view::progress::{Pacer, count_line, generation_line};
+use crate::view::progress::{Pacer, Recent, count_line, generation_line};
 use indicatif::ProgressBar;
 use serde::Serialize;
 use std::sync::Mutex;
-use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 
 /// A line that is rewritten on a terminal, and repeated from time to time elsewhere.
@@ -52,20 +51,24 @@ impl Drop for Line<'_> {
 
 /// Progress of an evolution; the line goes when this is dropped.
 pub struct Bar<'c> {
-    begin: Mutex<Option<Generation>>,
+    recent: Mutex<Option<Recent<Generation>>>,
     line: Line<'c>,
 }
 
 impl<'c> Bar<'c> {
     pub(super) fn new(console: &'c Console, total: u64) -> Self {
-        Bar { begin: Mutex::new(None), line: Line::new(console, total) }
+        Bar { recent: Mutex::new(None), line: Line::new(console, total) }
     }
 
     /// Shows how far it is (JSON: an event `generation`). The first call counts as the beginning: a
     /// resumed run calls it once before it goes on.
     pub fn update(&self, progress: &Generation) {
-        let begin = *lock(&self.begin).get_or_insert(*progress);
-        self.line.show(progress.done, |seconds| generation_line(progress, &begin, seconds));
+        self.line.show(progress.done, |seconds| {
+            let mut recent = lock(&self.recent);
+            let recent = recent.get_or_insert(Recent::new(seconds, *progress));
+            let (seconds, before) = recent.since(seconds, *progress, |now| now.done);
+            generation_line(progress, &before, seconds)
+        });
         self.line.console.event("generation", progress);
     }
 }
@@ -75,7 +78,7 @@ pub struct Counter<'c> {
     label: String,
     unit: String,
     line: Line<'c>,
-    begin: AtomicU64,
+    recent: Mutex<Recent<u64>>,
 }
 
 impl<'c> Counter<'c> {
@@ -84,13 +87,13 @@ impl<'c> Counter<'c> {
             label: label.into(),
             unit: unit.into(),
             line: Line::new(console, total),
-            begin: AtomicU64::new(0),
+            recent: Mutex::new(Recent::new(0.0, 0)),
         }
     }
 
     /// Shows that `known` of the things were done before.
     pub fn go_on_from(&self, known: u64) {
-        self.begin.store(known, Ordering::Relaxed);
+        *lock(&self.recent) = Recent::new(self.line.begin.elapsed().as_secs_f64(), known);
         self.update(known);
     }
 
@@ -105,8 +108,10 @@ impl<'c> Counter<'c> {
             unit: &'a str,
         }
         let (label, unit, total) = (self.label.as_str(), self.unit.as_str(), self.line.total);
-        let begin = self.begin.load(Ordering::Relaxed);
-        self.line.show(done, |seconds| count_line(label, [begin, done, total], unit, seconds));
+        self.line.show(done, |seconds| {
+            let (seconds, before) = lock(&self.recent).since(seconds, done, |done| *done);
+            count_line(label, [before, done, total], unit, seconds)
+        });
         let is_json = self.line.console.mode() == Mode::Json;
         if is_json && self.line.is_due(done, self.line.begin.elapsed().as_secs_f64()) {
             self.line.console.event("progress", &Count { label, done, total, unit });

@@ -3,32 +3,58 @@
 use crate::base::number;
 use crate::base::observer::Generation;
 
-/// How far an evolution is, in one line, given its beginning (of this session: a resumed run has
-/// done some generations already) and the seconds since.
-pub fn generation_line(now: &Generation, begin: &Generation, seconds: f64) -> String {
+/// Seconds after which speed is measured anew, and how much must be done by then.
+const ANEW: (f64, u64) = (60.0, 10);
+
+/// Where something was one or two minutes ago, or when it began: speed and remaining time are
+/// measured from there, since work is not evenly fast and may have been suspended.
+#[derive(Clone, Copy, Debug)]
+pub struct Recent<T> {
+    marks: [(f64, T); 2],
+}
+
+impl<T: Copy> Recent<T> {
+    /// It begins after so many seconds.
+    pub fn new(seconds: f64, begin: T) -> Self {
+        Recent { marks: [(seconds, begin); 2] }
+    }
+
+    /// Seconds from where it was to now, and what it was then; `done` counts what is done.
+    pub fn since(&mut self, seconds: f64, now: T, done: impl Fn(&T) -> u64) -> (f64, T) {
+        let [_, (then, mark)] = self.marks;
+        if seconds - then >= ANEW.0 && done(&now).saturating_sub(done(&mark)) >= ANEW.1 {
+            self.marks = [(then, mark), (seconds, now)];
+        }
+        let [(then, mark), _] = self.marks;
+        (seconds - then, mark)
+    }
+}
+
+/// How far an evolution is, in one line, given where it was some seconds ago.
+pub fn generation_line(now: &Generation, before: &Generation, seconds: f64) -> String {
     let best = now.best.map_or("none".into(), |best| number::fixed(best, 2));
-    let rate = rate(now.evaluations.saturating_sub(begin.evaluations), seconds);
+    let rate = rate(now.evaluations.saturating_sub(before.evaluations), seconds);
     // The speed last: it is what a narrow terminal cuts off.
     format!(
         "generation {}/{} · best {best} · coverage {} %{} · {rate} evaluations/s",
         now.done,
         now.total,
         number::percent(now.coverage),
-        left(begin.done, now.done, now.total, seconds)
+        left(before.done, now.done, now.total, seconds)
     )
 }
 
 /// How far some counted thing is, in one line: images, robots or, with the unit "bytes", megabytes.
-/// `begin` of them were done before.
-pub fn count_line(label: &str, [begin, done, total]: [u64; 3], unit: &str, seconds: f64) -> String {
-    let end = left(begin, done, total, seconds);
+/// `before` of them were done some seconds ago.
+pub fn count_line(label: &str, [before, done, total]: [u64; 3], unit: &str, seconds: f64) -> String {
+    let end = left(before, done, total, seconds);
     if unit == "bytes" {
         let mega = |bytes: f64| number::fixed(bytes / 1e6, 1);
-        let speed = if seconds > 0.0 { done as f64 / seconds } else { 0.0 };
+        let speed = if seconds > 0.0 { done.saturating_sub(before) as f64 / seconds } else { 0.0 };
         let [done, total, speed] = [done as f64, total as f64, speed].map(mega);
         return format!("{label} {done}/{total} MB · {speed} MB/s{end}");
     }
-    format!("{label} {done}/{total} {unit} · {} {unit}/s{end}", rate(done.saturating_sub(begin), seconds))
+    format!("{label} {done}/{total} {unit} · {} {unit}/s{end}", rate(done.saturating_sub(before), seconds))
 }
 
 fn rate(count: u64, seconds: f64) -> String {
@@ -36,8 +62,8 @@ fn rate(count: u64, seconds: f64) -> String {
     number::fixed(rate, if rate < 10.0 { 1 } else { 0 })
 }
 
-fn left(begin: u64, done: u64, total: u64, seconds: f64) -> String {
-    let (did, todo) = (done.saturating_sub(begin), total.saturating_sub(done));
+fn left(before: u64, done: u64, total: u64, seconds: f64) -> String {
+    let (did, todo) = (done.saturating_sub(before), total.saturating_sub(done));
     if did == 0 || todo == 0 {
         return String::new();
     }
@@ -107,6 +133,21 @@ mod tests {
             count_line("x", [40, 45, 50], "rollouts", 5.0),
             "x 45/50 rollouts · 1.0 rollouts/s · 5 s left"
         );
+    }
+
+    #[test]
+    fn speed_is_that_of_the_last_minutes() {
+        let mut recent = Recent::new(5.0, 40);
+        let mut since = |seconds: f64, done: u64| recent.since(seconds, done, |done| *done);
+        assert_eq!(since(15.0, 60), (10.0, 40));
+        assert_eq!(since(65.0, 100), (60.0, 40));
+        // An hour's pause counts for two minutes of work.
+        assert_eq!(since(3665.0, 101), (3660.0, 40));
+        assert_eq!(since(3670.0, 111), (3605.0, 100));
+        assert_eq!(since(3700.0, 161), (3635.0, 100));
+        assert_eq!(since(3730.0, 211), (60.0, 111));
+        // Slow things are measured over as long as it takes.
+        assert_eq!(since(7000.0, 215), (3330.0, 111));
     }
 
     #[test]
