@@ -178,6 +178,11 @@ fn a_training_is_told_as_one_and_its_command_trains() {
     sandbox.run("report -q -a gallery:zero_one-1 --rollouts 0 -o page.html").ended(0, &[]);
     let page = sandbox.read("page.html");
     assert!(page.contains("was trained with morphcog") && !page.contains("for 1 generations"));
+    // It has one robot, which is played at first, and no archive.
+    assert!(page.contains("<h2>The robot</h2>") && page.contains("data-first"));
+    for word in ["class=\"map\"", "QD score", "born in generation", "<h2>Archive</h2>"] {
+        assert!(!page.contains(word), "{word}");
+    }
     let commands = between(&page, "<pre># GAITS: run ", "</pre>")[0];
     let command = commands.lines().nth(1).unwrap().replace("&#39;", "'").replace("&amp;", "&");
     assert!(

@@ -47,15 +47,18 @@ fn about(dossier: &Dossier, robot: &Robot) -> String {
     let counts = robot.voxels;
     let verdict = dossier.findings.audit.as_ref().and_then(|audit| audit.robot(&robot.id));
     let verdict = verdict.map_or(String::new(), |found| format!("; {}", found.conclusion()));
+    let born = match dossier.run.origin {
+        Some(_) => String::new(),
+        None => format!(", born in generation {}", robot.generation),
+    };
     format!(
-        "{} ({}), fitness {}: {} muscle, {} sensor, {} voxels in all, born in generation {}{verdict}.",
+        "{} ({}), fitness {}: {} muscle, {} sensor, {} voxels in all{born}{verdict}.",
         robot.id,
         robot.task,
         number::fixed(robot.objective, 2),
         counts.muscle,
         counts.sensor,
-        counts.total,
-        robot.generation
+        counts.total
     )
 }
 
@@ -64,6 +67,8 @@ pub(super) fn bodies(run: usize, dossier: &Dossier, rollouts: &Rollouts) -> Stri
     let mut fittest: Vec<&Robot> = dossier.run.elites.iter().collect();
     fittest.sort_by(|a, b| b.objective.total_cmp(&a.objective));
     let mut seen = BTreeSet::new();
+    // Of a training, whose robots are not in a map beside.
+    let first = fittest.first().filter(|_| dossier.run.origin.is_some()).map(|robot| robot.id.clone());
     let chosen = fittest.into_iter().take(SHOWN).chain(dossier.most_different(SHOWN + 1));
     let buttons: String = chosen
         .filter(|robot| seen.insert(robot.id.clone()))
@@ -77,7 +82,8 @@ pub(super) fn bodies(run: usize, dossier: &Dossier, rollouts: &Rollouts) -> Stri
                 escape(&robot.task),
                 walks.join(" ")
             );
-            button(run, dossier, rollouts, robot, ("", "", false), &content)
+            let is_first = first.as_ref() == Some(&robot.id);
+            button(run, dossier, rollouts, robot, ("", "", is_first), &content)
         })
         .collect();
     format!("<div class=\"bodies\">{buttons}</div>\n")

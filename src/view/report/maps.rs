@@ -6,7 +6,7 @@ use crate::store::run::Robot;
 use crate::view::error::PictureError;
 use crate::view::html::{escape, packed};
 use crate::view::plot::{below, sequential};
-use crate::view::report::bodies::button;
+use crate::view::report::bodies::{bodies, button};
 use crate::view::walk::Walk;
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
@@ -16,6 +16,10 @@ use std::collections::{BTreeMap, BTreeSet};
 const MOST_BYTES: usize = 13_000_000;
 /// Most bytes of a single one.
 const MOST_OF_ONE: usize = 1_500_000;
+
+/// Where the chosen robot walks.
+const PLAYER: &str = "<div>\n<p class=\"about\" aria-live=\"polite\"></p>\n<iframe title=\"The chosen \
+     robot\"></iframe>\n</div>\n";
 
 /// Rollouts, packed, by run and robot.
 pub(super) struct Rollouts(BTreeMap<(usize, String), String>);
@@ -158,7 +162,10 @@ pub(super) fn archive(number: usize, dossier: &Dossier, rollouts: &Rollouts) -> 
         }
         out += "</div>\n";
     }
-    out += "</div>\n<div>\n<p class=\"about\" aria-live=\"polite\"></p>\n<iframe title=\"The chosen \
-     robot\"></iframe>\n</div>\n</div>\n";
-    out
+    out + "</div>\n" + PLAYER + "</div>\n"
+}
+
+/// The robots of a training with their player.
+pub(super) fn robots(number: usize, dossier: &Dossier, rollouts: &Rollouts) -> String {
+    format!("<div class=\"archive\">\n{}{PLAYER}</div>\n", bodies(number, dossier, rollouts))
 }

@@ -80,9 +80,10 @@ fn figure(figure: &Figure, class: &str) -> String {
 /// What several runs have in common.
 fn overview(runs: &[Dossier], together: &Findings) -> String {
     let mut out = "<section id=\"together\">\n<h2>All runs together</h2>\n".to_string();
-    out += &tables::runs(runs);
+    let are_trained = runs.iter().all(|dossier| dossier.run.origin.is_some());
+    out += &if are_trained { tables::trainings(runs) } else { tables::runs(runs) };
     let progress: Option<Vec<_>> = runs.iter().map(|dossier| dossier.progress.clone()).collect();
-    if let Some(progress) = progress {
+    if let Some(progress) = progress.filter(|_| !are_trained) {
         out += &format!("<div class=\"figures\">{}</div>\n", figure(&plot::progress(&progress), "column"));
     }
     out += &findings(together);
@@ -95,19 +96,25 @@ fn run(number: usize, dossier: &Dossier, rollouts: &Rollouts, is_one_of_several:
     let heading = |what: &str| format!("<h2>{}{what}</h2>\n", escape(&name));
     let mut out = format!("<section id=\"run{number}\" data-run=\"{number}\">\n{}", heading("What was run"));
     out += &tables::about(dossier);
-    out += &heading("Archive");
-    out += &maps::archive(number, dossier, rollouts);
-    out += &heading("The fittest, and the most different");
-    out += "<p>The fittest robots, then those whose bodies differ most from each other. Press one to watch it \
-     above.</p>\n";
-    out += &bodies::bodies(number, dossier, rollouts);
-    let mut figures = String::new();
-    if let Some(progress) = &dossier.progress {
-        figures += &figure(&plot::progress(std::slice::from_ref(progress)), "column");
+    if dossier.run.origin.is_some() {
+        // It has one robot, and no archive that came along.
+        out += &heading("The robot");
+        out += &maps::robots(number, dossier, rollouts);
+    } else {
+        out += &heading("Archive");
+        out += &maps::archive(number, dossier, rollouts);
+        out += &heading("The fittest, and the most different");
+        out += "<p>The fittest robots, then those whose bodies differ most from each other. Press one to watch \
+         it above.</p>\n";
+        out += &bodies::bodies(number, dossier, rollouts);
+        let mut figures = String::new();
+        if let Some(progress) = &dossier.progress {
+            figures += &figure(&plot::progress(std::slice::from_ref(progress)), "column");
+        }
+        let tasks = dossier.run.dimensions.tasks.len();
+        figures += &figure(&plot::archive(&dossier.run), if tasks > 1 { "page" } else { "column" });
+        out += &format!("{}<div class=\"figures\">\n{figures}</div>\n", heading("Progress"));
     }
-    let tasks = dossier.run.dimensions.tasks.len();
-    figures += &figure(&plot::archive(&dossier.run), if tasks > 1 { "page" } else { "column" });
-    out += &format!("{}<div class=\"figures\">\n{figures}</div>\n", heading("Progress"));
     out += &findings(&dossier.findings);
     out += &heading("Methods");
     out += &words::methods(dossier);

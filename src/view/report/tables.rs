@@ -4,7 +4,7 @@ use crate::analysis::published;
 use crate::base::number;
 use crate::base::number::percent;
 use crate::baseline::curve::Crossing;
-use crate::commands::report::Dossier;
+use crate::commands::report::{Dossier, Findings};
 use crate::sim::InstructionSet;
 use crate::store::audit::{AuditFile, Verdict};
 use crate::store::capacity::CapacityFile;
@@ -60,6 +60,30 @@ pub(super) fn runs(runs: &[Dossier]) -> String {
     table(&headers, runs.iter().map(row))
 }
 
+/// A line per training.
+pub(super) fn trainings(runs: &[Dossier]) -> String {
+    let row = |dossier: &Dossier| {
+        let run = &dossier.run;
+        let Findings { eval, audit, .. } = &dossier.findings;
+        let robot = run.elites.first();
+        let tested = robot.and_then(|robot| {
+            eval.as_ref()?.robots.iter().find(|tested| (&tested.id, &tested.task) == (&robot.id, &robot.task))
+        });
+        let audited = robot.and_then(|robot| audit.as_ref()?.robot(&robot.id));
+        vec![
+            words::name(dossier),
+            run.dimensions.tasks.join(", "),
+            or_none(run.stats.obj_max, |best| number::fixed(best, 2)),
+            or_none(tested, |tested| percent(tested.accuracy)),
+            or_none(tested, |tested| percent(tested.balanced_accuracy)),
+            or_none(audited, |found| found.conclusion()),
+            or_none(dossier.effort(), |(seconds, _)| duration(seconds)),
+        ]
+    };
+    let headers = ["training", "task", "fitness", "test, right %", "balanced %", "audit", "time"];
+    table(&headers, runs.iter().map(row))
+}
+
 /// What was run: words and values.
 pub(super) fn about(dossier: &Dossier) -> String {
     let run = &dossier.run;
@@ -82,27 +106,38 @@ pub(super) fn about(dossier: &Dossier) -> String {
     let effort = or_none(dossier.effort(), |(seconds, evaluations)| {
         format!("{} evaluations in {}", number::fixed(evaluations, 0), duration(seconds))
     });
-    let rows = [
-        ("Run", words::name(dossier)),
-        ("Tasks", run.dimensions.tasks.join(", ")),
-        ("Data", format!("{}, training split SHA-256 {}", run.dataset.name, run.dataset.train_sha256)),
-        ("Training images", format!("{}{more}", images.join(", "))),
-        ("Generations", format!("{} of {}", run.generations, run.config.generations)),
-        ("Effort", effort),
-        (
-            "Archive",
-            format!(
-                "{} of {} cells (coverage {} %), QD score {}, best fitness {}",
+    let time = or_none(dossier.effort(), |(seconds, _)| duration(seconds));
+    let best = or_none(stats.obj_max, |best| run.in_units(best));
+    let came_about = match &run.origin {
+        Some(origin) => {
+            let margin = run.config.stimulus.margin;
+            let window = match origin.windows {
+                0 => format!("stimulus.margin = {margin}"),
+                tried => format!("stimulus.margin = {margin}, the best of {tried}"),
+            };
+            let gaits = format!("{} after {} generations", origin.name, origin.generations);
+            vec![("Gaits", gaits), ("Window", window), ("Fitness", best), ("Time", time)]
+        }
+        None => {
+            let archive = format!(
+                "{} of {} cells (coverage {} %), QD score {}, best fitness {best}",
                 stats.num_elites,
                 run.dimensions.possible_cells,
                 percent(stats.coverage),
                 number::fixed(stats.qd_score, 1),
-                or_none(stats.obj_max, |best| run.in_units(best))
-            ),
-        ),
-        ("Made with", format!("morphcog {}", run.program_version)),
-        ("Report made on", machine),
+            );
+            let generations = format!("{} of {}", run.generations, run.config.generations);
+            vec![("Generations", generations), ("Effort", effort), ("Archive", archive)]
+        }
+    };
+    let mut rows = vec![
+        ("Run", words::name(dossier)),
+        ("Tasks", run.dimensions.tasks.join(", ")),
+        ("Data", format!("{}, training split SHA-256 {}", run.dataset.name, run.dataset.train_sha256)),
+        ("Training images", format!("{}{more}", images.join(", "))),
     ];
+    rows.extend(came_about);
+    rows.extend([("Made with", format!("morphcog {}", run.program_version)), ("Report made on", machine)]);
     let rows: String = rows
         .into_iter()
         .map(|(key, value)| format!("<tr><th scope=\"row\">{key}</th><td>{}</td></tr>\n", escape(&value)))
