@@ -67,8 +67,8 @@ pub(super) fn bodies(run: usize, dossier: &Dossier, rollouts: &Rollouts) -> Stri
     let mut fittest: Vec<&Robot> = dossier.run.elites.iter().collect();
     fittest.sort_by(|a, b| b.objective.total_cmp(&a.objective));
     let mut seen = BTreeSet::new();
-    // Of a training, whose robots are not in a map beside.
-    let first = fittest.first().filter(|_| dossier.run.origin.is_some()).map(|robot| robot.id.clone());
+    // A training has one robot, and no map from which it would be played.
+    let is_first = dossier.run.origin.is_some();
     let chosen = fittest.into_iter().take(SHOWN).chain(dossier.most_different(SHOWN + 1));
     let buttons: String = chosen
         .filter(|robot| seen.insert(robot.id.clone()))
@@ -82,7 +82,6 @@ pub(super) fn bodies(run: usize, dossier: &Dossier, rollouts: &Rollouts) -> Stri
                 escape(&robot.task),
                 walks.join(" ")
             );
-            let is_first = first.as_ref() == Some(&robot.id);
             button(run, dossier, rollouts, robot, ("", "", is_first), &content)
         })
         .collect();
