@@ -7,7 +7,7 @@ mod common;
 use common::program::{Sandbox, TINY, said};
 use common::server::Server;
 use morphcog::store::eval::EvalFile;
-use std::fs::{remove_dir_all, rename};
+use std::fs::{remove_dir_all, remove_file, rename};
 
 /// An IDX dataset of zeros and ones: noise with a bar, of the first ones upright; `seed` decides
 /// which noise.
@@ -135,6 +135,28 @@ fn an_evaluation_on_other_images_than_the_runs_is_refused() {
     assert_eq!((said.out.as_str(), sandbox.read("runs/one/eval.json")), ("", before));
     // Networks on other images are worth nothing beside its robots.
     sandbox.run(COMMANDS[7]).ended(3, &["another SHA-256", "runs/one/eval.json", "--data"]);
+}
+
+#[test]
+fn test_images_are_needed_only_where_they_are_shown() {
+    let sandbox = with_run();
+    for name in ["images-idx3-ubyte", "labels-idx1-ubyte"] {
+        remove_file(sandbox.path(&format!("there/t10k-{name}"))).unwrap();
+    }
+    for command in [
+        "eval -a runs/one --images 8 --cycles 1 --robots best-validation:1 --validation 40 --split validation",
+        "audit -a runs/one --robots top:1",
+        "replay -a runs/one --images train:3 -o replay.png",
+        "report runs/one -o report.html --rollouts 0",
+        "evolve -c shapes.toml -o runs/one -g 7 --resume",
+    ] {
+        sandbox.run(command).ended(0, &[]);
+    }
+    for command in
+        ["eval -a runs/one --images 8 --cycles 1", "replay -a runs/one --images test:3 -o replay.png"]
+    {
+        sandbox.run(command).ended(3, &["t10k-images-idx3-ubyte"]);
+    }
 }
 
 #[test]

@@ -197,8 +197,8 @@ impl Networks<'_> {
     }
 
     /// Says how many there are to train, and how many are known.
-    fn begin(&mut self, splits: &[&grouping::Split]) {
-        let Networks { config, known, .. } = &*self;
+    fn begin(&self, splits: &[&grouping::Split]) {
+        let Networks { config, known, .. } = self;
         let of_one = |(split, kind): (&grouping::Split, Kind)| -> usize {
             let key = self.key(split, kind);
             config.sizes().map(|size| known.of(&key, size).len().min(config.trainings)).sum()
@@ -210,7 +210,7 @@ impl Networks<'_> {
         let kept = if before > 0 { format!(" ({before} known from before)") } else { String::new() };
         let label = format!("training {total} networks{kept}:");
         self.observer.begins(&Work { label, total, known: before, unit: "trainings" });
-        self.done = AtomicU64::new(before);
+        self.done.store(before, Ordering::Relaxed);
     }
 
     /// The curves of a task, whose robots have this accuracy; `None` if it was stopped.

@@ -39,7 +39,7 @@ impl Images {
         let dataset = whereabouts(options).load(&setting.data, &Split::ALL)?;
         let [train, test] =
             Split::ALL.map(|split| dataset.fingerprint(split).expect("both splits were loaded just now"));
-        if train != setting.train_sha256 || test != report.test_sha256 {
+        if train != setting.train_sha256 || report.test_sha256.as_ref() != Some(&test) {
             let text = format!(
                 "{}: the images here are not those of {} (another SHA-256)",
                 dataset.place(),

@@ -105,12 +105,13 @@ pub fn eval(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Re
         })
     };
     let dataset = match other {
+        None if options.split == HeldOut::Validation => own(&[Split::Train])?,
         None => own(&Split::ALL)?,
         Some(name) => whereabouts.load(&config.data.of(name), &Split::ALL)?,
     };
     let robots = skilled(options.robots.of(&sources, options.seed)?, &grouping, observer)?;
     let shown = HeldOutImages::draw(config, &sources, &dataset, options)?;
-    let test_sha256 = dataset.fingerprint(Split::Test).expect("both splits are loaded");
+    let test_sha256 = dataset.fingerprint(Split::Test);
     let steps = checked_steps(config, options.cycles)?;
     let asked = (options.robots.describe(), options.split, options.seed, threshold);
     let mut report = EvalFile::new((&sources, config), asked, steps, &shown.images, test_sha256);

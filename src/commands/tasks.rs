@@ -16,7 +16,7 @@ use crate::store::audit::{AuditFile, RobotAudit};
 use crate::store::eval::EvalFile;
 use crate::store::folder::IfExists;
 use crate::store::images::{HeldOut, HowMany};
-use crate::store::lock::{self, Lock, Refusal};
+use crate::store::lock::{self, Lock};
 use crate::store::names::{AUDIT_JSON, DATA_FOLDER, METRICS, RUN_JSON, TASK_JSON, TASK_LOCK};
 use crate::store::robots::{Selection, Source};
 use crate::store::run::Robot;
@@ -239,13 +239,9 @@ pub fn run(task: &Task, place: &Place, stop: &AtomicBool, observer: &dyn Observe
     let folder = place.folder(task);
     std::fs::create_dir_all(&folder).map_err(|error| Error::writing(&folder, &error))?;
     let lock = folder.join(TASK_LOCK);
-    let _lock = Lock::take(&lock).map_err(|refusal| match refusal {
-        Refusal::Held(holder) => {
-            let by = holder.map_or(String::new(), |holder| format!(" ({holder})"));
-            Error::occupied(format!("{}: another process is at this task{by}", folder.display()))
-                .hint("let it end, or stop it".to_string())
-        }
-        Refusal::Io(error) => Error::writing(&lock, &error),
+    let _lock = Lock::take(&lock, stop, observer).map_err(|refusal| {
+        let held = format!("{}: another process is at this task", folder.display());
+        refusal.into_error(&lock, &held, "let it end, or stop it")
     })?;
     let path = folder.join(TASK_JSON);
     let known = TaskFile::read(&path)?;

@@ -4,6 +4,7 @@ use crate::base::error::Error;
 use crate::base::files::read_text;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
+use serde_json::Value;
 use std::path::Path;
 
 /// How a config is written.
@@ -13,19 +14,58 @@ pub(crate) enum Format {
     Json,
 }
 
-/// Reads a value; `name` is the file's, for messages.
-pub(crate) fn read<T: DeserializeOwned>(text: &str, format: Format, name: &str) -> Result<T, Error> {
-    match format {
+/// Reads settings; `name` is the file's, for messages.
+pub(crate) fn read<T: Serialize + DeserializeOwned>(
+    text: &str,
+    format: Format,
+    name: &str,
+) -> Result<T, Error> {
+    let settings = match format {
         Format::Toml => {
             let reader = toml::Deserializer::parse(text)
                 .map_err(|error| refused(name, line_at(text, error.span()), "", error.message()))?;
             serde_path_to_error::deserialize(reader).map_err(|error| {
                 let inner = error.inner();
                 refused(name, line_at(text, inner.span()), &error.path().to_string(), inner.message())
-            })
+            })?
         }
-        Format::Json => read_json(text, name),
+        Format::Json => read_json(text, name)?,
+    };
+    let given = match format {
+        Format::Toml => toml::from_str::<Value>(text).ok(),
+        Format::Json => serde_json::from_str(text.trim_start_matches('\u{feff}')).ok(),
+    };
+    match given.and_then(|given| listed(&given, &settings)) {
+        None => Ok(settings),
+        Some(key) => Err(placed(Error::input(no_list(&key)).of(&key), text, format, name)),
     }
+}
+
+/// The key of a table that is given as a list: serde takes a list for the values of a table's keys
+/// in their order, which nobody means who writes `[[body]]`.
+fn listed<T: Serialize>(given: &Value, settings: &T) -> Option<String> {
+    fn within(given: &Value, read: &Value) -> Option<Vec<String>> {
+        let keyed =
+            |(key, found): (String, Option<Vec<String>>)| found.map(|inner| [vec![key], inner].concat());
+        match (given, read) {
+            (Value::Array(_), Value::Object(_)) => Some(Vec::new()),
+            (Value::Array(given), Value::Array(read)) => {
+                let pairs = given.iter().zip(read).zip(1..);
+                pairs.map(|((given, read), n)| (format!("{n}"), within(given, read))).find_map(keyed)
+            }
+            (Value::Object(given), Value::Object(read)) => {
+                let pairs = given.iter().filter_map(|(key, value)| Some((key, value, read.get(key)?)));
+                pairs.map(|(key, given, read)| (key.clone(), within(given, read))).find_map(keyed)
+            }
+            _ => None,
+        }
+    }
+    let read = serde_json::to_value(settings).ok()?;
+    within(given, &read).map(|parts| parts.join("."))
+}
+
+fn no_list(key: &str) -> String {
+    format!("{key}: expected a table, found a list")
 }
 
 /// Reads an object from JSON; `name` is the file's, for messages.
@@ -186,8 +226,12 @@ pub(crate) fn changed<T: Serialize + DeserializeOwned>(
             set::<T>(&mut root, assignment)
                 .map_err(|text| Error::usage(format!("--set {assignment}: {text}")).of(SET))?;
         }
+        let given = serde_json::to_value(&root).ok();
         let settings: T = serde_path_to_error::deserialize(root)
             .map_err(|error| Error::usage(spoken(error.inner().message())).of(&error.path().to_string()))?;
+        if let Some(key) = given.and_then(|given| listed(&given, &settings)) {
+            return Err(Error::usage(no_list(&key)).of(&key));
+        }
         check(&settings).map(|()| settings)
     };
     let all: Vec<&String> = overrides.iter().collect();
@@ -370,6 +414,26 @@ mod tests {
         assert!(toml_error("name = 'a'\n[inner]\ncount = 256\n").starts_with("own.toml:3: inner.count: "));
         assert!(toml_error("name = 'a'\nname = = 3\n").starts_with("own.toml:2: "));
         assert!(toml_error("").contains("name"));
+    }
+
+    #[test]
+    fn a_list_is_no_table() {
+        assert_eq!(
+            toml_error("name = 'a'\ninner = [3, [1.0]]\n"),
+            "own.toml:2: inner: expected a table, found a list"
+        );
+        assert_eq!(
+            json_error("{\"name\": \"a\", \"inner\": []}"),
+            "own.json: inner: expected a table, found a list"
+        );
+        let outer: Outer = read("name = 'a'\ninner.list = [1, 2]\n", Format::Toml, "own.toml").unwrap();
+        assert_eq!(outer.inner.list, [1.0, 2.0]);
+        let set = |text: &str| changed(outer.clone(), &[text.to_string()], |_| Ok(()), |error| error);
+        assert_eq!(
+            set("inner=[3]").unwrap_err().message,
+            "--set inner=[3]: inner: expected a table, found a list"
+        );
+        assert_eq!(set("inner.list=[3]").unwrap().inner.list, [3.0]);
     }
 
     #[test]

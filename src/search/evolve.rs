@@ -103,7 +103,10 @@ pub fn evolve(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> 
     mutations.random_immigrant(0, 0).map_err(unmade)?;
     // Open. Only the leading rank has a folder.
     let ranks = options.ranks;
-    let folder = ranks.leads().then(|| RunFolder::open(&options.out, options.if_exists)).transpose()?;
+    let folder = ranks
+        .leads()
+        .then(|| RunFolder::open(&options.out, options.if_exists, stop, observer))
+        .transpose()?;
     let saved = match &folder {
         Some(folder) if resumes => resume::saved(folder, config, &training, |text| observer.warning(&text))?,
         _ => None,

@@ -147,7 +147,7 @@ pub fn train(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> R
         );
     }
     apart(&options.out, &source.path)?;
-    let folder = RunFolder::open(&options.out, options.if_exists)?;
+    let folder = RunFolder::open(&options.out, options.if_exists, stop, observer)?;
     let write = |name: &str, content: &[u8]| {
         let path = folder.path().join(name);
         write_atomically(&path, content).map_err(|error| Error::writing(&path, &error))

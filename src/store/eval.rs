@@ -51,8 +51,9 @@ pub struct EvalFile {
     pub selected: String,
     /// Name of the dataset.
     pub dataset: String,
-    /// SHA-256 of its test split.
-    pub test_sha256: String,
+    /// SHA-256 of its test split, if images of that were shown.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub test_sha256: Option<String>,
     /// What the robots were trained on, if that is another dataset.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub trained_on: Option<DatasetRef>,
@@ -217,7 +218,7 @@ impl EvalFile {
         (selected, split, seed, threshold): (String, HeldOut, u64, f64),
         control_steps: u32,
         images: &[ImageRef],
-        test_sha256: String,
+        test_sha256: Option<String>,
     ) -> Self {
         let first = sources.first().map(|source| &source.run);
         EvalFile {

@@ -3,8 +3,9 @@
 use crate::base::error::Error;
 use crate::base::files::{check_writable, remove_half_written};
 use crate::base::named;
+use crate::base::observer::Observer;
 use crate::store::lock;
-use crate::store::lock::{Lock, Refusal};
+use crate::store::lock::Lock;
 use crate::store::names::{
     AUDIT_JSON, CAPACITY_JSON, CHECKPOINTS, CONFIG, DATA_FOLDER, ELITES, EVAL_JSON, EVAL_VALIDATION_JSON,
     LOCK, METRICS, RESPONSE_JSON, RUN_JSON, TASK_JSON, TASK_LOCK, TEAM_JSON, TRAINING_JSON, VALIDATION_JSON,
@@ -12,6 +13,7 @@ use crate::store::names::{
 use crate::store::run::RunFile;
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
 
 /// The folder in the present one that runs go to if nothing else is said.
 pub const RUNS: &str = "runs";
@@ -50,8 +52,13 @@ impl RunFolder {
     ///
     /// # Errors
     /// If another process uses it, or it holds a run and `if_exists` says to refuse, or it cannot
-    /// be written.
-    pub fn open(path: &Path, if_exists: IfExists) -> Result<Self, Error> {
+    /// be written, or it is stopped while it waits for a sign of life of another process.
+    pub fn open(
+        path: &Path,
+        if_exists: IfExists,
+        stop: &AtomicBool,
+        observer: &dyn Observer,
+    ) -> Result<Self, Error> {
         std::fs::create_dir_all(path).map_err(|error| Error::writing(path, &error))?;
         let refuse_run = || match if_exists {
             IfExists::Refuse => vacant(path),
@@ -59,13 +66,9 @@ impl RunFolder {
         };
         refuse_run()?;
         let lock = path.join(LOCK);
-        let lock = Lock::take(&lock).map_err(|refusal| match refusal {
-            Refusal::Held(holder) => {
-                let by = holder.map_or(String::new(), |holder| format!(" ({holder})"));
-                let text = format!("{}: another morphcog is using this run folder{by}", path.display());
-                Error::occupied(text).hint("wait for it to end, or write elsewhere with --out".to_string())
-            }
-            Refusal::Io(error) => Error::writing(&lock, &error),
+        let lock = Lock::take(&lock, stop, observer).map_err(|refusal| {
+            let held = format!("{}: another morphcog is using this run folder", path.display());
+            refusal.into_error(&lock, &held, "wait for it to end, or write elsewhere with --out")
         })?;
         // Another process may have left its run while this one waited for the lock.
         refuse_run()?;

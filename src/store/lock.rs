@@ -5,11 +5,15 @@
 //! names host and process, and a heartbeat counts up in it: another process waits until it knows
 //! whether the heart still beats.
 
+use crate::base::error::Error;
+use crate::base::observer::Observer;
+use crate::base::stop::{Stopped, check};
 use gethostname::gethostname;
 use serde::{Deserialize, Serialize};
 use std::fs::{File, TryLockError};
 use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Condvar, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant, SystemTime};
@@ -63,6 +67,8 @@ pub enum State {
 pub enum Refusal {
     /// Another process has it; its name, if the file says it.
     Held(Option<Holder>),
+    /// It was told to stop while it waited.
+    Stopped,
     /// The file cannot be made or written.
     Io(io::Error),
 }
@@ -70,6 +76,26 @@ pub enum Refusal {
 impl From<io::Error> for Refusal {
     fn from(error: io::Error) -> Self {
         Refusal::Io(error)
+    }
+}
+
+impl From<Stopped> for Refusal {
+    fn from(_: Stopped) -> Self {
+        Refusal::Stopped
+    }
+}
+
+impl Refusal {
+    /// The error for the user, if `held` says what another process does, and `hint` what to do.
+    pub fn into_error(self, path: &Path, held: &str, hint: &str) -> Error {
+        match self {
+            Refusal::Held(holder) => {
+                let by = holder.map_or(String::new(), |holder| format!(" ({holder})"));
+                Error::occupied(format!("{held}{by}")).hint(hint.to_string())
+            }
+            Refusal::Stopped => Stopped.into(),
+            Refusal::Io(error) => Error::writing(path, &error),
+        }
     }
 }
 
@@ -97,24 +123,34 @@ pub struct Lock {
 }
 
 impl Lock {
-    /// Takes a lock. If the file names a process that may be alive on another machine, it waits up
-    /// to 25 seconds for its next heartbeat.
+    /// Takes a lock. If the file names a process that may be alive on another machine, it says so,
+    /// and waits up to 25 seconds for its next heartbeat.
     ///
     /// # Errors
-    /// If another process has it; what the system says.
-    pub fn take(path: &Path) -> Result<Self, Refusal> {
-        Lock::take_in(path, USUAL)
+    /// If another process has it; if it is stopped while it waits; what the system says.
+    pub fn take(path: &Path, stop: &AtomicBool, observer: &dyn Observer) -> Result<Self, Refusal> {
+        Lock::take_in(path, USUAL, stop, observer)
     }
 
-    fn take_in(path: &Path, manner: Manner) -> Result<Self, Refusal> {
+    fn take_in(
+        path: &Path,
+        manner: Manner,
+        stop: &AtomicBool,
+        observer: &dyn Observer,
+    ) -> Result<Self, Refusal> {
         let file = File::options().create(true).truncate(false).read(true).write(true).open(path)?;
         let is_locked = lock(&file, manner)?;
         let host = gethostname().to_string_lossy().into_owned();
         if let Some(before) = read(path)? {
             // What was on this machine and has no lock any more has ended.
             let has_ended = is_locked && before.host == host;
-            if !has_ended && is_alive(path, &before, manner.dead_after)? {
-                return Err(Refusal::Held(read(path)?));
+            if !has_ended {
+                let seconds = manner.dead_after.as_secs_f64().ceil();
+                let text = format!("{before} was at work here: waiting up to {seconds} s for a sign of life");
+                observer.note(&format!("{}: {text}", path.display()));
+                if is_alive(path, &before, manner.dead_after, stop)? {
+                    return Err(Refusal::Held(read(path)?));
+                }
             }
         }
         let own = Holder { host, process: std::process::id(), beats: 0 };
@@ -216,9 +252,13 @@ fn is_same(a: &Holder, b: &Holder) -> bool {
 }
 
 /// Whether a heart beats, or lets go and is taken by another, within some time.
-fn is_alive(path: &Path, before: &Holder, dead_after: Duration) -> io::Result<bool> {
+///
+/// # Errors
+/// If it is stopped before it knows; what the system says.
+fn is_alive(path: &Path, before: &Holder, dead_after: Duration, stop: &AtomicBool) -> Result<bool, Refusal> {
     let began = Instant::now();
     while began.elapsed() < dead_after {
+        check(stop)?;
         match read(path)? {
             None => return Ok(false),
             Some(now) if now != *before => return Ok(true),
@@ -247,6 +287,7 @@ fn beats(end: &(Mutex<bool>, Condvar), path: &Path, mut own: Holder, beat: Durat
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::base::stop::NEVER;
 
     /// No locks of the system, and a quick heart.
     const WITHOUT: Manner =
@@ -268,14 +309,14 @@ mod tests {
         let path = path(&folder);
         for manner in [USUAL, WITHOUT] {
             assert_eq!(read(&path).ok().flatten(), None);
-            let lock = Lock::take_in(&path, manner).unwrap();
-            let Err(Refusal::Held(Some(holder))) = Lock::take_in(&path, manner) else {
+            let lock = Lock::take_in(&path, manner, &NEVER, &()).unwrap();
+            let Err(Refusal::Held(Some(holder))) = Lock::take_in(&path, manner, &NEVER, &()) else {
                 panic!("{manner:?}: taken twice")
             };
             assert_eq!((holder.process, &holder.host), (std::process::id(), &lock.own.host));
             drop(lock);
             assert_eq!(state(&path).unwrap(), State::Free);
-            drop(Lock::take_in(&path, manner).unwrap());
+            drop(Lock::take_in(&path, manner, &NEVER, &()).unwrap());
         }
     }
 
@@ -285,13 +326,37 @@ mod tests {
         let path = path(&folder);
         elsewhere(&path);
         let began = Instant::now();
-        let lock = Lock::take_in(&path, WITHOUT).unwrap();
+        let lock = Lock::take_in(&path, WITHOUT, &NEVER, &()).unwrap();
         assert!(began.elapsed() >= WITHOUT.dead_after);
         let before = read(&path).unwrap().unwrap();
         std::thread::sleep(WITHOUT.beat * 5);
         assert!(read(&path).unwrap().unwrap().beats > before.beats);
-        assert!(matches!(Lock::take_in(&path, WITHOUT), Err(Refusal::Held(_))));
+        assert!(matches!(Lock::take_in(&path, WITHOUT, &NEVER, &()), Err(Refusal::Held(_))));
         drop(lock);
+    }
+
+    /// Keeps what is noted, and stops at the first note.
+    struct Stopping<'a>(&'a AtomicBool, Mutex<Vec<String>>);
+
+    impl Observer for Stopping<'_> {
+        fn note(&self, text: &str) {
+            self.1.lock().unwrap().push(text.to_string());
+            self.0.store(true, std::sync::atomic::Ordering::Relaxed);
+        }
+    }
+
+    #[test]
+    fn waiting_for_a_process_elsewhere_is_said_and_can_be_stopped() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = path(&folder);
+        elsewhere(&path);
+        let stop = AtomicBool::new(false);
+        let observer = Stopping(&stop, Mutex::default());
+        assert!(matches!(Lock::take(&path, &stop, &observer), Err(Refusal::Stopped)));
+        let notes = observer.1.into_inner().unwrap();
+        assert!(matches!(&notes[..], [note] if note.contains("process 7 on another-machine")), "{notes:?}");
+        // The name stays: nobody knows yet whether that process lives.
+        assert_eq!(read(&path).unwrap().unwrap().process, 7);
     }
 
     #[test]
@@ -303,7 +368,7 @@ mod tests {
         write(&path, &Holder { host: host.clone(), process: 1, beats: 9 }).unwrap();
         assert!(matches!(state(&path).unwrap(), State::Stale(holder) if holder.host == host));
         let began = Instant::now();
-        let _lock = Lock::take(&path).unwrap();
+        let _lock = Lock::take(&path, &NEVER, &()).unwrap();
         assert!(began.elapsed() < Duration::from_secs(5));
     }
 
@@ -323,7 +388,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = path(&folder);
         std::fs::write(&path, b"\0\0\xff").unwrap();
-        let _lock = Lock::take(&path).unwrap();
+        let _lock = Lock::take(&path, &NEVER, &()).unwrap();
         assert_eq!(read(&path).unwrap().unwrap().process, std::process::id());
     }
 }
