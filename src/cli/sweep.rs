@@ -69,13 +69,13 @@ pub(super) fn run(args: SweepArgs, console: &Console) -> Result<(), Error> {
     if asked(&args.what, &tasks, &Command { words, name: &name, place: &place }, console)? {
         return Ok(());
     }
+    tasks::check_folders(&tasks, &place).map_err(|errors| refused(errors, console))?;
     if args.collect {
         let status = tasks::status(&tasks, &place)?;
         let warn = |text: &str| console.warning(text);
         let collected = collect::collect(&tasks, &status, &place, &warn)?;
         return sweeps::collected(console, &name, &collected, &status, &out);
     }
-    tasks::check_folders(&tasks, &place).map_err(|errors| refused(errors, console))?;
     let stop = signals::stop_flag()?;
     let jobs = args.place.jobs.map(usize::from);
     let summary = tasks::run_all(&tasks, &place, jobs, &stop, &Reporter::new(console))?;

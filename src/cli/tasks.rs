@@ -164,6 +164,7 @@ pub(super) fn asked(
     } else if what.slurm {
         command.slurm(tasks.len(), console)?;
     } else if what.status {
+        tasks::check_folders(tasks, place).map_err(|errors| refused(errors, console))?;
         sweeps::status(console, &tasks::status(tasks, place)?);
     } else {
         return Ok(false);

@@ -2,12 +2,13 @@
 
 use crate::base::error::Error;
 use crate::base::table;
+use crate::commands::eval::own_name;
 use crate::commands::plot::Progress;
-use crate::commands::tasks::{Place, Status, Task};
+use crate::commands::tasks::{Place, Status, Task, another};
 use crate::store::audit::AuditFile;
 use crate::store::eval::EvalFile;
 use crate::store::images::HeldOut;
-use crate::store::names::{EVAL_JSON, EVAL_VALIDATION_JSON, METRICS, RUN_JSON};
+use crate::store::names::{METRICS, RUN_JSON};
 use crate::store::robots::Source;
 use crate::store::run::RunFile;
 use crate::store::task::State;
@@ -106,7 +107,13 @@ pub fn collect(
         }
         let source = Source::read(&archive)?;
         let run = &source.run;
-        let found = Found::of(&source, &folder, warn);
+        let differing = task.differing(run);
+        if !differing.is_empty() {
+            warn(&format!("{}; left out", another(&folder, &differing)));
+            all.rows.push(row(None));
+            continue;
+        }
+        let found = Found::of(&source, &folder, task.steps.eval.as_ref().map(|step| step.split), warn);
         let grouping = run.config.grouping()?;
         let names = grouping.tasks().iter().filter(|split| !split.is_same_way()).map(|split| split.name());
         for recognises in names {
@@ -128,13 +135,15 @@ struct Found {
 }
 
 impl Found {
-    fn of(source: &Source, folder: &Path, warn: &dyn Fn(&str)) -> Self {
+    /// `split`: which images the plan tests on, if it does.
+    fn of(source: &Source, folder: &Path, split: Option<HeldOut>, warn: &dyn Fn(&str)) -> Self {
         let run = &source.run;
         let told = |error: Error| warn(&format!("{error}; left out"));
-        let existing = |name: &str| Some(folder.join(name)).filter(|path| path.exists());
         let audit = AuditFile::if_any(run, &source.path).map_err(told).ok().flatten();
-        let test = existing(EVAL_JSON).or(existing(EVAL_VALIDATION_JSON));
-        let eval = test.and_then(|path| EvalFile::of_runs(&path, &[run]).map_err(told).ok());
+        // Tests may have been made without the plan.
+        let splits = split.map_or(vec![HeldOut::Test, HeldOut::Validation], |split| vec![split]);
+        let tests = splits.iter().map(|split| folder.join(own_name(*split))).filter(|path| path.exists());
+        let eval = tests.into_iter().find_map(|path| EvalFile::of_runs(&path, &[run]).map_err(told).ok());
         Found { validated: ranking(source).unwrap_or_default(), audit, eval }
     }
 

@@ -2,7 +2,6 @@
 
 use crate::base::error::Error;
 use crate::base::files::read_text;
-use crate::commands::sweep::beside;
 use crate::config::audit::Criteria;
 use crate::config::capacity::CapacityConfig;
 use crate::config::{Config, reading};
@@ -10,7 +9,7 @@ use crate::store::folder;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// The built-in plan: the paper's.
 pub const PAPER_TOML: (&str, &str) = ("paper.toml", include_str!("../../configs/paper.toml"));
@@ -33,6 +32,9 @@ pub struct Plan {
     /// The networks.
     #[serde(default)]
     pub capacity: CapacityConfig,
+    /// The plan's folder, from which on configs are looked for.
+    #[serde(skip)]
+    pub folder: PathBuf,
 }
 
 /// An experiment: a config, and what is changed in it.
@@ -75,13 +77,7 @@ impl Plan {
         let format = if is_json { reading::Format::Json } else { reading::Format::Toml };
         let plan: Plan = reading::read(&text, format, name)?;
         let folder = Path::new(name).parent().unwrap_or(Path::new(""));
-        let placed = |plan: &Plan| {
-            let from_here = |experiment: &Experiment| Experiment {
-                config: beside(folder, &experiment.config),
-                set: experiment.set.clone(),
-            };
-            Plan { experiment: plan.experiment.iter().map(from_here).collect(), ..plan.clone() }
-        };
+        let placed = |plan: &Plan| Plan { folder: folder.to_path_buf(), ..plan.clone() };
         let check = |plan: &Plan| plan.check().and_then(|()| placed(plan).experiments().map(|_| ()));
         let plan =
             reading::changed(plan, overrides, check, |error| reading::placed(error, &text, format, name))?;
@@ -113,11 +109,16 @@ impl Plan {
         for (number, experiment) in (1..).zip(&self.experiment) {
             let key = format!("experiment.{number}");
             let within = |error: Error| error.within(&format!("experiment {number}")).of(&key);
-            let name = folder::name_of(&experiment.config);
+            let name = folder::name_of(&self.folder.join(&experiment.config).to_string_lossy());
             if experiments.iter().any(|(other, _)| *other == name) {
                 return Err(within(Error::input(format!("config: {name}: expected once"))));
             }
-            let config = Config::load(&experiment.config, &experiment.set).map_err(within)?;
+            if experiment.set.iter().any(|set| set.split('=').next().is_some_and(|key| key.trim() == "seed"))
+            {
+                return Err(within(Error::input("set: seed: expected in seeds".to_string())));
+            }
+            let config =
+                Config::load_from(&self.folder, &experiment.config, &experiment.set).map_err(within)?;
             for &seed in &self.seeds {
                 let seeded = Config { seed, ..config.clone() };
                 seeded.validate().map_err(|error| error.within("seeds").of("seeds"))?;

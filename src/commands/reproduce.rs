@@ -6,7 +6,7 @@ use crate::base::random::{Purpose, stream};
 use crate::base::ranks::Ranks;
 use crate::commands::plan::Plan;
 use crate::commands::table::Row;
-use crate::commands::tasks::{self, Place, Run, Steps, Summary, Task, is_of, written};
+use crate::commands::tasks::{self, Place, Run, Steps, Summary, Task, another, is_of, written};
 use crate::commands::{audit, capacity, eval, plan, table};
 use crate::config::Config;
 use crate::search::showing;
@@ -17,7 +17,7 @@ use crate::store::images::{HeldOut, HowMany};
 use crate::store::names::{AUDIT_JSON, RUN_JSON};
 use crate::store::robots::{Chosen, Selection, Source};
 use crate::task::direction;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -85,6 +85,12 @@ pub fn reproduce(options: &Options, stop: &AtomicBool, observer: &dyn Observer) 
     let tasks = tasks(&options.plan, options.scale)?;
     let place = &options.place;
     tasks::check_folders(&tasks, place).map_err(|mut refused| refused.swap_remove(0))?;
+    let plan = options.plan.at(options.scale);
+    let experiments = plan.experiments()?;
+    for (_, config) in &experiments {
+        let tests = BTreeSet::from([(plan.images, config.classes())]);
+        tasks::check_images(&config.data, &tests, "images", place)?;
+    }
     let runs = tasks::run_all(&tasks, place, options.jobs, stop, observer)?;
     let (rows, capacities) = (Vec::new(), Vec::new());
     let stopped = runs.done < tasks.len();
@@ -92,9 +98,15 @@ pub fn reproduce(options: &Options, stop: &AtomicBool, observer: &dyn Observer) 
     if stopped {
         return Ok(finished);
     }
-    let plan = options.plan.at(options.scale);
+    for task in &tasks {
+        let folder = place.out.join(&task.name);
+        let differing = task.differing(&Source::read(&folder.join(RUN_JSON))?.run);
+        if !differing.is_empty() {
+            return Err(another(&folder, &differing));
+        }
+    }
     let job = Job { place, plan: &plan, stop, observer };
-    for (name, config) in &plan.experiments()? {
+    for (name, config) in &experiments {
         let Some((found, networks)) = job.experiment(name, config)? else {
             return Ok(Finished { stopped: true, ..finished });
         };

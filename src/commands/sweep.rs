@@ -119,7 +119,7 @@ impl SweepPlan {
         }
         self.groups()?;
         self.varied()?;
-        self.steps().check()
+        self.steps().check(self.archive.is_some())
     }
 
     fn steps(&self) -> Steps {
@@ -135,7 +135,11 @@ impl SweepPlan {
         for (k, &a) in self.pairs.iter().enumerate() {
             all.extend(self.pairs[k + 1..].iter().map(|&b| [vec![a.min(b)], vec![a.max(b)]]));
         }
-        if all.iter().collect::<BTreeSet<_>>().len() < all.len() {
+        // Which group walks which way is up to the robots: 1|0 is 0|1.
+        let same = |groups: &[Vec<u8>; 2]| -> BTreeSet<BTreeSet<u8>> {
+            groups.iter().map(|group| group.iter().copied().collect()).collect()
+        };
+        if all.iter().map(same).collect::<BTreeSet<_>>().len() < all.len() {
             return Err(Error::at("groups", "expected different ones, also of pairs"));
         }
         if self.archive.is_some() && all.is_empty() {
@@ -184,8 +188,15 @@ impl SweepPlan {
     /// What is wrong with the plan, or with some of its tasks: all of that at once.
     pub fn tasks(&self, path: &Path) -> Result<Vec<Task>, Vec<Error>> {
         let one = |error: Error| vec![error.within(&path.display().to_string())];
-        if self.set.iter().any(|set| set.split('=').next().is_some_and(|key| key.trim() == "seed")) {
+        let sets = |wanted: &dyn Fn(&str) -> bool| {
+            self.set.iter().any(|set| set.split('=').next().is_some_and(|key| wanted(key.trim())))
+        };
+        if sets(&|key| key == "seed") {
             return Err(one(Error::at("set", "seed: expected in seeds")));
+        }
+        let has_groups = !(self.groups.is_empty() && self.pairs.is_empty());
+        if has_groups && sets(&|key| key == "task" || key.starts_with("task.")) {
+            return Err(one(Error::at("set", "task: expected without, since groups or pairs say it")));
         }
         let base = self.base(path).map_err(one)?;
         let (groups, varied) = (self.groups().map_err(one)?, self.varied().map_err(one)?);
@@ -247,9 +258,9 @@ impl SweepPlan {
         }
         let config =
             self.config.as_deref().expect("a plan without an archive has a config, which is checked");
-        let name = beside(folder, config);
-        let loaded = Config::load(&name, &[]).map_err(|error| error.within("config").of("config"))?;
-        Ok(Base::Evolve(folder::name_of(&name), Box::new(loaded)))
+        let loaded = Config::load_from(folder, config, &[]);
+        let loaded = loaded.map_err(|error| error.within("config").of("config"))?;
+        Ok(Base::Evolve(folder::name_of(&folder.join(config).to_string_lossy()), Box::new(loaded)))
     }
 
     fn task(
@@ -289,6 +300,17 @@ impl SweepPlan {
                 }))
             }
         };
+        let classes = match &run {
+            Run::Evolve(config, _) => config.classes().len(),
+            Run::Train(training) => training.config.classes().len(),
+        };
+        if let Some(EvalStep { images, .. }) = self.eval.as_ref().filter(|step| step.images < classes) {
+            return Err(Error::value(
+                "eval.images",
+                images,
+                &format!("{classes} or more, one of each class"),
+            ));
+        }
         let mut varied: Vec<(String, String)> =
             combination.iter().map(|setting| (setting.key.clone(), text(&setting.value))).collect();
         varied.extend(groups.map(|[a, b]| ("groups".to_string(), groups_text([a, b], "|"))));
@@ -302,22 +324,19 @@ impl Base {
     fn name(&self, combination: &[&Setting], groups: Option<&[Vec<u8>; 2]>, seed: u64) -> String {
         let base = match self {
             Base::Evolve(name, _) => name.clone(),
-            Base::Train(archive, source) => {
-                let folder = archive.parent().and_then(Path::file_name);
-                folder.map_or(source.run.name.clone(), |name| name.to_string_lossy().into_owned())
-            }
+            Base::Train(archive, source) => match named::name(archive) {
+                Some((_, run)) => run.to_string(),
+                None => {
+                    let folder = archive.parent().and_then(Path::file_name);
+                    folder.map_or(source.run.name.clone(), |name| name.to_string_lossy().into_owned())
+                }
+            },
         };
         let words = combination.iter().map(|setting| setting.word.clone());
         let groups = groups.map(|[a, b]| groups_text([a, b], "v"));
         let parts = std::iter::once(base).chain(words).chain(groups).chain([format!("seed{seed}")]);
         parts.collect::<Vec<_>>().join("-")
     }
-}
-
-/// A path of a plan as it is from here; a name without such a file is that of something built in.
-pub(crate) fn beside(folder: &Path, name: &str) -> String {
-    let path = folder.join(name);
-    if path.exists() { path.to_string_lossy().into_owned() } else { name.to_string() }
 }
 
 /// A value as text: a text without its quotes.
@@ -429,6 +448,11 @@ mod tests {
             ("config = \"a\"\npairs = [3]", "pairs"),
             ("config = \"a\"\ngroups = [\"0|0\"]", "groups.1"),
             ("config = \"a\"\ngroups = [\"0|1\"]\npairs = [0, 1]", "groups"),
+            ("config = \"a\"\ngroups = [\"10|2\", \"2|01\"]", "groups"),
+            (
+                "config = \"a\"\n[audit]\nrobots = \"top:3\"\n[eval]\nphysical_only = true",
+                "eval.physical_only",
+            ),
             ("config = \"a\"\n[vary]\nseed = [1]", "vary.seed"),
             ("config = \"a\"\n[vary]\ngenerations = 5", "vary.generations"),
             ("config = \"a\"\n[vary]\ngenerations = []", "vary.generations"),
@@ -439,6 +463,22 @@ mod tests {
             let plan: SweepPlan = toml::from_str(text).unwrap();
             assert_eq!(plan.check().unwrap_err().key.as_deref(), Some(key), "{text}");
         }
+    }
+
+    #[test]
+    fn what_the_plan_says_is_not_said_by_set_too() {
+        for (text, key) in [
+            ("set = [\"seed=3\"]", "seed"),
+            ("set = [\"task.groups=[[5],[6]]\"]\npairs = [0, 1]", "task"),
+            ("[eval]\nimages = 1", "eval.images"),
+        ] {
+            let errors = plan(&format!("config = \"quickstart.toml\"\n{text}")).tasks(Path::new("plan.toml"));
+            let said = errors.unwrap_err()[0].to_string();
+            assert!(said.contains(&format!("{key}")), "{said}");
+        }
+        assert_eq!(names("config = \"quickstart.toml\"\nset = [\"task.groups=[[5],[6]]\"]").len(), 1);
+        let names = names("archive = \"gallery:gaits-6\"\npairs = [0, 1]\nseeds = [1]");
+        assert_eq!(names, ["gaits-6-0v1-seed1"], "no name that means another run");
     }
 
     #[test]

@@ -8,10 +8,10 @@ use crate::base::observer::{Generation, Observer, Work};
 use crate::base::ranks::Ranks;
 use crate::commands::{audit, eval};
 use crate::config::audit::Criteria;
-use crate::config::{Config, Settings, differing};
+use crate::config::{Config, DataConfig, Settings, differing};
 use crate::data::dataset::{BUILTIN, Split};
 use crate::search::showing::task_of;
-use crate::search::{evolve, showing, train, validation};
+use crate::search::{evolve, held_out, showing, train, validation};
 use crate::store::audit::{AuditFile, RobotAudit};
 use crate::store::eval::EvalFile;
 use crate::store::folder::IfExists;
@@ -19,7 +19,7 @@ use crate::store::images::{HeldOut, HowMany};
 use crate::store::lock::{self, Lock};
 use crate::store::names::{AUDIT_JSON, DATA_FOLDER, METRICS, RUN_JSON, TASK_JSON, TASK_LOCK};
 use crate::store::robots::{Selection, Source};
-use crate::store::run::Robot;
+use crate::store::run::{Robot, RunFile};
 use crate::store::setting::RunRef;
 use crate::store::task::{State, TaskFile};
 use crate::store::whereabouts::Whereabouts;
@@ -27,7 +27,7 @@ use crate::task::direction;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::io::{Read, Seek, SeekFrom};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
@@ -129,22 +129,34 @@ impl Default for EvalStep {
 }
 
 impl Steps {
-    /// Checks what a type cannot.
+    /// Checks what a type cannot; `trains`: of tasks that train, not evolve.
     ///
     /// # Errors
     /// What is wrong.
-    pub(crate) fn check(&self) -> Result<(), Error> {
+    pub(crate) fn check(&self, trains: bool) -> Result<(), Error> {
         if let Some(step) = &self.audit {
             selection("audit.robots", &step.robots)?;
             step.criteria.check().map_err(|error| error.of("audit.criteria"))?;
         }
         let Some(step) = &self.eval else { return Ok(()) };
-        selection("eval.robots", &step.robots)?;
-        match (step.images, step.physical_only && self.audit.is_none()) {
-            (0, _) => Err(Error::value("eval.images", 0, "1 or more")),
-            (_, true) => Err(Error::value("eval.physical_only", true, "it with [audit] only")),
-            _ => Ok(()),
+        let tested = selection("eval.robots", &step.robots)?;
+        if step.images == 0 {
+            return Err(Error::value("eval.images", 0, "1 or more"));
         }
+        let Some(audit) = self.audit.as_ref().filter(|_| step.physical_only) else {
+            return match step.physical_only {
+                true => Err(Error::value("eval.physical_only", true, "it with [audit] only")),
+                false => Ok(()),
+            };
+        };
+        // A training has one robot, whichever way it is chosen.
+        let is_whole = trains || selection("audit.robots", &audit.robots)? == Selection::All;
+        if !is_whole && tested.validated().is_none() && !tested.names_any() {
+            let expected =
+                "audit.robots = \"all\" with it: from a part of an archive nothing is drawn fairly";
+            return Err(Error::value("eval.physical_only", true, expected));
+        }
+        Ok(())
     }
 }
 
@@ -193,6 +205,24 @@ impl Task {
         serde_json::json!({ "amount": self.amount(), "validation": config.validation, "steps": self.steps })
     }
 
+    /// In which keys a run in its folder is another than this task makes: the key, its value there,
+    /// and in the plan.
+    pub(crate) fn differing(&self, run: &RunFile) -> Vec<(String, String, String)> {
+        match &self.run {
+            Run::Evolve(config, _) => differing(&run.config.settings(), &config.settings()),
+            // Of a training's config windows and numbers of images are found on the way.
+            Run::Train(training) => {
+                let of = |config: &Config, archive: String| -> Settings {
+                    let all = config.settings().into_iter();
+                    let own = all.filter(|(key, _)| key == "seed" || key.starts_with("task."));
+                    own.chain([("archive".to_string(), archive.into())]).collect()
+                };
+                let there = run.origin.as_ref().map_or("none".to_string(), |origin| origin.sha256.clone());
+                differing(&of(&run.config, there), &of(&training.config, training.sha256.clone()))
+            }
+        }
+    }
+
     /// How much of it there is to show on a bar: generations, or challengers.
     fn amount(&self) -> u64 {
         match &self.run {
@@ -214,21 +244,22 @@ pub fn check_folders(tasks: &[Task], place: &Place) -> Result<(), Vec<Error>> {
         let error = match differing {
             Ok(None) => return None,
             Ok(Some(keys)) if keys.is_empty() => return None,
-            Ok(Some(keys)) => {
-                let said = |(key, there, now): &(String, String, String)| {
-                    format!("{key} = {there} there, {now} in the plan")
-                };
-                let keys: Vec<String> = keys.iter().map(said).collect();
-                let text =
-                    format!("{}: the run there differs: {}", place.folder(task).display(), keys.join("; "));
-                Error::input(text).hint("move that folder away, or name another with --out".to_string())
-            }
+            Ok(Some(keys)) => another(&place.folder(task), &keys),
             Err(error) => error,
         };
         Some(error.within(&format!("task {number} ({})", task.name)))
     };
     let refused: Vec<Error> = (1..).zip(tasks).filter_map(check).collect();
     if refused.is_empty() { Ok(()) } else { Err(refused) }
+}
+
+/// That there is another run in a folder than its task makes, with the keys in which it differs.
+pub(crate) fn another(folder: &Path, keys: &[(String, String, String)]) -> Error {
+    let said =
+        |(key, there, now): &(String, String, String)| format!("{key} = {there} there, {now} in the plan");
+    let keys: Vec<String> = keys.iter().map(said).collect();
+    let text = format!("{}: the run there differs: {}", folder.display(), keys.join("; "));
+    Error::input(text).hint("move that folder away, or name another with --out".to_string())
 }
 
 /// Does a task, or goes on with it.
@@ -370,11 +401,13 @@ fn steps(task: &Task, place: &Place, stop: &AtomicBool, observer: &dyn Observer)
     Ok(())
 }
 
-/// Tasks have no options of their own, as hints of `evolve` and `train` name them.
+/// Tasks have no options of their own, as hints of `evolve` and `train` name them; and a run of
+/// another kind in the folder is no process that works there.
 fn elsewhere(error: Error) -> Error {
     match &error.hint {
         Some(hint) if hint.contains("--force") || hint.contains("--resume") => {
-            error.hint("move that folder away, or name another with --out".to_string())
+            let hint = "move that folder away, or name another with --out".to_string();
+            Error { kind: ErrorKind::Input, ..error }.hint(hint)
         }
         _ => error,
     }
@@ -437,23 +470,46 @@ pub struct Summary {
     pub open: usize,
 }
 
-/// Whether there are images for tasks that have not begun: else all would fail, one after the other.
+/// Whether there are images for tasks that have not begun, also for their tests: else all would
+/// fail, one after the other.
 ///
 /// # Errors
 /// If not.
 fn check_data<'a>(tasks: impl Iterator<Item = &'a Task>, place: &Place) -> Result<(), Error> {
-    let mut known = BTreeSet::new();
-    for task in tasks {
-        let data = match &task.run {
-            Run::Evolve(config, _) => &config.data,
-            Run::Train(training) => &training.config.data,
+    let mut needs: BTreeMap<String, (&DataConfig, BTreeSet<(usize, Vec<u8>)>)> = BTreeMap::new();
+    for task in tasks.filter(|task| !place.folder(task).join(DATA_FOLDER).exists()) {
+        let config = match &task.run {
+            Run::Evolve(config, _) => config,
+            Run::Train(training) => &training.config,
         };
-        let has_begun = place.folder(task).join(DATA_FOLDER).exists();
-        if data.dataset != BUILTIN && !has_begun && known.insert((data.dataset.clone(), data.dir.clone())) {
-            Whereabouts::given(place.data.as_deref()).load(data, &[Split::Train])?;
-        }
+        let test = task.steps.eval.as_ref().filter(|step| step.split == HeldOut::Test);
+        let name = format!("{:?}", (&config.data.dataset, &config.data.dir, &config.data.builtin));
+        let (_, tests) = needs.entry(name).or_insert((&config.data, BTreeSet::new()));
+        tests.extend(test.map(|step| (step.images, config.classes())));
     }
-    Ok(())
+    needs.into_values().try_for_each(|(data, tests)| check_images(data, &tests, "eval.images", place))
+}
+
+/// Whether there are images to train on, and so many test images of these classes; `key` says where
+/// so many are asked for.
+///
+/// # Errors
+/// If not.
+pub(crate) fn check_images(
+    data: &DataConfig,
+    tests: &BTreeSet<(usize, Vec<u8>)>,
+    key: &str,
+    place: &Place,
+) -> Result<(), Error> {
+    if data.dataset == BUILTIN && tests.is_empty() {
+        return Ok(());
+    }
+    let wanted = if tests.is_empty() { &[Split::Train][..] } else { &Split::ALL };
+    let dataset = Whereabouts::given(place.data.as_deref()).load(data, wanted)?;
+    tests.iter().try_for_each(|(count, classes)| {
+        let drawn = held_out::test_images(classes, &dataset, HowMany::Evenly(*count), 1);
+        drawn.map(|_| ()).map_err(|error| error.within(&format!("{key} = {count}")))
+    })
 }
 
 /// Does all tasks here, `jobs` at once; `None`: one per core. One that fails does not stop others.
@@ -479,8 +535,9 @@ pub fn run_all(
     let threads = place.threads.unwrap_or_else(cores);
     let jobs = jobs.unwrap_or(threads).min(numbered.len()).max(1);
     let place = Place { threads: Some((threads / jobs).max(1)), ..place.clone() };
-    let total = tasks.iter().map(Task::amount).sum();
-    let known: u64 = total - numbered.iter().map(|(_, task)| task.amount()).sum::<u64>();
+    let sum = |tasks: &mut dyn Iterator<Item = &Task>| tasks.map(Task::amount).fold(0, u64::saturating_add);
+    let total = sum(&mut tasks.iter());
+    let known = total - sum(&mut numbered.iter().map(|(_, task)| *task));
     if !numbered.is_empty() {
         let label = format!("{} of {} tasks, {jobs} at once:", numbered.len(), tasks.len());
         let train = tasks.iter().all(|task| matches!(task.run, Run::Train(_)));
@@ -553,7 +610,8 @@ impl Part<'_, '_> {
     fn is_at(&self, done: u64) {
         let All { observer, known, parts } = self.all;
         parts[self.index].fetch_max(done.min(self.amount), Ordering::Relaxed);
-        observer.progress(known + parts.iter().map(|part| part.load(Ordering::Relaxed)).sum::<u64>());
+        let done = parts.iter().map(|part| part.load(Ordering::Relaxed));
+        observer.progress(done.fold(*known, u64::saturating_add));
     }
 }
 

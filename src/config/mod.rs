@@ -244,22 +244,31 @@ impl Config {
     /// # Errors
     /// What is wrong, with file, line and key.
     pub fn load(name: &str, overrides: &[String]) -> Result<Self, Error> {
-        let path = Path::new(name);
+        Config::load_from(Path::new(""), name, overrides)
+    }
+
+    /// The same with the file looked for from a folder on.
+    ///
+    /// # Errors
+    /// As [`Config::load`].
+    pub(crate) fn load_from(folder: &Path, name: &str, overrides: &[String]) -> Result<Self, Error> {
         let built_in =
             || BUILT_IN.iter().find(|(own, _)| *own == name || own.strip_suffix(".toml") == Some(name));
-        let text = match read_text(path) {
-            Ok(text) => text,
+        let path = folder.join(name);
+        let text = match read_text(&path) {
+            Ok(text) => return Config::parse(&text, &path.to_string_lossy(), overrides),
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => match built_in() {
                 Some((_, text)) => (*text).to_string(),
                 None => {
                     let names = BUILT_IN.map(|(name, _)| name).join(", ");
                     return Err(Error::input(format!(
-                        "{name}: there is no such file, and no built-in config of that name"
+                        "{}: there is no such file, and no built-in config of that name",
+                        path.display()
                     ))
                     .hint(format!("the built-in configs are {names}")));
                 }
             },
-            Err(error) => return Err(Error::reading(path, &error)),
+            Err(error) => return Err(Error::reading(&path, &error)),
         };
         Config::parse(&text, name, overrides)
     }

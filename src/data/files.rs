@@ -176,8 +176,9 @@ pub(crate) fn choose(name: &str, given: &[Place]) -> Result<Place, FilesError> {
 pub(crate) fn load(name: &str, place: &Place, split: Split) -> Result<(Vec<u8>, StoredSplit), FilesError> {
     let broken =
         |source: IdxError| FilesError::Broken { advice: advice(name, place, !source.is_io()), source };
-    let image_file = find(name, place, split, "images")?;
-    let label_file = find(name, place, split, "labels")?;
+    let (image_file, beginning) = find(name, place, split, "images", None)?;
+    // Those of another set in the same folder would be as many.
+    let (label_file, _) = find(name, place, split, "labels", Some(&beginning))?;
     let images = idx::read_images(&image_file).map_err(broken)?;
     let labels = idx::read_labels(&label_file).map_err(broken)?;
     let (expected, found) = (images.content.count, labels.content.len());
@@ -217,8 +218,14 @@ fn standard_names(split: Split, content: &str) -> Vec<String> {
 
 /// The file of a split's images or labels: one of a standard name, or else the only one whose name
 /// ends in one (EMNIST's `emnist-digits-train-images-idx3-ubyte.gz`). The gzipped one of two that
-/// differ in .gz only.
-fn find(name: &str, place: &Place, split: Split, content: &'static str) -> Result<PathBuf, FilesError> {
+/// differ in .gz only. With how its name begins, up to the content; `beginning` is how it must.
+fn find(
+    name: &str,
+    place: &Place,
+    split: Split,
+    content: &'static str,
+    beginning: Option<&str>,
+) -> Result<(PathBuf, String), FilesError> {
     let (dataset, searched) = (name.to_string(), Box::new(place.clone()));
     let present = match file_names(&place.path) {
         Ok(present) => present,
@@ -228,7 +235,8 @@ fn find(name: &str, place: &Place, split: Split, content: &'static str) -> Resul
         }
     };
     let bare = |file: &str| file.strip_suffix(".gz").unwrap_or(file).to_string();
-    let bases: BTreeSet<String> = present.iter().map(|file| bare(file)).collect();
+    let begins_so = |base: &String| beginning.is_none_or(|beginning| begins(base, content) == beginning);
+    let bases: BTreeSet<String> = present.iter().map(|file| bare(file)).filter(begins_so).collect();
     let standard = standard_names(split, content);
     let ends_so = |base: &&String| standard.iter().any(|name| base.ends_with(name.as_str()));
     let found: Vec<String> = match standard.iter().find(|name| bases.contains(*name)) {
@@ -237,23 +245,35 @@ fn find(name: &str, place: &Place, split: Split, content: &'static str) -> Resul
     };
     match found.as_slice() {
         [] => {
-            let (expected, advice) = (standard[0].clone(), advice(name, place, false));
+            let usual = &standard[0];
+            let expected = match beginning {
+                Some(beginning) => usual.replacen(begins(usual, content), beginning, 1),
+                None => usual.clone(),
+            };
+            let advice = advice(name, place, false);
             Err(FilesError::Missing { dataset, split, content, expected, place: searched, advice })
         }
         [base] => {
             let zipped = format!("{base}.gz");
-            Ok(place.path.join(if present.contains(&zipped) { &zipped } else { base }))
+            let file = place.path.join(if present.contains(&zipped) { &zipped } else { base });
+            Ok((file, begins(base, content).to_string()))
         }
         _ => Err(FilesError::Ambiguous { dataset, split, content, place: searched, found }),
     }
 }
 
+/// How a file's name begins, before what it holds.
+fn begins<'a>(base: &'a str, content: &str) -> &'a str {
+    &base[..base.rfind(content).unwrap_or(base.len())]
+}
+
+/// Names of the files in a folder; not of hidden ones, as macOS puts beside others.
 fn file_names(folder: &Path) -> io::Result<BTreeSet<String>> {
     let mut names = BTreeSet::new();
     for entry in std::fs::read_dir(folder)? {
         let entry = entry?;
         if entry.path().is_file() {
-            names.extend(entry.file_name().into_string());
+            names.extend(entry.file_name().into_string().ok().filter(|name| !name.starts_with('.')));
         }
     }
     Ok(names)

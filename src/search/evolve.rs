@@ -18,7 +18,7 @@ use crate::search::{held_out, resume, validation};
 use crate::store::checkpoint::{Checkpoint, KnownBodies};
 use crate::store::folder::{IfExists, RunFolder};
 use crate::store::metrics::{Metrics, Totals};
-use crate::store::names::{CONFIG, ELITES, METRICS, RUN_JSON, TRAINING_JSON};
+use crate::store::names::{ELITES, METRICS, RUN_JSON, TRAINING_JSON};
 use crate::store::run::{Dimensions, FORMAT, FORMAT_VERSION, Robot, RunFile};
 use crate::store::validation::Validated;
 use crate::store::whereabouts::Whereabouts;
@@ -113,7 +113,7 @@ pub fn evolve(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> 
     };
     let saved = ranks.from_lead(saved);
     if let Some(folder) = &folder {
-        say_what_it_is(folder, config)?;
+        folder.write_config(config)?;
         whereabouts::remember(folder, &dataset)?;
     }
     let pool = pool(options.threads)?;
@@ -148,17 +148,6 @@ pub fn evolve(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> 
     };
     let stopped = !is_whole || validated.is_none();
     Ok(Finished { run: file, totals, validated: validated.unwrap_or_default(), stopped, unwritten })
-}
-
-/// Writes the config into the folder. One that says the same stays as it is, with its comments: it
-/// may be what this run was asked for with.
-fn say_what_it_is(folder: &RunFolder, config: &Config) -> Result<(), Error> {
-    let path = folder.path().join(CONFIG);
-    let there = Config::load(&path.to_string_lossy(), &[]);
-    if there.ok().as_ref() == Some(config) {
-        return Ok(());
-    }
-    write_atomically(&path, config.to_toml().as_bytes()).map_err(|error| Error::writing(&path, &error))
 }
 
 /// The run's metrics.csv, to go on after a generation.

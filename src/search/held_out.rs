@@ -147,7 +147,7 @@ pub(crate) fn test_images(
         let drawn = dataset.draw(Split::Test, &[label], share, seed, 0);
         let drawn = drawn.map_err(|error| {
             let most = classes.iter().map(|&c| dataset.indices_of(Split::Test, c).len()).min().unwrap_or(0);
-            let hint = format!("ask for at most --images {}", most * classes.len());
+            let hint = format!("ask for at most {} images", most * classes.len());
             Error::input(error.to_string()).hint(hint)
         })?;
         images.extend(drawn.into_iter().map(|index| ImageRef { index, label }));

@@ -25,7 +25,7 @@ use crate::search::{held_out, validation};
 use crate::store::folder::{IfExists, RunFolder};
 use crate::store::images::ImageRef;
 use crate::store::metrics::{Metrics, Totals};
-use crate::store::names::{CONFIG, ELITES, RESPONSE_JSON, RUN_JSON, TRAINING_JSON};
+use crate::store::names::{ELITES, RESPONSE_JSON, RUN_JSON, TRAINING_JSON};
 use crate::store::response::ResponseFile;
 use crate::store::robots::{Selection, Source};
 use crate::store::run::{Dimensions, FORMAT, FORMAT_VERSION, Robot, RunFile};
@@ -154,7 +154,7 @@ pub fn train(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> R
     };
     let key = key(&config, source.run.config.seed, &walkers, &training);
     let mut log = Log::open(log, key, stop, observer)?;
-    write(CONFIG, config.to_toml().as_bytes())?;
+    folder.write_config(&config)?;
     whereabouts::remember(&folder, &dataset)?;
     let pool = pool(options.threads)?;
     let began = Instant::now();
@@ -217,7 +217,7 @@ pub(crate) fn config_of(
         validation: ValidationConfig { best: 1, ..of_walkers.validation },
         ..of_walkers.clone()
     };
-    let (task, seed) = (base.task.clone(), base.seed);
+    let (task, seed, generations) = (base.task.clone(), base.seed, base.generations);
     let config = reading::changed(base, set, |config: &Config| config.validate(), |error| error)?;
     let BodyConfig { height, width, .. } = of_walkers.body;
     if (config.body.height, config.body.width) != (height, width) {
@@ -232,6 +232,9 @@ pub(crate) fn config_of(
     }
     if config.seed != seed {
         return Err(Error::value("seed", config.seed, &format!("{seed}, as said elsewhere")));
+    }
+    if config.generations != generations {
+        return Err(Error::at("generations", "expected without: a training has rounds and challengers"));
     }
     Ok(config)
 }

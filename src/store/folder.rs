@@ -1,9 +1,10 @@
 //! A run's folder: made, locked, and never overwritten by accident.
 
 use crate::base::error::Error;
-use crate::base::files::{check_writable, remove_half_written};
+use crate::base::files::{check_writable, remove_half_written, write_atomically};
 use crate::base::named;
 use crate::base::observer::Observer;
+use crate::config::Config;
 use crate::store::lock;
 use crate::store::lock::Lock;
 use crate::store::names::{
@@ -59,6 +60,10 @@ impl RunFolder {
         stop: &AtomicBool,
         observer: &dyn Observer,
     ) -> Result<Self, Error> {
+        if named::is_named(path) {
+            let text = format!("--out {}: expected another name", path.display());
+            return Err(Error::usage(format!("{text}: so are runs called that lie elsewhere")));
+        }
         std::fs::create_dir_all(path).map_err(|error| Error::writing(path, &error))?;
         let refuse_run = || match if_exists {
             IfExists::Refuse => vacant(path),
@@ -74,7 +79,8 @@ impl RunFolder {
         refuse_run()?;
         remove_half_written(path, &RunFolder::files()).map_err(|error| Error::writing(path, &error))?;
         if if_exists == IfExists::Overwrite {
-            for name in RunFolder::files() {
+            // A config is written if it says something else: what its author wrote about it stays.
+            for name in RunFolder::files().into_iter().filter(|name| *name != CONFIG) {
                 let file = path.join(name);
                 match std::fs::remove_file(&file) {
                     Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
@@ -92,6 +98,19 @@ impl RunFolder {
         &self.path
     }
 
+    /// Writes the run's config. One that says the same stays as it is, with its comments: it may be
+    /// what this run was asked for with.
+    ///
+    /// # Errors
+    /// What the system says.
+    pub(crate) fn write_config(&self, config: &Config) -> Result<(), Error> {
+        let path = self.path.join(CONFIG);
+        if Config::load(&path.to_string_lossy(), &[]).is_ok_and(|there| there == *config) {
+            return Ok(());
+        }
+        write_atomically(&path, config.to_toml().as_bytes()).map_err(|error| Error::writing(&path, &error))
+    }
+
     /// Names of the files of a run.
     pub(crate) fn files() -> [&'static str; 8] {
         let [newest, previous] = CHECKPOINTS;
@@ -104,7 +123,8 @@ impl RunFolder {
 /// # Errors
 /// If it holds a run.
 pub fn vacant(folder: &Path) -> Result<(), Error> {
-    if !RunFolder::files().iter().any(|name| folder.join(name).exists()) {
+    let of_run = RunFolder::files().into_iter().filter(|name| ![CONFIG, DATA_FOLDER].contains(name));
+    if !of_run.into_iter().any(|name| folder.join(name).exists()) {
         return Ok(());
     }
     let text = format!("{}: there is a run in this folder already", folder.display());

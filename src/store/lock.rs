@@ -193,6 +193,8 @@ impl Drop for Lock {
 pub fn state(path: &Path) -> io::Result<State> {
     let file = match File::options().read(true).write(true).open(path) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(State::Free),
+        // Others may look, too.
+        Err(error) if error.kind() == io::ErrorKind::PermissionDenied => File::open(path)?,
         opened => opened?,
     };
     let is_locked = match file.try_lock() {
