@@ -15,10 +15,12 @@ mod sweep;
 mod tasks;
 mod team;
 mod train;
+mod words;
 
 use crate::analysis::gallery;
 use crate::base::error::{Error, ErrorKind};
 use crate::base::ranks::Ranks;
+use crate::base::text::counted;
 use crate::base::{error, shipped, signals, threads};
 use crate::commands::one_by_one::Named;
 use crate::commands::plan::{PAPER_TOML, Plan};
@@ -154,7 +156,7 @@ fn run_evolve(args: EvolveArgs, console: &Console, ranks: Ranks) -> Result<(), E
         let reporter = Reporter::new(console);
         evolve::evolve(&options, &stop, &reporter)?
     };
-    summary::evolution(console, &finished, &out);
+    summary::evolution(console, &finished, &out, training.is_some());
     if !finished.validated.is_empty() {
         summary::validation(console, &finished.validated);
     }
@@ -248,7 +250,9 @@ fn test(options: &eval::Options, stop: &AtomicBool, console: &Console) -> Result
     if report.stopped {
         let text = match report.robots.len() {
             0 => "stopped before the first robot; nothing is written".to_string(),
-            robots => format!("stopped after {robots} robots; those are saved"),
+            robots => {
+                format!("stopped after {}", counted(robots, "robot; it is saved", "robots; those are saved"))
+            }
         };
         return Err(Error::stopped(text));
     }
@@ -381,7 +385,7 @@ fn run_data(command: DataCommand, console: &Console) -> Result<(), Error> {
                 SheetError::Write { file, source } => Error::writing(&file, &source),
                 error => Error::other(error.to_string()),
             })?;
-            console.info(&format!("wrote {}", out.display()));
+            console.line_about(&out, &format!("wrote {}", out.display()));
         }
     }
     Ok(())

@@ -7,7 +7,7 @@ use common::reference::{Reference, golden};
 use morphcog::commands::plan::PAPER_TOML;
 use morphcog::config::{BUILT_IN, Config};
 use morphcog::store::eval::EvalFile;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::sync::OnceLock;
 
@@ -114,6 +114,9 @@ fn a_wrong_command_line_ends_with_2() {
         "data sheet --samples x",
         "completions csh",
         "config zero_one.toml --unknown",
+        "plot bodies",
+        "schema rnu",
+        "data fetch emnist",
     ] {
         sandbox.run(wrong).ended(2, &[]);
     }
@@ -129,6 +132,33 @@ fn completions_for_all_shells_name_every_command() {
             assert!(said.out.contains(word), "{shell}: {command}");
         }
     }
+}
+
+#[test]
+fn where_a_few_words_are_meant_shells_offer_them() {
+    let sandbox = Sandbox::new();
+    let [bash, zsh] = ["bash", "zsh"].map(|shell| sandbox.run(&format!("completions {shell}")).out);
+    let offered = |words: &str, times: usize| {
+        assert_eq!(zsh.matches(&format!(":({words})")).count(), times, "zsh: {words}");
+        assert!(bash.contains(words), "bash: {words}");
+    };
+    offered("body spacetime snapshots archive progress accuracy capacity", 1);
+    // Of eval and of team; bash has it for options.
+    offered("test validation", 2);
+    assert_eq!(bash.matches("compgen -W \"test validation\"").count(), 2);
+    offered("gif html png terminal", 2);
+    offered("plain paper", 1);
+    offered("mnist fashion-mnist", 1);
+    offered("builtin mnist fashion-mnist", 2);
+    offered(&morphcog::commands::schema::ALL.map(|schema| schema.name).join(" "), 1);
+    let configs = BUILT_IN.map(|(name, _)| name).join(" ");
+    offered(&format!("{configs} {}", PAPER_TOML.0), 1);
+    // Errors have them, too, where nothing else may be meant.
+    sandbox.run("plot bodies").ended(2, &["expected one of body, spacetime"]);
+    sandbox.run("eval --split train").ended(2, &["expected test or validation"]);
+    sandbox.run("replay --format mpeg").ended(2, &["expected gif, html, png or terminal"]);
+    sandbox.write("mine.toml", TINY);
+    sandbox.run("config mine.toml").ended(0, &[]);
 }
 
 #[test]
@@ -413,7 +443,7 @@ fn broken_data_are_refused_naming_the_file() {
     sandbox.write("data/mnist/t10k-images-idx3-ubyte", [0u8, 0, 8, 3, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 9]);
     sandbox.write("data/mnist/t10k-labels-idx1-ubyte", [0u8, 0, 8, 1, 0, 0, 0, 1, 5]);
     let said = sandbox.run("data info mnist").ended(3, &["error: train: ", "train-images-idx3-ubyte"]);
-    assert!(said.out.contains("test: 1 images"), "{said:?}");
+    assert!(said.out.contains("test: 1 image"), "{said:?}");
     assert!(!said.err.contains("warning"), "{said:?}");
     for file in ["train-images-idx3-ubyte", "train-labels-idx1-ubyte"] {
         std::fs::remove_file(sandbox.path("data/mnist").join(file)).unwrap();
@@ -448,7 +478,7 @@ fn every_image_is_shown_if_all_are_asked_for() {
     // Class after class; no sevens, which the run does not know.
     assert_eq!(shown, [0, 1, 2, 5, 8, 3, 4, 7]);
     // A report's commands ask for the same.
-    sandbox.run("report -q run --rollouts 0 --data own").ended(0, &[]);
+    sandbox.run("report -q run --robots 0 --data own").ended(0, &[]);
     assert!(sandbox.read("run/report.html").contains("--images all"));
     sandbox.run("team -q -a run --data own --classes 0,1 --images all -o team.json").ended(0, &[]);
     let team: serde_json::Value = serde_json::from_str(&sandbox.read("team.json")).unwrap();
@@ -664,7 +694,7 @@ fn several_archives_are_named_in_the_same_way_by_every_command() {
         "plot -q archive",
         "plot -q progress",
         "plot -q body",
-        "report -q --rollouts 0",
+        "report -q --robots 0",
     ];
     for command in commands {
         for archives in ["--archive a b", "--archive a/run.json --archive b", "-a a -a b/run.json"] {
@@ -903,7 +933,7 @@ fn held_out_images_are_the_same_for_the_same_seed_and_others_for_another() {
 #[test]
 fn too_many_images_are_refused_saying_how_many_there_are() {
     let sandbox = with_run();
-    sandbox.run("eval -a run/run.json --images 1002").ended(3, &["500", "hint:", "--images 1000"]);
+    sandbox.run("eval -a run/run.json --images 1002").ended(3, &["500", "hint:", "at most 1000 images"]);
     assert!(!sandbox.path("run/eval.json").exists());
 }
 
@@ -968,7 +998,7 @@ fn a_run_may_be_named_by_its_folder() {
         "audit -q -a run --robots top:1",
         "replay -q -a run --format gif",
         "plot accuracy -q -a run -o accuracy.svg",
-        "report -q run --rollouts 0",
+        "report -q run --robots 0",
     ] {
         sandbox.run(command).ended(0, &[]);
     }
@@ -1100,7 +1130,7 @@ fn no_table_shows_a_minus_nothing() {
     sandbox.write("run/run.json", run.to_string());
     let mut said = sandbox.run("eval -a run -n 4 --cycles 1 --robots top:2").ended(0, &[]).out;
     said += &sandbox.run("replay -a run --format html").ended(0, &[]).out;
-    sandbox.run("report -q --archive run --rollouts 1").ended(0, &[]);
+    sandbox.run("report -q --archive run --robots 1").ended(0, &[]);
     sandbox.run("plot -q archive --archive run").ended(0, &[]);
     sandbox.run("plot -q body --archive run -o body.svg").ended(0, &[]);
     for file in ["run/report.html", "run/plot-archive.svg", "body.svg"] {
@@ -1157,6 +1187,188 @@ fn with_json_every_line_on_stdout_is_json() {
     assert_eq!(events("evolve -c tiny.toml -o run", 5), ["error"]);
     assert_eq!(events("eval -a nowhere.json", 3), ["error"]);
     assert_eq!(events("evolve -c tiny.toml -o x --set a=1", 2), ["error"]);
+}
+
+/// The rows of tables in the documentation, from a heading on: what the first cell names, and the
+/// whole row.
+fn documented(name: &str, heading: &str) -> Vec<(Vec<String>, String)> {
+    let text = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join(name)).unwrap();
+    let (_, text) = text.split_once(heading).unwrap();
+    let row = |line: &str| {
+        let line = line.replace("\\|", "¦");
+        let first = line.strip_prefix("| ")?.split(" | ").next()?.replace('¦', "|");
+        let names = first.split('`').skip(1).step_by(2).map(str::to_string).collect::<Vec<_>>();
+        Some((names, line))
+    };
+    text.lines().filter_map(row).collect()
+}
+
+#[test]
+fn every_event_of_json_is_documented_with_its_fields() {
+    let rows = documented("docs/command-line.md", "### JSON");
+    let row = |event: &str| {
+        let found = rows.iter().find(|(names, _)| names.len() == 1 && names[0] == event);
+        &found.unwrap_or_else(|| panic!("the event {event} is not documented")).1
+    };
+    // All that the source has.
+    let mut open = vec![Path::new(env!("CARGO_MANIFEST_DIR")).join("src")];
+    let mut events = BTreeSet::new();
+    while let Some(path) = open.pop() {
+        if path.is_dir() {
+            open.extend(std::fs::read_dir(path).unwrap().map(|entry| entry.unwrap().path()));
+            continue;
+        }
+        let Ok(source) = std::fs::read_to_string(&path) else { continue };
+        let code = source.split("#[cfg(test)]").next().unwrap();
+        for call in [".event(", ".finding("] {
+            let names = code.split(call).skip(1).filter_map(|rest| rest.trim_start().strip_prefix('"'));
+            events.extend(names.map(|name| name.split('"').next().unwrap().to_string()));
+        }
+    }
+    assert!(events.len() > 20, "{events:?}");
+    events.iter().for_each(|event| {
+        row(event);
+    });
+    // Those of quick commands, as they come.
+    let sandbox = with_run();
+    sandbox.write("plan.toml", "config = \"tiny.toml\"\nseeds = [3]\n");
+    let train = "train -a run --robots all --task 0|1 --out taught --set train.random_images=20 --set \
+                 train.windows=4 --set stimulus.reduction=area --set train.rounds=1 --set train.images=4 --set \
+                 train.final_images=4 --set train.challengers=1 --set protocol.control_steps=50 --set \
+                 validation.images=40";
+    let mut seen = BTreeSet::new();
+    for args in [
+        "evolve -c tiny.toml -o new",
+        train,
+        "train -a run --robots all --task 0|1 --out own --set train.rounds=0 --set train.random_images=20 \
+         --set train.final_images=4 --set train.challengers=1 --set validation.images=40",
+        "response -a taught --images 60",
+        "eval -a run -n 20 --cycles 1",
+        "capacity --eval run/eval.json --set trainings=2 --set sizes=[1,3]",
+        "team -a run --classes 0,1 --images 20",
+        "replay -a run --format png",
+        "report run --robots 0",
+        "data info",
+        "data sheet",
+        "gallery",
+        "sweep plan.toml",
+        "sweep plan.toml --status",
+        "sweep plan.toml --collect",
+        "eval -a nowhere.json",
+    ] {
+        let said = sandbox.run(&format!("{args} --json"));
+        assert_eq!(said.code, Some(if args.contains("nowhere") { 3 } else { 0 }), "{said:#?}");
+        for line in said.json_lines() {
+            let event = line["event"].as_str().unwrap();
+            for field in line.as_object().unwrap().keys().filter(|field| *field != "event") {
+                assert!(row(event).contains(&format!("`{field}`")), "{args}: {event} has {field}");
+            }
+            seen.insert(event.to_string());
+        }
+    }
+    // These take longer.
+    events.retain(|event| !["speed", "reproduced"].contains(&event.as_str()));
+    assert_eq!(seen, events);
+}
+
+#[test]
+fn a_written_file_is_named_for_programs() {
+    let sandbox = with_run();
+    for (args, file) in
+        [("report run --robots 0", "run/report.html"), ("data sheet -o sheet.png --samples 1", "sheet.png")]
+    {
+        let lines = sandbox.run(&format!("{args} --json")).ended(0, &[]).json_lines();
+        let last = lines.last().unwrap();
+        assert_eq!((&last["event"], &last["file"]), (&"result".into(), &file.into()), "{lines:?}");
+        assert!(last["text"].as_str().unwrap().starts_with(&format!("wrote {file}")), "{last}");
+    }
+}
+
+#[test]
+fn every_column_of_a_test_and_of_an_audit_is_explained() {
+    let sandbox = Sandbox::tiny();
+    // Some of its robots are walkers.
+    sandbox
+        .run("evolve -q -c tiny.toml -o run --generations 40 --set protocol.control_steps=150")
+        .ended(0, &[]);
+    let rows = documented("docs/analysing.md", "## Test");
+    let explained: Vec<&str> = rows.iter().flat_map(|(names, _)| names).map(String::as_str).collect();
+    let explained = [explained, vec!["robot", "task", "change"]].concat();
+    let mut columns = 0;
+    for args in [
+        "eval -a run -n 20 --cycles 1 --robots best-validation:1 --validation 40",
+        "audit -a run --robots top:4 --set least_walk=0 --set threshold=0",
+    ] {
+        let said = sandbox.run(args).ended(0, &[]).out;
+        let lines: Vec<&str> = said.lines().collect();
+        // A header stands above a rule.
+        for pair in lines.windows(2).filter(|pair| pair[1].starts_with("--")) {
+            for column in pair[0].split("  ").map(str::trim).filter(|column| !column.is_empty()) {
+                assert!(explained.contains(&column), "{column} is not explained");
+                columns += 1;
+            }
+        }
+    }
+    assert_eq!(columns, 13 + 9 + 8 + 4);
+}
+
+#[test]
+fn rows_of_a_collected_sweep_are_numbers_or_null_for_programs() {
+    let sandbox = Sandbox::tiny();
+    let plan = "config = \"tiny.toml\"\nseeds = [1, 2]\n[vary]\nmap_elites.parents = [4]\n[eval]\nrobots = \
+                \"top:2\"\nimages = 20\n";
+    sandbox.write("plan.toml", plan);
+    sandbox.run("sweep plan.toml --out all -q --task 1").ended(0, &[]);
+    let lines = sandbox.run("sweep plan.toml --out all --collect --json").ended(0, &["not all"]).json_lines();
+    let rows: Vec<_> = lines.iter().filter(|line| line["event"] == "collected").collect();
+    let [done, waiting] = rows.as_slice() else { panic!("{lines:?}") };
+    let eval: EvalFile = serde_json::from_str(&sandbox.read("all/tiny-parents=4-seed1/eval.json")).unwrap();
+    let mean = &eval.means["0|1"];
+    assert_eq!((done["number"].as_u64(), done["state"].as_str()), (Some(1), Some("done")));
+    assert_eq!((done["accuracy"].as_f64(), done["robots"].as_u64()), (Some(mean.accuracy), Some(2)));
+    let ends = [&done["accuracy_low"], &done["accuracy_high"]].map(|end| end.as_f64());
+    assert_eq!(ends, mean.interval.unwrap().map(Some));
+    assert_eq!(done["varied"], serde_json::json!({ "map_elites.parents": 4, "seed": 1 }));
+    assert_eq!((&waiting["state"], &waiting["accuracy"]), (&"waiting".into(), &serde_json::Value::Null));
+    // The columns of the table.
+    let table = sandbox.read("all/sweep.csv");
+    let columns = table.lines().next().unwrap().split(',').filter(|column| !column.starts_with("varied_"));
+    assert!(columns.clone().count() > 15);
+    columns.for_each(|column| assert!(done.get(column).is_some(), "{column}"));
+    // Nothing is empty, and every file is named.
+    let results: Vec<_> = lines.iter().filter(|line| line["event"] == "result").collect();
+    assert!(results.len() >= 3 && results.len() + rows.len() == lines.len(), "{lines:?}");
+    assert_eq!(results[0]["file"], "all/sweep.csv");
+    assert!(results.iter().all(|line| line["text"] != "" && line["file"].is_string()), "{results:?}");
+}
+
+#[test]
+fn how_far_tasks_are_has_no_column_without_a_name() {
+    let sandbox = Sandbox::tiny();
+    sandbox.write("plan.toml", "config = \"tiny.toml\"\nseeds = [3]\n");
+    let status = || sandbox.run("sweep plan.toml --out all --status").ended(0, &[]).out;
+    let plain = status();
+    assert!(plain.lines().next().unwrap().ends_with("  left"), "{plain}");
+    assert!(plain.lines().all(|line| line.trim_end() == line), "{plain:?}");
+    assert!(plain.ends_with("1 task: 1 waiting\n"), "one task is no tasks: {plain}");
+    sandbox.run("sweep plan.toml --out all -q").ended(0, &[]);
+    let path = "all/tiny-seed3/task.json";
+    let mut task: serde_json::Value = serde_json::from_str(&sandbox.read(path)).unwrap();
+    (task["state"], task["error"]) = ("failed".into(), "no room".into());
+    sandbox.write(path, task.to_string());
+    let failed = status();
+    assert!(failed.lines().next().unwrap().ends_with("  about"), "{failed}");
+    assert!(failed.contains("no room") && failed.ends_with("1 task: 1 failed\n"), "{failed}");
+}
+
+#[test]
+fn a_report_is_asked_for_robots_and_the_old_word_still_works() {
+    let sandbox = with_run();
+    for option in ["--robots", "--rollouts"] {
+        sandbox.run(&format!("report -q run {option} 0")).ended(0, &[]);
+    }
+    let help = sandbox.run("report --help").ended(0, &[]).out;
+    assert!(help.contains("--robots <N>") && !help.contains("--rollouts"), "{help}");
 }
 
 #[test]

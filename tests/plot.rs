@@ -144,6 +144,55 @@ fn seeds_become_one_figure_and_robots_one_each() {
 }
 
 #[test]
+fn a_test_of_several_runs_says_which_they_are_in_as_many_lines_as_that_needs() {
+    let sandbox = with_run();
+    sandbox.write("other.toml", common::program::TINY);
+    let evolve = |config: &str, seed: u64, out: &str| {
+        sandbox.run(&format!("evolve -q -c {config}.toml --seed {seed} -o {out}")).ended(0, &[]);
+    };
+    evolve("tiny", 4, "four");
+    evolve("tiny", 3, "again --set map_elites.parents=6");
+    evolve("other", 5, "other");
+    // All words, after the title.
+    let words = |runs: &str, robots: &str| {
+        sandbox.run(&format!("eval -q -a {runs} -n 10 -r {robots} --cycles 1 -o e.json")).ended(0, &[]);
+        sandbox.run("plot accuracy -a e.json -o e.svg").ended(0, &[]);
+        let svg = sandbox.read("e.svg");
+        let document = Document::parse(&svg).unwrap();
+        let texts = document.descendants().filter(|node| node.has_tag_name("text"));
+        texts.skip(1).filter_map(|node| node.text().map(str::to_string)).collect::<Vec<_>>()
+    };
+    let selected = "the 2 fittest of each task on the training images";
+    let said = |runs: &str, name: &str, has_seed: bool| {
+        let words = words(runs, "top:2");
+        assert_eq!(words[0], format!("{name}; {selected}"));
+        assert_eq!(words.iter().any(|word| word.ends_with("(3)")), has_seed, "{words:?}");
+    };
+    said("run", "tiny, seed 3", false);
+    // Of one name: its seeds, each once.
+    said("run four again", "tiny, seeds 3, 4", true);
+    // Of several names a seed would not say whose it is.
+    said("run four other", "3 runs", false);
+    let ids: Vec<String> =
+        sandbox.run_file("run").elites.iter().take(9).map(|elite| elite.id.clone()).collect();
+    let of = format!("tiny, seed 3; chosen by id: {}", ids.join(", "));
+    let lines = words("run", &ids.join(","));
+    assert!((2..=3).any(|count| lines[..count].join(" ") == of), "{lines:?}");
+}
+
+#[test]
+fn progress_is_that_of_runs_with_two_generations_or_more() {
+    let sandbox = with_run();
+    sandbox.run("evolve -q -c tiny.toml --seed 4 -g 1 -o short").ended(0, &[]);
+    let words = ["short/metrics.csv", "expected at least 2 generations, found 1"];
+    sandbox.run("plot progress -a short -o short.svg").ended(3, &words);
+    assert!(!sandbox.path("short.svg").exists());
+    sandbox.run("plot progress -a short run -o both.svg").ended(0, &[words[0], words[1], "left out"]);
+    let svg = sandbox.read("both.svg");
+    assert!(svg.contains("tiny, seed 3") && !svg.contains("seeds"), "{svg}");
+}
+
+#[test]
 fn what_cannot_be_shown_is_refused_in_a_line() {
     let sandbox = with_run();
     let refused = |line: &str, code, words: &[&str]| {

@@ -58,6 +58,53 @@ fn a_click_on_a_cell_plays_its_robot() {
 }
 
 #[test]
+fn only_the_map_of_the_chosen_task_and_the_chosen_robot_are_seen() {
+    let Some(program) = found() else { return };
+    let sandbox = Sandbox::new();
+    let tasks = TINY.replace("groups = [[0], [1]]", "splits = [0, 1, 2]");
+    sandbox.write("tasks.toml", tasks.replace("train_images = [0, 1]", "images_per_class = 1"));
+    sandbox.run("evolve -q -c tasks.toml -o run").ended(0, &[]);
+    sandbox.run("report -q run --rollouts 2").ended(0, &[]);
+    let mut browser = Browser::start(&program, &sandbox);
+    let mut tab = browser.tab(1280, 900, false);
+    tab.open(&format!("file://{}", sandbox.path("run/report.html").display()));
+    let playing = "document.querySelector('iframe')?.contentDocument?.getElementById('label')";
+    tab.wait(playing);
+    // One map at a time.
+    let seen = "[...document.querySelectorAll('.map')].filter((map) => map.offsetHeight > 0)\
+                .map((map) => map.dataset.task).join()";
+    assert_eq!(tab.eval(seen), "0");
+    let tasks = tab.eval("document.querySelector('select.task').options.length").as_u64().unwrap();
+    assert!(tasks > 1, "{tasks}");
+    for task in (0..tasks).rev() {
+        tab.eval(&format!(
+            "(() => {{ const s = document.querySelector('select.task'); s.value = '{task}'; \
+             s.dispatchEvent(new Event('change')); }})()"
+        ));
+        assert_eq!(tab.eval(seen), task.to_string());
+    }
+    // Of a robot whose rollout is not there, or is damaged, no other one is seen in its place.
+    let height = "document.querySelector('iframe').offsetHeight";
+    let mut click = |robot: &str, says: &str, is_seen: bool| {
+        tab.eval(&format!("document.querySelector('button[data-robot]{robot}').click()"));
+        tab.wait(&format!("document.querySelector('.about').textContent.includes('{says}')"));
+        assert_eq!(tab.eval(&format!("{height} > 0")), is_seen, "{robot}");
+    };
+    click("[data-rollout=\"\"]", "not in this report", false);
+    click("[data-first]", "fitness", true);
+    let damaged = "[data-rollout]:not([data-rollout=\"\"]):not([data-first])";
+    click(damaged, "fitness", true);
+    tab.eval(&format!(
+        "document.getElementById(document.querySelector('button{damaged}').dataset.rollout).textContent = 'AAAA'"
+    ));
+    tab.eval(&format!("document.querySelector('button{damaged}').click()"));
+    tab.wait("document.querySelector('.about').textContent.includes('cannot unpack')");
+    assert_eq!(tab.eval(height), 0);
+    assert_eq!(tab.complaints(), Vec::<String>::new());
+    tab.close();
+}
+
+#[test]
 fn a_team_walks_on_the_page_and_says_there_what_it_said_in_its_test() {
     let Some(program) = found() else { return };
     let sandbox = pairs();

@@ -94,11 +94,9 @@ fn what_reads_a_run_reads_this_one() {
     let sandbox = sandbox();
     let run = evolve(&sandbox, "run", "");
     let best = &run.best().unwrap().id;
-    sandbox.run("eval -q -a run/run.json -n 20 --cycles 1 --robots top:1").ended(0, &[]);
-    // It rollouts its training images anew: those of the run are another body's, under other
-    // images.
-    let audit = sandbox.run("audit -a run/run.json --set threshold=0").ended(0, &[]);
-    assert!(!audit.err.contains("walks otherwise"), "{}", audit.err);
+    for command in ["eval", "audit"] {
+        sandbox.run(&format!("{command} -a run/run.json")).ended(3, &["these are gaits", "morphcog train"]);
+    }
     sandbox.run(&format!("replay -a run/run.json --robot {best} -o replay.png")).ended(0, &[]);
     sandbox.run("plot archive -a run/run.json -o archive.svg").ended(0, &[]);
     sandbox.run("report run").ended(0, &[]);

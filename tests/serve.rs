@@ -25,6 +25,7 @@ use morphcog::task::rollout::record;
 use morphcog::task::stimulus::{Encoding, Reduction, StimulusParams, stimulus};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
+use std::io::{BufRead, BufReader, Read};
 use std::time::{Duration, Instant};
 
 fn json_of(answer: &Answer) -> Value {
@@ -107,6 +108,71 @@ fn an_audit_beside_the_archive_is_shown() {
     let robots = json_of(&server.get("/api/archives/3"))["robots"].clone();
     assert!(robots[0]["audit"]["verdict"].is_string(), "{}", robots[0]);
     assert_eq!(robots[1]["audit"], Value::Null);
+}
+
+#[test]
+fn the_robots_of_every_collection_are_listed_with_the_fittest_first() {
+    let sandbox = Sandbox::tiny();
+    sandbox.run("evolve --config tiny.toml --out runs/one --quiet").ended(0, &[]);
+    let server = Server::start(&sandbox, "");
+    let archives = json_of(&server.get("/api/archives"));
+    for (number, archive) in archives.as_array().unwrap().iter().enumerate() {
+        let robots = json_of(&server.get(&format!("/api/archives/{number}")))["robots"].clone();
+        let robots = robots.as_array().unwrap();
+        let fitness: Vec<f64> = robots.iter().map(|robot| robot["fitness"].as_f64().unwrap()).collect();
+        assert!(fitness.is_sorted_by(|a, b| a >= b), "{number}: {fitness:?}");
+        assert_eq!(archive["best"], json!(fitness[0]), "{number}");
+        // The page begins with the robot that ships as the best.
+        assert!(number > 0 || robots[0]["id"] == "eaa751007e", "{}", robots[0]["id"]);
+    }
+}
+
+/// What it says before its page is open.
+fn notes(sandbox: &Sandbox, args: &str) -> String {
+    let mut child = sandbox.start(&format!("serve --no-open {args}"));
+    let mut address = String::new();
+    BufReader::new(child.stdout.take().unwrap()).read_line(&mut address).unwrap();
+    child.kill().unwrap();
+    child.wait().unwrap();
+    let mut said = String::new();
+    child.stderr.take().unwrap().read_to_string(&mut said).unwrap();
+    assert!(address.starts_with("http://"), "{said}");
+    said
+}
+
+#[test]
+fn a_newest_run_that_cannot_be_read_is_a_note_unless_it_was_named() {
+    let sandbox = Sandbox::new();
+    sandbox.write("runs/broken/run.json", "{}");
+    let said = notes(&sandbox, "");
+    assert!(said.contains("note: runs/broken/run.json") && said.contains("left out"), "{said}");
+    let server = Server::start(&sandbox, "");
+    assert_eq!(json_of(&server.get("/api/archives")).as_array().unwrap().len(), 3);
+    sandbox.run("serve --no-open --archive runs/broken").ended(3, &["runs/broken/run.json"]);
+}
+
+#[test]
+fn images_that_one_of_several_runs_finds_are_not_said_to_be_missing() {
+    let sandbox = Sandbox::tiny();
+    for (split, count) in [("train", 4u8), ("t10k", 2)] {
+        let pixels: Vec<u8> = (0..count).flat_map(|image| [60 * image; 100]).collect();
+        let header = [0, 0, 8, 3, 0, 0, 0, count, 0, 0, 0, 10, 0, 0, 0, 10];
+        sandbox.write(&format!("there/{split}-images-idx3-ubyte"), [&header[..], &pixels].concat());
+        let labels: Vec<u8> = (0..count).map(|image| image % 2).collect();
+        let header = [0, 0, 8, 1, 0, 0, 0, count];
+        sandbox.write(&format!("there/{split}-labels-idx1-ubyte"), [&header[..], &labels].concat());
+    }
+    for out in ["lost", "kept"] {
+        sandbox
+            .run(&format!("evolve -q -c tiny.toml --set data.dataset=shapes --data there -o {out}"))
+            .ended(0, &[]);
+    }
+    std::fs::remove_file(sandbox.path("lost/data-folder.json")).unwrap();
+    assert!(notes(&sandbox, "--archive lost").contains("shapes"));
+    for archives in ["lost kept", "kept lost"] {
+        let said = notes(&sandbox, &format!("--archive {archives}"));
+        assert!(!said.contains("shapes"), "{said}");
+    }
 }
 
 #[test]
@@ -225,6 +291,7 @@ fn bodies_and_scenarios_are_checked_and_pictures_reduced_as_runs_do() {
     let loaded = json_of(&server.post_text("/api/scenario", &std::fs::read_to_string(&scenario).unwrap()));
     assert_eq!(loaded["stimulus"], json!([[0.0, 0.5], [1.0, 0.0]]));
     assert_eq!((&loaded["control_steps"], &loaded["body"]), (&json!(7), &json!([[3, 6], [4, 5]])));
+    assert_eq!(loaded["note"], Value::Null);
 
     // A robot sees with its run's encoding, a body of one's own with the one that is asked for.
     let see = |subject: Value| {
@@ -242,6 +309,27 @@ fn bodies_and_scenarios_are_checked_and_pictures_reduced_as_runs_do() {
     };
     let expected = stimulus(&drawing(), 2, 3, &own).unwrap();
     assert_eq!(see(json!({ "body": [[3, 3, 6], [4, 4, 5]], "encoding": own })), expected);
+}
+
+#[test]
+fn what_of_a_scenario_is_not_shown_is_said() {
+    let sandbox = Sandbox::new();
+    let server = Server::start(&sandbox, "");
+    let note = |keys: Value| {
+        let mut scenario = json!({ "body": [[3]] });
+        scenario.as_object_mut().unwrap().extend(keys.as_object().unwrap().clone());
+        json_of(&server.post("/api/scenario", &scenario))["note"].clone()
+    };
+    assert_eq!(note(json!({ "start_row": 2, "start_column": 493, "control_steps": 5000 })), Value::Null);
+    for start in [json!({ "start_row": 3 }), json!({ "start_column": 494 })] {
+        assert_eq!(note(start), "it starts in row 2, column 493, as all bodies do here");
+    }
+    assert_eq!(note(json!({ "control_steps": 5001 })), "it ends after 5000 control steps");
+    let all = json!({ "stimuli": [[[0]], [[1]]], "switch_every": 9000, "start_row": 9 });
+    let all = note(all);
+    for words in ["the first is shown; ", "row 2", "5000 control steps"] {
+        assert!(all.as_str().unwrap().contains(words), "{all}");
+    }
 }
 
 /// Moments as the page decodes them: centre and points.

@@ -282,6 +282,46 @@ fn a_run_that_begins_while_the_page_is_open_appears_grows_and_ends_on_it() {
 }
 
 #[test]
+fn an_audit_that_appears_while_the_page_is_open_is_said_and_can_be_chosen_by() {
+    let sandbox = Sandbox::tiny();
+    let Some(mut browser) = browser(&sandbox) else { return };
+    sandbox.run("evolve -q -c tiny.toml -o run").ended(0, &[]);
+    sandbox.run("audit -q -a run -o audit.json").ended(0, &[]);
+    let audit: Value = serde_json::from_str(&sandbox.read("audit.json")).unwrap();
+    // With verdicts of two kinds, and a reason to look for.
+    let with_reason = |reason: &str| {
+        let mut audit = audit.clone();
+        for (number, robot) in audit["robots"].as_array_mut().unwrap().iter_mut().enumerate() {
+            robot["verdict"] = if number % 2 == 0 { "exploits" } else { "fragile" }.into();
+            robot["reason"] = reason.into();
+        }
+        audit.to_string()
+    };
+    let server = Server::start(&sandbox, "--archive run");
+    let mut tab = browser.tab(1280, 900, false);
+    open(&mut tab, &server);
+    choose(&mut tab, "3");
+    let begun = || serde_json::from_str::<Value>(&server.get("/api/status").body).unwrap()["begun"].clone();
+    let (who, before) = (tab.text("#who"), begun());
+    assert_eq!(tab.eval("document.getElementById('audit').hidden"), true);
+    sandbox.write("run/audit.json", with_reason("seen once"));
+    tab.wait("document.getElementById('about').textContent.includes('seen once')");
+    assert_eq!(tab.eval("document.getElementById('audit').hidden"), false);
+    tab.eval("(() => { const s = document.getElementById('audit'); s.value = 'fragile'; s.onchange(); })()");
+    let few = tab.text("#count");
+    assert!(few.contains(" of "), "{few}");
+    // What was chosen stays, the robot walks on.
+    sandbox.write("run/audit.json", with_reason("seen once more"));
+    tab.wait("document.getElementById('about').textContent.includes('seen once more')");
+    assert_eq!(
+        (tab.eval("document.getElementById('audit').value"), tab.text("#count")),
+        ("fragile".into(), few)
+    );
+    assert_eq!((tab.text("#who"), begun()), (who, before));
+    assert_eq!(tab.complaints(), Vec::<String>::new());
+}
+
+#[test]
 fn a_body_that_is_built_and_the_robot_it_makes_are_in_sight_together() {
     let sandbox = Sandbox::new();
     let Some(mut browser) = browser(&sandbox) else { return };

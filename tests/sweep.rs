@@ -359,7 +359,7 @@ split = "validation"
     // Which classes there are, only the images tell.
     sandbox
         .run("sweep plans/pairs.toml --out pairs --set pairs=[1,12]")
-        .ended(1, &["task 1 (walkers-1v12-seed3) failed", "class 12", "1 of 1 tasks failed: 1"]);
+        .ended(3, &["task 1 (walkers-1v12-seed3)", "class 12"]);
 }
 
 #[test]
@@ -378,4 +378,103 @@ fn the_runs_of_a_reproduction_are_tasks_of_the_same_kind() {
     reproduce("--out one").ended(0, &[]);
     reproduce("--out two").ended(0, &[]);
     assert_eq!(sandbox.read("one/reproduction.csv"), sandbox.read("two/reproduction.csv"));
+}
+
+/// A short plan with two tasks.
+const SHORT: &str = "config = \"tiny.toml\"\nseeds = [1, 2]\nset = [\"generations=2\"]\n";
+
+#[test]
+fn runs_of_another_plan_are_no_results_of_this_one() {
+    let sandbox = Sandbox::tiny();
+    sandbox.write("plan.toml", SHORT);
+    sandbox.run("sweep plan.toml --out all -q").ended(0, &[]);
+    // One was replaced by hand.
+    sandbox
+        .run("evolve -q -c tiny.toml -g 2 --seed 2 --set protocol.control_steps=5 -o all/tiny-seed2 --force")
+        .ended(0, &[]);
+    let said = sandbox.run("sweep plan.toml --out all --collect").ended(0, &["left out"]);
+    assert!(said.err.contains("protocol.control_steps = 5 there, 20 in the plan"), "{said:?}");
+    let csv = sandbox.read("all/sweep.csv");
+    let lines: Vec<&str> = csv.lines().collect();
+    assert!(lines[1].contains("0|1") && !lines[2].contains("0|1"), "{csv}");
+    // The plan was changed in a key that is in no folder's name.
+    sandbox.write("plan.toml", SHORT.replace("generations=2", "protocol.control_steps=5"));
+    for what in ["--collect", "--status", ""] {
+        let words = ["task 1 (tiny-seed1)", "the run there differs", "20 there, 5 in the plan"];
+        sandbox.run(&format!("sweep plan.toml --out all {what}")).ended(3, &words);
+    }
+}
+
+#[test]
+fn what_a_later_step_lacks_is_said_before_the_first_task_begins() {
+    let sandbox = Sandbox::tiny();
+    for (more, words) in [
+        ("[eval]\nimages = 100000", &["task 1 (tiny-seed1)", "eval.images = 100000", "class 0"][..]),
+        ("[eval]\nimages = 1", &["eval.images = 1: expected 2 or more"]),
+        ("[validation]", &["unknown field"]),
+        (
+            "[audit]\nrobots = \"top:1\"\n[eval]\nphysical_only = true",
+            &["eval.physical_only", "audit.robots"],
+        ),
+        ("groups = [\"0|1\", \"1|0\"]", &["groups", "expected different ones"]),
+    ] {
+        let (first, rest) = more.split_once('\n').unwrap_or((more, ""));
+        let keys =
+            if first.starts_with('[') { format!("{SHORT}{more}") } else { format!("{first}\n{SHORT}{rest}") };
+        sandbox.write("plan.toml", keys);
+        sandbox.run("sweep plan.toml --out all").ended(3, words);
+        assert!(!sandbox.path("all/tiny-seed1/run.json").exists(), "{more}");
+    }
+    sandbox.write("plan.toml", format!("{SHORT}[eval]\nimages = \"all\"\n"));
+    sandbox.run("sweep plan.toml --out none --status --set eval.images=most").ended(2, &["expected all"]);
+    sandbox.run("sweep plan.toml --out all --status").ended(0, &[]);
+}
+
+#[test]
+fn a_run_of_another_kind_in_a_tasks_folder_is_a_failure_with_its_reason() {
+    let sandbox = Sandbox::tiny();
+    sandbox.write("plan.toml", SHORT);
+    sandbox.write("all/tiny-seed1/training.json", "{}");
+    let said = sandbox.run("sweep plan.toml --out all").ended(1, &["1 of 2 tasks failed: 1"]);
+    assert!(said.err.contains("the run in this folder is a training"), "{said:?}");
+}
+
+#[test]
+fn a_plans_config_is_beside_the_plan_or_built_in_wherever_one_stands() {
+    let sandbox = Sandbox::new();
+    sandbox.write("plans/plan.toml", "config = \"quickstart.toml\"\nset = [\"generations=1\"]\n");
+    sandbox.write("quickstart.toml", TINY);
+    sandbox.run("sweep plans/plan.toml --out all -q").ended(0, &[]);
+    assert_eq!(sandbox.run_file("all/quickstart-seed1").config.body.height, 7);
+    sandbox.write("plans/quickstart.toml", TINY.replace("height = 5", "height = 6"));
+    sandbox.run("sweep plans/plan.toml --out beside -q").ended(0, &[]);
+    assert_eq!(sandbox.run_file("beside/quickstart-seed3").config.body.height, 6);
+    sandbox.write("plans/plan.toml", "config = \"own.toml\"\n");
+    sandbox.write("own.toml", TINY);
+    sandbox.run("sweep plans/plan.toml --out none").ended(3, &["plans/own.toml: there is no such file"]);
+}
+
+#[test]
+fn other_classes_draw_images_of_their_own() {
+    let sandbox = Sandbox::tiny();
+    sandbox.write("plan.toml", format!("{SHORT}pairs = [0, 4]\n"));
+    sandbox.run("sweep plan.toml --out all -q").ended(0, &[]);
+    let images = sandbox.run_file("all/tiny-0v4-seed1").training_images;
+    assert_eq!(images.iter().map(|image| image.label).collect::<Vec<_>>(), [0, 4]);
+}
+
+#[test]
+fn listed_commands_name_the_images_and_the_atlas_of_this_folder() {
+    let sandbox = Sandbox::new();
+    sandbox.write("data/mnist/train", "");
+    sandbox.write("plan.toml", "config = \"zero_one.toml\"\n");
+    let list = sandbox.run("sweep plan.toml --list").ended(0, &[]).out;
+    let data = sandbox.path("data/mnist");
+    assert!(list.contains(&format!("--data {}", data.display())), "{list}");
+    let atlas = Path::new(env!("CARGO_MANIFEST_DIR")).join("data/atlas");
+    sandbox.write("plan.toml", "archive = \"atlas:zero_one-1\"\npairs = [0, 1]\nseeds = [1]\n");
+    let mut command = sandbox.command("sweep plan.toml --list".split(' '));
+    command.env("MORPHCOG_ATLAS", &atlas);
+    let list = said(command).ended(0, &[]).out;
+    assert!(list.starts_with(&format!("env MORPHCOG_ATLAS={} ", atlas.display())), "{list}");
 }

@@ -309,3 +309,93 @@ fn evolve_with_train_ends_with_the_robot_that_train_makes_of_its_gaits() {
     sandbox.run("evolve -q -c gaits.toml --train -o other/two").ended(5, &["other/two-0v1"]);
     assert!(!sandbox.path("other/two").exists());
 }
+
+#[test]
+fn keys_that_a_training_has_otherwise_are_refused() {
+    let sandbox = sandbox();
+    for key in [
+        "generations=5",
+        "data.images_per_class=7",
+        "evaluation.fitness=response",
+        "evaluation.fitness=min",
+        "protocol.rollout=sequential",
+    ] {
+        let name = key.split('=').next().unwrap();
+        sandbox
+            .run(&format!("train -a walkers --task 0|1 {LITTLE} --set {key} -o none"))
+            .ended(3, &[name, "expected without: a training has"]);
+    }
+    sandbox
+        .run(&format!("train -a walkers --task 0|1 --robots best-validation:1 {LITTLE} -o none"))
+        .ended(2, &["--robots best-validation", "gaits have no task"]);
+    assert!(!sandbox.path("none").exists());
+}
+
+#[test]
+fn a_small_dataset_is_divided_between_training_and_validation() {
+    let sandbox = sandbox();
+    let small = "--set data.builtin.train_per_class=60";
+    let train = format!("train -a walkers --task 0|1 --robots all {LITTLE} {small}");
+    let said = sandbox
+        .run(&format!("{train} --set validation.images=400 --set train.challengers=0 -o taught"))
+        .ended(0, &[]);
+    assert!(said.err.contains("validating on 40 images in place of 400"), "{said:?}");
+    let config = sandbox.run_file("taught").config;
+    assert_eq!((config.data.images_per_class, config.validation.images), (40, 40));
+    // So few that neither goes.
+    let fewer = train.replace("=60", "=30");
+    let said = sandbox.run(&format!("{fewer} -o none")).ended(3, &["validation.images"]);
+    assert!(said.err.contains("train.images_per_class") && !said.err.contains("at most"), "{said:?}");
+}
+
+#[test]
+fn what_a_training_lacks_is_said_before_its_gaits_evolve() {
+    let sandbox = Sandbox::new();
+    sandbox.write("run.toml", TINY.replace("train_images = [0, 1]", "builtin.train_per_class = 30"));
+    sandbox
+        .run("evolve -c run.toml --train -o none")
+        .ended(3, &["validation.images", "train.images_per_class"]);
+    assert!(!sandbox.path("none").exists());
+}
+
+#[test]
+fn an_evolution_goes_on_whatever_its_training_is_to_be() {
+    let sandbox = Sandbox::new();
+    sandbox.write("run.toml", gaits());
+    sandbox.run("evolve -q -c run.toml -g 2 -o run").ended(0, &[]);
+    sandbox.run("evolve -q -c run.toml -g 3 -o run --resume --set train.challengers=6").ended(0, &[]);
+    assert_eq!(sandbox.run_file("run").config.train.challengers, 6);
+}
+
+#[test]
+fn gaits_have_no_task_to_be_tested_or_audited_on() {
+    let sandbox = Sandbox::new();
+    sandbox.write("run.toml", gaits());
+    let said = sandbox.run("evolve -c run.toml -g 2 -o run").ended(0, &[]);
+    assert!(said.err.contains("next: morphcog train --archive run/run.json"), "{said:?}");
+    for command in ["eval -a run", "audit -a run", "team -a run"] {
+        sandbox.run(command).ended(3, &["these are gaits", "morphcog train --archive run/run.json"]);
+    }
+    sandbox
+        .run("evolve -c run.toml --set validation.best=1 -o none")
+        .ended(3, &["validation.best", "gaits tell no images apart yet"]);
+}
+
+#[test]
+fn images_of_an_earlier_training_never_validate_a_later_one() {
+    let sandbox = sandbox();
+    let train = |from: &str, out: &str, seed: u64| {
+        let data = format!("--set data.builtin.seed={seed}");
+        sandbox
+            .run(&format!("train -q -a {from} --task 0|1 --robots all {LITTLE} --set train.challengers=0 {data} -o {out}"))
+            .ended(0, &[]);
+        sandbox.run_file(out)
+    };
+    let first = train("walkers", "first", 1);
+    let second = train("first", "second", 2);
+    let third = train("second", "third", 1);
+    let of = |run: &morphcog::store::run::RunFile| run.origin.clone().unwrap();
+    assert!(of(&second).elsewhere.contains_key(&first.dataset.train_sha256));
+    let before = of(&third).trained_on;
+    assert!(first.training_images.iter().all(|image| before.contains(&image.index)), "{}", before.len());
+}

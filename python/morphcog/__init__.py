@@ -22,6 +22,7 @@ import json as _json
 import os as _os
 import subprocess as _subprocess
 import sys as _sys
+from collections.abc import Mapping as _Mapping
 from dataclasses import dataclass as _dataclass
 
 import numpy as _np
@@ -228,7 +229,10 @@ class Run:
         return Robot(identity, task, objective, body, self)
 
     def evaluate(self, robots="top:10", images=1000, split="test", data=None):
-        """Tests robots on held-out images, as `morphcog eval`: a DataFrame with a row for each robot."""
+        """Tests robots on held-out images, as `morphcog eval`: a DataFrame with a row for each robot.
+
+        images: how many, or "all".
+        """
         self._command("eval", "--robots", robots, "--images", images, "--split", split, data=data)
         name = "eval.csv" if split == "test" else "eval-validation.csv"
         return self._beside(name)
@@ -275,12 +279,16 @@ def evolve(
 ):
     """Evolves an archive of robots, as `morphcog evolve`, and returns its Run.
 
-    config: a file or the name of a built-in config. set: changes of keys, as "map_elites.parents=10", or a
-    dict. out: run folder (default: runs/<config>-seed<seed>). resume: goes on with the run in the folder.
-    force: replaces it. Ctrl-C saves the run, which resume goes on with. Raises Error with what is wrong.
+    config: a file or the name of a built-in config. set: a change of a key, as "map_elites.parents=10", several
+    of them, or a dict. out: run folder (default: runs/<config>-seed<seed>). resume: goes on with the run in the
+    folder. force: replaces it. Ctrl-C saves the run, which resume goes on with. Raises Error with what is wrong.
     """
-    pairs = set.items() if isinstance(set, dict) else (text.split("=", 1) for text in set)
-    changes = ["=".join([key, value if isinstance(value, str) else _json.dumps(value)]) for key, value in pairs]
+    if isinstance(set, str):
+        changes = [set]
+    elif isinstance(set, _Mapping):
+        changes = [f"{key}={value if isinstance(value, str) else _json.dumps(value)}" for key, value in set.items()]
+    else:
+        changes = list(set)
     changes += [] if seed is None else [f"seed={seed}"]
     changes += [] if generations is None else [f"generations={generations}"]
     path = lambda value: None if value is None else _os.fspath(value)

@@ -43,7 +43,7 @@ class Run:
     def evaluate(
         self,
         robots: str = "top:10",
-        images: int = 1000,
+        images: int | Literal["all"] = 1000,
         split: Literal["test", "validation"] = "test",
         data: Path | None = None,
     ) -> pd.DataFrame: ...
@@ -71,7 +71,7 @@ def evolve(
     *,
     generations: int | None = None,
     seed: int | None = None,
-    set: Iterable[str] | Mapping[str, Any] = (),
+    set: str | Iterable[str] | Mapping[str, Any] = (),
     out: Path | None = None,
     resume: bool = False,
     force: bool = False,

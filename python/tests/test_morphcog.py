@@ -120,6 +120,8 @@ def test_a_controller_can_drive_every_sensor_at_every_step():
         (lambda: mc.load_run("nowhere"), ["nowhere"]),
         (lambda: mc.evolve("nothing.toml"), ["no built-in config"]),
         (lambda: mc.evolve("quickstart.toml", set={"map_elites.parents": 0}), ["map_elites.parents"]),
+        (lambda: mc.evolve("quickstart.toml", set="map_elites.parents=0"), ["map_elites.parents = 0"]),
+        (lambda: mc.evolve("quickstart.toml", set=["map_elites.parents"]), ["map_elites.parents", "key=value"]),
         (lambda: mc.images("builtin", "validation"), ['expected "train" or "test"']),
         (lambda: mc.images("nowhere", data="no-folder"), ["no-folder"]),
     ],

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 pub const PREFIX: &str = "atlas:";
 
 /// The environment variable that says where the atlas is.
-const VARIABLE: &str = "MORPHCOG_ATLAS";
+pub const VARIABLE: &str = "MORPHCOG_ATLAS";
 
 /// Where it is looked for after that: the repository's folder.
 const FOLDER: &str = "data/atlas";
@@ -26,6 +26,11 @@ fn folders(variable: Option<&OsStr>) -> Vec<PathBuf> {
 
 fn variable() -> Option<std::ffi::OsString> {
     std::env::var_os(VARIABLE)
+}
+
+/// The folder of the atlas that has a run.
+pub fn folder_of(run: &str) -> Option<PathBuf> {
+    folders(variable().as_deref()).into_iter().find(|folder| holds_run(&folder.join(run)))
 }
 
 /// The compressed file of a run.

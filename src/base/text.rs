@@ -1,4 +1,7 @@
-//! [`one_line`]: text from anywhere as one line that a terminal shows as it is meant.
+//! [`one_line`]: text from anywhere as one line that a terminal shows as it is meant; [`counted`]:
+//! how many there are of something.
+
+use std::fmt::Display;
 
 /// Most characters of a message: more than any of ours has.
 const MOST: usize = 1500;
@@ -26,6 +29,12 @@ pub fn shortened(text: &str, most: usize) -> String {
     let begin: String = begin.chars().take(half).collect();
     let end: String = last[last.len().saturating_sub(half)..].iter().collect();
     format!("{begin}{CUT}{end}")
+}
+
+/// A number, and the word for one or for any other number of things: "1 robot", "2 robots".
+pub fn counted<N: Display + PartialEq + From<u8>>(count: N, one: &str, more: &str) -> String {
+    let word = if count == N::from(1) { one } else { more };
+    format!("{count} {word}")
 }
 
 /// Where a piece is left out.
@@ -56,6 +65,12 @@ mod tests {
         let plain = "runs/größe/雪: 0|123, −3.2 × \\ \"quoted\"";
         assert_eq!(one_line(plain), plain);
         assert_eq!(one_line(&one_line("a\x1b")), one_line("a\x1b"));
+    }
+
+    #[test]
+    fn one_thing_is_not_several() {
+        assert_eq!(counted(1_usize, "robot", "robots"), "1 robot");
+        assert_eq!([0_u64, 2].map(|n| counted(n, "task is", "tasks are")), ["0 tasks are", "2 tasks are"]);
     }
 
     #[test]

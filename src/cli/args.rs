@@ -12,10 +12,14 @@ use crate::cli::serve::ServeArgs;
 use crate::cli::sweep::SweepArgs;
 use crate::cli::team::TeamArgs;
 use crate::cli::train::TrainArgs;
+use crate::cli::words::{held_out, offering};
 use crate::cli::{audit, capacity, demo, plot, report, reproduce, response, serve, sweep, team, train};
+use crate::commands::plan::PAPER_TOML;
 use crate::commands::replay::Shown;
+use crate::commands::schema;
 use crate::config;
 use crate::data::dataset::BUILTIN;
+use crate::data::files::FETCHABLE;
 use crate::search::showing;
 use crate::store::images::{HeldOut, HowMany};
 use crate::store::robots::Selection;
@@ -23,6 +27,7 @@ use crate::task::direction;
 use crate::view::console::Mode;
 use crate::view::pictures::Format;
 use crate::view::scene::Look;
+use clap::builder::{StringValueParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
 
@@ -163,6 +168,7 @@ Examples:
     #[command(after_help = "Examples:\n  morphcog config\n  morphcog config zero_one.toml > mine.toml")]
     Config {
         /// Name of a built-in config, or a file: printed with its defaults.
+        #[arg(value_parser = config_or_file(), hide_possible_values = true)]
         name: Option<String>,
         #[arg(long, value_name = "KEY=VALUE", requires = "name", help = SET)]
         set: Vec<String>,
@@ -173,6 +179,7 @@ Examples:
     )]
     Schema {
         /// Name of a schema, as morphcog schema lists them.
+        #[arg(value_parser = offering(schema::ALL.map(|schema| schema.name), StringValueParser::new()))]
         name: Option<String>,
     },
     /// Completions for a shell.
@@ -252,7 +259,7 @@ pub(super) struct EvalArgs {
     pub(super) images: HowMany,
     /// Which images: test, or validation (of the training split, neither trained on nor chosen
     /// from), to compare robots by and leave the test images unseen.
-    #[arg(long, default_value_t = HeldOut::Test, value_name = "SPLIT")]
+    #[arg(long, default_value_t = HeldOut::Test, value_name = "SPLIT", value_parser = held_out())]
     pub(super) split: HeldOut,
     #[arg(short, long, visible_aliases = ["robot", "select"], default_value = "top:10", help = ROBOTS)]
     pub(super) robots: Vec<Selection>,
@@ -309,7 +316,7 @@ pub(super) struct ReplayArgs {
     #[arg(long, value_name = "DIR")]
     pub(super) data: Option<PathBuf>,
     /// What to make, separated by commas (default: gif,html).
-    #[arg(short, long, value_delimiter = ',')]
+    #[arg(short, long, value_delimiter = ',', value_parser = offering(FORMATS, str::parse::<Format>))]
     pub(super) format: Vec<Format>,
     /// File; its ending (.gif, .html, .png) says the format (default: replay-<robot> beside
     /// run.json).
@@ -326,7 +333,7 @@ pub(super) struct ReplayArgs {
     #[arg(long, default_value_t = 50, value_parser = clap::value_parser!(u32).range(1..=50))]
     pub(super) fps: u32,
     /// How GIF and PNG draw the world: plain, or as in the paper's videos.
-    #[arg(long, value_name = "plain|paper", default_value_t = Look::Plain)]
+    #[arg(long, default_value_t = Look::Plain, value_parser = offering(["plain", "paper"], str::parse::<Look>))]
     pub(super) look: Look,
     /// Open the result.
     #[arg(long)]
@@ -352,8 +359,8 @@ pub(super) enum DataCommand {
         after_help = "Examples:\n  morphcog data fetch\n  morphcog data fetch fashion-mnist --to ~/data/fashion"
     )]
     Fetch {
-        /// mnist or fashion-mnist.
-        #[arg(default_value = "mnist")]
+        /// What to download.
+        #[arg(default_value = "mnist", value_parser = offering(FETCHABLE, StringValueParser::new()))]
         dataset: String,
         /// Folder (default: data/<dataset>).
         #[arg(long, value_name = "DIR")]
@@ -390,11 +397,25 @@ pub(super) enum DataCommand {
 #[derive(Debug, Args)]
 pub(super) struct DatasetArgs {
     /// builtin, mnist, fashion-mnist, or a name of your own.
-    #[arg(default_value = BUILTIN)]
+    #[arg(default_value = BUILTIN, value_parser = dataset(), hide_possible_values = true)]
     pub(super) dataset: String,
     /// Folder with the files.
     #[arg(long, value_name = "DIR")]
     pub(super) data: Option<PathBuf>,
+}
+
+/// Formats of moving pictures.
+const FORMATS: [&str; 4] = ["gif", "html", "png", "terminal"];
+
+/// Reads the name of a built-in config, or of a file.
+fn config_or_file() -> impl TypedValueParser<Value = String> {
+    let names = config::BUILT_IN.map(|(name, _)| name);
+    offering(names.into_iter().chain([PAPER_TOML.0]), StringValueParser::new())
+}
+
+/// Reads the name of a dataset, which may be the user's own.
+fn dataset() -> impl TypedValueParser<Value = String> {
+    offering([BUILTIN].into_iter().chain(FETCHABLE), StringValueParser::new())
 }
 
 impl Cli {

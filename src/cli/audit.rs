@@ -4,6 +4,7 @@ use crate::analysis::gallery;
 use crate::base::error::Error;
 use crate::base::ranks::Ranks;
 use crate::base::signals;
+use crate::base::text::counted;
 use crate::cli::choice;
 use crate::cli::choice::threads;
 use crate::cli::choice::{Archives, ROBOTS, selected};
@@ -116,7 +117,8 @@ pub(super) fn run(args: AuditArgs, console: &Console, ranks: Ranks) -> Result<()
             return Err(error);
         }
         if finished.stopped {
-            let text = format!("stopped; {} robots are audited and saved", finished.file.robots.len());
+            let audited = finished.file.robots.len();
+            let text = format!("stopped; {} audited and saved", counted(audited, "robot is", "robots are"));
             return Err(Error::stopped(text).hint("the same command goes on".to_string()));
         }
     }

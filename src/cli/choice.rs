@@ -3,6 +3,7 @@
 
 use crate::analysis::gallery;
 use crate::base::error::Error;
+use crate::base::named;
 use crate::base::signals;
 use crate::base::stop::NEVER;
 use crate::base::threads::MOST_THREADS;
@@ -82,7 +83,8 @@ pub(super) fn say_unfinished<'a>(archives: impl IntoIterator<Item = &'a PathBuf>
     if archives.is_empty() {
         archives.extend(folder::newest_run());
     }
-    for path in archives {
+    // Those that have names do not go on.
+    for path in archives.into_iter().filter(|path| !named::is_named(path)) {
         if let Some((done, asked)) = RunFile::progress(&path).filter(|(done, asked)| done < asked) {
             console.info(&format!(
                 "{}: generation {done} of {asked}: the run is not at its end",

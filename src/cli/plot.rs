@@ -3,6 +3,7 @@
 use crate::base::error::Error;
 use crate::cli::choice;
 use crate::cli::choice::{Archives, ROBOTS, selected};
+use crate::cli::words::offering;
 use crate::commands::one_by_one;
 use crate::commands::one_by_one::Named;
 use crate::commands::replay::{Options, Shown};
@@ -35,7 +36,8 @@ Examples:
 
 #[derive(Debug, Args)]
 pub(super) struct PlotArgs {
-    /// What to show: body, spacetime, snapshots, archive, progress, accuracy or capacity.
+    /// What to show.
+    #[arg(value_parser = offering(Kind::ALL.map(|(_, name)| name), str::parse::<Kind>))]
     kind: Kind,
     #[command(flatten)]
     archives: Archives,

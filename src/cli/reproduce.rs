@@ -52,7 +52,12 @@ pub(super) fn run(args: ReproduceArgs, console: &Console) -> Result<(), Error> {
     let name = if Plan::is_built_in(&args.plan) { args.plan.clone() } else { absolute(&args.plan)? };
     let mut words = ["reproduce", &name, "--scale", &args.scale.to_string()].map(quoted).to_vec();
     words.extend(args.set.iter().flat_map(|set| ["--set".to_string(), quoted(set)]));
-    if asked(&args.what, &tasks, &Command { words, name: "reproduce", place: &place }, console)? {
+    if asked(
+        &args.what,
+        &tasks,
+        &Command { words, name: "reproduce", tasks: &tasks, place: &place },
+        console,
+    )? {
         if args.what.list || args.what.slurm {
             console
                 .info("when all tasks are done, the same command without --list or --slurm makes the table");

@@ -4,6 +4,7 @@ use crate::analysis::measure::Options;
 use crate::analysis::{gallery, measure};
 use crate::base::error::Error;
 use crate::base::signals;
+use crate::base::text::counted;
 use crate::cli::choice;
 use crate::cli::choice::threads;
 use crate::cli::choice::{ROBOTS, run_json, selected};
@@ -125,7 +126,9 @@ pub(super) fn run(args: ResponseArgs, console: &Console) -> Result<(), Error> {
     if finished.stopped {
         let text = match finished.file.robots.len() {
             0 => "stopped before the first robot was measured; nothing is written".to_string(),
-            robots => format!("stopped after {robots} robots; those are saved"),
+            robots => {
+                format!("stopped after {}", counted(robots, "robot; it is saved", "robots; those are saved"))
+            }
         };
         return Err(Error::stopped(text));
     }

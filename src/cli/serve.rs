@@ -35,13 +35,12 @@ pub(super) struct ServeArgs {
 }
 
 pub(super) fn run(args: ServeArgs, console: &Console) -> Result<(), Error> {
-    let archives = match args.archives.paths() {
-        // A page without a run is of use, too: the published robots are there.
-        given if given.is_empty() => folder::newest_run().into_iter().collect(),
-        given => given,
-    };
+    let archives = args.archives.paths();
+    // A page without a run is of use, too: the published robots are there.
+    let newest = if archives.is_empty() { folder::newest_run().ok() } else { None };
     let stop = signals::stop_flag()?;
-    let (service, notes) = Service::open(&Options { archives, data: args.data, runs: folder::RUNS.into() })?;
+    let options = Options { archives, newest, data: args.data, runs: folder::RUNS.into() };
+    let (service, notes) = Service::open(&options)?;
     let server = Server::bind(service, args.port)?;
     for note in notes {
         console.info(&format!("note: {note}"));

@@ -66,7 +66,7 @@ pub(super) fn run(args: SweepArgs, console: &Console) -> Result<(), Error> {
     let absolute = std::path::absolute(&args.plan).map_err(|error| Error::reading(&args.plan, &error))?;
     let mut words = vec!["sweep".to_string(), in_shell(&absolute)];
     words.extend(args.set.iter().flat_map(|set| ["--set".to_string(), in_shell(Path::new(set))]));
-    if asked(&args.what, &tasks, &Command { words, name: &name, place: &place }, console)? {
+    if asked(&args.what, &tasks, &Command { words, name: &name, tasks: &tasks, place: &place }, console)? {
         return Ok(());
     }
     tasks::check_folders(&tasks, &place).map_err(|errors| refused(errors, console))?;

@@ -1,7 +1,7 @@
 //! What `sweep` and `reproduce` have in common: one task, all of them, lists, how far they are.
 
 use crate::base::error::Error;
-use crate::base::signals;
+use crate::base::{atlas, signals};
 use crate::cli::choice::threads;
 use crate::cli::process;
 use crate::commands::tasks;
@@ -63,6 +63,8 @@ pub(super) struct Command<'a> {
     pub(super) words: Vec<String>,
     /// Name of the plan.
     pub(super) name: &'a str,
+    /// Its tasks.
+    pub(super) tasks: &'a [Task],
     /// Where.
     pub(super) place: &'a Place,
 }
@@ -81,10 +83,24 @@ impl Command<'_> {
         words.extend(["--out".to_string(), in_shell(&absolute(&self.place.out)?)]);
         let environment =
             std::env::var_os("MORPHCOG_DATA").filter(|value| !value.is_empty()).map(PathBuf::from);
-        if let Some(data) = self.place.data.clone().or(environment) {
+        if let Some(data) = self.place.data.clone().or(environment).or_else(|| self.data_here()) {
             words.extend(["--data".to_string(), in_shell(&absolute(&data)?)]);
         }
+        if let Some(atlas) = self.tasks.iter().find_map(Task::atlas) {
+            words.splice(
+                0..0,
+                ["env".to_string(), format!("{}={}", atlas::VARIABLE, in_shell(&absolute(&atlas)?))],
+            );
+        }
         Ok(words.join(" "))
+    }
+
+    /// The folder that the tasks' images are looked for in from the present one on, if there is one of
+    /// all tasks.
+    fn data_here(&self) -> Option<PathBuf> {
+        let mut all = self.tasks.iter().map(Task::data_here);
+        let first = all.next()?;
+        all.all(|other| other == first).then_some(first)?
     }
 
     fn list(&self, count: usize, console: &Console) -> Result<(), Error> {

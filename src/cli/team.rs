@@ -1,10 +1,12 @@
 //! `morphcog team`: its words, and what it calls.
 
 use crate::base::error::Error;
+use crate::base::text::counted;
 use crate::base::{shipped, signals};
 use crate::cli::choice;
 use crate::cli::choice::threads;
 use crate::cli::choice::{Archives, selected};
+use crate::cli::words::held_out;
 use crate::commands::team;
 use crate::commands::team::Options;
 use crate::store::folder;
@@ -51,7 +53,7 @@ pub(super) struct TeamArgs {
     images: HowMany,
     /// Which images: test, or validation (of the training split, neither trained on nor chosen
     /// from).
-    #[arg(long, default_value_t = HeldOut::Test, value_name = "SPLIT")]
+    #[arg(long, default_value_t = HeldOut::Test, value_name = "SPLIT", value_parser = held_out())]
     split: HeldOut,
     /// Seed of what is drawn: images, and robots with random:N.
     #[arg(long, default_value_t = 1)]
@@ -93,7 +95,8 @@ pub(super) fn run(args: TeamArgs, console: &Console) -> Result<(), Error> {
         return Err(error);
     }
     if file.answers.is_none() {
-        let text = format!("stopped after {} of {} robots; those are saved", file.members.len(), file.size);
+        let (shown, all) = (file.members.len(), counted(file.size, "robot", "robots"));
+        let text = format!("stopped after {shown} of {all}; what is done is saved");
         return Err(Error::stopped(text).hint("the same command goes on".to_string()));
     }
     Ok(())

@@ -140,7 +140,7 @@ pub(super) fn after_evolution(evolution: &evolve::Options) -> Result<Options, Er
     let name = name(&archive, groups, None);
     let of_training = out.with_file_name(&name);
     // What would stop the training is said before gaits evolve for an hour.
-    train::config_of(config, groups, None, &[])?;
+    train::check(config, groups, data.as_deref())?;
     if *if_exists == IfExists::Refuse {
         folder::vacant(&of_training)?;
     }
@@ -181,7 +181,7 @@ pub(super) fn trained(options: &Options, stop: &AtomicBool, console: &Console) -
         out: archive.with_file_name(AUDIT_JSON),
         threads: options.threads,
         ranks: Ranks::ALONE,
-        source: audit::Source::Archive(archive),
+        source: audit::Source::Archive(archive.clone()),
     };
     let audited = audit::audit(&options, stop, &Reporter::new(console))?;
     verdicts::audit(console, &audited, &options.out);
@@ -191,5 +191,6 @@ pub(super) fn trained(options: &Options, stop: &AtomicBool, console: &Console) -
     if audited.stopped {
         return Err(Error::stopped("stopped while auditing; the run is saved".to_string()).hint(goes_on()));
     }
+    console.info(&format!("next: morphcog eval --archive {}", folder::in_shell(&archive)));
     Ok(())
 }

@@ -163,7 +163,7 @@ pub fn audit(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> R
         // Another audit of the same run may have written meanwhile.
         file.add_known(&options.out);
         file.robots.sort_by_key(|robot| order.iter().position(|id| *id == robot.id));
-        if ranks.leads() {
+        if ranks.leads() && !file.robots.is_empty() {
             unwritten.tried(file.write(&options.out), |text| observer.warning(text));
         }
         if stopped {
@@ -208,6 +208,7 @@ fn open(options: &Options) -> Result<Opened, Error> {
         }
         Source::Archive(path) => {
             let source = robots::Source::read(path)?;
+            source.has_task()?;
             let run = &source.run;
             check_out(&options.out, path, AUDIT_JSON)?;
             let whereabouts = Whereabouts::given(data).and_of(path);

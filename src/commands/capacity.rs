@@ -18,7 +18,7 @@ use crate::store::images::HeldOut;
 use crate::store::names::{CAPACITY_JSON, RUN_JSON};
 use crate::store::results::write_with_table;
 use crate::store::run::RunFile;
-use crate::store::setting::Setting;
+use crate::store::setting::{RunRef, Setting};
 use crate::store::trainings::Trainings;
 use crate::store::unwritten::Unwritten;
 use crate::task::grouping;
@@ -95,6 +95,7 @@ pub fn capacity(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -
         format_version: FORMAT_VERSION,
         program_version: env!("CARGO_PKG_VERSION").to_string(),
         run: report.run.clone(),
+        eval_sha256: Some(report.fingerprint()),
         selected: report.selected.clone(),
         dataset: report.dataset.clone(),
         patience_on: if config.clean { "validation" } else { "test" }.to_string(),
@@ -296,8 +297,11 @@ fn robots<'a>(report: &'a EvalFile, options: &Options) -> Result<Vec<&'a RobotRe
         return Err(Error::usage(text.to_string()).hint("morphcog audit --robots gallery".to_string()));
     }
     let folder = options.eval.parent().unwrap_or(Path::new(""));
-    let audits: Result<Vec<_>, Error> =
-        report.runs.iter().map(|run| AuditFile::near(folder, &run.sha256)).collect();
+    let audit = |run: &RunRef| match &run.archive {
+        Some(archive) => AuditFile::of_state(&run.sha256, &Path::new(archive).join(RUN_JSON)),
+        None => AuditFile::near(folder, &run.sha256),
+    };
+    let audits: Result<Vec<_>, Error> = report.runs.iter().map(audit).collect();
     let audits = audits?;
     let physical = |robot: &&RobotReport| {
         audits

@@ -217,6 +217,7 @@ fn sources(options: &Options) -> Result<Vec<Source>, Error> {
         archives => archives.iter().map(|path| Source::read(path)).collect::<Result<_, _>>()?,
     };
     for source in &sources {
+        source.has_task()?;
         check_out(&options.out, &source.path, own_name(options.split))?;
         same_setting(&sources[0], source)?;
     }

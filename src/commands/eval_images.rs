@@ -7,9 +7,11 @@ use crate::config::Config;
 use crate::data::dataset::{Dataset, Split};
 use crate::search::held_out;
 use crate::search::held_out::images_besides;
+use crate::search::training::Training;
 use crate::store::eval::Baselines;
 use crate::store::images::{HeldOut, ImageRef};
 use crate::store::robots::Source;
+use crate::store::run::RunFile;
 use crate::store::validation::shown as shown_for_validation;
 use crate::store::whereabouts::{see, see_all};
 use crate::task::baselines::{Labelled, best_pixel, larger_group, nearest_training_image};
@@ -53,10 +55,10 @@ impl<'a> HeldOutImages<'a> {
             HeldOut::Test => held_out::test_images(&classes, dataset, asked, options.seed)?,
             HeldOut::Validation => {
                 let runs: Vec<_> = sources.iter().map(|source| &source.run).collect();
-                // Now or before: a robot that is named may be one of the best of `validation.json`.
+                // Now, or before: those of `validation.json`.
                 let count = |source: &Source| match options.robots.validated() {
                     Some(_) => Some(options.validation.unwrap_or(config.validation.images)),
-                    None => options.robots.names_any().then(|| shown_for_validation(source)).flatten(),
+                    None => shown_for_validation(source),
                 };
                 let besides = chosen_by(sources, dataset, count)?;
                 images_besides(&besides, &runs, &classes, dataset, "--images", asked)?
@@ -102,7 +104,7 @@ impl<'a> HeldOutImages<'a> {
         let is_own = self.dataset.name() == self.config.data.dataset;
         let of_runs = sources.iter().map(|source| {
             let path = source.path.display().to_string();
-            let own = seen(&source.run.training_images);
+            let own = taught_with(&source.run, self.dataset).and_then(|images| seen(&images));
             let own = own.map_err(|error| error.within("training_images").within(&path))?;
             Ok((source.run.config.grouping()?, own))
         });
@@ -150,6 +152,19 @@ impl<'a> HeldOutImages<'a> {
         }
         Ok(choice)
     }
+}
+
+/// The images that a run's robots were trained on: of a training, all that it learnt from, and not
+/// only the last, which stand in its file.
+fn taught_with(run: &RunFile, dataset: &Dataset) -> Result<Vec<ImageRef>, Error> {
+    if run.origin.is_none() {
+        return Ok(run.training_images.clone());
+    }
+    let labelled = |index: usize| {
+        let label = dataset.label(Split::Train, index);
+        label.map(|label| ImageRef { index, label }).map_err(|error| Error::input(error.to_string()))
+    };
+    Training::indices(&run.config, dataset)?.into_iter().map(labelled).collect()
 }
 
 fn labelled(list: &[(Grid<f64>, u8)]) -> Vec<Labelled<'_>> {

@@ -9,6 +9,7 @@ use crate::commands::table::Row;
 use crate::commands::tasks::{self, Place, Run, Steps, Summary, Task, another, is_of, written};
 use crate::commands::{audit, capacity, eval, plan, table};
 use crate::config::Config;
+use crate::data::dataset::Split;
 use crate::search::showing;
 use crate::store::audit::{AuditFile, Verdict};
 use crate::store::capacity::CapacityFile;
@@ -16,8 +17,9 @@ use crate::store::eval::EvalFile;
 use crate::store::images::{HeldOut, HowMany};
 use crate::store::names::{AUDIT_JSON, RUN_JSON};
 use crate::store::robots::{Chosen, Selection, Source};
+use crate::store::whereabouts::Whereabouts;
 use crate::task::direction;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -88,8 +90,8 @@ pub fn reproduce(options: &Options, stop: &AtomicBool, observer: &dyn Observer) 
     let plan = options.plan.at(options.scale);
     let experiments = plan.experiments()?;
     for (_, config) in &experiments {
-        let tests = BTreeSet::from([(plan.images, config.classes())]);
-        tasks::check_images(&config.data, &tests, "images", place)?;
+        let dataset = Whereabouts::given(place.data.as_deref()).load(&config.data, &Split::ALL)?;
+        tasks::check_test(config, &dataset, HowMany::Evenly(plan.images), "images")?;
     }
     let runs = tasks::run_all(&tasks, place, options.jobs, stop, observer)?;
     let (rows, capacities) = (Vec::new(), Vec::new());

@@ -280,8 +280,13 @@ impl SweepPlan {
                 // Of a config with splits, the groups are in their place.
                 let mut config = (**config).clone();
                 if groups.is_some() {
+                    let classes = config.classes();
                     (config.task.splits, config.task.same_way_bin) = (None, false);
                     config.task.groups = groups.cloned();
+                    // Images that a config names are of the classes of its own task.
+                    if config.classes() != classes {
+                        config.data.train_images = None;
+                    }
                 }
                 let config = reading::changed(config, &set, Config::validate, |error| error)?;
                 Run::Evolve(Box::new(config), config_name.clone())
@@ -304,7 +309,8 @@ impl SweepPlan {
             Run::Evolve(config, _) => config.classes().len(),
             Run::Train(training) => training.config.classes().len(),
         };
-        if let Some(EvalStep { images, .. }) = self.eval.as_ref().filter(|step| step.images < classes) {
+        let too_few = |step: &&EvalStep| !step.images.has_each(classes);
+        if let Some(EvalStep { images, .. }) = self.eval.as_ref().filter(too_few) {
             return Err(Error::value(
                 "eval.images",
                 images,
@@ -457,7 +463,6 @@ mod tests {
             ("config = \"a\"\n[vary]\ngenerations = 5", "vary.generations"),
             ("config = \"a\"\n[vary]\ngenerations = []", "vary.generations"),
             ("config = \"a\"\n[vary]\ngenerations = [5, 5]", "vary.generations"),
-            ("config = \"a\"\n[eval]\nimages = 0", "eval.images"),
             ("config = \"a\"\n[eval]\nphysical_only = true", "eval.physical_only"),
         ] {
             let plan: SweepPlan = toml::from_str(text).unwrap();

@@ -6,11 +6,13 @@
 use crate::base::error::{Error, ErrorKind};
 use crate::base::observer::{Generation, Observer, Work};
 use crate::base::ranks::Ranks;
+use crate::base::{atlas, named};
 use crate::commands::{audit, eval};
 use crate::config::audit::Criteria;
-use crate::config::{Config, DataConfig, Settings, differing};
-use crate::data::dataset::{BUILTIN, Split};
+use crate::config::{Config, Settings, differing};
+use crate::data::dataset::{Dataset, Split};
 use crate::search::showing::task_of;
+use crate::search::training::Training as Images;
 use crate::search::{evolve, held_out, showing, train, validation};
 use crate::store::audit::{AuditFile, RobotAudit};
 use crate::store::eval::EvalFile;
@@ -18,7 +20,7 @@ use crate::store::folder::IfExists;
 use crate::store::images::{HeldOut, HowMany};
 use crate::store::lock::{self, Lock};
 use crate::store::names::{AUDIT_JSON, DATA_FOLDER, METRICS, RUN_JSON, TASK_JSON, TASK_LOCK};
-use crate::store::robots::{Selection, Source};
+use crate::store::robots::{BEST, Selection, Source};
 use crate::store::run::{Robot, RunFile};
 use crate::store::setting::RunRef;
 use crate::store::task::{State, TaskFile};
@@ -27,6 +29,7 @@ use crate::task::direction;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
+use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::{Read, Seek, SeekFrom};
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -114,8 +117,8 @@ impl Default for AuditStep {
 pub struct EvalStep {
     /// Which robots, as `--robots` of `morphcog eval`. Default "best".
     pub robots: String,
-    /// Images in all. Default 1000.
-    pub images: usize,
+    /// Images in all, evenly divided between the classes, or "all" that there are. Default 1000.
+    pub images: HowMany,
     /// Which images. Default "test".
     pub split: HeldOut,
     /// Only robots that the audit found physical. Default false.
@@ -124,7 +127,12 @@ pub struct EvalStep {
 
 impl Default for EvalStep {
     fn default() -> Self {
-        EvalStep { robots: "best".to_string(), images: 1000, split: HeldOut::Test, physical_only: false }
+        EvalStep {
+            robots: "best".to_string(),
+            images: HowMany::Evenly(1000),
+            split: HeldOut::Test,
+            physical_only: false,
+        }
     }
 }
 
@@ -140,9 +148,6 @@ impl Steps {
         }
         let Some(step) = &self.eval else { return Ok(()) };
         let tested = selection("eval.robots", &step.robots)?;
-        if step.images == 0 {
-            return Err(Error::value("eval.images", 0, "1 or more"));
-        }
         let Some(audit) = self.audit.as_ref().filter(|_| step.physical_only) else {
             return match step.physical_only {
                 true => Err(Error::value("eval.physical_only", true, "it with [audit] only")),
@@ -151,7 +156,8 @@ impl Steps {
         };
         // A training has one robot, whichever way it is chosen.
         let is_whole = trains || selection("audit.robots", &audit.robots)? == Selection::All;
-        if !is_whole && tested.validated().is_none() && !tested.names_any() {
+        let is_named = matches!(&tested, Selection::Ids(ids) if !ids.iter().any(|id| id == BEST));
+        if !is_whole && tested.validated().is_none() && !is_named {
             let expected =
                 "audit.robots = \"all\" with it: from a part of an archive nothing is drawn fairly";
             return Err(Error::value("eval.physical_only", true, expected));
@@ -221,6 +227,25 @@ impl Task {
                 differing(&of(&run.config, there), &of(&training.config, training.sha256.clone()))
             }
         }
+    }
+
+    /// The folder that its images are looked for in if no other is named, if it is there: one that
+    /// depends on the present folder.
+    pub fn data_here(&self) -> Option<PathBuf> {
+        let (data, whereabouts) = match &self.run {
+            Run::Evolve(config, _) => (&config.data, Whereabouts::given(None)),
+            Run::Train(training) => {
+                (&training.config.data, Whereabouts::given(None).and_of(&training.archive))
+            }
+        };
+        whereabouts.by_default(data)
+    }
+
+    /// The folder of the atlas that its gaits are from, if they are.
+    pub fn atlas(&self) -> Option<PathBuf> {
+        let Run::Train(training) = &self.run else { return None };
+        let (of, run) = named::name(&training.archive)?;
+        if atlas::PREFIX.starts_with(of) { atlas::folder_of(run) } else { None }
     }
 
     /// How much of it there is to show on a bar: generations, or challengers.
@@ -375,7 +400,7 @@ fn steps(task: &Task, place: &Place, stop: &AtomicBool, observer: &dyn Observer)
         let options = eval::Options {
             archives: vec![archive],
             robots: selection("eval.robots", &step.robots)?.physical(step.physical_only),
-            images: HowMany::Evenly(step.images),
+            images: step.images,
             split: step.split,
             validation: None,
             seed: 1,
@@ -415,7 +440,7 @@ fn elsewhere(error: Error) -> Error {
 
 /// Whether an evaluation is whole, and of these runs and images; its robots are another question.
 pub(crate) fn is_of(known: &EvalFile, sources: &[Source], options: &eval::Options) -> bool {
-    let runs: Vec<RunRef> = sources.iter().map(|source| RunRef::new(&source.run)).collect();
+    let runs: Vec<RunRef> = sources.iter().map(RunRef::of).collect();
     let same = (known.seed, known.split, HowMany::Evenly(known.images.len()), known.threshold)
         == (options.seed, options.split, options.images, options.threshold);
     let is_ours = known.program_version == env!("CARGO_PKG_VERSION");
@@ -470,46 +495,59 @@ pub struct Summary {
     pub open: usize,
 }
 
-/// Whether there are images for tasks that have not begun, also for their tests: else all would
-/// fail, one after the other.
+/// Whether there are images for tasks that have not begun, also for their tests: else they would
+/// fail, one after the other, or when hours of work are done.
 ///
 /// # Errors
 /// If not.
-fn check_data<'a>(tasks: impl Iterator<Item = &'a Task>, place: &Place) -> Result<(), Error> {
-    let mut needs: BTreeMap<String, (&DataConfig, BTreeSet<(usize, Vec<u8>)>)> = BTreeMap::new();
-    for task in tasks.filter(|task| !place.folder(task).join(DATA_FOLDER).exists()) {
+fn check_data<'a>(tasks: impl Iterator<Item = (usize, &'a Task)>, place: &Place) -> Result<(), Error> {
+    let has_begun = |task: &Task| place.folder(task).join(DATA_FOLDER).exists();
+    let mut datasets: BTreeMap<String, Dataset> = BTreeMap::new();
+    let mut known = BTreeSet::new();
+    for (number, task) in tasks.filter(|(_, task)| !has_begun(task)) {
         let config = match &task.run {
             Run::Evolve(config, _) => config,
             Run::Train(training) => &training.config,
         };
         let test = task.steps.eval.as_ref().filter(|step| step.split == HeldOut::Test);
-        let name = format!("{:?}", (&config.data.dataset, &config.data.dir, &config.data.builtin));
-        let (_, tests) = needs.entry(name).or_insert((&config.data, BTreeSet::new()));
-        tests.extend(test.map(|step| (step.images, config.classes())));
+        let splits = if test.is_some() { &Split::ALL[..] } else { &[Split::Train] };
+        let name = format!("{:?}", (splits, &config.data.dataset, &config.data.dir, &config.data.builtin));
+        let dataset = match datasets.entry(name.clone()) {
+            Entry::Occupied(loaded) => loaded.into_mut(),
+            Entry::Vacant(place_of) => {
+                place_of.insert(Whereabouts::given(place.data.as_deref()).load(&config.data, splits)?)
+            }
+        };
+        let named = |error: Error| error.within(&format!("task {number} ({})", task.name));
+        match &task.run {
+            Run::Evolve(config, _) => {
+                Images::images(config, dataset).map_err(named)?;
+                held_out::check(config, &[], "data.images_per_class", dataset).map_err(named)?;
+            }
+            Run::Train(training) => {
+                train::with_images(training.config.clone(), &[], dataset, &()).map_err(named)?;
+            }
+        }
+        let Some(step) = test.filter(|step| known.insert((name, step.images, config.classes()))) else {
+            continue;
+        };
+        check_test(config, dataset, step.images, "eval.images").map_err(named)?;
     }
-    needs.into_values().try_for_each(|(data, tests)| check_images(data, &tests, "eval.images", place))
+    Ok(())
 }
 
-/// Whether there are images to train on, and so many test images of these classes; `key` says where
-/// so many are asked for.
+/// Whether there are so many test images; `key` says where they are asked for.
 ///
 /// # Errors
 /// If not.
-pub(crate) fn check_images(
-    data: &DataConfig,
-    tests: &BTreeSet<(usize, Vec<u8>)>,
+pub(crate) fn check_test(
+    config: &Config,
+    dataset: &Dataset,
+    images: HowMany,
     key: &str,
-    place: &Place,
 ) -> Result<(), Error> {
-    if data.dataset == BUILTIN && tests.is_empty() {
-        return Ok(());
-    }
-    let wanted = if tests.is_empty() { &[Split::Train][..] } else { &Split::ALL };
-    let dataset = Whereabouts::given(place.data.as_deref()).load(data, wanted)?;
-    tests.iter().try_for_each(|(count, classes)| {
-        let drawn = held_out::test_images(classes, &dataset, HowMany::Evenly(*count), 1);
-        drawn.map(|_| ()).map_err(|error| error.within(&format!("{key} = {count}")))
-    })
+    let drawn = held_out::test_images(&config.classes(), dataset, images, 1);
+    drawn.map(|_| ()).map_err(|error| error.within(&format!("{key} = {images}")))
 }
 
 /// Does all tasks here, `jobs` at once; `None`: one per core. One that fails does not stop others.
@@ -528,7 +566,7 @@ pub fn run_all(
         !is_done(known.as_ref(), task)
     };
     let numbered: Vec<(usize, &Task)> = (1..).zip(tasks).filter(|(_, task)| is_open(task)).collect();
-    check_data(numbered.iter().map(|(_, task)| *task), place)?;
+    check_data(numbered.iter().copied(), place)?;
     std::fs::create_dir_all(&place.out).map_err(|error| Error::writing(&place.out, &error))?;
     let before = tasks.len() - numbered.len();
     let cores = || std::thread::available_parallelism().map_or(1, usize::from);

@@ -75,6 +75,7 @@ pub fn team(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Re
         return Err(Error::input(text.to_string()));
     };
     for source in &sources {
+        source.has_task()?;
         check_out(&options.out, &source.path, TEAM_JSON)?;
         same_data(first, source)?;
     }

@@ -81,6 +81,12 @@ impl Config {
                 "\"sequential\"".to_string(),
                 "\"fresh\"",
             ),
+            (
+                self.validation.best > 0,
+                "validation.best",
+                self.validation.best.to_string(),
+                "0: gaits tell no images apart yet",
+            ),
             (images < LEAST_IMAGES || images % 2 == 1, images_key, found, enough.as_str()),
         ];
         match checks.into_iter().find(|(is_wrong, ..)| *is_wrong) {

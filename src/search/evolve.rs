@@ -98,7 +98,7 @@ pub fn evolve(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> 
     }
     let dataset = whereabouts.load(&config.data, &[Split::Train])?;
     let training = Training::of(config, &dataset)?;
-    held_out::check(config, &dataset)?;
+    held_out::check(config, &[], "data.images_per_class", &dataset)?;
     let mutations = Mutations { seed: config.seed, spec: config.body_spec(), params: &config.genome, stop };
     mutations.random_immigrant(0, 0).map_err(unmade)?;
     // Open. Only the leading rank has a folder.

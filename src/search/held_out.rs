@@ -5,7 +5,7 @@
 use crate::base::error::Error;
 use crate::base::random::{Purpose, stream};
 use crate::config::Config;
-use crate::config::validation::{IMAGES_KEY, ValidationConfig};
+use crate::config::validation::{IMAGES_KEY, LEAST, ValidationConfig};
 use crate::data::dataset::{Dataset, Split};
 use crate::search::training::Training;
 use crate::store::images::{HowMany, ImageRef};
@@ -53,26 +53,32 @@ fn per_class(
                 scarcest.len()
             );
             let most = scarcest.len() * left.len();
-            Err(Error::input(text).hint(format!("ask for at most {most}{or}")))
+            let fewer = (most >= LEAST).then(|| format!("ask for at most {most}"));
+            let hints = fewer.into_iter().chain((!or.is_empty()).then(|| or.to_string()));
+            let hint = hints.collect::<Vec<_>>().join(", or ");
+            let error = Error::input(text);
+            Err(if hint.is_empty() { error } else { error.hint(hint) })
         }
         _ => Ok(per_class),
     }
 }
 
 /// Whether a run that is to choose robots when it ends will have images for that: to be known
-/// before it begins.
+/// before it begins. `before`: on which images its gaits were trained; `key` says how many images of
+/// a class the run itself is trained on.
 ///
 /// # Errors
 /// If of a class there are not enough.
-pub(crate) fn check(config: &Config, dataset: &Dataset) -> Result<(), Error> {
+pub(crate) fn check(config: &Config, before: &[usize], key: &str, dataset: &Dataset) -> Result<(), Error> {
     let ValidationConfig { images, best } = config.validation;
     if best == 0 {
         return Ok(());
     }
-    let or = ", train on fewer (images_per_class), or choose none (validation.best = 0)";
-    let seen = Training::indices(config, dataset)?.into_iter().collect();
+    let or = format!("train on fewer ({key}), or choose none (validation.best = 0)");
+    let mut seen: BTreeSet<usize> = Training::indices(config, dataset)?.into_iter().collect();
+    seen.extend(before);
     let classes = config.classes();
-    per_class(&classes, &left(&classes, &seen, dataset), IMAGES_KEY, images, or).map(|_| ())
+    per_class(&classes, &left(&classes, &seen, dataset), IMAGES_KEY, images, &or).map(|_| ())
 }
 
 /// `count` validation images of some runs of one experiment together, evenly divided between the
@@ -111,7 +117,10 @@ pub(crate) fn images_besides(
         seen.extend(trained_on(run, dataset)?);
     }
     let left = left(classes, &seen, dataset);
-    let HowMany::Evenly(count) = how_many else { return Ok(left.concat()) };
+    let HowMany::Evenly(count) = how_many else {
+        per_class(classes, &left, asked, classes.len(), "")?;
+        return Ok(left.concat());
+    };
     let per_class = per_class(classes, &left, asked, count, "")?;
     let draw = |(&label, free): (&u8, Vec<ImageRef>)| -> Vec<ImageRef> {
         let mut random = stream(config.seed, Purpose::Validation, 0, u64::from(label));
@@ -135,11 +144,17 @@ pub(crate) fn test_images(
     seed: u64,
 ) -> Result<Vec<ImageRef>, Error> {
     let HowMany::Evenly(count) = how_many else {
-        let of_class = |&label: &u8| {
-            let all = dataset.indices_of(Split::Test, label).iter();
-            all.map(move |&index| ImageRef { index, label })
-        };
-        return Ok(classes.iter().flat_map(of_class).collect());
+        let mut all = Vec::new();
+        for &label in classes {
+            let of_class = dataset.indices_of(Split::Test, label);
+            if of_class.is_empty() {
+                let text = format!("{}: there is no test image of class {label}", dataset.name());
+                let there = dataset.classes(Split::Test);
+                return Err(Error::input(text).hint(format!("there are of the classes {there:?}")));
+            }
+            all.extend(of_class.iter().map(|&index| ImageRef { index, label }));
+        }
+        return Ok(all);
     };
     let mut images = Vec::new();
     for (place, &label) in classes.iter().enumerate() {
@@ -147,7 +162,7 @@ pub(crate) fn test_images(
         let drawn = dataset.draw(Split::Test, &[label], share, seed, 0);
         let drawn = drawn.map_err(|error| {
             let most = classes.iter().map(|&c| dataset.indices_of(Split::Test, c).len()).min().unwrap_or(0);
-            let hint = format!("ask for at most {} images", most * classes.len());
+            let hint = format!("ask for at most {} images, or for all", most * classes.len());
             Error::input(error.to_string()).hint(hint)
         })?;
         images.extend(drawn.into_iter().map(|index| ImageRef { index, label }));

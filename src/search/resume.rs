@@ -56,7 +56,9 @@ fn compatible(saved: &Checkpoint, config: &Config, training: &Training) -> Resul
         );
         return Err(Error::input(text).hint(format!("go on with morphcog {theirs}, or {ANEW}")));
     }
-    if let Some((key, theirs, ours)) = differing(&saved.run.config.settings(), &config.settings()).first() {
+    let differing = differing(&saved.run.config.settings(), &config.settings());
+    // No evolution depends on how its gaits are trained when it has ended.
+    if let Some((key, theirs, ours)) = differing.iter().find(|(key, ..)| !key.starts_with("train.")) {
         let text = format!("the run in this folder has another config: {key} = {theirs} there, {ours} now");
         return Err(Error::input(text).hint(hint()));
     }

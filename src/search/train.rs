@@ -14,7 +14,7 @@ use crate::body::Body;
 use crate::config::evaluation::EvaluationConfig;
 use crate::config::task::TaskConfig;
 use crate::config::train::TrainConfig;
-use crate::config::validation::ValidationConfig;
+use crate::config::validation::{LEAST, ValidationConfig};
 use crate::config::{BodyConfig, Config, DataConfig, reading};
 use crate::data::dataset::{Dataset, Split};
 use crate::qd::{Archive, DescriptorSpace, Elite};
@@ -22,7 +22,7 @@ use crate::search::probing::{Probing, response};
 use crate::search::training::{Training, scarcest};
 use crate::search::windows::{Found, Windows};
 use crate::search::{held_out, validation};
-use crate::store::folder::{IfExists, RunFolder};
+use crate::store::folder::{self, IfExists, RunFolder};
 use crate::store::images::ImageRef;
 use crate::store::metrics::{Metrics, Totals};
 use crate::store::names::{ELITES, RESPONSE_JSON, RUN_JSON, TRAINING_JSON};
@@ -32,7 +32,7 @@ use crate::store::run::{Dimensions, FORMAT, FORMAT_VERSION, Robot, RunFile};
 use crate::store::training::{Batch, FILE, File, Origin};
 use crate::store::validation::Validated;
 use crate::store::whereabouts;
-use crate::store::whereabouts::{Whereabouts, see};
+use crate::store::whereabouts::{Whereabouts, load_dataset_of, see};
 use crate::task::evaluation::fresh_rollouts;
 use crate::task::fitness::Fitness;
 use crate::task::grouping::balanced;
@@ -41,6 +41,7 @@ use crate::task::protocol::{Protocol, RolloutMode};
 use crate::task::refine::Challenge;
 use crate::task::response::{Example, Gait, Response};
 use crate::task::teach::{Image, Plan, Rollouts, Round, Taught, Teacher};
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::{Duration, Instant};
@@ -119,18 +120,21 @@ struct Walker<'a> {
 /// What is wrong with archive, options, data or folder; that it was stopped (the same with
 /// [`IfExists::Resume`] goes on). Nothing that was there is lost.
 pub fn train(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Result<Finished, Error> {
+    if options.robots.validated().is_some() {
+        let text = "--robots best-validation: expected another selection: gaits have no task to validate";
+        return Err(Error::usage(text.to_string()).hint("the fittest four are --robots top:4".to_string()));
+    }
     let source = Source::read(&options.archive)?;
     let whereabouts = Whereabouts::given(options.data.as_deref())
         .and_of(&options.out.join(RUN_JSON))
         .and_of(&options.archive);
     let config = config_of(&source.run.config, &options.groups, options.seed, &options.set)?;
     let dataset = whereabouts.load(&config.data, &[Split::Train])?;
-    let config = with_images(config, &dataset)?;
+    let origin = origin(&source, &config, &dataset, &whereabouts)?;
+    let config = with_images(config, &origin.trained_on, &dataset, observer)?;
     let mut training = Training::of(&config, &dataset)?;
     let classes = training.images.iter().map(|image| image.label);
     training.conditions = config.train.perturbations.of(classes);
-    let origin = origin(&source, &config, &dataset)?;
-    held_out::check(&config, &dataset)?;
     let mut walkers = walkers(&source, &options.robots, config.seed)?;
     if config.train.rounds == 0 {
         // One of them is refined as it is: the fittest, the first of several.
@@ -217,48 +221,114 @@ pub(crate) fn config_of(
         validation: ValidationConfig { best: 1, ..of_walkers.validation },
         ..of_walkers.clone()
     };
-    let (task, seed, generations) = (base.task.clone(), base.seed, base.generations);
-    let config = reading::changed(base, set, |config: &Config| config.validate(), |error| error)?;
+    let asked = base.clone();
+    let check = |config: &Config| fixed(config, &asked).and_then(|()| config.validate());
+    let config = reading::changed(base, set, check, |error| error)?;
     let BodyConfig { height, width, .. } = of_walkers.body;
     if (config.body.height, config.body.width) != (height, width) {
         let found = format!("{} × {} voxels", config.body.height, config.body.width);
         return Err(Error::value("body", found, &format!("{height} × {width}, as the gaits have")));
     }
-    if config.task != task {
+    if config.task != asked.task {
         return Err(Error::at(
             "task",
             "expected the groups that are trained to be said once, not as a key, too",
         ));
     }
-    if config.seed != seed {
-        return Err(Error::value("seed", config.seed, &format!("{seed}, as said elsewhere")));
-    }
-    if config.generations != generations {
-        return Err(Error::at("generations", "expected without: a training has rounds and challengers"));
+    if config.seed != asked.seed {
+        return Err(Error::value("seed", config.seed, &format!("{}, as said elsewhere", asked.seed)));
     }
     Ok(config)
 }
 
-/// The same with as many training images as there are beside those that validate.
-fn with_images(config: Config, dataset: &Dataset) -> Result<Config, Error> {
-    let fewest = scarcest(dataset, &config.classes(), LEAST_PER_CLASS)?;
-    let per_class = config.train.images_per_class.min((fewest * 3 / 4).max(1));
+/// Whether a config has what trainings have, and nothing in its place.
+fn fixed(config: &Config, asked: &Config) -> Result<(), Error> {
+    let fixed = [
+        ("generations", config.generations != asked.generations, "has rounds and challengers"),
+        (
+            "data.images_per_class",
+            config.data.images_per_class != asked.data.images_per_class,
+            "has train.images_per_class",
+        ),
+        ("evaluation", config.evaluation != asked.evaluation, "has a fitness of its own"),
+        ("protocol.rollout", config.protocol.rollout != asked.protocol.rollout, "has fresh rollouts"),
+    ];
+    match fixed.into_iter().find(|(_, is_set, _)| *is_set) {
+        Some((key, _, has)) => Err(Error::at(key, format!("expected without: a training {has}"))),
+        None => Ok(()),
+    }
+}
+
+/// The same with as many training images as there are beside those that validate; of few images
+/// fewer validate than the config asks for, too. `before`: what the gaits were trained on.
+///
+/// # Errors
+/// If there are too few to train on, or to validate with.
+pub(crate) fn with_images(
+    config: Config,
+    before: &[usize],
+    dataset: &Dataset,
+    observer: &dyn Observer,
+) -> Result<Config, Error> {
+    let classes = config.classes();
+    let fewest = scarcest(dataset, &classes, LEAST_PER_CLASS)?;
+    let ValidationConfig { images, best } = config.validation;
+    let mut per_class = config.train.images_per_class.min((fewest * 3 / 4).max(1));
+    let mut validation = config.validation;
+    let wanted = images.div_ceil(classes.len());
+    let is_said = images != ValidationConfig::default().images;
+    if best > 0 && !is_said && fewest - per_class < wanted {
+        per_class = per_class.min((fewest * 2 / 3).max(1));
+        let there = (fewest - per_class).min(wanted) * classes.len();
+        if (LEAST..images).contains(&there) {
+            observer
+                .warning(&format!("validating on {there} images in place of {images}: there are no more"));
+            validation.images = there;
+        }
+    }
     let data = DataConfig { images_per_class: per_class, ..config.data.clone() };
-    let config = Config { data, ..config };
+    let config = Config { data, validation, ..config };
     config.validate()?;
+    held_out::check(&config, before, "train.images_per_class", dataset)?;
     Ok(config)
+}
+
+/// Whether a run's gaits, when they have evolved, can be trained to tell these groups apart: to be
+/// known before they evolve.
+///
+/// # Errors
+/// If the config, or the images there are, do not allow it.
+pub(crate) fn check(evolved: &Config, groups: &[Vec<u8>; 2], data: Option<&Path>) -> Result<(), Error> {
+    let config = config_of(evolved, groups, None, &[])?;
+    let dataset = Whereabouts::given(data).load(&config.data, &[Split::Train])?;
+    with_images(config, &Training::indices(evolved, &dataset)?, &dataset, &()).map(|_| ())
 }
 
 /// Where the walkers are from, and what they were trained on: not for validation.
-fn origin(source: &Source, config: &Config, dataset: &Dataset) -> Result<Origin, Error> {
+fn origin(
+    source: &Source,
+    config: &Config,
+    dataset: &Dataset,
+    whereabouts: &Whereabouts,
+) -> Result<Origin, Error> {
     let run = &source.run;
-    let is_same = dataset.fingerprint(Split::Train).is_some_and(|sha256| sha256 == run.dataset.train_sha256);
-    let trained_on = if is_same { held_out::trained_on(run, dataset)? } else { Default::default() };
+    let mut trained_on = run.origin.as_ref().map_or(BTreeMap::new(), |origin| origin.elsewhere.clone());
+    let of_run = match dataset.fingerprint(Split::Train) {
+        Some(sha256) if sha256 == run.dataset.train_sha256 => held_out::trained_on(run, dataset)?,
+        // Some day it may be trained on that data again.
+        _ => match load_dataset_of(Some(&run.dataset), &run.config, whereabouts, &[Split::Train]) {
+            Ok(own) => held_out::trained_on(run, &own)?,
+            Err(_) => run.training_images.iter().map(|image| image.index).collect(),
+        },
+    };
+    trained_on.insert(run.dataset.train_sha256.clone(), of_run.into_iter().collect());
+    let own = dataset.fingerprint(Split::Train).and_then(|sha256| trained_on.remove(&sha256));
     Ok(Origin {
         name: run.name.clone(),
         generations: run.generations,
         sha256: run.fingerprint(),
-        trained_on: trained_on.into_iter().collect(),
+        trained_on: own.unwrap_or_default(),
+        elsewhere: trained_on,
         windows: if config.train.rounds == 0 { 0 } else { config.train.windows },
     })
 }
@@ -292,9 +362,13 @@ fn measured(
     observer: &dyn Observer,
 ) -> Vec<Batch> {
     let nothing = || vec![Vec::new(); walkers.len()];
-    let path = source.path.with_file_name(RESPONSE_JSON);
+    // That of a named run is in the present folder, if it was measured.
+    let made = folder::beside(&source.path, RESPONSE_JSON);
+    let path = if made.exists() { made } else { source.path.with_file_name(RESPONSE_JSON) };
     let of_run = &source.run.config;
-    if (&config.physics, &config.protocol) != (&of_run.physics, &of_run.protocol) {
+    // A response is measured in fresh rollouts.
+    let protocol = Protocol { rollout: RolloutMode::Fresh, ..of_run.protocol.clone() };
+    if (&config.physics, &config.protocol) != (&of_run.physics, &protocol) {
         return nothing();
     }
     let Some(file) = ResponseFile::found(&path, observer) else { return nothing() };

@@ -62,7 +62,38 @@ impl Training {
             Some(indices) => Ok(indices.clone()),
             None => dataset
                 .draw(Split::Train, &config.classes(), config.data.images_per_class, config.seed, 0)
-                .map_err(|error| Error::input(format!("data.images_per_class: {error}"))),
+                .map_err(|error| {
+                    let there = dataset.classes(Split::Train);
+                    Error::input(format!("data.images_per_class: {error}"))
+                        .hint(format!("{} has the classes {there:?}", dataset.name()))
+                }),
+        }
+    }
+
+    /// The training images of a config, one or more of each class of its task.
+    ///
+    /// # Errors
+    /// As [`Training::load`].
+    pub(crate) fn images(config: &Config, dataset: &Dataset) -> Result<Vec<ImageRef>, Error> {
+        let refuse = |error: DatasetError| Error::input(format!("data.train_images: {error}"));
+        let hint = || "--set data.train_images= draws images of the task's classes by the seed".to_string();
+        let classes = config.classes();
+        let mut images = Vec::new();
+        for index in Training::indices(config, dataset)? {
+            let label = dataset.label(Split::Train, index).map_err(refuse)?;
+            if !classes.contains(&label) {
+                let text =
+                    format!("data.train_images: image {index} shows a {label}, expected one of {classes:?}");
+                return Err(Error::input(text).hint(hint()));
+            }
+            images.push(ImageRef { index, label });
+        }
+        match classes.iter().find(|&&class| images.iter().all(|image| image.label != class)) {
+            Some(class) => {
+                let text = format!("data.train_images: expected an image of class {class}, found none");
+                Err(Error::input(text).hint(hint()))
+            }
+            None => Ok(images),
         }
     }
 
@@ -71,24 +102,9 @@ impl Training {
     /// # Errors
     /// As [`Training::load`].
     pub fn of(config: &Config, dataset: &Dataset) -> Result<Self, Error> {
-        let refuse = |error: DatasetError| Error::input(format!("data.train_images: {error}"));
-        let classes = config.classes();
-        let (mut images, mut stimuli) = (Vec::new(), Vec::new());
-        for index in Training::indices(config, dataset)? {
-            let label = dataset.label(Split::Train, index).map_err(refuse)?;
-            if !classes.contains(&label) {
-                let text =
-                    format!("data.train_images: image {index} shows a {label}, expected one of {classes:?}");
-                return Err(Error::input(text).hint("see [task] for the classes".to_string()));
-            }
-            stimuli.push(see(config, dataset, Split::Train, index)?);
-            images.push(ImageRef { index, label });
-        }
-        if let Some(class) = classes.iter().find(|&&class| images.iter().all(|image| image.label != class)) {
-            return Err(Error::input(format!(
-                "data.train_images: expected an image of class {class}, found none"
-            )));
-        }
+        let images = Training::images(config, dataset)?;
+        let seen = |image: &ImageRef| see(config, dataset, Split::Train, image.index);
+        let mut stimuli: Vec<Grid<f64>> = images.iter().map(seen).collect::<Result<_, _>>()?;
         let train_sha256 = dataset.fingerprint(Split::Train).expect("its images were read just now");
         let dataset = DatasetRef { name: dataset.name().to_string(), train_sha256 };
         let conditions = match config.measures_response() {

@@ -122,10 +122,10 @@ impl<'a> Windows<'a> {
             Example { right: *right, weight: *weight, ..Example::new(gait, &seen, &self.config.physics) }
         };
         let examples: Vec<Example> = self.images.iter().map(example).collect();
-        let soft = vec![Material::Soft; gait.places().len()];
+        let any = vec![Material::SensorExpand; gait.places().len()];
         let solved = |(draw, side)| {
             let examples = examples.iter().map(|example| (example, response.intercept));
-            let mut lesson = Lesson::foretold(examples, &response.slopes, &soft, side);
+            let mut lesson = Lesson::foretold(examples, &response.slopes, &any, side);
             lesson.solve(&mut stream(self.config.seed, Purpose::Windows, 1, draw));
             lesson.objective()
         };

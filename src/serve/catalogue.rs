@@ -164,11 +164,16 @@ struct Archives {
 
 impl Catalogue {
     /// Reads the archives, and the audits beside them; an audit that cannot be used is told in a
-    /// note. `runs` is the folder whose runs are added when they change.
+    /// note, and so is a `newest` run that nobody has named. `runs` is the folder whose runs are added
+    /// when they change.
     ///
     /// # Errors
     /// What is wrong with an archive.
-    pub fn open(archives: &[PathBuf], runs: &Path) -> Result<(Self, Vec<String>), Error> {
+    pub fn open(
+        archives: &[PathBuf],
+        newest: Option<&Path>,
+        runs: &Path,
+    ) -> Result<(Self, Vec<String>), Error> {
         let mut notes = Vec::new();
         let zero_one = trained(shipped::ZERO_ONE, "Trained on thousands of images")?;
         let team = trained(shipped::TEAM, "Ten digits: a robot for each pair")?;
@@ -177,6 +182,12 @@ impl Catalogue {
         let mut watched = Vec::new();
         for path in archives {
             watched.push(Watched::read(path, &mut notes)?);
+        }
+        if let Some(path) = newest {
+            match Watched::read(path, &mut notes) {
+                Ok(newest) => watched.push(newest),
+                Err(error) => notes.push(format!("{error}; left out")),
+            }
         }
         let archives = Mutex::new(Archives { watched, looked: None });
         Ok((Catalogue { built_in, archives, runs: runs.to_path_buf(), opened }, notes))
@@ -321,6 +332,10 @@ impl Collection {
     }
 }
 
+fn fittest_first(robots: &mut [Entry]) {
+    robots.sort_by(|a, b| b.fitness.total_cmp(&a.fitness));
+}
+
 fn published() -> Result<Collection, Error> {
     let config = gallery::config()?;
     let grouping = config.grouping()?;
@@ -338,7 +353,7 @@ fn published() -> Result<Collection, Error> {
         body: robot.body,
     };
     let mut robots: Vec<Entry> = gallery::gallery()?.into_iter().map(entry).collect();
-    robots.sort_by(|a, b| b.fitness.total_cmp(&a.fitness));
+    fittest_first(&mut robots);
     let name = "Published with the paper".to_string();
     Ok(Collection {
         name,
@@ -360,7 +375,8 @@ fn trained(set: &str, name: &str) -> Result<Collection, Error> {
     for (run, audit) in gallery::trained(set)? {
         all.push(of_run(run, Some(&audit))?);
     }
-    let robots = all.iter_mut().flat_map(|one| std::mem::take(&mut one.robots)).collect();
+    let mut robots: Vec<Entry> = all.iter_mut().flat_map(|one| std::mem::take(&mut one.robots)).collect();
+    fittest_first(&mut robots);
     let mut tasks: Vec<String> = all.iter().flat_map(|one| one.tasks.clone()).collect();
     tasks.dedup();
     let first = all.swap_remove(0);
@@ -396,7 +412,7 @@ fn of_run(run: RunFile, audit: Option<&AuditFile>) -> Result<Collection, Error> 
         body: robot.body.clone(),
     };
     let mut robots: Vec<Entry> = run.elites.iter().map(entry).collect();
-    robots.sort_by(|a, b| b.fitness.total_cmp(&a.fitness));
+    fittest_first(&mut robots);
     Ok(Collection {
         name: format!("{}, seed {}", run.name, run.config.seed),
         path: None,

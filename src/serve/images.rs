@@ -56,8 +56,10 @@ impl ImageSets {
     pub fn open(catalogue: &Catalogue, data: Option<&Path>) -> Result<(Self, Vec<String>), Error> {
         let refuse = |error: crate::data::dataset::DatasetError| Error::input(error.to_string());
         let mut sets = Vec::new();
-        let mut notes = Vec::new();
-        for collection in catalogue.collections() {
+        // With the name of the set that each is about.
+        let mut notes: Vec<(&String, String)> = Vec::new();
+        let collections = catalogue.collections();
+        for collection in &collections {
             let name = &collection.config.data.dataset;
             if name == BUILTIN || sets.iter().any(|set: &Dataset| set.name() == name) {
                 continue;
@@ -69,13 +71,19 @@ impl ImageSets {
             };
             let (own, config) = (collection.dataset.as_ref(), &collection.config);
             match load_dataset_of(own, config, &whereabouts, &[Split::Test]) {
-                Ok(set) => sets.push(set),
-                Err(error) if !notes.contains(&error.message) => notes.push(error.message),
+                Ok(set) => {
+                    // Robots of another archive may know better where it is.
+                    notes.retain(|(of, _)| *of != name);
+                    sets.push(set);
+                }
+                Err(error) if notes.iter().all(|(_, told)| *told != error.message) => {
+                    notes.push((name, error.message));
+                }
                 Err(_) => {}
             }
         }
         sets.push(Dataset::load(BUILTIN, &[], &[Split::Test]).map_err(refuse)?);
-        Ok((ImageSets { sets }, notes))
+        Ok((ImageSets { sets }, notes.into_iter().map(|(_, note)| note).collect()))
     }
 
     /// What there is.

@@ -18,12 +18,14 @@ pub mod team;
 use crate::base::error::Error;
 use crate::body::Body;
 use crate::commands::simulate::Scenario;
+use crate::config::reading::read_json;
 use crate::sim::Physics;
+use crate::task::protocol::Protocol;
 use catalogue::Catalogue;
 use images::ImageSets;
 use refusal::Refusal;
 use request::Plan;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use simulations::Simulations;
 use std::path::PathBuf;
 
@@ -32,6 +34,8 @@ use std::path::PathBuf;
 pub struct Options {
     /// The run.json files to browse.
     pub archives: Vec<PathBuf>,
+    /// One more that was not asked for by name: it is left out, with a note, if it cannot be read.
+    pub newest: Option<PathBuf>,
     /// Where the data are, if the command line says.
     pub data: Option<PathBuf>,
     /// The folder whose runs appear on the page when they change.
@@ -88,18 +92,26 @@ pub struct Loaded {
     /// Length of the simulation, cut to what the page allows.
     pub control_steps: u64,
     /// What of it is not shown.
-    pub note: Option<&'static str>,
+    pub note: Option<String>,
+}
+
+/// Where a scenario starts, if it says that.
+#[derive(Deserialize)]
+struct Beginning {
+    start_row: Option<u32>,
+    start_column: Option<i64>,
 }
 
 impl Service {
-    /// Reads the archives and finds the images; what could not be found without being asked for by
-    /// name is told in the notes.
+    /// Reads the archives and finds the images; what could not be read or found without being asked
+    /// for by name is told in the notes.
     ///
     /// # Errors
     /// What is wrong with an archive.
     pub fn open(options: &Options) -> Result<(Self, Vec<String>), Error> {
-        let (catalogue, mut notes) = Catalogue::open(&options.archives, &options.runs)?;
-        let (images, missing) = ImageSets::open(&catalogue, options.data.as_deref())?;
+        let Options { archives, newest, data, runs } = options;
+        let (catalogue, mut notes) = Catalogue::open(archives, newest.as_deref(), runs)?;
+        let (images, missing) = ImageSets::open(&catalogue, data.as_deref())?;
         notes.extend(missing);
         Ok((Service { catalogue, images, simulations: Simulations::default() }, notes))
     }
@@ -143,12 +155,25 @@ impl Service {
                 "scenario: physics: the page has EvoGym's constants only; morphcog simulate takes others";
             return Err(Refusal::Wrong(text.to_string()));
         }
-        let note = (scenario.stimuli().len() > 1).then_some("of its stimuli the first is shown");
+        let Beginning { start_row, start_column } = read_json(text, "scenario")?;
+        let here = Protocol::default();
+        let (row, column) = (here.start_row, here.start_column);
+        let starts_here =
+            start_row.is_none_or(|own| own == row) && start_column.is_none_or(|own| own == column);
+        let most = u64::from(request::MAX_STEPS);
+        let notes: Vec<String> = [
+            (scenario.stimuli().len() > 1).then(|| "of its stimuli the first is shown".to_string()),
+            (!starts_here).then(|| format!("it starts in row {row}, column {column}, as all bodies do here")),
+            (scenario.control_steps() > most).then(|| format!("it ends after {most} control steps")),
+        ]
+        .into_iter()
+        .flatten()
+        .collect();
         Ok(Loaded {
             stimulus: scenario.stimuli().first().cloned(),
-            control_steps: scenario.control_steps().clamp(1, u64::from(request::MAX_STEPS)),
+            control_steps: scenario.control_steps().clamp(1, most),
             body: scenario.body,
-            note,
+            note: (!notes.is_empty()).then(|| notes.join("; ")),
         })
     }
 

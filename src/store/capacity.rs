@@ -30,6 +30,9 @@ pub struct CapacityFile {
     pub program_version: String,
     /// Name of the evaluated run, or of the runs.
     pub run: String,
+    /// Names the evaluation: runs, images, robots and how these walked.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub eval_sha256: Option<String>,
     /// How the robots were selected, for people.
     pub selected: String,
     /// Name of the dataset.
@@ -116,10 +119,12 @@ impl CapacityFile {
     pub fn is_of(&self, report: &EvalFile) -> bool {
         let same = |task: &TaskCapacity| {
             report.means.get(&task.task).is_some_and(|mean| {
-                let is_whole = mean.robots == task.robots && (mean.accuracy - task.accuracy).abs() < 1e-9;
-                is_whole || self.physical_only && task.robots <= mean.robots
+                mean.robots == task.robots && (mean.accuracy - task.accuracy).abs() < 1e-9
             })
         };
+        if let Some(known) = &self.eval_sha256 {
+            return *known == report.fingerprint();
+        }
         self.dataset == report.dataset && self.selected == report.selected && self.tasks.iter().all(same)
     }
 

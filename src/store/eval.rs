@@ -3,6 +3,7 @@
 use crate::base::error::Error;
 use crate::base::files::read_text;
 use crate::base::hash;
+use crate::base::hash::sha256_hex;
 use crate::base::statistics::{bootstrap, standard_deviation, wilson};
 use crate::base::table;
 use crate::config::{Config, reading};
@@ -212,6 +213,15 @@ impl RobotReport {
 }
 
 impl EvalFile {
+    /// Names what was shown to which robots, and what they did.
+    pub(crate) fn fingerprint(&self) -> String {
+        let runs: Vec<&String> = self.runs.iter().map(|run| &run.sha256).collect();
+        let walked =
+            self.robots.iter().map(|robot| (robot.run, &robot.id, &robot.task, &robot.displacements));
+        let all = (runs, &self.dataset, &self.images, self.threshold, walked.collect::<Vec<_>>());
+        sha256_hex(serde_json::to_string(&all).expect("texts, numbers and lists are JSON").as_bytes())
+    }
+
     /// Of robots of these runs; together they see images and have tasks as a config says.
     pub(crate) fn new(
         (sources, together): (&[Source], &Config),
@@ -227,7 +237,7 @@ impl EvalFile {
             program_version: env!("CARGO_PKG_VERSION").to_string(),
             run: first.map_or(String::new(), |run| run.name.clone()),
             run_seed: first.map_or(0, |run| run.config.seed),
-            runs: sources.iter().map(|source| RunRef::new(&source.run)).collect(),
+            runs: sources.iter().map(RunRef::of).collect(),
             setting: first.map(|run| Setting {
                 stimulus: together.stimulus,
                 task: together.task.clone(),

@@ -4,7 +4,8 @@
 use crate::data::dataset::Split;
 use crate::task::score::Answer;
 use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use std::borrow::Cow;
 use std::fmt;
 use std::str::FromStr;
 
@@ -70,7 +71,7 @@ impl FromStr for HeldOut {
 }
 
 /// How many held-out images are shown.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum HowMany {
     /// All that there are of the classes.
     All,
@@ -106,6 +107,48 @@ impl FromStr for HowMany {
             Ok(count) if (1..=MOST).contains(&count) => Ok(HowMany::Evenly(count)),
             _ => Err(format!("expected all, or a number from 1 to {MOST}")),
         }
+    }
+}
+
+impl Serialize for HowMany {
+    fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
+        match self {
+            HowMany::All => to.serialize_str("all"),
+            HowMany::Evenly(count) => count.serialize(to),
+        }
+    }
+}
+
+impl<'de> Deserialize<'de> for HowMany {
+    fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
+        /// A number or a word, either of which is read as text.
+        #[derive(Deserialize)]
+        #[serde(untagged)]
+        enum Written {
+            Count(u64),
+            Word(String),
+            Other(serde::de::IgnoredAny),
+        }
+        let text = match Written::deserialize(from)? {
+            Written::Count(count) => count.to_string(),
+            Written::Word(word) => word,
+            Written::Other(_) => String::new(),
+        };
+        text.parse().map_err(serde::de::Error::custom)
+    }
+}
+
+impl JsonSchema for HowMany {
+    fn inline_schema() -> bool {
+        true
+    }
+
+    fn schema_name() -> Cow<'static, str> {
+        "HowMany".into()
+    }
+
+    fn json_schema(_: &mut schemars::SchemaGenerator) -> schemars::Schema {
+        schemars::json_schema!({ "anyOf": [{ "const": "all" }, { "type": "integer", "minimum": 1 }] })
     }
 }
 

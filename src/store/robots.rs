@@ -29,6 +29,20 @@ impl Source {
     pub fn read(path: &Path) -> Result<Self, Error> {
         Ok(Source { path: path.to_path_buf(), run: RunFile::read(path)? })
     }
+
+    /// Whether its robots tell images apart.
+    ///
+    /// # Errors
+    /// If they are gaits, which have no task yet; what teaches them one.
+    pub(crate) fn has_task(&self) -> Result<(), Error> {
+        if !self.run.config.measures_response() {
+            return Ok(());
+        }
+        let text = format!("{}: these are gaits, which tell no images apart yet", self.path.display());
+        let hint =
+            format!("morphcog train --archive {} --task \"4|9\" teaches one", folder::archive(&self.path));
+        Err(Error::input(text).hint(hint))
+    }
 }
 
 /// A robot, and the run it is of, by its place among several.
@@ -103,15 +117,6 @@ impl Selection {
             Selection::Validated(count) => Some(*count),
             Selection::Physical(of) => of.validated(),
             _ => None,
-        }
-    }
-
-    /// Whether it names robots by their ids.
-    pub(crate) fn names_any(&self) -> bool {
-        match self {
-            Selection::Ids(_) | Selection::Drawn { .. } => true,
-            Selection::Physical(of) => of.names_any(),
-            _ => false,
         }
     }
 

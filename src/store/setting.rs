@@ -1,6 +1,7 @@
 //! What evaluations say of the runs they are of: enough to show others the same images.
 
 use crate::base::error::Error;
+use crate::base::named;
 use crate::config::evaluation::EvaluationConfig;
 use crate::config::train::TrainConfig;
 use crate::config::validation::ValidationConfig;
@@ -8,7 +9,9 @@ use crate::config::{ArchiveConfig, BodyConfig, CheckpointConfig, Config, DataCon
 use crate::genome::MutationParams;
 use crate::qd::EmitterParams;
 use crate::sim::Physics;
+use crate::store::folder;
 use crate::store::images::ImageRef;
+use crate::store::robots::Source;
 use crate::store::run::RunFile;
 use crate::task::evaluation::Savings;
 use crate::task::protocol::Protocol;
@@ -29,6 +32,9 @@ pub struct RunRef {
     pub training_images: Vec<ImageRef>,
     /// SHA-256 of its content.
     pub sha256: String,
+    /// How `--archive` names it, if it has a name and no path.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub archive: Option<String>,
 }
 
 /// What networks need to know to be given the same images as the robots.
@@ -47,13 +53,15 @@ pub struct Setting {
 }
 
 impl RunRef {
-    pub(crate) fn new(run: &RunFile) -> Self {
+    pub(crate) fn of(source: &Source) -> Self {
+        let run = &source.run;
         RunRef {
             name: run.name.clone(),
             seed: run.config.seed,
             generations: run.generations,
             training_images: run.training_images.clone(),
             sha256: run.fingerprint(),
+            archive: named::is_named(&source.path).then(|| folder::archive(&source.path)),
         }
     }
 }

@@ -4,6 +4,7 @@
 use crate::base::number::is_zero;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 
 /// What the file calls itself, and the version of its schema.
 pub(crate) const FILE: (&str, u32) = ("morphcog-training", 1);
@@ -21,6 +22,9 @@ pub struct Origin {
     /// Indices of the images that its robots were ever trained on, if they are of the same data:
     /// not for validation.
     pub trained_on: Vec<usize>,
+    /// The same of other data, by the SHA-256 of their training images.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub elsewhere: BTreeMap<String, Vec<usize>>,
     /// How many windows of the images were tried, of which the run's config has the best; 0 if none
     /// but the config's own.
     #[serde(default, skip_serializing_if = "is_zero")]

@@ -6,7 +6,7 @@ use crate::base::error::Error;
 use crate::base::files::{read_text, write_atomically};
 use crate::config::{BodyConfig, Config, DataConfig, reading};
 use crate::data::dataset::{BUILTIN, Dataset, DatasetError, Split};
-use crate::data::files::{Place, places};
+use crate::data::files::{Place, default_folder, places};
 use crate::store::folder::RunFolder;
 use crate::store::images::{DatasetRef, ImageRef};
 use crate::store::names::DATA_FOLDER;
@@ -87,6 +87,18 @@ impl Whereabouts {
             )),
             None => refuse(error),
         })
+    }
+
+    /// The folder in which a dataset is looked for if neither the command line nor a run says where
+    /// its images are: the one of the config, or else `data/<name>`; none if it is not there, or
+    /// nothing needs to be there.
+    pub(crate) fn by_default(&self, config: &DataConfig) -> Option<PathBuf> {
+        let is_known = self.data.is_some() || self.remembered(&config.dataset).ok()?.0.is_some();
+        if config.dataset == BUILTIN || is_known {
+            return None;
+        }
+        let folder = config.dir.clone().unwrap_or_else(|| default_folder(&config.dataset));
+        folder.is_dir().then_some(folder)
     }
 
     /// The first remembered folder with a dataset of this name that is still there; and the first

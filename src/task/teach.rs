@@ -12,7 +12,7 @@ use crate::body::{Body, Material};
 use crate::sim::Physics;
 use crate::task::fitness::clipped_margin;
 use crate::task::refine::{Challenge, Refinement, WeightedImage};
-use crate::task::response::{CHOICES, Design, Evidence, Example, Gait, Lesson, Moments, Response, dot};
+use crate::task::response::{Design, Evidence, Example, Gait, Lesson, Moments, Response, SENSORS, dot};
 
 /// What rollouts under random images count beside those around the latest design. They are farther
 /// from it, but more, and each tells more of the slopes.
@@ -162,18 +162,18 @@ impl<'a> Teacher<'a> {
             evidence,
             slopes: response.slopes.clone(),
             intercepts: vec![response.intercept; conditions],
-            design: vec![Material::Soft; gait.places().len()],
+            design: vec![Material::SensorExpand; gait.places().len()],
             earlier: Vec::new(),
             predicted: f64::NEG_INFINITY,
             side: 1.0,
             rounds: 0,
             rollouts: 0,
         };
+        let any = teacher.design.clone();
         for (draw, side) in [(0, 1.0), (1, -1.0)] {
-            let soft = vec![Material::Soft; gait.places().len()];
             let mut random = teacher.random(Use::First, draw);
             let (predicted, design) =
-                teacher.solved(&soft, side, |lesson| lesson.solve_from_many(&mut random));
+                teacher.solved(&any, side, |lesson| lesson.solve_from_many(&mut random));
             if predicted > teacher.predicted {
                 (teacher.predicted, teacher.design, teacher.side) = (predicted, design, side);
             }
@@ -234,9 +234,9 @@ impl<'a> Teacher<'a> {
         let draw = |(turn, number): (usize, &usize)| {
             let material = |material: &Material| {
                 // Half of the rollouts are of the design itself; the groups take turns, so as many
-                // of each.
-                if turn / 2 % 2 == 1 && random.unit() < CHANGED {
-                    CHOICES[random.below(CHOICES.len())]
+                // of each. A soft voxel stays one: all rollouts are of one body.
+                if turn / 2 % 2 == 1 && *material != Material::Soft && random.unit() < CHANGED {
+                    SENSORS[random.below(SENSORS.len())]
                 } else {
                     *material
                 }
@@ -244,11 +244,11 @@ impl<'a> Teacher<'a> {
             (*number, self.design.iter().map(material).collect())
         };
         let asked: Vec<(usize, Design)> = numbers.iter().enumerate().map(draw).collect();
-        let as_probe = |(number, design): &(usize, Design)| {
-            self.gait.as_probe(design, &self.images[*number].stimulus, self.physics)
-        };
+        let as_probe =
+            |(number, design): &(usize, Design)| self.gait.as_probe(design, &self.images[*number].stimulus);
         let stimuli: Vec<Grid<f64>> = asked.iter().map(as_probe).collect();
-        let found = rollouts.roll(&self.gait.probe(), &stimuli, &self.conditions_of(&numbers))?;
+        let body = self.gait.probe_of(&self.design);
+        let found = rollouts.roll(&body, &stimuli, &self.conditions_of(&numbers))?;
         self.rollouts += asked.len();
 
         let mut sets = vec![Moments::new(self.design.len()); self.conditions];
@@ -414,7 +414,7 @@ fn nowhere(displacement: Option<f64>) -> f64 {
 mod tests {
     use super::*;
     use crate::body::Body;
-    use crate::task::response::{Shown, random_image};
+    use crate::task::response::{CHOICES, Shown, random_image};
     use std::convert::Infallible;
 
     /// A body that walks by the widths of its places, less and less far, and otherwise where they

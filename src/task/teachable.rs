@@ -131,10 +131,10 @@ impl<'a> Half<'a> {
     /// of an example is 1, −1 if it walks left there.
     fn solved(&self, seed: u64, number: u64) -> Solved {
         let Response { slopes, intercept, .. } = &self.response;
-        let soft = vec![Material::Soft; slopes.len()];
+        let any = vec![Material::SensorExpand; slopes.len()];
         let solved = |side: f64, draw: u64| {
             let examples = self.examples.iter().map(|example| (*example, *intercept));
-            let mut lesson = Lesson::foretold(examples, slopes, &soft, side);
+            let mut lesson = Lesson::foretold(examples, slopes, &any, side);
             lesson.solve_from_many(&mut stream(seed, Purpose::Training, 0, 2 * number + draw));
             (lesson.objective(), lesson.design())
         };

@@ -10,6 +10,7 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde::Serialize;
 use std::error::Error;
 use std::io::{self, IsTerminal, Write};
+use std::path::Path;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// Most characters of a cell of a table.
@@ -23,8 +24,8 @@ pub enum Mode {
     Human,
     /// Results, warnings and errors only.
     Quiet,
-    /// Programs: one JSON object per line on stdout, its kind under `event`; warnings and errors on
-    /// stderr too.
+    /// Programs: one JSON object per line on stdout, its kind under `event`, progress and notes too;
+    /// warnings on stderr, errors on both. docs/command-line.md has all kinds.
     Json,
 }
 
@@ -101,12 +102,22 @@ impl Console {
         lock(&self.streams).lost
     }
 
-    /// A line of results, to stdout. Like all that people are told, it shows control characters and
-    /// line breaks, which can only come from a file or its name, and obeys none.
+    /// A line of results, to stdout; an empty one parts others for people. Like all that people are
+    /// told, it shows control characters and line breaks, which can only come from a file or its
+    /// name, and obeys none.
     pub fn line(&self, text: &str) {
         match self.mode {
-            Mode::Json => self.event("result", &Text { text }),
+            Mode::Json if text.is_empty() => {}
+            Mode::Json => self.event("result", &Text { text, file: None }),
             _ => self.out(&format!("{}\n", one_line(text))),
+        }
+    }
+
+    /// A line of results about a file, as "wrote walk.gif" (JSON: its path under `file`, too).
+    pub fn line_about(&self, file: &Path, text: &str) {
+        match self.mode {
+            Mode::Json => self.event("result", &Text { text, file: Some(file.display().to_string()) }),
+            _ => self.line(text),
         }
     }
 
@@ -164,7 +175,7 @@ impl Console {
         match self.mode {
             Mode::Human => self.err(&format!("{}\n", one_line(text))),
             Mode::Quiet => {}
-            Mode::Json => self.event("info", &Text { text }),
+            Mode::Json => self.event("info", &Text { text, file: None }),
         }
     }
 
@@ -288,6 +299,8 @@ fn in_json(c: char) -> String {
 #[derive(Serialize)]
 struct Text<'a> {
     text: &'a str,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    file: Option<String>,
 }
 
 #[cfg(test)]
@@ -371,6 +384,8 @@ pub(super) mod tests {
         console.event("list", &[1, 2]);
         console.event("done", &serde_json::json!({}));
         console.line("a\nb");
+        console.line("");
+        console.line_about(Path::new("walk.gif"), "wrote walk.gif");
         console.table(&["a"], &[vec!["1".into()]]);
         console.info("note");
         console.error(&Inner, None);
@@ -378,8 +393,10 @@ pub(super) mod tests {
         assert!(text.starts_with("{\"event\":\"generation\",\"generation\":3,"), "{text}");
         let lines: Vec<serde_json::Value> = text.lines().map(|l| serde_json::from_str(l).unwrap()).collect();
         let events: Vec<&str> = lines.iter().map(|l| l["event"].as_str().unwrap()).collect();
-        assert_eq!(events, ["generation", "list", "done", "result", "table", "info", "error"]);
+        assert_eq!(events, ["generation", "list", "done", "result", "result", "table", "info", "error"]);
         assert_eq!((&lines[1]["value"][1], &lines[3]["text"]), (&2.into(), &"a\nb".into()));
+        assert_eq!(lines[3].get("file"), None);
+        assert_eq!((&lines[4]["text"], &lines[4]["file"]), (&"wrote walk.gif".into(), &"walk.gif".into()));
     }
 
     #[test]

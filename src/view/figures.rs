@@ -10,6 +10,7 @@ use crate::commands::replay::{Found, Options};
 use crate::store::capacity::CapacityFile;
 use crate::store::eval::EvalFile;
 use crate::store::folder;
+use crate::store::names::METRICS;
 use crate::store::names::{CAPACITY_JSON, EVAL_JSON, RUN_JSON};
 use crate::store::run::{RunFile, different};
 use crate::view::console::Console;
@@ -148,9 +149,18 @@ pub fn make(console: &Console, wanted: &Wanted) -> Result<Vec<PathBuf>, Error> {
         let runs: Vec<RunFile> = paths.iter().map(|path| RunFile::read(path)).collect::<Result<_, _>>()?;
         let named = || paths.iter().copied().zip(&runs);
         different(named())?;
-        let lines: Result<Vec<Progress>, Error> =
-            named().map(|(path, run)| Progress::of(run, path)).collect();
-        let lines = lines?;
+        let (mut lines, mut short) = (Vec::new(), Vec::new());
+        for (path, run) in named() {
+            let line = Progress::of(run, path)?;
+            match line.moments.len() {
+                0 | 1 => short.push(too_short(path, run, line.moments.len())),
+                _ => lines.push(line),
+            }
+        }
+        match short.first() {
+            Some(error) if lines.is_empty() => return Err(error.clone()),
+            _ => short.iter().for_each(|error| console.warning(&format!("{error}; left out"))),
+        }
         let figure = plot::progress(&lines);
         write(Made { figure, stem: stem(paths.first().copied(), wanted.kind, "") })?;
         sweeps::differences(console, &lines);
@@ -204,6 +214,16 @@ pub fn no_robot(kind: Kind) -> Error {
     let of_robots = Kind::ALL.iter().filter(|(kind, _)| kind.is_of_robot()).map(|(_, name)| *name);
     let of_robots = of_robots.collect::<Vec<_>>().join(", ");
     Error::usage(format!("--robot: plot {kind} shows no single robot; expected with {of_robots} only"))
+}
+
+/// That a run has too few generations for a line.
+fn too_short(path: &Path, run: &RunFile, generations: usize) -> Error {
+    let path = path.with_file_name(METRICS);
+    let text = format!("{}: expected at least 2 generations, found {generations}", path.display());
+    match run.origin {
+        Some(_) => Error::input(text).hint("morphcog plot accuracy shows what its test found".to_string()),
+        None => Error::input(text),
+    }
 }
 
 /// `plot-<kind>[-robot]` beside a run.json, or here.

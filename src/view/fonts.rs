@@ -57,6 +57,21 @@ pub fn fitted(text: &str, size: f64, bold: bool, most: f64) -> String {
     begin.collect::<String>().trim_end().to_string() + "…"
 }
 
+/// A text in at most `count` lines no wider than `most` points, broken at blanks; what is too long
+/// even so is cut.
+pub fn lines(text: &str, size: f64, bold: bool, most: f64, count: usize) -> Vec<String> {
+    let mut lines = Vec::new();
+    let mut rest = text;
+    while lines.len() + 1 < count && width(rest, size, bold) > most {
+        let blanks = rest.match_indices(' ').map(|(at, _)| at);
+        let Some(end) = blanks.take_while(|at| width(&rest[..*at], size, bold) <= most).last() else { break };
+        lines.push(rest[..end].to_string());
+        rest = rest[end..].trim_start();
+    }
+    lines.push(fitted(rest, size, bold, most));
+    lines
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -81,6 +96,21 @@ mod tests {
             endless.starts_with("name name") && endless.ends_with('…') && endless.len() < 40,
             "{endless}"
         );
+    }
+
+    #[test]
+    fn texts_are_broken_at_blanks_into_as_many_lines_as_they_need() {
+        let text = "seven runs; the fittest of each task";
+        let broken = |most: f64, count: usize| lines(text, 8.0, false, most, count);
+        assert_eq!(broken(500.0, 3), [text]);
+        let three = broken(60.0, 3);
+        assert_eq!((three.len(), three.join(" ").as_str()), (3, text));
+        assert!(three.iter().all(|line| width(line, 8.0, false) <= 60.0), "{three:?}");
+        assert_eq!(broken(60.0, 9), three);
+        assert!(broken(60.0, 2)[1].ends_with('…') && broken(60.0, 1)[0].ends_with('…'));
+        // A word that is too long by itself is cut.
+        assert_eq!(lines("morphological", 8.0, false, 30.0, 3).len(), 1);
+        assert_eq!(lines("", 8.0, false, 30.0, 3), [""]);
     }
 
     #[test]

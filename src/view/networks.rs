@@ -49,7 +49,8 @@ pub fn capacity(console: &Console, file: &CapacityFile, out: Option<&Path>) {
     } else {
         "images of the training split"
     };
-    console.line(&format!("{}; early stopping waits on {waits}", file.selected));
+    let physical = if file.physical_only { ", those found physical" } else { "" };
+    console.line(&format!("{}{physical}; early stopping waits on {waits}", file.selected));
     if let Some(out) = out {
         console.line(&format!("wrote {} and {}", out.display(), out.with_extension("csv").display()));
     }

@@ -13,14 +13,19 @@ use crate::view::{colour, fonts};
 
 /// Side of the stimulus picture at zoom 1, pixels.
 const STIMULUS: f64 = 84.0;
+/// Width of the legend at zoom 1, pixels.
+const LEGEND: f64 = 116.0;
 /// Distance from the picture's edges at zoom 1, pixels.
 const MARGIN: f64 = 10.0;
+/// Distance of the words from what stands left and right of them at zoom 1, pixels.
+const GAP: f64 = 12.0;
 
 /// Sizes of letters at zoom 1, pixels.
 const LARGE: f64 = 15.0;
 const SMALL: f64 = 11.0;
-/// Width for words beside the stimulus at zoom 1, pixels.
-const WORDS: f64 = 238.0;
+/// What a displacement is measured in, and its distance from the number at zoom 1, pixels.
+const UNIT: &str = "voxel lengths";
+const BEFORE_UNIT: f64 = 5.0;
 
 /// Everything around the world at a frame.
 pub fn panel(walk: &Walk, frame: usize, stage: &Stage) -> Vec<Primitive> {
@@ -28,10 +33,35 @@ pub fn panel(walk: &Walk, frame: usize, stage: &Stage) -> Vec<Primitive> {
     let mut out =
         vec![Primitive::rectangle([0.0, 0.0], [f64::from(stage.width), stage.panel], colour::PAPER)];
     let side = stimulus(walk, frame, [MARGIN * z, MARGIN * z], z, &mut out);
-    readouts(walk, frame, [MARGIN * z + side[0] + 12.0 * z, MARGIN * z], z, &mut out);
-    legend(walk, [f64::from(stage.width) - (MARGIN + 116.0) * z, MARGIN * z], z, &mut out);
+    let (words, mut end) = (MARGIN * z + side[0] + GAP * z, f64::from(stage.width) - MARGIN * z);
+    if stage.has_legend {
+        end -= LEGEND * z;
+        legend(walk, [end, MARGIN * z], z, &mut out);
+        end -= GAP * z;
+    }
+    readouts(walk, frame, [words, MARGIN * z], (end - words) / z, z, &mut out);
     numbers(walk, frame, stage, &mut out);
     out
+}
+
+/// Width at zoom 1, pixels, from which on the legend has room beside the words of a walk. The names
+/// of image and robot do not count: they may be of any length, and are cut.
+pub fn least_width(walk: &Walk) -> f64 {
+    let recording = walk.recording();
+    let large = |text: &str| fonts::width(text, LARGE, true);
+    let small = |text: &str| fonts::width(text, SMALL, false);
+    let farthest = (0..walk.len()).map(|frame| walk.displacement(frame).abs()).fold(0.0, f64::max);
+    let distance = large(&format!("← {}", signed(-farthest))) + BEFORE_UNIT + small(UNIT);
+    let ends = (0..recording.phases.len()).map(|phase| walk.phase_frames(phase).end - 1);
+    let time = ends.map(|frame| readout(walk, frame).time).max_by_key(String::len).unwrap_or_default();
+    let judge = recording.judge.as_ref();
+    let sides = judge.iter().flat_map(|j| [(f64::NEG_INFINITY, &j.left), (f64::INFINITY, &j.right)]);
+    let verdicts = sides.map(|(moved, classes)| {
+        let class = classes.first().copied().unwrap_or_default();
+        large(&judge::verdict(judge, moved, class, true))
+    });
+    let words = verdicts.fold(distance.max(small(&time)), f64::max);
+    MARGIN + STIMULUS + GAP + words + GAP + LEGEND + MARGIN
 }
 
 /// Words on a moment of a walk: what every view says.
@@ -122,11 +152,12 @@ fn sensor_line(material: Material) -> Colour {
     if material == Material::SensorShrink { Colour::new(240, 62, 82) } else { Colour::new(38, 186, 120) }
 }
 
-fn readouts(walk: &Walk, frame: usize, [x, y]: [f64; 2], z: f64, out: &mut Vec<Primitive>) {
+/// The words, none of them wider than there is `room` \[pixels at zoom 1\].
+fn readouts(walk: &Walk, frame: usize, [x, y]: [f64; 2], room: f64, z: f64, out: &mut Vec<Primitive>) {
     let words = readout(walk, frame);
     let recording = walk.recording();
     let mut line = |[dx, dy]: [f64; 2], text: &str, size: f64, bold, colour| {
-        let text = fonts::fitted(text, size, bold, WORDS - dx);
+        let text = fonts::fitted(text, size, bold, room - dx);
         let wide = fonts::width(&text, size, bold);
         out.push(Primitive::Text { text, at: [x + dx * z, y + dy * z], size: size * z, bold, colour });
         dx + wide
@@ -134,7 +165,7 @@ fn readouts(walk: &Walk, frame: usize, [x, y]: [f64; 2], z: f64, out: &mut Vec<P
     line([0.0, 14.0], &words.label, LARGE, true, colour::INK);
     line([0.0, 30.0], &words.time, SMALL, false, colour::FAINT);
     let end = line([0.0, 49.0], &words.displacement, LARGE, true, colour::TRACE);
-    line([end + 5.0, 49.0], "voxel lengths", SMALL, false, colour::FAINT);
+    line([end + BEFORE_UNIT, 49.0], UNIT, SMALL, false, colour::FAINT);
     line([0.0, 67.0], &words.verdict, LARGE, true, colour::INK);
     let name = format!("robot {}", recording.robot);
     let (note, colour) = match recording.unstable {
@@ -200,6 +231,7 @@ fn numbers(walk: &Walk, frame: usize, stage: &Stage, out: &mut Vec<Primitive>) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::task::judge::Judge;
     use crate::view::simulated;
 
     #[test]
@@ -217,6 +249,48 @@ mod tests {
             assert_ne!(signed(walked), "0.00");
             assert_eq!(last.displacement, format!("{arrow} {}", signed(walked)));
             assert_eq!(readout(&walk, 50).time, "step 50/100 · cycle 1.0");
+        }
+    }
+
+    #[test]
+    fn read_outs_end_before_the_legend_and_verdicts_are_whole_at_every_width() {
+        let mut recording = simulated("3344/5566", 2, 50, true);
+        for (number, frame) in recording.frames.iter_mut().enumerate() {
+            frame.centre[0] -= 0.5 * (number % 51) as f64;
+        }
+        for (left, right, from) in [
+            (vec![0], vec![1], 320),
+            (vec![0, 1, 2], vec![3], 320),
+            ((0..5).collect(), (5..10).collect(), 400),
+        ] {
+            recording.judge = Some(Judge { left, right });
+            let walk = Walk::new(&recording).unwrap();
+            let verdict = readout(&walk, 50).verdict;
+            assert!(verdict.ends_with(": correct"), "{verdict}");
+            let mut with_legend = 0;
+            for width in (320..=1500).chain([2048, 4096]) {
+                let stage = Stage::new(&walk, width).unwrap();
+                let all = panel(&walk, 50, &stage);
+                let texts = all.iter().filter_map(|primitive| match primitive {
+                    Primitive::Text { text, at, size, bold, .. } if at[1] < stage.panel => {
+                        Some((text.as_str(), at[0], at[0] + fonts::width(text, *size, *bold)))
+                    }
+                    _ => None,
+                });
+                let is_of_legend = |text: &str| Material::ALL.iter().any(|m| m.name() == text);
+                let (legend, words): (Vec<_>, Vec<_>) = texts.partition(|(text, ..)| is_of_legend(text));
+                let end = legend
+                    .iter()
+                    .map(|(_, left, _)| left - 22.0 * stage.zoom)
+                    .fold(f64::from(width), f64::min);
+                assert!(words.iter().all(|(.., right)| *right < end), "{width}: {words:?} {end}");
+                let is_whole = words.iter().any(|(text, ..)| *text == verdict)
+                    && words.iter().any(|(text, ..)| *text == UNIT);
+                assert!(is_whole || width < from, "{width}: {words:?}");
+                assert_eq!(legend.is_empty(), !stage.has_legend);
+                with_legend += usize::from(stage.has_legend);
+            }
+            assert!(with_legend > 980, "{with_legend}");
         }
     }
 

@@ -1,6 +1,7 @@
 //! [`Stage`]: which part of the world a picture shows, and where on it.
 
 use crate::view::error::PictureError;
+use crate::view::panel::least_width;
 use crate::view::scene::{Look, Window};
 use crate::view::walk::Walk;
 use std::ops::RangeInclusive;
@@ -29,8 +30,11 @@ pub struct Stage {
     pub width: u32,
     /// Height of the picture, pixels.
     pub height: u32,
-    /// Size of letters and lines: 1 up to 720 pixels width, then larger.
+    /// Size of letters and lines: 1 up to 720 pixels width, then larger as far as there is room for
+    /// the words of the walk.
     pub zoom: f64,
+    /// Whether there is room for the legend beside these words.
+    pub has_legend: bool,
     /// Height of the panel, pixels.
     pub panel: f64,
     crisp: bool,
@@ -50,7 +54,9 @@ impl Stage {
         if !WIDTHS.contains(&width) {
             return Err(PictureError::Size { width, height: 0 });
         }
-        let zoom = (f64::from(width) / 480.0).round().max(1.0);
+        let least = least_width(walk);
+        let zoom = (f64::from(width) / 480.0).round().min((f64::from(width) / least).floor()).max(1.0);
+        let has_legend = f64::from(width) >= least * zoom;
         let (smallest, largest) = (VOXEL.start() * zoom, VOXEL.end() * zoom);
         let (first, all) = (walk.extent(0..1), walk.extent(0..walk.len()));
         let size = (first.right - first.left).clamp(1.0, 128.0);
@@ -78,6 +84,7 @@ impl Stage {
             width,
             height,
             zoom,
+            has_legend,
             panel,
             crisp,
             look: Look::Plain,

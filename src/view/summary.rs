@@ -25,8 +25,9 @@ use std::path::Path;
 /// Robots shown after an evolution.
 const SHOWN: usize = 5;
 
-/// After an evolution: the fittest robots, what was saved, and what to do next.
-pub fn evolution(console: &Console, finished: &Finished, out: &Path) {
+/// After an evolution: the fittest robots, what was saved, and what to do next, unless the command
+/// itself goes on.
+pub fn evolution(console: &Console, finished: &Finished, out: &Path, goes_on: bool) {
     let Finished { run, totals, .. } = finished;
     if console.mode() == Mode::Json {
         let elites = run.elites.len();
@@ -86,8 +87,16 @@ pub fn evolution(console: &Console, finished: &Finished, out: &Path) {
         ));
     }
     let archive = out.join(RUN_JSON);
-    console.info(&format!("next: morphcog replay --robot best --archive {}", in_shell(&archive)));
-    console.info(&format!("      morphcog eval --archive {}", in_shell(&archive)));
+    let archive = in_shell(&archive);
+    if goes_on {
+        return;
+    }
+    // Gaits tell no images apart yet.
+    if run.config.measures_response() {
+        return console.info(&format!("next: morphcog train --archive {archive} --task \"4|9\""));
+    }
+    console.info(&format!("next: morphcog replay --robot best --archive {archive}"));
+    console.info(&format!("      morphcog eval --archive {archive}"));
 }
 
 /// After a training: the robot.

@@ -4,6 +4,7 @@ use crate::base::error::Error;
 use crate::base::files::write_atomically;
 use crate::base::number;
 use crate::base::number::percent;
+use crate::base::text::counted;
 use crate::commands::collect::{Collected, Row, csv};
 use crate::commands::plot::alike;
 use crate::commands::tasks::Status;
@@ -13,6 +14,7 @@ use crate::view::error::write_whole;
 use crate::view::plot;
 use crate::view::plot::{Figure, PRINT};
 use crate::view::progress::duration;
+use serde_json::{Map, Value, json};
 use std::path::Path;
 
 /// How far tasks are: a line per task, and how many there are of each kind.
@@ -33,7 +35,9 @@ pub fn status(console: &Console, all: &[Status]) {
             status.about.clone().unwrap_or_default(),
         ]
     };
-    let headers = ["task", "name", "state", "generations", "time", "left", ""];
+    let mut headers = vec!["task", "name", "state", "generations", "time", "left"];
+    // Cells without a header are left out.
+    headers.extend(all.iter().any(|status| status.about.is_some()).then_some("about"));
     console.table(&headers, &all.iter().map(row).collect::<Vec<_>>());
     console.line("");
     console.line(&in_short(all));
@@ -51,7 +55,7 @@ fn in_short(all: &[Status]) -> String {
         Some(left) if open().count() > 0 => format!("; about {} of task time left", duration(left)),
         _ => String::new(),
     };
-    format!("{} tasks: {counts}{left}", all.len())
+    format!("{}: {counts}{left}", counted(all.len(), "task", "tasks"))
 }
 
 /// Writes what a sweep found, and says it.
@@ -68,14 +72,17 @@ pub fn collected(
     let path = out.join("sweep.csv");
     std::fs::create_dir_all(out).map_err(|error| Error::writing(out, &error))?;
     write_atomically(&path, &csv(&found.rows)).map_err(|error| Error::writing(&path, &error))?;
-    table(console, &found.rows);
+    match console.mode() {
+        Mode::Json => found.rows.iter().for_each(|row| console.event("collected", &event(row))),
+        _ => table(console, &found.rows),
+    }
     console.line("");
-    console.line(&format!("wrote {}", path.display()));
+    console.line_about(&path, &format!("wrote {}", path.display()));
     let draw = |stem: &str, figure: Figure| -> Result<(), Error> {
         for (ending, bytes) in [("svg", figure.svg().into_bytes()), ("png", figure.png(PRINT)?)] {
             let path = out.join(format!("{stem}.{ending}"));
             write_whole(&path, &bytes)?;
-            console.line(&format!("wrote {}", path.display()));
+            console.line_about(&path, &format!("wrote {}", path.display()));
         }
         Ok(())
     };
@@ -91,6 +98,34 @@ pub fn collected(
         console.warning(&format!("this is not all: {}", in_short(status)));
     }
     Ok(())
+}
+
+/// A row for programs: the columns of `sweep.csv`, the plan's values in one object.
+fn event(row: &Row) -> Value {
+    // They are kept as text: what is a number there is one here.
+    let value = |text: &str| serde_json::from_str(text).unwrap_or_else(|_| Value::from(text));
+    let varied: Map<String, Value> =
+        row.varied.iter().map(|(key, text)| (key.clone(), value(text))).collect();
+    let run = row.run.as_ref();
+    let audited = run.and_then(|run| run.audited);
+    let tested = run.and_then(|run| run.tested.as_ref());
+    let interval = tested.and_then(|tested| tested.interval);
+    json!({
+        "number": row.number, "name": row.name, "state": row.state, "varied": varied,
+        "recognises": run.map(|run| &run.recognises),
+        "generations": run.map(|run| run.generations),
+        "seconds": run.map(|run| run.seconds),
+        "num_elites": run.map(|run| run.num_elites),
+        "obj_max": run.and_then(|run| run.obj_max),
+        "validation_balanced_accuracy": run.and_then(|run| run.validation),
+        "audited": audited.map(|[all, _]| all), "physical": audited.map(|[_, good]| good),
+        "split": tested.map(|tested| tested.split),
+        "images": tested.map(|tested| tested.images),
+        "robots": tested.map(|tested| tested.robots),
+        "accuracy": tested.map(|tested| tested.accuracy),
+        "accuracy_low": interval.map(|[low, _]| low), "accuracy_high": interval.map(|[_, high]| high),
+        "balanced_accuracy": tested.map(|tested| tested.balanced),
+    })
 }
 
 fn table(console: &Console, rows: &[Row]) {

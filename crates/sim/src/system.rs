@@ -18,8 +18,13 @@ pub struct System {
 impl System {
     /// A body under some physics.
     ///
-    /// With constants that [`Physics::validate`] refuses a simulation ends, too, but mostly as
-    /// unstable.
+    /// Constants are not checked here: call [`Physics::validate`] first. With those that it refuses,
+    /// a simulation mostly ends as unstable; it may also take very long.
+    ///
+    /// # Panics
+    /// With some constants that [`Physics::validate`] refuses the simulation panics: if `cycle_steps`
+    /// or `peg_spacing` is 0, if `target_min` is above `target_max`, if one of these two is NaN.
+    /// Others may.
     pub fn new(body: &Body, physics: Physics) -> Self {
         System { lattice: Lattice::new(body, &physics), physics }
     }

@@ -95,25 +95,33 @@ const pad = new Pad($("pad"), (done) => {
 
 const images = new Images(({ image, about }) => show({ shown: { image }, about }, 0));
 
-const choose = (robot, from) => {
+// What is said of a robot.
+const introduce = (robot, from) => {
   const { encoding, level } = robot.encoding;
-  who = {
-    robot, from, name: robot.id,
-    subject: () => ({ archive: from.index, robot: robot.id }),
-    rows: () => rows(robot), steps: () => Math.min(from.control_steps, 5000),
-  };
   const way = { saturated: "1 where there is any ink", intensity: "as dark as the ink", threshold: `1 above ${level}` }[encoding];
   const margins = [robot.encoding.margin ?? 0].flat(), part = margins.some((margin) => margin > 0) ? "a part of it, " : "";
   $("encoding").textContent = `${part}${robot.body.length} × ${robot.body[0].length} pixels, ${way}`;
   $("who").textContent = robot.id;
   const audit = robot.audit ? ` · audit: ${robot.audit.conclusion}` : "";
   $("about").textContent = `${from.name} · task ${robot.task} · fitness ${signed(robot.fitness, 2)} · ${robot.voxels.total} voxels${audit}`;
+};
+
+const choose = (robot, from) => {
+  who = {
+    robot, from, name: robot.id,
+    subject: () => ({ archive: from.index, robot: robot.id }),
+    rows: () => rows(robot), steps: () => Math.min(from.control_steps, 5000),
+  };
+  introduce(robot, from);
   const { left, right } = robot.judge ?? { left: [], right: [] };
   images.labels = left.concat(right).length ? left.concat(right) : null;
   start();
 };
 
-const robots = new Robots(materials, choose);
+// It walks on, whatever has been found of it meanwhile.
+const renew = (robot, from) => { if (who?.robot?.id === robot.id && who.from.index === from.index) introduce(robot, from); };
+
+const robots = new Robots(materials, choose, renew);
 
 const editor = new Editor(materials, {
   say,

@@ -6,8 +6,9 @@ import { drawBody } from "./stage.js";
 const FEW = 24;
 
 export class Robots {
-  constructor(materials, chosen) {
-    this.materials = materials; this.chosen = chosen; this.robot = null; this.from = null; this.all = false;
+  // `chosen` hears of a robot that is to be watched, `renewed` of what is new about it.
+  constructor(materials, chosen, renewed) {
+    Object.assign(this, { materials, chosen, renewed, robot: null, from: null, all: false });
     $("archive").onchange = () => this.open(Number($("archive").value));
     $("task").onchange = () => this.show();
     $("audit").onchange = () => this.show();
@@ -38,7 +39,11 @@ export class Robots {
       const index = this.index, from = { index, ...await get("/api/archives/" + index) };
       if (this.index !== index) return;
       this.from = from;
+      const same = from.robots.find((robot) => robot.id === this.robot?.id);
+      this.robot = same ?? this.robot;
+      this.choices();
       this.show();
+      if (same) this.renewed(same, from);
       if (!this.robot && from.robots[0]) this.choose(from.robots[0]);
     }
     await this.progress();
@@ -66,18 +71,26 @@ export class Robots {
     const from = { index, ...await get("/api/archives/" + index) };
     if (this.index !== index) return;
     this.from = from;
-    const choices = (id, name, values) => {
-      $(id).replaceChildren(new Option(name, ""), ...values.map((value) => new Option(value, value)));
-      $(id).hidden = values.length < 2;
-    };
-    choices("task", "all tasks", this.from.tasks);
-    const verdicts = [...new Set(this.from.robots.map((robot) => robot.audit?.verdict).filter(Boolean))].sort();
-    choices("audit", "all verdicts", verdicts);
+    for (const id of ["task", "audit"]) $(id).value = "";
+    this.choices();
     this.show();
     $("progress").hidden = true;
     const first = this.from.robots[0];
     if (first) this.choose(first);
     await this.progress();
+  }
+
+  // The tasks and verdicts that there are, to show only robots of one. What is chosen stays if there still is a choice.
+  choices() {
+    const { tasks, robots } = this.from, verdicts = [...new Set(robots.map((robot) => robot.audit?.verdict).filter(Boolean))].sort();
+    for (const [id, all, values] of [["task", "all tasks", tasks], ["audit", "all verdicts", verdicts]]) {
+      const select = $(id), { value } = select, wanted = ["", ...values];
+      // A list that is open stays open.
+      if (wanted.join("\n") === [...select.options].map((option) => option.value).join("\n")) continue;
+      select.replaceChildren(...wanted.map((text) => new Option(text || all, text)));
+      select.hidden = values.length < 2;
+      select.value = !select.hidden && values.includes(value) ? value : "";
+    }
   }
 
   show() {

@@ -3,10 +3,11 @@
 use crate::base::number;
 use crate::store::eval::{EvalFile, RobotReport};
 use crate::view::colour;
-use crate::view::plot::axes::{AXIS, Axis, MARGIN, Plot, heading};
+use crate::view::plot::axes::{AXIS, Axis, MARGIN, Plot, heading_in_lines};
 use crate::view::plot::canvas::{Canvas, Pen, TEXT, Words};
 use crate::view::plot::figure::{COLUMN, Figure};
 use crate::view::{fonts, plot::scales};
+use std::collections::BTreeSet;
 
 /// Robots that have a line of their own with their name; of more, lines are thin and nameless.
 const NAMED: usize = 40;
@@ -16,7 +17,8 @@ const NAMED: usize = 40;
 pub fn accuracy(report: &EvalFile) -> Figure {
     let mut canvas = Canvas::new();
     let of = format!("{}; {}", runs(report), report.selection());
-    let top = heading(&mut canvas, &format!("Accuracy on {} images", report.split), &of, COLUMN);
+    let title = format!("Accuracy on {} images", report.split);
+    let top = heading_in_lines(&mut canvas, &title, &of, COLUMN, 3);
     let named = report.robots.len() <= NAMED;
     let line = if named { 10.5 } else { 3.0 };
     let mut tasks: Vec<&str> = report.robots.iter().map(|robot| robot.task.as_str()).collect();
@@ -59,20 +61,29 @@ pub fn accuracy(report: &EvalFile) -> Figure {
     Figure::new(&format!("Accuracy: {of}"), [COLUMN, height], canvas.finish())
 }
 
-/// The runs in words: name and seeds.
+/// The runs in words: name and seeds, or how many they are if they have several names.
 fn runs(report: &EvalFile) -> String {
+    let Some(seeds) = seeds(report) else { return format!("{} runs", report.runs.len()) };
+    let word = if seeds.len() > 1 { "seeds" } else { "seed" };
+    let seeds: Vec<String> = seeds.iter().map(u64::to_string).collect();
+    format!("{}, {word} {}", report.run, seeds.join(", "))
+}
+
+/// The seeds of the runs; none if these have several names: then a seed does not say which is meant.
+fn seeds(report: &EvalFile) -> Option<BTreeSet<u64>> {
     match report.runs.as_slice() {
-        [] | [_] => format!("{}, seed {}", report.run, report.run_seed),
-        runs => {
-            let seeds: Vec<String> = runs.iter().map(|run| run.seed.to_string()).collect();
-            format!("{}, seeds {}", report.run, seeds.join(", "))
+        [] => Some(BTreeSet::from([report.run_seed])),
+        runs if runs.iter().all(|run| run.name == report.run) => {
+            Some(runs.iter().map(|run| run.seed).collect())
         }
+        _ => None,
     }
 }
 
-/// What a robot is called: its id, and of several runs the seed of its own.
+/// What a robot is called: its id, and of several seeds that of its own run.
 fn name(report: &EvalFile, robot: &RobotReport) -> String {
-    match report.runs.get(robot.run).filter(|_| report.runs.len() > 1) {
+    let has_several = seeds(report).is_some_and(|seeds| seeds.len() > 1);
+    match report.runs.get(robot.run).filter(|_| has_several) {
         Some(run) => format!("{} ({})", robot.id, run.seed),
         None => robot.id.clone(),
     }

@@ -165,10 +165,20 @@ pub fn left_space(labels: f64) -> f64 {
 
 /// What the figure shows (bold), and of what; the y below it.
 pub fn heading(canvas: &mut Canvas, title: &str, of: &str, width: f64) -> f64 {
+    heading_in_lines(canvas, title, of, width, 1)
+}
+
+/// The same with up to `count` lines for what it is of.
+pub fn heading_in_lines(canvas: &mut Canvas, title: &str, of: &str, width: f64, count: usize) -> f64 {
+    const LINE: f64 = 9.5;
     let most = width - 2.0 * MARGIN;
     canvas.fitted([MARGIN, MARGIN + 7.0], title, most, Words { size: HEADING, ..Words::default() }.bold());
-    canvas.fitted([MARGIN, MARGIN + 17.0], of, most, Words::default().colour(colour::FAINT));
-    MARGIN + 24.0
+    let lines = fonts::lines(of, TEXT, false, most, count);
+    for (k, line) in lines.iter().enumerate() {
+        let at = [MARGIN, MARGIN + 17.0 + LINE * k as f64];
+        canvas.text(at, line, Words::default().colour(colour::FAINT));
+    }
+    MARGIN + 24.0 + LINE * (lines.len() - 1) as f64
 }
 
 /// Distance of everything from the figure's edges, points.

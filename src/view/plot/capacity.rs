@@ -162,6 +162,7 @@ mod tests {
             format_version: 1,
             program_version: "0".into(),
             run: "toy".into(),
+            eval_sha256: None,
             selected: "all".into(),
             dataset: "mnist".into(),
             patience_on: "test".into(),

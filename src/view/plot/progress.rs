@@ -23,8 +23,11 @@ const QUANTITIES: [Quantity; 3] = [
     ("best fitness", |moment| moment.obj_max.unwrap_or(f64::NAN), scales::VERMILLION),
 ];
 
-/// Groups that have a line of their own in the legend.
-const NAMED: usize = 24;
+/// Groups that have a line of their own in the legend: as many as look different.
+const NAMED: usize = scales::SET.len() * DASHES.len();
+
+/// Dashes of lines, and the gaps between them; the first is solid.
+const DASHES: [Option<[f64; 2]>; 4] = [None, Some([4.0, 1.6]), Some([1.0, 1.6]), Some([2.5, 4.0])];
 
 /// QD score, coverage and best fitness of runs over their evaluations. Runs that differ in nothing
 /// but the seed are one line, their median, in a band from the least to the largest, as far as the
@@ -56,7 +59,8 @@ pub fn progress(runs: &[Progress]) -> Figure {
         let size = [COLUMN - MARGIN - 8.0 - left, PANEL];
         let plot = Plot { at: [left, top], size, x: x.clone(), y };
         plot.grid(&mut canvas, true, false);
-        for (number, (group, bands)) in groups.iter().zip(&bands).enumerate() {
+        // The first on top: no line without a name hides one that has one.
+        for (number, (group, bands)) in groups.iter().zip(&bands).enumerate().rev() {
             let pen = if groups.len() > 1 { pen(number) } else { Pen::new(colour, 1.2) };
             draw(&mut canvas, &plot, bands, pen, group.runs.len() > 1);
         }
@@ -84,14 +88,13 @@ fn end(group: &Group) -> f64 {
     if shortest.is_finite() { shortest } else { 0.0 }
 }
 
-/// The line of a group: a colour, and, when the colours are used up, other dashes.
+/// The line of a group: a colour, and, when the colours are used up, other dashes; gray for what has
+/// no name.
 fn pen(number: usize) -> Pen {
     let colour = scales::SET[number % scales::SET.len()];
-    let pen = Pen::new(colour, 1.1);
-    match number / scales::SET.len() {
-        0 => pen,
-        1 => pen.dashed(4.0, 1.6),
-        _ => pen.dashed(1.0, 1.6),
+    match DASHES.get(number / scales::SET.len()) {
+        Some(dashes) => Pen { dashes: *dashes, ..Pen::new(colour, 1.1) },
+        None => Pen::new(scales::CELL, 0.8),
     }
 }
 
@@ -110,17 +113,19 @@ fn legend(canvas: &mut Canvas, groups: &[Group], top: f64) -> f64 {
     }
     if groups.len() > NAMED {
         y += 10.0;
+        canvas.line([MARGIN + 4.0, y - 2.6], [MARGIN + 18.0, y - 2.6], pen(NAMED));
         let text = format!("and {} more", groups.len() - NAMED);
         canvas.text([MARGIN + 22.0, y], &text, Words::default().colour(colour::FAINT));
     }
     y
 }
 
-/// The runs in a line: their name once, and their seeds.
+/// The runs in a line: their names and seeds, each once.
 fn names(runs: &[Progress]) -> String {
     let mut parts = Vec::<(String, Vec<String>)>::new();
     for run in runs {
         match parts.iter_mut().find(|(name, _)| *name == run.run) {
+            Some((_, seeds)) if seeds.contains(&run.seed.to_string()) => {}
             Some((_, seeds)) => seeds.push(run.seed.to_string()),
             None => parts.push((run.run.clone(), vec![run.seed.to_string()])),
         }
@@ -217,6 +222,16 @@ mod tests {
         assert!(svg.contains("parents=0 (seed 1)") && svg.contains("parents=1 (seed 1)"));
         assert!(progress(&runs).svg().contains("and 6 more"));
         assert!(!progress(&runs[..1]).svg().contains("parents"));
+        assert_eq!(names(&runs), "toy, seed 1");
+    }
+
+    #[test]
+    fn lines_with_a_name_look_different() {
+        let mut pens: Vec<String> = (0..=NAMED).map(|number| format!("{:?}", pen(number))).collect();
+        pens.sort();
+        pens.dedup();
+        assert_eq!(pens.len(), 25);
+        assert_eq!(pen(NAMED), pen(NAMED + 7));
     }
 
     #[test]

@@ -138,11 +138,12 @@ fn drawn(canvas: &mut Canvas, at: [f64; 2], side: f64, body: &Body) {
     robot::body_outline(canvas, at, cell, body, Pen::new(colour::INK, 0.4));
 }
 
+/// What a robot tells apart by walking left or right, and how well.
 fn caption(canvas: &mut Canvas, [middle, y]: [f64; 2], most: f64, member: &Member) {
-    // An arrow says which way the classes before the bar walk.
+    // The classes under which it walks left, a bar, those under which it walks right.
     let (a, b) = if member.first_group_walks == Direction::Left.name() { (0, 1) } else { (1, 0) };
     let group = |k: usize| member.groups[k].iter().map(u8::to_string).collect::<Vec<_>>().join(" ");
-    let text = format!("← {}   {} →", group(a), group(b));
+    let text = format!("← {} | {} →", group(a), group(b));
     canvas.fitted([middle, y + 7.5], &text, most + GAP, Words::middle());
     let accuracy = format!("{} %", percent(member.own.accuracy));
     canvas.fitted(
@@ -151,4 +152,34 @@ fn caption(canvas: &mut Canvas, [middle, y]: [f64; 2], most: f64, member: &Membe
         most,
         Words { size: 6.2, ..Words::middle() }.colour(colour::FAINT),
     );
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::task::voting::Accuracy;
+
+    #[test]
+    fn a_caption_has_a_bar_between_the_classes_of_the_two_ways() {
+        let mut member = Member {
+            id: "a".into(),
+            run: "toy".into(),
+            run_sha256: String::new(),
+            task: "0|123".into(),
+            groups: [vec![0], vec![1, 2, 3]],
+            first_group_walks: "right".into(),
+            body: "3".parse().unwrap(),
+            own: Accuracy { right: 9, accuracy: 0.9, interval: [0.8, 1.0] },
+            not_moved: 0.0,
+            displacements: Vec::new(),
+        };
+        let said = |member: &Member| {
+            let mut canvas = Canvas::new();
+            caption(&mut canvas, [50.0, 50.0], 110.0, member);
+            canvas.finish()
+        };
+        assert!(said(&member).contains(">← 1 2 3 | 0 →<"), "{}", said(&member));
+        member.first_group_walks = "left".into();
+        assert!(said(&member).contains(">← 0 | 1 2 3 →<"), "{}", said(&member));
+    }
 }

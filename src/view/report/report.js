@@ -34,6 +34,8 @@
         // Only the robot that was asked for last.
         if (turn === asked) frame.srcdoc = page.split("%ROLLOUT%").join(text.replaceAll("<", "\\u003c"));
       } catch (error) {
+        if (turn !== asked) return;
+        frame.hidden = true;
         about.textContent += " This browser cannot unpack it (" + error + ").";
       }
       if (scroll && window.matchMedia("(max-width: 860px)").matches) about.scrollIntoView({ block: "start" });

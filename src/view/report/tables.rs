@@ -208,7 +208,14 @@ pub(super) fn eval(report: &EvalFile) -> String {
     ];
     out += "<h3>Robots</h3>\n";
     out += &table(&headers, report.robots.iter().take(LISTED).map(row));
+    out += &more(report.robots.len(), "eval.csv");
     out
+}
+
+/// How many more there are than are listed, and where.
+fn more(count: usize, file: &str) -> String {
+    let more = count.saturating_sub(LISTED);
+    if more > 0 { format!("<p>And {more} more, in <code>{file}</code>.</p>\n") } else { String::new() }
 }
 
 /// Verdicts.
@@ -240,7 +247,7 @@ pub(super) fn audit(audit: &AuditFile) -> String {
     };
     let rows: Vec<Vec<String>> = walkers.iter().take(LISTED).map(row).collect();
     let headers = ["robot", "task", "verdict", "persists in % of changed rollouts", "spread"];
-    let listed = table(&headers, rows);
+    let listed = table(&headers, rows) + &more(walkers.len(), "audit.csv");
     out += &format!("<details><summary>Verdicts on the walkers</summary>\n{listed}</details>\n");
     out
 }
@@ -268,8 +275,10 @@ pub(super) fn capacity(file: &CapacityFile) -> String {
     } else {
         "images of the training split"
     };
+    let physical = if file.physical_only { " that are physical" } else { "" };
     format!(
-        "<p>Networks trained on the robots' images, {} times per size; early stopping waits on {waits}.</p>\n{}",
+        "<p>Of the robots{physical}: networks trained on their images, {} times per size; early stopping waits on \
+         {waits}.</p>\n{}",
         file.trainings,
         table(&headers, rows)
     )

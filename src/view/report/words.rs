@@ -276,6 +276,9 @@ fn seeing_and_training(config: &Config) -> Settings {
 fn settings(file: &CapacityFile) -> String {
     let usual = CapacityConfig::default();
     let mut text = if file.patience_on == "test" { String::new() } else { " --clean".to_string() };
+    if file.physical_only {
+        text += " --physical-only";
+    }
     if file.trainings != usual.trainings {
         text += &format!(" --set trainings={}", file.trainings);
     }

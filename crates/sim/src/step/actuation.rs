@@ -21,6 +21,9 @@ pub(crate) fn target(material: Material, control_step: u64, pixel: f64, physics:
 
 /// Target width of any voxel under a pixel in [0, 1] \[rest widths\]: of a muscle halfway through
 /// its swing, of a passive one 1.
+///
+/// # Panics
+/// If `target_min` is above `target_max`, or one of them NaN, which [`Physics::validate`] refuses.
 pub fn width(material: Material, pixel: f64, physics: &Physics) -> f64 {
     let free = match material {
         Material::MuscleInPhase | Material::MuscleAntiphase => {
