@@ -74,7 +74,7 @@ fn an_audit_that_cannot_be_written_is_shown() {
     let before = files(&sandbox.path("run"));
     let audit = "audit --archive run/run.json --robots top:1 --set perturbations.time_step=[2]";
     let said = said_why(without_room(&sandbox, 0, audit), "run/audit.json");
-    assert!(said.out.contains("verdict") && said.out.contains("1 robots: "), "{}", said.out);
+    assert!(said.out.contains("verdict") && said.out.contains("1 robot: "), "{}", said.out);
     assert_eq!(files(&sandbox.path("run")), before);
 }
 

@@ -216,7 +216,7 @@ fn a_test_that_was_stopped_goes_on_and_ends_with_the_same_bytes_on_any_threads()
     std::fs::create_dir(sandbox.path("more")).unwrap();
     sandbox.run(&format!("{fewer} -q --images 30 -o more/team.json")).ended(0, &[]);
     let said = sandbox.run(&format!("{TEAM} --images 30 -o more/team.json")).ended(0, &[]);
-    assert!(said.err.contains("30 images to 1 robots"), "{}", said.err);
+    assert!(said.err.contains("30 images to 1 robot:"), "{}", said.err);
     assert!(files(&sandbox.path("whole")) == files(&sandbox.path("more")));
     // Other images are shown to all.
     let said = sandbox.run(&format!("{TEAM} --images 30 --seed 2 -o parts/team.json")).ended(0, &[]);

@@ -7,6 +7,7 @@ use crate::base::error::{Error, ErrorKind};
 use crate::base::hash::sha256_hex;
 use crate::base::observer::{Observer, Work};
 use crate::base::stop::check;
+use crate::base::text::counted;
 use crate::base::threads::pool;
 use crate::body::Body;
 use crate::config::train::MOST_RANDOM_IMAGES;
@@ -143,7 +144,7 @@ pub fn measure(options: &Options, stop: &AtomicBool, observer: &dyn Observer) ->
         robots: Vec::new(),
     };
     if !subjects.is_empty() {
-        let label = format!("measuring {} robots:", subjects.len());
+        let label = format!("measuring {}:", counted(subjects.len(), "robot", "robots"));
         observer.begins(&Work::new(label, (subjects.len() * options.images) as u64, "rollouts"));
     }
     let earlier = earlier(options, observer);

@@ -74,7 +74,9 @@ pub(super) fn run(args: CapacityArgs, console: &Console) -> Result<(), Error> {
     }
     if !file.tasks.is_empty() {
         let [svg, png] = networks::figure(&file, &options.out)?;
-        console.line(&format!("wrote {} and {}", svg.display(), png.display()));
+        for path in [&svg, &png] {
+            console.line_about(path, &format!("wrote {}", path.display()));
+        }
     }
     if file.stopped {
         let text = "stopped; the trainings done so far are kept".to_string();

@@ -79,7 +79,7 @@ pub(super) fn run(args: ReproduceArgs, console: &Console) -> Result<(), Error> {
     }
     for (path, file) in &finished.capacities {
         let made = networks::figure(file, path)?;
-        console.line(&format!("wrote {}", made[1].display()));
+        console.line_about(&made[1], &format!("wrote {}", made[1].display()));
     }
     Ok(())
 }

@@ -2,6 +2,7 @@
 
 use crate::base::error::Error;
 use crate::base::signals;
+use crate::base::text::counted;
 use crate::cli::tasks::{Command, What, Where, asked, ended, refused};
 use crate::commands::sweep::SweepPlan;
 use crate::commands::{collect, tasks};
@@ -80,7 +81,7 @@ pub(super) fn run(args: SweepArgs, console: &Console) -> Result<(), Error> {
     let jobs = args.place.jobs.map(usize::from);
     let summary = tasks::run_all(&tasks, &place, jobs, &stop, &Reporter::new(console))?;
     ended(&summary, tasks.len())?;
-    console.line(&format!("{} tasks are done, in {}", tasks.len(), out.display()));
+    console.line(&format!("{} done, in {}", counted(tasks.len(), "task is", "tasks are"), out.display()));
     console.info(&format!("next: morphcog sweep {} --collect", in_shell(&args.plan)));
     Ok(())
 }

@@ -7,6 +7,7 @@ use crate::base::hash::sha256_hex;
 use crate::base::observer::{Observer, Work};
 use crate::base::ranks::Ranks;
 use crate::base::stop::Stopped;
+use crate::base::text::counted;
 use crate::base::threads::pool;
 use crate::body::Body;
 use crate::config::Config;
@@ -137,7 +138,7 @@ pub fn audit(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> R
         subjects.into_iter().filter(|subject| file.robot(&subject.id).is_none()).collect();
     let rollouts: usize = open.iter().map(|subject| 1 + trial.perturbations(subject).len()).sum();
     let rollouts = rollouts.div_ceil(options.ranks.size());
-    let label = format!("auditing {} robots:", open.len());
+    let label = format!("auditing {}:", counted(open.len(), "robot", "robots"));
     observer.begins(&Work::new(label, rollouts as u64, "rollouts"));
     let pool = pool(options.threads)?;
     let done = AtomicU64::new(0);

@@ -4,6 +4,7 @@ use crate::analysis::gallery;
 use crate::base::error::Error;
 use crate::base::observer::{Observer, Work};
 use crate::base::ranks::Ranks;
+use crate::base::text::counted;
 use crate::base::threads::pool;
 use crate::commands::eval_images::HeldOutImages;
 use crate::config::validation::{IMAGES_KEY, LEAST};
@@ -141,7 +142,11 @@ pub fn eval(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Re
         }
     };
     let (count, images) = (robots.len(), shown.images.len());
-    let label = format!("evaluating {count} robots on {images} images:");
+    let label = format!(
+        "evaluating {} on {}:",
+        counted(count, "robot", "robots"),
+        counted(images, "image", "images")
+    );
     let own_share = count.div_ceil(options.ranks.size());
     observer.begins(&Work::new(label, (own_share * images) as u64, "rollouts"));
     let testing = Testing { options, sources: &sources, grouping: &grouping, shown: &shown };

@@ -4,6 +4,7 @@ use crate::base::error::Error;
 use crate::base::observer::Observer;
 use crate::base::random::{Purpose, stream};
 use crate::base::ranks::Ranks;
+use crate::base::text::counted;
 use crate::commands::plan::Plan;
 use crate::commands::table::Row;
 use crate::commands::tasks::{self, Place, Run, Steps, Summary, Task, another, is_of, written};
@@ -194,7 +195,7 @@ impl Job<'_> {
                     break;
                 }
                 let drawn: Vec<Chosen> = turn.iter().map(|&index| of_task[index]).collect();
-                self.observer.note(&format!("{task}: audit of {} robots", drawn.len()));
+                self.observer.note(&format!("{task}: audit of {}", counted(drawn.len(), "robot", "robots")));
                 let Some(verdicts) = self.audited(sources, &drawn)? else { return Ok(None) };
                 for (candidate, verdict) in drawn.into_iter().zip(verdicts) {
                     if physical.len() >= self.plan.robots {

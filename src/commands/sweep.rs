@@ -479,7 +479,7 @@ mod tests {
         ] {
             let errors = plan(&format!("config = \"quickstart.toml\"\n{text}")).tasks(Path::new("plan.toml"));
             let said = errors.unwrap_err()[0].to_string();
-            assert!(said.contains(&format!("{key}")), "{said}");
+            assert!(said.contains(key), "{said}");
         }
         assert_eq!(names("config = \"quickstart.toml\"\nset = [\"task.groups=[[5],[6]]\"]").len(), 1);
         let names = names("archive = \"gallery:gaits-6\"\npairs = [0, 1]\nseeds = [1]");

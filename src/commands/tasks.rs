@@ -6,6 +6,7 @@
 use crate::base::error::{Error, ErrorKind};
 use crate::base::observer::{Generation, Observer, Work};
 use crate::base::ranks::Ranks;
+use crate::base::text::counted;
 use crate::base::{atlas, named};
 use crate::commands::{audit, eval};
 use crate::config::audit::Criteria;
@@ -577,7 +578,8 @@ pub fn run_all(
     let total = sum(&mut tasks.iter());
     let known = total - sum(&mut numbered.iter().map(|(_, task)| *task));
     if !numbered.is_empty() {
-        let label = format!("{} of {} tasks, {jobs} at once:", numbered.len(), tasks.len());
+        let label =
+            format!("{} of {}, {jobs} at once:", numbered.len(), counted(tasks.len(), "task", "tasks"));
         let train = tasks.iter().all(|task| matches!(task.run, Run::Train(_)));
         let unit = if train { "challengers" } else { "generations" };
         observer.begins(&Work { label, total, known, unit });

@@ -4,6 +4,7 @@
 use crate::base::Grid;
 use crate::base::error::Error;
 use crate::base::observer::{Observer, Work};
+use crate::base::text::counted;
 use crate::base::threads::pool;
 use crate::baseline::linear::{Labelled, Linear, Moments, nearest_neighbours};
 use crate::commands::eval_images::chosen_by;
@@ -128,7 +129,11 @@ pub fn team(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Re
         })
         .collect();
     let open = members.iter().filter(|member| member.is_none()).count();
-    let label = format!("showing {} images to {open} robots:", images.len());
+    let label = format!(
+        "showing {} to {}:",
+        counted(images.len(), "image", "images"),
+        counted(open, "robot", "robots")
+    );
     observer.begins(&Work::new(label, (open * images.len()) as u64, "rollouts"));
     let (pool, mut done, mut unwritten) = (pool(options.threads)?, 0, Unwritten::default());
     for (place, (chosen, of_robot)) in robots.iter().zip(&splits).enumerate() {

@@ -2,6 +2,7 @@
 
 use crate::base::Grid;
 use crate::base::observer::{Observer, Work};
+use crate::base::text::counted;
 use crate::config::Config;
 use crate::store::run::Robot;
 use crate::task::evaluation::fresh_rollouts;
@@ -38,7 +39,11 @@ impl Walker<'_> {
     /// A validation begins: number of robots, of images for the best of them, and of simulations in
     /// all.
     pub fn validating(&self, robots: usize, images: usize, showings: u64) {
-        let label = format!("validating {robots} robots on up to {images} images:");
+        let label = format!(
+            "validating {} on up to {}:",
+            counted(robots, "robot", "robots"),
+            counted(images, "image", "images")
+        );
         self.observer.begins(&Work::new(label, showings, "rollouts"));
     }
 

@@ -8,6 +8,7 @@ use crate::base::error::Error;
 use crate::base::files::{read_text, write_atomically};
 use crate::base::hash::sha256_hex;
 use crate::base::observer::{Observer, Work};
+use crate::base::text::counted;
 use crate::base::threads::pool;
 use crate::base::{Grid, number};
 use crate::body::Body;
@@ -163,8 +164,11 @@ pub fn train(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> R
     let pool = pool(options.threads)?;
     let began = Instant::now();
     let (gaits, images) = (walkers.len(), training.images.len());
-    observer
-        .note(&format!("training in {}: {gaits} gaits, {images} training images", folder.path().display()));
+    observer.note(&format!(
+        "training in {}: {}, {images} training images",
+        folder.path().display(),
+        counted(gaits, "gait", "gaits")
+    ));
     let trainer = Trainer { config: &config, dataset: &dataset, training: &training, probing, measured };
     let taught = pool.install(|| trainer.train(&walkers, &mut log, observer));
     // What was simulated is kept, however it ended.
@@ -298,7 +302,7 @@ pub(crate) fn with_images(
 ///
 /// # Errors
 /// If the config, or the images there are, do not allow it.
-pub(crate) fn check(evolved: &Config, groups: &[Vec<u8>; 2], data: Option<&Path>) -> Result<(), Error> {
+pub fn check(evolved: &Config, groups: &[Vec<u8>; 2], data: Option<&Path>) -> Result<(), Error> {
     let config = config_of(evolved, groups, None, &[])?;
     let dataset = Whereabouts::given(data).load(&config.data, &[Split::Train])?;
     with_images(config, &Training::indices(evolved, &dataset)?, &dataset, &()).map(|_| ())

@@ -139,7 +139,7 @@ pub fn make(console: &Console, wanted: &Wanted) -> Result<Vec<PathBuf>, Error> {
                 _ => figure.png(f64::from(wanted.dpi) / 72.0).map_err(failed)?,
             };
             write_whole(&path, &bytes).map_err(failed)?;
-            console.line(&format!("wrote {}", path.display()));
+            console.line_about(&path, &format!("wrote {}", path.display()));
             files.push(path);
         }
         Ok(())

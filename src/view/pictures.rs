@@ -182,6 +182,6 @@ pub fn make(console: &Console, replay: &Replay, wanted: &Wanted) -> Result<Vec<P
     if recording.unstable {
         console.warning("the simulation became unstable and ended early");
     }
-    made.iter().for_each(|path| console.line(&format!("wrote {}", path.display())));
+    made.iter().for_each(|path| console.line_about(path, &format!("wrote {}", path.display())));
     Ok(made)
 }

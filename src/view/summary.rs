@@ -5,6 +5,7 @@ use crate::analysis::published;
 use crate::base::clock::CLOCK;
 use crate::base::number;
 use crate::base::number::percent;
+use crate::base::text::counted;
 use crate::commands::bench::Speed;
 use crate::commands::data::Found;
 use crate::data::fetch::{Fetched, Outcome};
@@ -58,11 +59,11 @@ pub fn evolution(console: &Console, finished: &Finished, out: &Path, goes_on: bo
     let stats = run.stats;
     let cells = run.dimensions.possible_cells;
     console.line(&format!(
-        "{} of {cells} cells filled (coverage {} %), QD score {}, {} generations in {}",
+        "{} of {cells} cells filled (coverage {} %), QD score {}, {} in {}",
         stats.num_elites,
         percent(stats.coverage),
         number::fixed(stats.qd_score, 1),
-        run.generations,
+        counted(run.generations, "generation", "generations"),
         duration(totals.seconds)
     ));
     let showings = (totals.simulated + totals.saved()).max(1) as f64;
@@ -112,11 +113,12 @@ pub fn training(console: &Console, finished: &train::Finished, out: &Path) {
     }
     let gait = robot.parent.as_deref().unwrap_or("none");
     console.line(&format!(
-        "{}: {} with the gait of {gait}, fitness {} on {} training images, after {rollouts} rollouts",
+        "{}: {} with the gait of {gait}, fitness {} on {} training images, after {}",
         robot.id,
         robot.task,
         number::fixed(robot.objective, 3),
-        run.training_images.len()
+        run.training_images.len(),
+        counted(*rollouts, "rollout", "rollouts")
     ));
     console.line(&format!("wrote {}", out.display()));
 }
@@ -284,7 +286,7 @@ pub fn fetched(console: &Console, files: &[Fetched]) {
             Outcome::Kept => "was there and is right".to_string(),
             Outcome::Downloaded(url) => format!("downloaded from {url}, checksum right"),
         };
-        console.line(&format!("{}: {how}", file.file.display()));
+        console.line_about(&file.file, &format!("{}: {how}", file.file.display()));
     }
 }
 

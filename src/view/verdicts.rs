@@ -1,6 +1,7 @@
 //! What `morphcog audit` says at its end.
 
 use crate::base::number;
+use crate::base::text::counted;
 use crate::commands::audit::Finished;
 use crate::store::audit::{AuditFile, RobotAudit, Verdict};
 use crate::view::console::{Console, Mode};
@@ -26,7 +27,12 @@ pub fn audit(console: &Console, finished: &Finished, out: &Path) {
     let verdicts = [Verdict::Physical, Verdict::Exploits, Verdict::Fragile, Verdict::NotAWalker];
     let count = |verdict: Verdict| robots.iter().filter(|robot| robot.verdict == verdict).count();
     let counts: Vec<String> = verdicts.map(|v| format!("{} {}", count(v), v.name())).to_vec();
-    console.line(&format!("{}: {} robots: {}", file.run, robots.len(), counts.join(", ")));
+    console.line(&format!(
+        "{}: {}: {}",
+        file.run,
+        counted(robots.len(), "robot", "robots"),
+        counts.join(", ")
+    ));
     breaking(console, &robots);
     let csv = out.with_extension("csv");
     if unwritten.is_none() {
