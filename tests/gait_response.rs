@@ -183,9 +183,11 @@ fn a_file_keeps_what_it_has_of_other_robots() {
     assert_eq!(first.displacements, measured(&ids[0]).displacements);
     // What could be taught was another task.
     assert!(first.taught.is_none() && second.taught.is_some() && measured(&ids[0]).taught.is_some());
-    // Random images of another seed are others: nothing of them goes together.
-    sandbox.run(&format!("response -q -a run --robots {} -n 60 --seed 8", ids[0])).ended(0, &[]);
-    assert_eq!(responses(&sandbox, "run/response.json").robots.len(), 1);
+    // Random images of another seed are others: nothing of them goes together, and nothing is lost.
+    let other = format!("response -q -a run --robots {} -n 60 --seed 8", ids[0]);
+    sandbox.run(&other).ended(3, &["run/response.json: 2 robots of this run are measured", "--out"]);
+    assert_eq!(responses(&sandbox, "run/response.json"), file);
+    sandbox.run(&format!("{other} -o other.json")).ended(0, &[]);
 }
 
 #[test]

@@ -128,6 +128,7 @@ fn a_response_that_was_measured_before_is_taken_and_changes_nothing() {
     sandbox.write("walkers/response.json", measured.to_string());
     assert_eq!(train("one", "--force")[0][0], changed);
     // That of another seed, or of other physics, is not.
+    std::fs::remove_file(sandbox.path("walkers/response.json")).unwrap();
     sandbox.run("response -q -a walkers --robots top:2 --images 60 --error 0 --seed 8").ended(0, &[]);
     assert!(train("one", "--force") == without[0]);
     sandbox.write("walkers/response.json", &text);

@@ -148,6 +148,20 @@ pub fn measure(options: &Options, stop: &AtomicBool, observer: &dyn Observer) ->
         observer.begins(&Work::new(label, (subjects.len() * options.images) as u64, "rollouts"));
     }
     let earlier = earlier(options, observer);
+    if let Some((path, before)) = earlier.iter().find(|(path, _)| *path == options.out)
+        && before.run_sha256 == provenance.sha256
+        && before.setting.seed != seed
+    {
+        let count = counted(before.robots.len(), "robot of this run is", "robots of this run are");
+        let text = format!(
+            "{}: {count} measured with the random images of seed {}",
+            path.display(),
+            before.setting.seed
+        );
+        return Err(
+            Error::input(text).hint("write elsewhere with --out, or measure with that --seed".to_string())
+        );
+    }
     let measuring =
         Measuring { options, config, probing, task, earlier, run_sha256: &provenance.sha256, seed, stop };
     let mut unwritten = Unwritten::default();
