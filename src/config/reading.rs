@@ -166,6 +166,9 @@ fn spoken(message: &str) -> String {
         ("a boolean", "true or false"),
         ("a sequence", "a list"),
     ];
+    if let Some((start, _)) = message.split_once("expected struct ") {
+        return format!("{start}expected a table");
+    }
     for (kind, words) in words {
         if let Some(start) = message.strip_suffix(&format!("expected {kind}")) {
             return format!("{start}expected {words}");
@@ -434,6 +437,9 @@ mod tests {
             "--set inner=[3]: inner: expected a table, found a list"
         );
         assert_eq!(set("inner.list=[3]").unwrap().inner.list, [3.0]);
+        // Nor is a number.
+        let error = set("inner=3").unwrap_err().message;
+        assert!(error.ends_with("expected a table"), "{error}");
     }
 
     #[test]
