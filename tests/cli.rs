@@ -478,7 +478,7 @@ fn every_image_is_shown_if_all_are_asked_for() {
     // Class after class; no sevens, which the run does not know.
     assert_eq!(shown, [0, 1, 2, 5, 8, 3, 4, 7]);
     // A report's commands ask for the same.
-    sandbox.run("report -q run --robots 0 --data own").ended(0, &[]);
+    sandbox.run("report -q run --rollouts 0 --data own").ended(0, &[]);
     assert!(sandbox.read("run/report.html").contains("--images all"));
     sandbox.run("team -q -a run --data own --classes 0,1 --images all -o team.json").ended(0, &[]);
     let team: serde_json::Value = serde_json::from_str(&sandbox.read("team.json")).unwrap();
@@ -694,7 +694,7 @@ fn several_archives_are_named_in_the_same_way_by_every_command() {
         "plot -q archive",
         "plot -q progress",
         "plot -q body",
-        "report -q --robots 0",
+        "report -q --rollouts 0",
     ];
     for command in commands {
         for archives in ["--archive a b", "--archive a/run.json --archive b", "-a a -a b/run.json"] {
@@ -998,7 +998,7 @@ fn a_run_may_be_named_by_its_folder() {
         "audit -q -a run --robots top:1",
         "replay -q -a run --format gif",
         "plot accuracy -q -a run -o accuracy.svg",
-        "report -q run --robots 0",
+        "report -q run --rollouts 0",
     ] {
         sandbox.run(command).ended(0, &[]);
     }
@@ -1130,7 +1130,7 @@ fn no_table_shows_a_minus_nothing() {
     sandbox.write("run/run.json", run.to_string());
     let mut said = sandbox.run("eval -a run -n 4 --cycles 1 --robots top:2").ended(0, &[]).out;
     said += &sandbox.run("replay -a run --format html").ended(0, &[]).out;
-    sandbox.run("report -q --archive run --robots 1").ended(0, &[]);
+    sandbox.run("report -q --archive run --rollouts 1").ended(0, &[]);
     sandbox.run("plot -q archive --archive run").ended(0, &[]);
     sandbox.run("plot -q body --archive run -o body.svg").ended(0, &[]);
     for file in ["run/report.html", "run/plot-archive.svg", "body.svg"] {
@@ -1247,7 +1247,7 @@ fn every_event_of_json_is_documented_with_its_fields() {
         "capacity --eval run/eval.json --set trainings=2 --set sizes=[1,3]",
         "team -a run --classes 0,1 --images 20",
         "replay -a run --format png",
-        "report run --robots 0",
+        "report run --rollouts 0",
         "data info",
         "data sheet",
         "gallery",
@@ -1275,7 +1275,7 @@ fn every_event_of_json_is_documented_with_its_fields() {
 fn a_written_file_is_named_for_programs() {
     let sandbox = with_run();
     for (args, file) in
-        [("report run --robots 0", "run/report.html"), ("data sheet -o sheet.png --samples 1", "sheet.png")]
+        [("report run --rollouts 0", "run/report.html"), ("data sheet -o sheet.png --samples 1", "sheet.png")]
     {
         let lines = sandbox.run(&format!("{args} --json")).ended(0, &[]).json_lines();
         let last = lines.last().unwrap();
@@ -1359,16 +1359,6 @@ fn how_far_tasks_are_has_no_column_without_a_name() {
     let failed = status();
     assert!(failed.lines().next().unwrap().ends_with("  about"), "{failed}");
     assert!(failed.contains("no room") && failed.ends_with("1 task: 1 failed\n"), "{failed}");
-}
-
-#[test]
-fn a_report_is_asked_for_robots_and_the_old_word_still_works() {
-    let sandbox = with_run();
-    for option in ["--robots", "--rollouts"] {
-        sandbox.run(&format!("report -q run {option} 0")).ended(0, &[]);
-    }
-    let help = sandbox.run("report --help").ended(0, &[]).out;
-    assert!(help.contains("--robots <N>") && !help.contains("--rollouts"), "{help}");
 }
 
 #[test]

@@ -422,7 +422,9 @@ fn what_a_later_step_lacks_is_said_before_the_first_task_begins() {
         let keys =
             if first.starts_with('[') { format!("{SHORT}{more}") } else { format!("{first}\n{SHORT}{rest}") };
         sandbox.write("plan.toml", keys);
-        sandbox.run("sweep plan.toml --out all").ended(3, words);
+        for task in ["", "--task 1"] {
+            sandbox.run(&format!("sweep plan.toml --out all {task}")).ended(3, words);
+        }
         assert!(!sandbox.path("all/tiny-seed1/run.json").exists(), "{more}");
     }
     sandbox.write("plan.toml", format!("{SHORT}[eval]\nimages = \"all\"\n"));

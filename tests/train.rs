@@ -5,6 +5,9 @@ mod common;
 
 use common::program::{Sandbox, TINY, files, gaits};
 use morphcog::config::Config;
+use morphcog::data::dataset::Split;
+use morphcog::search::training::Training;
+use morphcog::store::whereabouts::load_dataset;
 
 /// A little of everything: seconds in place of minutes.
 const LITTLE: &str = "--set train.random_images=40 --set train.rounds=2 --set train.images=24 \
@@ -396,7 +399,13 @@ fn images_of_an_earlier_training_never_validate_a_later_one() {
     let second = train("first", "second", 2);
     let third = train("second", "third", 1);
     let of = |run: &morphcog::store::run::RunFile| run.origin.clone().unwrap();
-    assert!(of(&second).elsewhere.contains_key(&first.dataset.train_sha256));
+    let elsewhere = of(&second).elsewhere;
+    assert!(elsewhere.iter().any(|other| other.train_sha256 == first.dataset.train_sha256));
     let before = of(&third).trained_on;
     assert!(first.training_images.iter().all(|image| before.contains(&image.index)), "{}", before.len());
+    // Also those that it drew and was not shown last.
+    let drawn =
+        Training::indices(&first.config, &load_dataset(&first.config, None, &[Split::Train]).unwrap());
+    let drawn = drawn.unwrap();
+    assert!(drawn.len() > first.training_images.len() && drawn.iter().all(|index| before.contains(index)));
 }

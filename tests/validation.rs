@@ -200,6 +200,12 @@ fn a_run_that_will_leave_too_few_of_them_is_refused_before_it_begins() {
         ["validation.images = 40", "20 images of class", "data.images_per_class", "validation.best"];
     sandbox.run("evolve -q -c run.toml -o run").ended(3, &refused);
     assert!(!sandbox.path("run").exists());
+    // One that leaves none has none to be tested on, however many are asked for.
+    sandbox.write("all.toml", few.replace("images_per_class = 30", "images_per_class = 40"));
+    sandbox.run("evolve -q -c all.toml -o all").ended(0, &[]);
+    sandbox
+        .run("eval -a all --split validation --images all")
+        .ended(3, &["--images all: expected 1 image of class 0 that the run is not trained on, found 0"]);
     // Nor is one begun in a folder that is there already.
     std::fs::create_dir(sandbox.path("empty")).unwrap();
     sandbox.run("evolve -q -c run.toml -o empty --resume").ended(3, &refused);

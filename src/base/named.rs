@@ -31,6 +31,12 @@ pub fn name(path: &Path) -> Option<(&str, &str)> {
     parts(path)?.0.split_once(':')
 }
 
+/// The folder of the atlas that a named run of it is in; none of other paths.
+pub fn atlas_of(path: &Path) -> Option<PathBuf> {
+    let (name, _) = parts(path)?;
+    atlas::folder_of(name.strip_prefix(atlas::PREFIX)?)
+}
+
 /// Where a file of a named run is; none of other paths, or if nothing of that name ships with the
 /// program.
 ///

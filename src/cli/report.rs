@@ -16,7 +16,7 @@ pub(super) const EXAMPLES: &str = "\
 Examples:
   morphcog report --archive runs/zero_one-seed1
   morphcog report --archive runs/zero_one-seed* -o seeds.html
-  morphcog report --archive runs/zero_one-seed1 --robots 20 --open
+  morphcog report --archive runs/zero_one-seed1 --rollouts 20 --open
 
 What lies beside a run.json is part of its report: metrics.csv, eval.json, audit.json,
 capacity.json. Of several runs, those of them together are looked for above their folders.";
@@ -30,8 +30,8 @@ pub(super) struct ReportArgs {
     runs: Vec<Runs>,
     /// Robots that can be watched, the fittest of each run; the more, the fewer frames each has
     /// (the page stays below 20 MB).
-    #[arg(long, alias = "rollouts", value_name = "N", default_value_t = 100)]
-    robots: usize,
+    #[arg(long, value_name = "ROBOTS", default_value_t = 100)]
+    rollouts: usize,
     /// Folder with the images.
     #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,
@@ -53,8 +53,8 @@ pub(super) fn run(args: ReportArgs, console: &Console) -> Result<(), Error> {
     let out = args.out.unwrap_or_else(|| folder::beside_all(&archives, "report.html"));
     folder::writable(&out)?;
     let gathered =
-        report::gather(&archives, args.data.as_deref(), args.robots > 0, &|text| console.warning(text))?;
-    let rollouts = args.robots.div_ceil(archives.len());
+        report::gather(&archives, args.data.as_deref(), args.rollouts > 0, &|text| console.warning(text))?;
+    let rollouts = args.rollouts.div_ceil(archives.len());
     let content = Content { gathered: &gathered, rollouts };
     let page = {
         let counter = console.counter("simulating for the page:", content.count() as u64, "rollouts");

@@ -172,6 +172,7 @@ pub(super) fn asked(
             return Err(Error::usage(text));
         };
         tasks::check_folders(std::slice::from_ref(task), place).map_err(|errors| refused(errors, console))?;
+        tasks::check_data(std::iter::once((number, task)), place)?;
         let stop = signals::stop_flag()?;
         tasks::run(task, place, &stop, &Reporter::new(console)).map_err(goes_on)?;
         console.line(&format!("task {number} ({}): done", task.name));

@@ -13,6 +13,7 @@ use crate::store::robots::Source;
 use crate::store::run::RunFile;
 use crate::store::task::State;
 use crate::store::validation::ranking;
+use serde::Serialize;
 use std::path::{Path, PathBuf};
 
 /// What a task found on one of the tasks that its robots do, as 0|1.
@@ -180,6 +181,71 @@ impl Found {
     }
 }
 
+/// What a row says of its run, as the columns of `sweep.csv`; nothing where there is none.
+#[derive(Debug, Default, Serialize)]
+pub struct Columns<'a> {
+    recognises: Option<&'a str>,
+    generations: Option<u64>,
+    seconds: Option<f64>,
+    num_elites: Option<usize>,
+    obj_max: Option<f64>,
+    validation_balanced_accuracy: Option<f64>,
+    audited: Option<usize>,
+    physical: Option<usize>,
+    split: Option<HeldOut>,
+    images: Option<usize>,
+    robots: Option<usize>,
+    accuracy: Option<f64>,
+    accuracy_low: Option<f64>,
+    accuracy_high: Option<f64>,
+    balanced_accuracy: Option<f64>,
+}
+
+impl<'a> Columns<'a> {
+    /// Their names, in order.
+    const NAMES: [&'static str; 15] = [
+        "recognises",
+        "generations",
+        "seconds",
+        "num_elites",
+        "obj_max",
+        "validation_balanced_accuracy",
+        "audited",
+        "physical",
+        "split",
+        "images",
+        "robots",
+        "accuracy",
+        "accuracy_low",
+        "accuracy_high",
+        "balanced_accuracy",
+    ];
+
+    /// Of a row.
+    pub fn of(row: &'a Row) -> Self {
+        let Some(run) = &row.run else { return Columns::default() };
+        let tested = run.tested.as_ref();
+        let interval = tested.and_then(|tested| tested.interval);
+        Columns {
+            recognises: Some(&run.recognises),
+            generations: Some(run.generations),
+            seconds: Some(run.seconds),
+            num_elites: Some(run.num_elites),
+            obj_max: run.obj_max,
+            validation_balanced_accuracy: run.validation,
+            audited: run.audited.map(|[all, _]| all),
+            physical: run.audited.map(|[_, physical]| physical),
+            split: tested.map(|tested| tested.split),
+            images: tested.map(|tested| tested.images),
+            robots: tested.map(|tested| tested.robots),
+            accuracy: tested.map(|tested| tested.accuracy),
+            accuracy_low: interval.map(|[low, _]| low),
+            accuracy_high: interval.map(|[_, high]| high),
+            balanced_accuracy: tested.map(|tested| tested.balanced),
+        }
+    }
+}
+
 /// The table as CSV: a row per task and what its robots tell apart; a column per varied key.
 pub fn csv(rows: &[Row]) -> Vec<u8> {
     let mut keys: Vec<&String> = rows.iter().flat_map(|row| row.varied.iter().map(|(key, _)| key)).collect();
@@ -187,42 +253,12 @@ pub fn csv(rows: &[Row]) -> Vec<u8> {
     keys.dedup();
     let about = ["number", "name", "state"].map(str::to_string);
     let varied = keys.iter().map(|key| format!("varied_{key}"));
-    let run =
-        ["recognises", "generations", "seconds", "num_elites", "obj_max", "validation_balanced_accuracy"];
-    let audit = ["audited", "physical"];
-    let test =
-        ["split", "images", "robots", "accuracy", "accuracy_low", "accuracy_high", "balanced_accuracy"];
-    let more = run.iter().chain(&audit).chain(&test).map(ToString::to_string);
     let fields = rows.iter().map(|row| {
         let of =
             |key: &&String| row.varied.iter().find(|(own, _)| own == *key).map(|(_, value)| value.as_str());
         let varied: Vec<Option<&str>> = keys.iter().map(of).collect();
-        let run = row.run.as_ref();
-        let audited = run.and_then(|run| run.audited);
-        let tested = run.and_then(|run| run.tested.as_ref());
-        let interval = tested.and_then(|tested| tested.interval);
-        (
-            (row.number, &row.name, row.state.name()),
-            varied,
-            (
-                run.map(|run| &run.recognises),
-                run.map(|run| run.generations),
-                run.map(|run| run.seconds),
-                run.map(|run| run.num_elites),
-                run.and_then(|run| run.obj_max),
-                run.and_then(|run| run.validation),
-            ),
-            [0, 1].map(|k| audited.map(|audited| audited[k])),
-            (
-                tested.map(|tested| tested.split.to_string()),
-                tested.map(|tested| tested.images),
-                tested.map(|tested| tested.robots),
-                tested.map(|tested| tested.accuracy),
-                interval.map(|interval| interval[0]),
-                interval.map(|interval| interval[1]),
-                tested.map(|tested| tested.balanced),
-            ),
-        )
+        ((row.number, &row.name, row.state.name()), varied, Columns::of(row))
     });
+    let more = Columns::NAMES.map(str::to_string);
     table::csv(about.into_iter().chain(varied).chain(more), fields)
 }

@@ -157,14 +157,10 @@ impl<'a> HeldOutImages<'a> {
 /// The images that a run's robots were trained on: of a training, all that it learnt from, and not
 /// only the last, which stand in its file.
 fn taught_with(run: &RunFile, dataset: &Dataset) -> Result<Vec<ImageRef>, Error> {
-    if run.origin.is_none() {
-        return Ok(run.training_images.clone());
+    match run.origin {
+        Some(_) => Training::images(&run.config, dataset),
+        None => Ok(run.training_images.clone()),
     }
-    let labelled = |index: usize| {
-        let label = dataset.label(Split::Train, index);
-        label.map(|label| ImageRef { index, label }).map_err(|error| Error::input(error.to_string()))
-    };
-    Training::indices(&run.config, dataset)?.into_iter().map(labelled).collect()
 }
 
 fn labelled(list: &[(Grid<f64>, u8)]) -> Vec<Labelled<'_>> {

@@ -211,7 +211,7 @@ impl Team {
 /// The training images, or one of each class if they are many.
 fn images(run: &RunFile, path: &Path, whereabouts: &Whereabouts) -> Result<Vec<Seen>, Error> {
     let hint = |error: Error| match &error.hint {
-        None => error.hint("or --robots 0 for a report without moving pictures".to_string()),
+        None => error.hint("or --rollouts 0 for a report without moving pictures".to_string()),
         Some(_) => error,
     };
     let dataset = load_dataset_of(Some(&run.dataset), &run.config, whereabouts, &[Split::Train]);

@@ -195,6 +195,11 @@ impl Scenario {
         self.stimuli.as_deref().unwrap_or(self.stimulus.as_slice())
     }
 
+    /// Where it begins.
+    pub fn start(&self) -> Start {
+        Start { column: self.start_column, row: self.start_row.unwrap_or(self.physics.ground_row) }
+    }
+
     /// The constants of its simulator.
     pub fn physics(&self) -> &Physics {
         &self.physics
@@ -219,10 +224,9 @@ pub fn simulate(
     mut line: impl FnMut(String) -> Result<(), Error>,
 ) -> Result<(), Error> {
     let physics = &scenario.physics;
-    let start_row = scenario.start_row.unwrap_or(physics.ground_row);
-    let start = Start { column: scenario.start_column, row: start_row };
+    let start = scenario.start();
     let mut world = World::new(System::new(&scenario.body, physics.clone()), start);
-    let offset = scenario.start_column as f64 * physics.cell_size;
+    let offset = start.column as f64 * physics.cell_size;
     let stimuli = scenario.stimuli();
     let dark = Grid::filled(scenario.body.height(), scenario.body.width(), 0.0);
     let mut header = "step,com_x,com_y".to_string();

@@ -4,17 +4,16 @@
 //! in its folder, so that any process on any machine goes on with it.
 
 use crate::base::error::{Error, ErrorKind};
+use crate::base::named;
 use crate::base::observer::{Generation, Observer, Work};
 use crate::base::ranks::Ranks;
 use crate::base::text::counted;
-use crate::base::{atlas, named};
 use crate::commands::{audit, eval};
 use crate::config::audit::Criteria;
 use crate::config::{Config, Settings, differing};
 use crate::data::dataset::{Dataset, Split};
 use crate::search::showing::task_of;
-use crate::search::training::Training as Images;
-use crate::search::{evolve, held_out, showing, train, validation};
+use crate::search::{evolve, held_out, showing, train, training, validation};
 use crate::store::audit::{AuditFile, RobotAudit};
 use crate::store::eval::EvalFile;
 use crate::store::folder::IfExists;
@@ -245,8 +244,7 @@ impl Task {
     /// The folder of the atlas that its gaits are from, if they are.
     pub fn atlas(&self) -> Option<PathBuf> {
         let Run::Train(training) = &self.run else { return None };
-        let (of, run) = named::name(&training.archive)?;
-        if atlas::PREFIX.starts_with(of) { atlas::folder_of(run) } else { None }
+        named::atlas_of(&training.archive)
     }
 
     /// How much of it there is to show on a bar: generations, or challengers.
@@ -501,7 +499,7 @@ pub struct Summary {
 ///
 /// # Errors
 /// If not.
-fn check_data<'a>(tasks: impl Iterator<Item = (usize, &'a Task)>, place: &Place) -> Result<(), Error> {
+pub fn check_data<'a>(tasks: impl Iterator<Item = (usize, &'a Task)>, place: &Place) -> Result<(), Error> {
     let has_begun = |task: &Task| place.folder(task).join(DATA_FOLDER).exists();
     let mut datasets: BTreeMap<String, Dataset> = BTreeMap::new();
     let mut known = BTreeSet::new();
@@ -522,7 +520,7 @@ fn check_data<'a>(tasks: impl Iterator<Item = (usize, &'a Task)>, place: &Place)
         let named = |error: Error| error.within(&format!("task {number} ({})", task.name));
         match &task.run {
             Run::Evolve(config, _) => {
-                Images::images(config, dataset).map_err(named)?;
+                training::Training::images(config, dataset).map_err(named)?;
                 held_out::check(config, &[], "data.images_per_class", dataset).map_err(named)?;
             }
             Run::Train(training) => {

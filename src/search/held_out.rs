@@ -4,6 +4,7 @@
 
 use crate::base::error::Error;
 use crate::base::random::{Purpose, stream};
+use crate::base::text::counted;
 use crate::config::Config;
 use crate::config::validation::{IMAGES_KEY, LEAST, ValidationConfig};
 use crate::data::dataset::{Dataset, Split};
@@ -32,32 +33,28 @@ fn left(classes: &[u8], seen: &BTreeSet<usize>, dataset: &Dataset) -> Vec<Vec<Im
     classes.iter().map(of_class).collect()
 }
 
-/// How many are to be taken of each class, for `count` in all; `asked` says where that many were
-/// asked for, `or` what else to do.
+/// How many are to be taken of each class, one or more; `asked` says where so many were asked for.
 ///
 /// # Errors
-/// If a class has not as many.
+/// If a class has not as many; for how many in all one could ask.
 fn per_class(
     classes: &[u8],
     left: &[Vec<ImageRef>],
     asked: &str,
-    count: usize,
-    or: &str,
-) -> Result<usize, Error> {
-    let per_class = count.div_ceil(left.len().max(1));
+    how_many: HowMany,
+) -> Result<usize, (Error, usize)> {
+    let per_class = match how_many {
+        HowMany::All => 1,
+        HowMany::Evenly(count) => count.div_ceil(left.len().max(1)),
+    };
     match classes.iter().zip(left).min_by_key(|(_, left)| left.len()) {
         Some((label, scarcest)) if scarcest.len() < per_class => {
             let text = format!(
-                "{asked} {count}: expected {per_class} images of class {label} that the run is not trained on, \
-                 found {}",
+                "{asked} {how_many}: expected {} of class {label} that the run is not trained on, found {}",
+                counted(per_class, "image", "images"),
                 scarcest.len()
             );
-            let most = scarcest.len() * left.len();
-            let fewer = (most >= LEAST).then(|| format!("ask for at most {most}"));
-            let hints = fewer.into_iter().chain((!or.is_empty()).then(|| or.to_string()));
-            let hint = hints.collect::<Vec<_>>().join(", or ");
-            let error = Error::input(text);
-            Err(if hint.is_empty() { error } else { error.hint(hint) })
+            Err((Error::input(text), scarcest.len() * left.len()))
         }
         _ => Ok(per_class),
     }
@@ -74,11 +71,14 @@ pub(crate) fn check(config: &Config, before: &[usize], key: &str, dataset: &Data
     if best == 0 {
         return Ok(());
     }
-    let or = format!("train on fewer ({key}), or choose none (validation.best = 0)");
     let mut seen: BTreeSet<usize> = Training::indices(config, dataset)?.into_iter().collect();
     seen.extend(before);
     let classes = config.classes();
-    per_class(&classes, &left(&classes, &seen, dataset), IMAGES_KEY, images, &or).map(|_| ())
+    let left = left(&classes, &seen, dataset);
+    per_class(&classes, &left, IMAGES_KEY, HowMany::Evenly(images)).map(|_| ()).map_err(|(error, most)| {
+        let fewer = if most >= LEAST { format!("ask for at most {most}, ") } else { String::new() };
+        error.hint(format!("{fewer}train on fewer ({key}), or choose none (validation.best = 0)"))
+    })
 }
 
 /// `count` validation images of some runs of one experiment together, evenly divided between the
@@ -117,11 +117,9 @@ pub(crate) fn images_besides(
         seen.extend(trained_on(run, dataset)?);
     }
     let left = left(classes, &seen, dataset);
-    let HowMany::Evenly(count) = how_many else {
-        per_class(classes, &left, asked, classes.len(), "")?;
-        return Ok(left.concat());
-    };
-    let per_class = per_class(classes, &left, asked, count, "")?;
+    let per_class = per_class(classes, &left, asked, how_many)
+        .map_err(|(error, most)| error.hint(format!("ask for at most {most}")))?;
+    let HowMany::Evenly(count) = how_many else { return Ok(left.concat()) };
     let draw = |(&label, free): (&u8, Vec<ImageRef>)| -> Vec<ImageRef> {
         let mut random = stream(config.seed, Purpose::Validation, 0, u64::from(label));
         random.sample(free.len(), per_class).into_iter().map(|i| free[i]).collect()

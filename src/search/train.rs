@@ -30,10 +30,10 @@ use crate::store::names::{ELITES, RESPONSE_JSON, RUN_JSON, TRAINING_JSON};
 use crate::store::response::ResponseFile;
 use crate::store::robots::{Selection, Source};
 use crate::store::run::{Dimensions, FORMAT, FORMAT_VERSION, Robot, RunFile};
-use crate::store::training::{Batch, FILE, File, Origin};
+use crate::store::training::{Batch, Drawn, Elsewhere, FILE, File, Origin};
 use crate::store::validation::Validated;
 use crate::store::whereabouts;
-use crate::store::whereabouts::{Whereabouts, load_dataset_of, see};
+use crate::store::whereabouts::{Whereabouts, see};
 use crate::task::evaluation::fresh_rollouts;
 use crate::task::fitness::Fitness;
 use crate::task::grouping::balanced;
@@ -42,7 +42,7 @@ use crate::task::protocol::{Protocol, RolloutMode};
 use crate::task::refine::Challenge;
 use crate::task::response::{Example, Gait, Response};
 use crate::task::teach::{Image, Plan, Rollouts, Round, Taught, Teacher};
-use std::collections::BTreeMap;
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::{Duration, Instant};
@@ -131,7 +131,7 @@ pub fn train(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> R
         .and_of(&options.archive);
     let config = config_of(&source.run.config, &options.groups, options.seed, &options.set)?;
     let dataset = whereabouts.load(&config.data, &[Split::Train])?;
-    let origin = origin(&source, &config, &dataset, &whereabouts)?;
+    let origin = origin(&source, &config, &dataset)?;
     let config = with_images(config, &origin.trained_on, &dataset, observer)?;
     let mut training = Training::of(&config, &dataset)?;
     let classes = training.images.iter().map(|image| image.label);
@@ -280,11 +280,12 @@ pub(crate) fn with_images(
     let mut per_class = config.train.images_per_class.min((fewest * 3 / 4).max(1));
     let mut validation = config.validation;
     let wanted = images.div_ceil(classes.len());
-    let is_said = images != ValidationConfig::default().images;
-    if best > 0 && !is_said && fewest - per_class < wanted {
+    if best > 0 && fewest - per_class < wanted {
         per_class = per_class.min((fewest * 2 / 3).max(1));
         let there = (fewest - per_class).min(wanted) * classes.len();
-        if (LEAST..images).contains(&there) {
+        // What was asked for by a number of one's own is kept, or refused.
+        let is_asked = images != ValidationConfig::default().images;
+        if !is_asked && (LEAST..images).contains(&there) {
             observer
                 .warning(&format!("validating on {there} images in place of {images}: there are no more"));
             validation.images = there;
@@ -309,30 +310,31 @@ pub fn check(evolved: &Config, groups: &[Vec<u8>; 2], data: Option<&Path>) -> Re
 }
 
 /// Where the walkers are from, and what they were trained on: not for validation.
-fn origin(
-    source: &Source,
-    config: &Config,
-    dataset: &Dataset,
-    whereabouts: &Whereabouts,
-) -> Result<Origin, Error> {
+fn origin(source: &Source, config: &Config, dataset: &Dataset) -> Result<Origin, Error> {
     let run = &source.run;
-    let mut trained_on = run.origin.as_ref().map_or(BTreeMap::new(), |origin| origin.elsewhere.clone());
-    let of_run = match dataset.fingerprint(Split::Train) {
-        Some(sha256) if sha256 == run.dataset.train_sha256 => held_out::trained_on(run, dataset)?,
+    let sha256 = dataset.fingerprint(Split::Train).expect("a training loads its training images");
+    let all = run.origin.as_ref().map_or(Vec::new(), |origin| origin.elsewhere.clone());
+    let (here, mut elsewhere): (Vec<_>, Vec<_>) =
+        all.into_iter().partition(|other| other.train_sha256 == sha256);
+    let mut trained_on = BTreeSet::new();
+    match sha256 == run.dataset.train_sha256 {
+        true => trained_on = held_out::trained_on(run, dataset)?,
         // Some day it may be trained on that data again.
-        _ => match load_dataset_of(Some(&run.dataset), &run.config, whereabouts, &[Split::Train]) {
-            Ok(own) => held_out::trained_on(run, &own)?,
-            Err(_) => run.training_images.iter().map(|image| image.index).collect(),
-        },
-    };
-    trained_on.insert(run.dataset.train_sha256.clone(), of_run.into_iter().collect());
-    let own = dataset.fingerprint(Split::Train).and_then(|sha256| trained_on.remove(&sha256));
+        false => elsewhere.push(Elsewhere::of(run)),
+    }
+    for earlier in here {
+        trained_on.extend(earlier.indices);
+        if let Some(Drawn { classes, images_per_class, seed }) = earlier.drawn {
+            let drawn = dataset.draw(Split::Train, &classes, images_per_class, seed, 0);
+            trained_on.extend(drawn.map_err(|error| Error::input(error.to_string()))?);
+        }
+    }
     Ok(Origin {
         name: run.name.clone(),
         generations: run.generations,
         sha256: run.fingerprint(),
-        trained_on: own.unwrap_or_default(),
-        elsewhere: trained_on,
+        trained_on: trained_on.into_iter().collect(),
+        elsewhere,
         windows: if config.train.rounds == 0 { 0 } else { config.train.windows },
     })
 }

@@ -18,14 +18,13 @@ pub mod team;
 use crate::base::error::Error;
 use crate::body::Body;
 use crate::commands::simulate::Scenario;
-use crate::config::reading::read_json;
-use crate::sim::Physics;
+use crate::sim::{Physics, Start};
 use crate::task::protocol::Protocol;
 use catalogue::Catalogue;
 use images::ImageSets;
 use refusal::Refusal;
 use request::Plan;
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 use simulations::Simulations;
 use std::path::PathBuf;
 
@@ -95,13 +94,6 @@ pub struct Loaded {
     pub note: Option<String>,
 }
 
-/// Where a scenario starts, if it says that.
-#[derive(Deserialize)]
-struct Beginning {
-    start_row: Option<u32>,
-    start_column: Option<i64>,
-}
-
 impl Service {
     /// Reads the archives and finds the images; what could not be read or found without being asked
     /// for by name is told in the notes.
@@ -155,11 +147,8 @@ impl Service {
                 "scenario: physics: the page has EvoGym's constants only; morphcog simulate takes others";
             return Err(Refusal::Wrong(text.to_string()));
         }
-        let Beginning { start_row, start_column } = read_json(text, "scenario")?;
-        let here = Protocol::default();
-        let (row, column) = (here.start_row, here.start_column);
-        let starts_here =
-            start_row.is_none_or(|own| own == row) && start_column.is_none_or(|own| own == column);
+        let Protocol { start_row: row, start_column: column, .. } = Protocol::default();
+        let starts_here = scenario.start() == Start { row, column };
         let most = u64::from(request::MAX_STEPS);
         let notes: Vec<String> = [
             (scenario.stimuli().len() > 1).then(|| "of its stimuli the first is shown".to_string()),

@@ -149,7 +149,7 @@ impl AuditFile {
         let shipped = run_json.with_file_name(AUDIT_JSON);
         if *path != shipped
             && let Ok(known) = AuditFile::read(&shipped)
-            && known.criteria == file.criteria
+            && (known.run_sha256.as_str(), &known.criteria) == (fingerprint, &file.criteria)
             && known.robots.len() > file.robots.len()
         {
             return Ok(known);

@@ -2,9 +2,9 @@
 //! run its gaits are from.
 
 use crate::base::number::is_zero;
+use crate::store::run::RunFile;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
 
 /// What the file calls itself, and the version of its schema.
 pub(crate) const FILE: (&str, u32) = ("morphcog-training", 1);
@@ -22,13 +22,54 @@ pub struct Origin {
     /// Indices of the images that its robots were ever trained on, if they are of the same data:
     /// not for validation.
     pub trained_on: Vec<usize>,
-    /// The same of other data, by the SHA-256 of their training images.
-    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
-    pub elsewhere: BTreeMap<String, Vec<usize>>,
+    /// The same of other data, run by run.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub elsewhere: Vec<Elsewhere>,
     /// How many windows of the images were tried, of which the run's config has the best; 0 if none
     /// but the config's own.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub windows: usize,
+}
+
+/// Which images of other data a run was trained on; those data need not be there.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct Elsewhere {
+    /// SHA-256 of the training images.
+    pub train_sha256: String,
+    /// Indices of those that the run was shown last, or that its gaits were trained on.
+    pub indices: Vec<usize>,
+    /// Those that it drew, if its config names none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub drawn: Option<Drawn>,
+}
+
+/// Images that were drawn.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct Drawn {
+    /// Of these classes.
+    pub classes: Vec<u8>,
+    /// So many of each.
+    pub images_per_class: usize,
+    /// By this seed.
+    pub seed: u64,
+}
+
+impl Elsewhere {
+    /// What a run was trained on.
+    pub(crate) fn of(run: &RunFile) -> Self {
+        let config = &run.config;
+        let before = run.origin.iter().flat_map(|origin| origin.trained_on.iter().copied());
+        let drawn = || Drawn {
+            classes: config.classes(),
+            images_per_class: config.data.images_per_class,
+            seed: config.seed,
+        };
+        Elsewhere {
+            train_sha256: run.dataset.train_sha256.clone(),
+            indices: run.training_images.iter().map(|image| image.index).chain(before).collect(),
+            drawn: config.data.train_images.is_none().then(drawn),
+        }
+    }
 }
 
 /// Displacements that were simulated together, in the order of the images; `None` where unstable.

@@ -23,17 +23,18 @@ pub const CHOICES: [Material; 3] = [Material::Soft, Material::SensorExpand, Mate
 /// places, and says nothing of soft voxels. One is no sensor at rest: it has no goal, so the sides
 /// that it shares are as wide as its neighbour wants, and its springs are others (`physics.md`,
 /// "Actuation").
-pub const SENSORS: [Material; 2] = [Material::SensorExpand, Material::SensorShrink];
+pub const SENSORS: [Material; 2] = [CHOICES[CHOSEN.start], CHOICES[CHOSEN.start + 1]];
 
-/// These among [`CHOICES`].
-const CHOSEN: Range<usize> = 1..3;
+/// Where these stand in [`CHOICES`].
+const CHOSEN: Range<usize> = 1..CHOICES.len();
 
 /// Penalties on slopes among which cross-validation chooses \[rollouts × squared rest widths\].
 /// Larger ones shrink the slopes; smaller ones fit noise where there are few rollouts.
 const RIDGES: [f64; 7] = [0.25, 1.0, 2.0, 4.0, 8.0, 16.0, 64.0];
 
 /// Probability that a place is wide in a random image, and that it is narrow. A design has about as
-/// many of either: larger values say nothing of soft voxels, smaller ones tell less of the slopes.
+/// many of either: larger values say nothing of what is between, as under grey pixels; smaller ones
+/// tell less of the slopes.
 const EXTREME: f64 = 0.4;
 
 /// Folds of the cross-validation. More cost time and change little.
@@ -134,8 +135,7 @@ fn resting(physics: &Physics) -> f64 {
 }
 
 /// An image under which each place of a probe is, independently of all others, as wide as can be
-/// (with probability 0.4), as narrow as can be (0.4), or at rest (0.2): as if each were a sensor of
-/// either kind or a soft voxel.
+/// (with probability 0.4), as narrow as can be (0.4), or at rest (0.2).
 pub fn random_image(height: usize, width: usize, physics: &Physics, random: &mut Stream) -> Grid<f64> {
     let rest = resting(physics);
     Grid::from_fn(height, width, |_, _| {

@@ -87,11 +87,10 @@ pub fn evolution(console: &Console, finished: &Finished, out: &Path, goes_on: bo
             "the archive is empty: no robot has walked yet and been as fit as the config wants{unstable}"
         ));
     }
-    let archive = out.join(RUN_JSON);
-    let archive = in_shell(&archive);
     if goes_on {
         return;
     }
+    let archive = in_shell(&out.join(RUN_JSON));
     // Gaits tell no images apart yet.
     if run.config.measures_response() {
         return console.info(&format!("next: morphcog train --archive {archive} --task \"4|9\""));

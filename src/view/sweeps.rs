@@ -5,7 +5,7 @@ use crate::base::files::write_atomically;
 use crate::base::number;
 use crate::base::number::percent;
 use crate::base::text::counted;
-use crate::commands::collect::{Collected, Row, csv};
+use crate::commands::collect::{Collected, Columns, Row, csv};
 use crate::commands::plot::alike;
 use crate::commands::tasks::Status;
 use crate::store::task::State;
@@ -14,7 +14,8 @@ use crate::view::error::write_whole;
 use crate::view::plot;
 use crate::view::plot::{Figure, PRINT};
 use crate::view::progress::duration;
-use serde_json::{Map, Value, json};
+use serde::Serialize;
+use serde_json::{Map, Value};
 use std::path::Path;
 
 /// How far tasks are: a line per task, and how many there are of each kind.
@@ -73,7 +74,7 @@ pub fn collected(
     std::fs::create_dir_all(out).map_err(|error| Error::writing(out, &error))?;
     write_atomically(&path, &csv(&found.rows)).map_err(|error| Error::writing(&path, &error))?;
     match console.mode() {
-        Mode::Json => found.rows.iter().for_each(|row| console.event("collected", &event(row))),
+        Mode::Json => found.rows.iter().for_each(|row| console.event("collected", &Event::of(row))),
         _ => table(console, &found.rows),
     }
     console.line("");
@@ -101,31 +102,23 @@ pub fn collected(
 }
 
 /// A row for programs: the columns of `sweep.csv`, the plan's values in one object.
-fn event(row: &Row) -> Value {
-    // They are kept as text: what is a number there is one here.
-    let value = |text: &str| serde_json::from_str(text).unwrap_or_else(|_| Value::from(text));
-    let varied: Map<String, Value> =
-        row.varied.iter().map(|(key, text)| (key.clone(), value(text))).collect();
-    let run = row.run.as_ref();
-    let audited = run.and_then(|run| run.audited);
-    let tested = run.and_then(|run| run.tested.as_ref());
-    let interval = tested.and_then(|tested| tested.interval);
-    json!({
-        "number": row.number, "name": row.name, "state": row.state, "varied": varied,
-        "recognises": run.map(|run| &run.recognises),
-        "generations": run.map(|run| run.generations),
-        "seconds": run.map(|run| run.seconds),
-        "num_elites": run.map(|run| run.num_elites),
-        "obj_max": run.and_then(|run| run.obj_max),
-        "validation_balanced_accuracy": run.and_then(|run| run.validation),
-        "audited": audited.map(|[all, _]| all), "physical": audited.map(|[_, good]| good),
-        "split": tested.map(|tested| tested.split),
-        "images": tested.map(|tested| tested.images),
-        "robots": tested.map(|tested| tested.robots),
-        "accuracy": tested.map(|tested| tested.accuracy),
-        "accuracy_low": interval.map(|[low, _]| low), "accuracy_high": interval.map(|[_, high]| high),
-        "balanced_accuracy": tested.map(|tested| tested.balanced),
-    })
+#[derive(Serialize)]
+struct Event<'a> {
+    number: usize,
+    name: &'a str,
+    state: State,
+    varied: Map<String, Value>,
+    #[serde(flatten)]
+    run: Columns<'a>,
+}
+
+impl<'a> Event<'a> {
+    fn of(row: &'a Row) -> Self {
+        // They are kept as text: what is a number there is one here.
+        let value = |text: &str| serde_json::from_str(text).unwrap_or_else(|_| Value::from(text));
+        let varied = row.varied.iter().map(|(key, text)| (key.clone(), value(text))).collect();
+        Event { number: row.number, name: &row.name, state: row.state, varied, run: Columns::of(row) }
+    }
 }
 
 fn table(console: &Console, rows: &[Row]) {
