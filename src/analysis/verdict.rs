@@ -19,7 +19,7 @@ pub(crate) struct Behaviour<'a> {
     plain: Vec<f64>,
     /// For each image whether its class is to walk right; none if it is in no group.
     rightward: Vec<Option<bool>>,
-    /// Images answered right.
+    /// Images answered correctly.
     answered: Vec<usize>,
     /// Why it is no walker, if it is none.
     flaw: Option<String>,
@@ -59,12 +59,12 @@ impl<'a> Behaviour<'a> {
         let flaw = if let Some((group, _)) = shares.iter().find(|(_, share)| *share == 0.0) {
             let classes: Vec<String> = split.classes(*group).iter().map(u8::to_string).collect();
             let (threshold, classes) = (criteria.threshold, classes.join(", "));
-            Some(format!("never walks more than {threshold} voxel lengths the right way for {classes}"))
+            Some(format!("never walks more than {threshold} voxel lengths the correct way for {classes}"))
         } else if (walked as f64) < criteria.least_answered * asked.len() as f64 {
             Some(format!("answers {walked} of {} training images", asked.len()))
         } else if balanced <= CHANCE {
             Some(format!(
-                "answers {} % of its training images right, balanced",
+                "answers {} % of its training images correctly, balanced",
                 number::fixed(100.0 * balanced, 0)
             ))
         } else {
@@ -130,7 +130,7 @@ impl<'a> Behaviour<'a> {
     }
 }
 
-/// How far a displacement leads to the right side.
+/// How far a displacement leads in the correct direction.
 fn towards(rightward: Option<bool>, displacement: f64) -> f64 {
     match rightward {
         Some(true) => displacement,
@@ -202,7 +202,7 @@ mod tests {
         assert_eq!(split.name(), "0|123");
         assert_eq!(flaw([5.0, -4.0, -9.0, -2.0]), None);
         assert_eq!(flaw([5.0, -4.0, -1.0, -2.0]).unwrap(), "answers 2 of 4 training images");
-        assert!(flaw([2.0, -4.0, -9.0, -8.0]).is_some_and(|flaw| flaw.ends_with("the right way for 0")));
+        assert!(flaw([2.0, -4.0, -9.0, -8.0]).is_some_and(|flaw| flaw.ends_with("the correct way for 0")));
         // Knowing little is no flaw of a walk, knowing nothing is.
         assert_eq!(flaw([9.0, -8.0, 4.0, 4.0]), None);
         let flaw = |d: &[f64], classes: &[u8]| {
@@ -212,7 +212,7 @@ mod tests {
         let halves = [5.0, -5.0, -4.0, 4.0];
         assert_eq!(
             flaw(&halves, &[0, 0, 1, 2]).unwrap(),
-            "answers 50 % of its training images right, balanced"
+            "answers 50 % of its training images correctly, balanced"
         );
         let still = Behaviour::new(&criteria, (split, Fitness::Min), &[0, 1, 2, 3], vec![0.0; 4]);
         assert_eq!(still.judge(&[]).0, Verdict::NotAWalker);

@@ -56,7 +56,7 @@ pub enum Pooling {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Watch {
-    /// Share answered right: larger is better.
+    /// Share answered correctly: larger is better.
     Accuracy,
     /// Cross-entropy: smaller is better.
     Loss,
@@ -105,7 +105,7 @@ impl Default for Hyperparameters {
 /// How a training ended.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Trained {
-    /// Share of the test images answered right.
+    /// Share of the test images answered correctly.
     pub accuracy: f64,
     /// Epochs it took.
     pub epochs: usize,

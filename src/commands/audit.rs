@@ -121,8 +121,8 @@ pub fn audit(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> R
         && earlier.run_sha256 == file.run_sha256
         && earlier.criteria != file.criteria
     {
-        let (out, count) = (options.out.display(), earlier.robots.len());
-        let text = format!("{out}: {count} robots of this run are audited by other criteria");
+        let count = counted(earlier.robots.len(), "robot of this run is", "robots of this run are");
+        let text = format!("{}: {count} audited by other criteria", options.out.display());
         let hint = "write elsewhere with --out, or move that file away".to_string();
         return Err(Error::input(text).hint(hint));
     }
@@ -388,7 +388,7 @@ mod tests {
         for task in ["same way", "0|1"] {
             let found = audited("1221/1221", task, Physics::default());
             assert_eq!(found.verdict, Verdict::NotAWalker, "{found:?}");
-            assert!(found.reason.contains("the right way for 0"), "{}", found.reason);
+            assert!(found.reason.contains("the correct way for 0"), "{}", found.reason);
             assert!(found.rollouts.is_empty() && found.energy_per_cycle.drive == 0.0);
         }
     }

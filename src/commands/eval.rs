@@ -262,8 +262,9 @@ fn skilled<'a>(
         return Err(Error::input(text.to_string()));
     }
     if let Some(chosen) = unskilled.first() {
-        let (count, id) = (unskilled.len(), &chosen.robot.id);
-        observer.warning(&format!("{count} robots ({id} …) walk the same way for every class; left out"));
+        let count = counted(unskilled.len(), "robot that walks", "robots that walk");
+        let id = &chosen.robot.id;
+        observer.warning(&format!("left out: {count} the same way for every class ({id} …)"));
     }
     Ok(robots)
 }

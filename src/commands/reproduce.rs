@@ -280,7 +280,11 @@ impl Job<'_> {
         {
             return Ok(Some(known));
         }
-        self.observer.note(&format!("{name}: {} robots on {} test images", chosen.len(), self.plan.images));
+        self.observer.note(&format!(
+            "{name}: {} on {} test images",
+            counted(chosen.len(), "robot", "robots"),
+            self.plan.images
+        ));
         let finished = eval::eval(&options, self.stop, self.observer)?;
         let report = written(finished.file, finished.unwritten)?;
         let is_whole = !report.stopped && !self.stop.load(Ordering::Relaxed);

@@ -16,9 +16,9 @@ pub struct Criteria {
     /// The same in a changed simulation \[voxel lengths\]. Lower than `threshold`, so that
     /// borderline walkers do not fail on a tiny change. Default 1.5.
     pub least_walk: f64,
-    /// A walker answers at least this share of its training images, right or wrong. Default 0.75.
+    /// A walker answers at least this share of its training images, correctly or not. Default 0.75.
     pub least_answered: f64,
-    /// A rollout persists if at least this share of the images answered right still is. Default
+    /// A rollout persists if at least this share of the images answered correctly still is. Default
     /// 0.9.
     pub least_kept: f64,
     /// And if the walks under them, together, are at least this share of what they were. Default

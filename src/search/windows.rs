@@ -2,7 +2,7 @@
 //!
 //! Some places of a gait move it far, others do not, and some pixels tell two groups of images
 //! apart, others do not. A window of the images, stretched over the body, brings them together. What
-//! a gait could be taught under a window is foretold by its response alone, so many can be tried.
+//! a gait could be taught under a window is predicted from its response alone, so many can be tried.
 
 use crate::base::Grid;
 use crate::base::error::Error;
@@ -125,7 +125,7 @@ impl<'a> Windows<'a> {
         let any = vec![Material::SensorExpand; gait.places().len()];
         let solved = |(draw, side)| {
             let examples = examples.iter().map(|example| (example, response.intercept));
-            let mut lesson = Lesson::foretold(examples, &response.slopes, &any, side);
+            let mut lesson = Lesson::predicted(examples, &response.slopes, &any, side);
             lesson.solve(&mut stream(self.config.seed, Purpose::Windows, 1, draw));
             lesson.objective()
         };

@@ -305,10 +305,10 @@ pub struct PerturbedRollout {
     /// Displacement under each training image, voxel lengths (a mirrored rollout's mirrored back);
     /// none if unstable.
     pub displacements: Option<Vec<f64>>,
-    /// Share of the images answered right in the unchanged rollout under which it still walks the
-    /// right way.
+    /// Share of the images answered correctly in the unchanged rollout under which it still walks the
+    /// correct way.
     pub kept: f64,
-    /// Walks under them, towards the right sides, as a share of the unchanged rollout's.
+    /// Walks under them, in the correct direction, as a share of the unchanged rollout's.
     pub distance: f64,
     /// Whether the behaviour persists.
     pub persists: bool,

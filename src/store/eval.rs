@@ -126,17 +126,17 @@ pub struct RobotReport {
     /// Which way the classes before the task's bar are to walk: "left" or "right", as on the
     /// training images.
     pub first_group_walks: String,
-    /// Images answered right.
+    /// Images answered correctly.
     pub right: usize,
     /// Images in all.
     pub images: usize,
-    /// Share answered right.
+    /// Share answered correctly.
     pub accuracy: f64,
     /// Its 95 % Wilson interval.
     pub interval: [f64; 2],
-    /// Mean over the two groups of the share answered right.
+    /// Mean over the two groups of the share answered correctly.
     pub balanced_accuracy: f64,
-    /// Share answered right, by class.
+    /// Share answered correctly, by class.
     pub per_class: BTreeMap<u8, f64>,
     /// Mean |displacement|, voxel lengths, of the stable rollouts.
     pub mean_distance: f64,

@@ -157,7 +157,7 @@ pub struct Taught {
     pub fitness: f64,
     /// Its 95 % interval.
     pub fitness_interval: [f64; 2],
-    /// Share of right answers, both groups weighing the same.
+    /// Share of correct answers, both groups weighing the same.
     pub accuracy: f64,
     /// Its 95 % interval.
     pub accuracy_interval: [f64; 2],

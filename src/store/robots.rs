@@ -2,6 +2,7 @@
 
 use crate::base::error::Error;
 use crate::base::random::{Purpose, stream};
+use crate::base::text::counted;
 use crate::store::audit::AuditFile;
 use crate::store::folder;
 use crate::store::run::{Robot, RunFile};
@@ -264,7 +265,8 @@ pub(crate) fn by_id<'a>(robots: &[Chosen<'a>], id: &str) -> Result<Vec<Chosen<'a
     match found.as_slice() {
         [first, others @ ..] if others.iter().all(|other| other.robot.id == first.robot.id) => Ok(found),
         [] => {
-            let hint = format!("there are {} robots, the fittest are {}", robots.len(), list(robots));
+            let there = counted(robots.len(), "robot; the fittest is", "robots; the fittest are");
+            let hint = format!("the archive has {there} {}", list(robots));
             Err(Error::input(format!("there is no robot {id}")).hint(hint))
         }
         several => {

@@ -114,9 +114,9 @@ pub struct Answers {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Decoded {
-    /// How many are right.
+    /// How many are correct.
     pub accuracy: Accuracy,
-    /// Share answered right, by class.
+    /// Share answered correctly, by class.
     pub per_class: BTreeMap<u8, f64>,
     /// Images by their class (rows) and by the answer (columns), both in the order of `classes`.
     pub confusion: Vec<Vec<usize>>,

@@ -21,9 +21,9 @@ pub struct Validated {
     pub task: String,
     /// Images.
     pub images: usize,
-    /// Images answered right.
+    /// Images answered correctly.
     pub right: usize,
-    /// Mean over the two groups of the share answered right.
+    /// Mean over the two groups of the share answered correctly.
     pub balanced_accuracy: f64,
 }
 

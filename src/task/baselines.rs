@@ -67,7 +67,7 @@ pub fn best_pixel(split: &Split, images: &[Labelled]) -> Option<PixelRule> {
 }
 
 impl PixelRule {
-    /// Share of images it answers right.
+    /// Share of images it answers correctly.
     pub fn accuracy(&self, split: &Split, images: &[Labelled]) -> f64 {
         let answer = |image: &Labelled| {
             let value = image.stimulus.or_default((self.row, self.column));

@@ -59,7 +59,7 @@ impl Assignment {
         }
     }
 
-    /// How far a displacement leads towards the right side; negative if it leads to the wrong one.
+    /// How far a displacement leads in the correct direction; negative if it leads in the wrong one.
     pub fn margin(self, group: Group, displacement: f64) -> f64 {
         match self.expected(group) {
             Direction::Right => displacement,
@@ -67,8 +67,8 @@ impl Assignment {
         }
     }
 
-    /// Whether a displacement is the right answer to an image of a group: farther than `threshold`,
-    /// the right way.
+    /// Whether a displacement is the correct answer to an image of a group: farther than `threshold`,
+    /// the correct way.
     pub fn is_right(self, group: Group, displacement: f64, threshold: f64) -> bool {
         Direction::of(displacement, threshold) == Some(self.expected(group))
     }

@@ -7,14 +7,14 @@ use serde::{Deserialize, Serialize};
 
 /// Margin at which an answer is as good as can be, for [`Fitness::MeanClipped`] \[voxel lengths\].
 /// With less, a small change turns many answers; with more, bodies that walk far count more than
-/// bodies that are right.
+/// bodies that are correct.
 pub const ENOUGH: f64 = 10.0;
 
 /// More than rounding can make of a sum over images.
 const SLACK: f64 = 1e-9;
 
 /// How answers to several images become one number. An answer's *margin* is its displacement
-/// towards the right side, in voxel lengths, negative on the wrong one; of the two ways to assign
+/// in the correct direction, in voxel lengths, negative in the wrong one; of the two ways to assign
 /// sides to groups the fitter counts.
 ///
 /// Where images are averaged, both groups weigh the same, however many images they have: with one
@@ -136,7 +136,7 @@ fn response(displacements: impl Iterator<Item = Option<f64>> + Clone) -> f64 {
     response_so_far(displacements).unwrap_or(0.0)
 }
 
-/// By number of the group: displacements towards the right side if group A is to walk right; if it
+/// By number of the group: displacements in the correct direction if group A is to walk right; if it
 /// is to walk left, the negatives of those.
 pub(super) fn margins(
     answers: impl Iterator<Item = (Group, Option<f64>)> + Clone,

@@ -517,7 +517,7 @@ impl Lesson {
 
     /// A lesson whose examples have the displacements that the model says of `design`: by the slopes,
     /// and by an intercept for each example. With a `side` of −1 all walk the other way.
-    pub fn foretold<'a>(
+    pub fn predicted<'a>(
         examples: impl IntoIterator<Item = (&'a Example, f64)>,
         slopes: &[f64],
         design: &[Material],

@@ -1,8 +1,8 @@
 //! From displacements to fitness and task: pure functions (paper, section "Fitness").
 //!
-//! The paper defines fitness by cases: all images answered right: the smallest |d|; else minus the
-//! largest |d| of a wrong answer. Call an answer's *margin* its displacement towards the right
-//! side, negative on the wrong one: both cases are then the smallest margin. Two things follow that
+//! The paper defines fitness by cases: all images answered correctly: the smallest |d|; else minus the
+//! largest |d| of a wrong answer. Call an answer's *margin* its displacement in the correct
+//! direction, negative in the wrong one: both cases are then the smallest margin. Two things follow that
 //! make savings lossless: fitness is continuous (d = 0 counts as wrong, with margin 0), and the
 //! fitness of some of the images bounds that of all from above.
 
@@ -26,7 +26,7 @@ pub struct Score {
     /// Index in [`Grouping::tasks`].
     pub task: usize,
     /// See [`Fitness`]. The smallest margin is in voxel lengths and positive if every image is
-    /// answered right.
+    /// answered correctly.
     pub fitness: f64,
 }
 

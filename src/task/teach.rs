@@ -56,7 +56,7 @@ pub struct Plan {
 pub struct Image {
     /// What the voxels see.
     pub stimulus: Grid<f64>,
-    /// Its widths, its right side and its weight.
+    /// Its widths, its correct side and its weight.
     pub example: Example,
     /// The condition under which it is shown: a number from 0.
     pub condition: usize,
@@ -391,7 +391,7 @@ impl<'a> Teacher<'a> {
     /// and the solution.
     fn solved(&self, from: &[Material], side: f64, solve: impl FnOnce(&mut Lesson)) -> (f64, Design) {
         let examples = self.images.iter().map(|image| (&image.example, self.intercepts[image.condition]));
-        let mut lesson = Lesson::foretold(examples, &self.slopes, from, side);
+        let mut lesson = Lesson::predicted(examples, &self.slopes, from, side);
         solve(&mut lesson);
         (lesson.objective(), lesson.design())
     }

@@ -50,7 +50,7 @@ impl Estimate {
 pub struct Teachable {
     /// Mean clipped margin of its answers: from −1 to 1.
     pub fitness: Estimate,
-    /// Share of its answers that are right.
+    /// Share of its answers that are correct.
     pub accuracy: Estimate,
 }
 
@@ -62,7 +62,7 @@ pub struct Teachable {
 /// the examples; its slopes are hardly shrunk, so predictions have noise but little bias. A real
 /// displacement scatters about what exact slopes would predict by `scatter` \[voxel lengths\].
 /// Predictions are noisy already, so the scatter about them is less, by as much. Standard errors
-/// say what other rollouts and other images would have changed. An answer is right if its margin is
+/// say what other rollouts and other images would have changed. An answer is correct if its margin is
 /// above `threshold` \[voxel lengths\].
 ///
 /// # Errors
@@ -134,7 +134,7 @@ impl<'a> Half<'a> {
         let any = vec![Material::SensorExpand; slopes.len()];
         let solved = |side: f64, draw: u64| {
             let examples = self.examples.iter().map(|example| (*example, *intercept));
-            let mut lesson = Lesson::foretold(examples, slopes, &any, side);
+            let mut lesson = Lesson::predicted(examples, slopes, &any, side);
             lesson.solve_from_many(&mut stream(seed, Purpose::Training, 0, 2 * number + draw));
             (lesson.objective(), lesson.design())
         };
@@ -142,7 +142,7 @@ impl<'a> Half<'a> {
         if right.0 >= left.0 { (right.1, 1.0) } else { (left.1, -1.0) }
     }
 
-    /// Mean clipped margin of the answers of a design, and the share that are right.
+    /// Mean clipped margin of the answers of a design, and the share that are correct.
     fn judged(&self, (design, side): &Solved, scatter: f64, threshold: f64) -> [Estimate; 2] {
         let total: f64 = self.examples.iter().map(|example| example.weight).sum();
         let fit = self.response.evidence.least_biased();
@@ -193,7 +193,7 @@ struct Answer {
     weight: f64,
     /// Which way is right: 1 right, −1 left.
     right: f64,
-    /// How far it walks the right way \[voxel lengths\].
+    /// How far it walks the correct way \[voxel lengths\].
     margin: f64,
     /// By how much the truth differs from that without its being known \[voxel lengths\].
     scatter: f64,
@@ -287,7 +287,7 @@ mod tests {
             (0..count).map(example).collect()
         }
 
-        /// What a design is worth in truth, and the share of its answers that are right.
+        /// What a design is worth in truth, and the share of its answers that are correct.
         fn truth(&self, (design, side): &Solved, examples: &[Example]) -> [f64; 2] {
             let (mut clipped, mut share) = (0.0, 0.0);
             for example in examples {

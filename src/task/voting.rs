@@ -101,19 +101,19 @@ impl Tally {
     }
 }
 
-/// How many answers are right.
+/// How many answers are correct.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Accuracy {
-    /// Images answered right.
+    /// Images answered correctly.
     pub right: usize,
-    /// Share answered right.
+    /// Share answered correctly.
     pub accuracy: f64,
     /// Its 95 % Wilson interval.
     pub interval: [f64; 2],
 }
 
 impl Accuracy {
-    /// Of answers, each with what would be right.
+    /// Of answers, each with what would be correct.
     pub fn of<T: PartialEq>(answers: impl IntoIterator<Item = (T, T)>) -> Self {
         let (mut right, mut all) = (0, 0);
         for (answer, expected) in answers {

@@ -28,7 +28,7 @@ pub fn response(console: &Console, finished: &Finished, out: &Path) {
     let mut headers = vec!["robot", "places", "certain", "explained %", "scatter", "relative error"];
     headers.extend(["at no width", "rollouts", "unstable", "ended by"]);
     let (fitness, accuracy) = match &file.setting.task {
-        Some(task) => (format!("fitness of {task}"), format!("% right of {task}")),
+        Some(task) => (format!("fitness of {task}"), format!("% correct of {task}")),
         None => Default::default(),
     };
     if file.setting.task.is_some() {

@@ -131,7 +131,7 @@ pub fn validation(console: &Console, best: &[Validated]) {
         let of = format!("{} of {}", robot.right, robot.images);
         vec![robot.id.clone(), robot.task.clone(), of, percent(robot.balanced_accuracy)]
     });
-    console.table(&["best on validation", "task", "right", "balanced %"], &rows.collect::<Vec<_>>());
+    console.table(&["best on validation", "task", "correct", "balanced %"], &rows.collect::<Vec<_>>());
 }
 
 /// After an evaluation: a table per robot, the means and the baselines, and the paper's table;
@@ -282,8 +282,8 @@ pub fn schemas(console: &Console, schemas: &[(&str, &str)]) {
 pub fn fetched(console: &Console, files: &[Fetched]) {
     for file in files {
         let how = match &file.outcome {
-            Outcome::Kept => "was there and is right".to_string(),
-            Outcome::Downloaded(url) => format!("downloaded from {url}, checksum right"),
+            Outcome::Kept => "was there and is correct".to_string(),
+            Outcome::Downloaded(url) => format!("downloaded from {url}, checksum correct"),
         };
         console.line_about(&file.file, &format!("{}: {how}", file.file.display()));
     }

@@ -1,5 +1,6 @@
 //! The figure of a body: its voxels by material.
 
+use crate::base::text::counted;
 use crate::body::{Body, Material};
 use crate::view::colour;
 use crate::view::colour::Colour;
@@ -43,9 +44,9 @@ pub fn body(body: &Body, of: &str) -> Figure {
     let faint = Words::default().colour(colour::FAINT);
     let notes = [
         format!("{} × {} places,", body.height(), body.width()),
-        format!("{} voxels,", counts.total),
-        format!("{} muscles,", counts.muscle),
-        format!("{} sensors", counts.sensor),
+        format!("{},", counted(counts.total, "voxel", "voxels")),
+        format!("{},", counted(counts.muscle, "muscle", "muscles")),
+        counted(counts.sensor, "sensor", "sensors"),
     ];
     for (k, note) in notes.iter().enumerate() {
         canvas.text([x, below + 11.0 + 10.0 * k as f64], note, faint);

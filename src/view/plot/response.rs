@@ -94,7 +94,7 @@ fn notes(found: &RobotResponse, task: Option<&str>) -> Vec<String> {
     }
     if let (Some(taught), Some(task)) = (&found.taught, task) {
         let [low, high] = taught.accuracy_interval.map(|share| number::fixed(100.0 * share, 0));
-        notes.push(format!("{task}: {low}–{high} % right"));
+        notes.push(format!("{task}: {low}–{high} % correct"));
     }
     notes
 }
@@ -172,6 +172,6 @@ mod tests {
             accuracy_interval: interval,
             margin: None,
         });
-        assert!(response(&still, Some("4|9"), "robot a").svg().contains("4|9: 61–75 % right"));
+        assert!(response(&still, Some("4|9"), "robot a").svg().contains("4|9: 61–75 % correct"));
     }
 }

@@ -3,6 +3,7 @@
 use crate::analysis::published;
 use crate::base::number;
 use crate::base::number::percent;
+use crate::base::text::counted;
 use crate::baseline::curve::Crossing;
 use crate::commands::report::{Dossier, Findings};
 use crate::sim::InstructionSet;
@@ -80,7 +81,7 @@ pub(super) fn trainings(runs: &[Dossier]) -> String {
             or_none(dossier.effort(), |(seconds, _)| duration(seconds)),
         ]
     };
-    let headers = ["training", "task", "fitness", "test, right %", "balanced %", "audit", "time"];
+    let headers = ["training", "task", "fitness", "test, correct %", "balanced %", "audit", "time"];
     table(&headers, runs.iter().map(row))
 }
 
@@ -115,7 +116,8 @@ pub(super) fn about(dossier: &Dossier) -> String {
                 0 => format!("stimulus.margin = {margin}"),
                 tried => format!("stimulus.margin = {margin}, the best of {tried}"),
             };
-            let gaits = format!("{} after {} generations", origin.name, origin.generations);
+            let age = counted(origin.generations, "generation", "generations");
+            let gaits = format!("{} after {age}", origin.name);
             vec![("Gaits", gaits), ("Window", window), ("Fitness", best), ("Time", time)]
         }
         None => {

@@ -53,10 +53,10 @@ pub(super) fn contents(runs: &[Dossier]) -> String {
 fn rewarded(fitness: Fitness) -> &'static str {
     match fitness {
         Fitness::Min => {
-            "the smallest distance walked towards the right side, or minus the largest one towards the wrong side"
+            "the smallest distance walked in the correct direction, or minus the largest one in the wrong direction"
         }
         Fitness::MeanClipped => {
-            "the mean distance walked towards the right side, clipped at ten voxel lengths, both groups weighing \
+            "the mean distance walked in the correct direction, clipped at ten voxel lengths, both groups weighing \
              the same"
         }
         Fitness::Response => {
