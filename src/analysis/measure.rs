@@ -175,7 +175,7 @@ pub fn measure(options: &Options, stop: &AtomicBool, observer: &dyn Observer) ->
         match found {
             Ok(Some(found)) => file.robots.push(found),
             Ok(None) => refused.push(Error::input(format!(
-                "robot {}: most of its rollouts under random images are unstable, so its response cannot be measured",
+                "robot {}: most of its rollouts with random images are unstable, so its response cannot be measured",
                 subject.id
             ))),
             Err(error) if error.kind == ErrorKind::Stopped => {

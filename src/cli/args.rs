@@ -55,12 +55,12 @@ the fittest), an id or the beginning of one; top:1, random:1 or best-validation:
 robot; without --archive also the name of a published robot";
 
 /// What is said of `--set`.
-pub(super) const SET: &str = "Change a key, as in map_elites.parents=10 or task.groups.2=[1,2] (items are counted \
-from 1); without a value, as in data.train_images=, it has its default again; may be given several times";
+pub(super) const SET: &str = "Change a key, such as map_elites.parents=10 or task.groups.2=[1,2] (items are counted \
+from 1); without a value, such as data.train_images=, it is reset to its default; may be given several times";
 
 const EXAMPLES: &str = "\
 Examples:
-  morphcog demo                                a minute or two, no download
+  morphcog demo                                about a minute, no download
   morphcog serve                               draw a digit, and watch a body read it
   morphcog evolve --config quickstart.toml     small robots from nothing
   morphcog replay --robot best                 watch the fittest robot of the newest run
@@ -74,7 +74,7 @@ Exit codes:
 
 #[derive(Debug, Subcommand)]
 pub(super) enum Command {
-    /// A first look: train a body for a minute, and test it.
+    /// A first look: train a body for about a minute, and test it.
     #[command(after_help = demo::EXAMPLES)]
     Demo(DemoArgs),
     /// Evolve bodies with MAP-Elites.
@@ -108,7 +108,7 @@ Examples:
     /// Check whether robots walk or exploit the simulator.
     #[command(after_help = audit::EXAMPLES)]
     Audit(AuditArgs),
-    /// Find the networks that robots are worth.
+    /// Find the smallest networks that are as accurate as the robots.
     #[command(after_help = capacity::EXAMPLES)]
     Capacity(CapacityArgs),
     /// Make a page about runs: archive, robots to watch, tests, methods.
@@ -133,7 +133,7 @@ Examples:
     /// Make a figure: SVG and PNG for papers and pages.
     #[command(after_help = plot::EXAMPLES)]
     Plot(PlotArgs),
-    /// Simulate any body under any stimuli.
+    /// Simulate any body with any stimuli.
     #[command(after_help = "\
 Examples:
   morphcog simulate scenario.json --out traj.csv
@@ -203,9 +203,8 @@ Examples:
     },
     /// How fast this machine simulates.
     ///
-    /// Measured is the processor time of one thread, which other work on the machine leaves nearly
-    /// as it is. Where the system does not tell it (Windows), it is wall-clock time, and the output
-    /// says so.
+    /// Measures the processor time of one thread, which other work on the machine hardly affects.
+    /// Where the system does not report it (Windows), it is wall-clock time, and the output says so.
     #[command(after_help = "Examples:\n  morphcog bench\n  morphcog bench --all")]
     Bench {
         /// Every instruction set of this machine, not only the one in use.
@@ -221,7 +220,7 @@ pub(super) struct EvolveArgs {
     pub(super) config: String,
     #[arg(long, value_name = "KEY=VALUE", help = SET)]
     pub(super) set: Vec<String>,
-    /// Seed of all chance.
+    /// Random seed.
     #[arg(long, value_parser = clap::value_parser!(u64).range(..=config::MAX_NUMBER))]
     pub(super) seed: Option<u64>,
     /// Number of generations.
@@ -242,7 +241,7 @@ pub(super) struct EvolveArgs {
     /// Replace the run in the folder.
     #[arg(long)]
     pub(super) force: bool,
-    /// Then train the fittest gaits to tell the config's two groups apart, as morphcog train does.
+    /// Afterwards, train the fittest gaits to tell the config's two groups apart, as morphcog train does.
     #[arg(long)]
     pub(super) train: bool,
     /// At the end, replay the best robot into its run folder.
@@ -254,11 +253,11 @@ pub(super) struct EvolveArgs {
 pub(super) struct EvalArgs {
     #[command(flatten)]
     pub(super) archives: Archives,
-    /// Images in all, evenly divided between the classes, or all of the classes.
+    /// Number of images in all, as many of each class; or "all": every image of the classes.
     #[arg(short = 'n', long, default_value_t = HowMany::Evenly(1000))]
     pub(super) images: HowMany,
     /// Which images: test, or validation (of the training split, neither trained on nor chosen
-    /// from), to compare robots by and leave the test images unseen.
+    /// from), to compare robots while the test images stay unseen.
     #[arg(long, default_value_t = HeldOut::Test, value_name = "SPLIT", value_parser = held_out())]
     pub(super) split: HeldOut,
     #[arg(short, long, visible_aliases = ["robot", "select"], default_value = "top:10", help = ROBOTS)]
@@ -269,10 +268,10 @@ pub(super) struct EvalArgs {
     /// Only robots that morphcog audit found physical.
     #[arg(long)]
     pub(super) physical_only: bool,
-    /// Seed of what is drawn: images, and robots with random:N.
+    /// Random seed for drawing images, and robots with random:N.
     #[arg(long, default_value_t = 1)]
     pub(super) seed: u64,
-    /// Another dataset than the run's, as builtin: its test images are shown.
+    /// A dataset other than the run's, such as builtin: its test images are shown.
     #[arg(long, value_name = "NAME")]
     pub(super) dataset: Option<String>,
     /// Displacements up to this many voxel lengths are wrong.
@@ -297,7 +296,7 @@ pub(super) struct EvalArgs {
 pub(super) struct ReplayArgs {
     #[arg(short, long, visible_aliases = ["robots", "select"], default_value = "best", help = ROBOT)]
     pub(super) robot: Selection,
-    /// Seed of a robot drawn with random:1.
+    /// Random seed for random:1.
     #[arg(long, default_value_t = 1)]
     pub(super) seed: u64,
     /// Only robots that morphcog audit found physical: "best" is the best of them.
@@ -306,10 +305,10 @@ pub(super) struct ReplayArgs {
     /// The run.json, or its folder (default: the newest under runs/).
     #[arg(short, long, value_name = "FILE", value_parser = run_json())]
     pub(super) archive: Option<PathBuf>,
-    /// Images by index, as train:1,test:17 (default: the training images).
+    /// Images by index, such as train:1,test:17 (default: the training images).
     #[arg(short, long, value_delimiter = ',')]
     pub(super) images: Vec<Shown>,
-    /// Another dataset than the run's, as builtin.
+    /// A dataset other than the run's, such as builtin.
     #[arg(long)]
     pub(super) dataset: Option<String>,
     /// Folder with the images.
@@ -372,7 +371,7 @@ pub(super) enum DataCommand {
         #[arg(long)]
         force: bool,
     },
-    /// What is found of a dataset, and where.
+    /// Show which files of a dataset are found, and where.
     #[command(
         after_help = "Examples:\n  morphcog data info\n  morphcog data info emnist-digits --data ~/data/emnist"
     )]

@@ -40,14 +40,14 @@ pub(super) struct AuditArgs {
     archives: Archives,
     #[arg(short, long, visible_aliases = ["robot", "select"], default_value = "all", help = ROBOTS)]
     robots: Vec<Selection>,
-    /// Seed of robots drawn with random:N.
+    /// Random seed for random:N.
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// How to judge: a TOML file (or JSON); keys that are not in it have their defaults.
+    /// Criteria: a TOML file (or JSON); missing keys have their defaults.
     #[arg(long, value_name = "FILE")]
     criteria: Option<PathBuf>,
-    /// Change a criterion, as in threshold=2 or perturbations.time_step=[2,4]; without a value, it
-    /// has its default again; may be given several times.
+    /// Change a criterion, such as threshold=2 or perturbations.time_step=[2,4]; without a value, it
+    /// is reset to its default; may be given several times.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
     /// Folder with the images.

@@ -26,19 +26,18 @@ pub(super) struct CapacityArgs {
     /// What morphcog eval wrote (default: eval.json beside the newest run under runs/).
     #[arg(short, long, value_name = "FILE")]
     eval: Option<PathBuf>,
-    /// Early stopping waits on images of the training split, not, as in the paper, on the test
-    /// images.
+    /// Early stopping uses images of the training split; in the paper it uses the test images.
     #[arg(long)]
     clean: bool,
     /// Only robots that morphcog audit found physical (audit.json is looked for beside the
     /// evaluation and one folder below).
     #[arg(long)]
     physical_only: bool,
-    /// Settings: a TOML file (or JSON); keys that are not in it have their defaults.
+    /// Settings: a TOML file (or JSON); missing keys have their defaults.
     #[arg(short, long, value_name = "FILE")]
     config: Option<PathBuf>,
-    /// Change a setting, as in trainings=10 or mlp.epochs=20; without a value, it has its default
-    /// again; may be given several times.
+    /// Change a setting, such as trainings=10 or mlp.epochs=20; without a value, it is reset to its
+    /// default; may be given several times.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
     /// Folder with the images.

@@ -31,7 +31,7 @@ then
   morphcog serve                                draw digits yourself
   morphcog evolve --config quickstart.toml      small robots from nothing
 
-A minute or two, no download: a gait that ships with the program is trained to tell zeros from ones,
+About a minute, no download: a gait that ships with the program is trained to tell zeros from ones,
 on digits that the program draws itself. Then the robot is shown 200 digits that it has never seen.
 Ctrl-C stops it; the same command goes on.";
 
@@ -56,13 +56,13 @@ const TEST_IMAGES: usize = 200;
 
 #[derive(Debug, Args)]
 pub(super) struct DemoArgs {
-    /// Seed of all chance.
+    /// Random seed.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u64).range(..=config::MAX_NUMBER))]
     seed: u64,
     /// Run folder.
     #[arg(short, long, value_name = "DIR", default_value = "runs/demo")]
     out: PathBuf,
-    /// Begin anew where there is a run in the folder.
+    /// Start again, replacing the run in the folder.
     #[arg(long)]
     force: bool,
     /// Threads (default: one per core); the result does not depend on it.

@@ -22,9 +22,9 @@ Kinds:
   snapshots    poses of its rollout laid over each other
   archive      fitness over muscle, sensor and total voxels
   progress     QD score, coverage and best fitness; several archives (seeds) make a band
-  accuracy     what morphcog eval found (eval.json beside run.json, or named in its place by --archive)
-  capacity     what morphcog capacity found (capacity.json beside run.json, or named in its place by --archive)
-Of several robots or archives, all but progress make a figure each.
+  accuracy     what morphcog eval found (eval.json beside run.json, or the file that --archive names)
+  capacity     what morphcog capacity found (capacity.json beside run.json, or the file that --archive names)
+With several robots or archives, every kind but progress makes one figure for each.
 
 Examples:
   morphcog plot archive --archive runs/zero_one-seed1/run.json
@@ -43,16 +43,16 @@ pub(super) struct PlotArgs {
     archives: Archives,
     #[arg(short, long, visible_aliases = ["robots", "select"], help = format!("{ROBOTS} [default: best]"))]
     robot: Vec<Selection>,
-    /// Seed of robots drawn with random:N.
+    /// Random seed for random:N.
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// Only robots that morphcog audit found physical: "best" is the best of them.
     #[arg(long)]
     physical_only: bool,
-    /// Images by index, as train:1,test:17 (default: the training images).
+    /// Images by index, such as train:1,test:17 (default: the training images).
     #[arg(short, long, value_delimiter = ',')]
     images: Vec<Shown>,
-    /// Another dataset than the run's, as builtin.
+    /// A dataset other than the run's, such as builtin.
     #[arg(long)]
     dataset: Option<String>,
     /// Folder with the images.
@@ -65,10 +65,10 @@ pub(super) struct PlotArgs {
     /// run.json).
     #[arg(short, long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// Pixels of PNG per inch.
+    /// Resolution of the PNG, pixels per inch.
     #[arg(long, default_value_t = 300, value_parser = clap::value_parser!(u32).range(36..=2400))]
     dpi: u32,
-    /// No white behind the figure.
+    /// Transparent background.
     #[arg(long)]
     transparent: bool,
 }

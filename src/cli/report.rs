@@ -19,7 +19,7 @@ Examples:
   morphcog report --archive runs/zero_one-seed1 --rollouts 20 --open
 
 What lies beside a run.json is part of its report: metrics.csv, eval.json, audit.json,
-capacity.json. Of several runs, those of them together are looked for above their folders.";
+capacity.json. With several runs, their common results are looked for in the folder above them.";
 
 #[derive(Debug, Args)]
 pub(super) struct ReportArgs {

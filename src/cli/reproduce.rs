@@ -20,20 +20,20 @@ Examples:
   morphcog reproduce mine.toml --set seeds=[1,2] --out mine
 
 Evolves every experiment from every seed, audits robots until enough are found physical, tests them
-on held-out images, finds the networks they are worth, and prints the paper's table. Ctrl-C stops it
+on held-out images, finds the networks that are as accurate, and prints the paper's table. Ctrl-C stops it
 anywhere; the same command goes on.";
 
 #[derive(Debug, Args)]
 pub(super) struct ReproduceArgs {
-    /// What belongs to it (TOML or JSON), or paper.toml, which is built in.
+    /// Plan file (TOML or JSON), or paper.toml, which is built in.
     #[arg(default_value = PAPER_TOML.0)]
     plan: String,
     /// More than 0, up to 1: generations are multiplied by it, test images and trainings by its
     /// square root.
     #[arg(long, default_value_t = 1.0)]
     scale: f64,
-    /// Change a key, as in seeds=[1,2] or experiment.1.config=mine.toml (experiments are counted
-    /// from 1); without a value, it has its default again; may be given several times.
+    /// Change a key, such as seeds=[1,2] or experiment.1.config=mine.toml (experiments are counted
+    /// from 1); without a value, it is reset to its default; may be given several times.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
     /// Folder for everything.

@@ -32,9 +32,8 @@ then
 All soft voxels and sensors of a robot are made wide, narrow or left at rest by random images, each
 independently of the others: by how much does each move the body? A measurement ends when the slopes
 are known well enough (--error), or after --images rollouts. Images of a dataset are only needed
-with --task. What response.json has is taken, not measured again, by this command and by `train` for
-its own first rollouts, for any task: if many trainings begin with the same gaits, measure these
-first. Ctrl-C stops it.";
+with --task. Earlier measurements in response.json are reused for any task, by this command and by
+`train`: if many trainings begin with the same gaits, measure these first. Ctrl-C stops it.";
 
 /// Two groups of classes.
 type Groups = [Vec<u8>; 2];
@@ -49,23 +48,22 @@ pub(super) struct ResponseArgs {
     /// Only robots that morphcog audit found physical: "best" is the best of them.
     #[arg(long)]
     physical_only: bool,
-    /// Two groups of classes, as 4|9, 0|123 or 10,11|3: says what robots could be taught, too.
+    /// Two groups of classes, such as 4|9, 0|123 or 10,11|3: says what robots could be taught, too.
     #[arg(short, long, value_name = "A|B", value_parser = groups)]
     task: Option<Groups>,
-    /// Change a key of the config that a training of the task would have, as in stimulus.margin=5 or
-    /// train.windows=2000; may be given several times.
+    /// Change a key of the config that a training of the task would have, such as stimulus.margin=5
+    /// or train.windows=2000; may be given several times.
     #[arg(long, value_name = "KEY=VALUE", requires = "task")]
     set: Vec<String>,
-    /// Most rollouts of a robot, each under a random image: 60 or more; what is known of it is
-    /// taken whole.
+    /// Most rollouts of a robot, each with a random image (60 or more); all earlier ones are reused.
     #[arg(short = 'n', long, default_value_t = 1000)]
     images: usize,
-    /// The error of the slopes, relative to them, at which a robot's measurement ends; 0: never
-    /// before the last image.
+    /// Relative error of the slopes at which a robot's measurement ends; 0: only after --images
+    /// rollouts.
     #[arg(long, default_value_t = 0.2)]
     error: f64,
-    /// Seed of what is drawn: random images (default: that of the run, as train has it), and robots
-    /// with random:N (default: 1).
+    /// Random seed for the images (default: that of the run, as train has it), and for random:N
+    /// (default: 1).
     #[arg(long)]
     seed: Option<u64>,
     /// Folder with the images of the task.

@@ -40,9 +40,9 @@ tasks are done; 1: some failed; 75: stopped.";
 
 #[derive(Debug, Args)]
 pub(super) struct SweepArgs {
-    /// What is swept (TOML or JSON; morphcog schema sweep says what it holds).
+    /// Plan file (TOML or JSON; morphcog schema sweep has its keys).
     plan: PathBuf,
-    /// Change a key of the plan, as in seeds=[1,2]; without a value, it has its default again; may
+    /// Change a key of the plan, such as seeds=[1,2]; without a value, it is reset to its default; may
     /// be given several times.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,

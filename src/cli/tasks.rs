@@ -30,7 +30,7 @@ pub(super) struct What {
     /// Print a job script for Slurm's sbatch.
     #[arg(long)]
     pub(super) slurm: bool,
-    /// Say how far every task is.
+    /// Show the progress of every task.
     #[arg(long)]
     pub(super) status: bool,
 }

@@ -27,8 +27,7 @@ Examples:
   morphcog team --archive runs/pairs/*/ --split validation --images 400
 
 A robot votes for the classes of the side it walks to, if it walks farther than 3 voxel lengths;
-most votes win, and of classes with as many votes the one that all robots together walked farthest
-towards. A second answer is that sum of walks alone. No weight of the votes is trained. team.json
+most votes win; in a tie, the class with the largest sum of walks. A second answer is that sum of walks alone. No weight of the votes is trained. team.json
 keeps every walk: the same command goes on after Ctrl-C, and with more runs.";
 
 /// What is said of `--archive`: elsewhere the newest run is the default.
@@ -45,17 +44,17 @@ pub(super) struct TeamArgs {
     /// their beginnings, separated by commas (of all archives) [default: best].
     #[arg(short, long, visible_aliases = ["robot", "select"])]
     robots: Vec<Selection>,
-    /// Classes to tell apart, as 0,1,2 (default: all of the dataset).
+    /// Classes to tell apart, such as 0,1,2 (default: all of the dataset).
     #[arg(long, value_delimiter = ',')]
     classes: Vec<u8>,
-    /// Images in all, evenly divided between the classes, or all of the classes.
+    /// Number of images in all, as many of each class; or "all": every image of the classes.
     #[arg(short = 'n', long, default_value_t = HowMany::Evenly(1000))]
     images: HowMany,
     /// Which images: test, or validation (of the training split, neither trained on nor chosen
     /// from).
     #[arg(long, default_value_t = HeldOut::Test, value_name = "SPLIT", value_parser = held_out())]
     split: HeldOut,
-    /// Seed of what is drawn: images, and robots with random:N.
+    /// Random seed for drawing images, and robots with random:N.
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// Folder with the images.

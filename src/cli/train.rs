@@ -34,8 +34,8 @@ Examples:
 then
   morphcog eval --archive runs/gaits-seed1-4v9 --robots best
 
-The response of each gait is measured under random images. The gait that can be taught most is
-taught with many training images, and the body is refined: challengers that answer better replace
+The response of each gait is measured with random images. The most promising gait is trained
+on many training images, and the body is refined: challengers that answer better replace
 it. The robot is validated on images that it was not trained on, and audited. Ctrl-C stops it;
 --resume goes on, also after its end with more challengers (--set train.challengers=240).";
 
@@ -44,25 +44,25 @@ type Groups = [Vec<u8>; 2];
 
 #[derive(Debug, Args)]
 pub(super) struct TrainArgs {
-    /// The run.json (or its folder) whose robots walk (default: the newest under runs/).
+    /// The run.json of the gaits, or its folder (default: the newest under runs/).
     #[arg(short, long, value_name = "FILE", value_parser = run_json())]
     archive: Option<PathBuf>,
-    /// Two groups of classes, as 4|9, 0|123 or 10,11|3.
+    /// Two groups of classes, such as 4|9, 0|123 or 10,11|3.
     #[arg(short, long, value_name = "A|B", value_parser = groups)]
     task: Groups,
     #[arg(short, long, visible_aliases = ["robot", "select"], default_value = "top:4", help = ROBOTS)]
     robots: Vec<Selection>,
-    /// Seed of all chance (default: that of the archive's run).
+    /// Random seed (default: that of the archive's run).
     #[arg(long, value_parser = clap::value_parser!(u64).range(..=config::MAX_NUMBER))]
     seed: Option<u64>,
-    /// Change a key, as in train.rounds=10 or data.dataset=fashion-mnist; may be given several
+    /// Change a key, such as train.rounds=10 or data.dataset=fashion-mnist; may be given several
     /// times.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
     /// Folder with the images.
     #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,
-    /// Run folder (default: the archive's folder and the task, as runs/gaits-seed1-4v9).
+    /// Run folder (default: the archive's folder and the task, such as runs/gaits-seed1-4v9).
     #[arg(short, long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Go on with the training in the folder; start it if there is none.

@@ -14,7 +14,7 @@ pub struct TrainConfig {
     /// Default 2000, or three quarters of the images of the scarcest class if that is less: more
     /// make designs general, and cost little.
     pub images_per_class: usize,
-    /// Rollouts under random images that measure a gait's response. Default 300: with fewer than
+    /// Rollouts with random images that measure a gait's response. Default 300: with fewer than
     /// two for each soft voxel and sensor the slopes are mostly noise.
     pub random_images: usize,
     /// Windows of the images that are tried for each gait, that of `stimulus.margin` first: the model
@@ -29,13 +29,13 @@ pub struct TrainConfig {
     /// Training images that a round shows. Default 120: with fewer, slopes are noisier, and the
     /// constant is off.
     pub images: usize,
-    /// Training images under which designs and challengers are compared. Default 400: with fewer,
+    /// Training images on which designs and challengers are compared. Default 400: with fewer,
     /// small gains cannot be told from chance.
     pub final_images: usize,
     /// Bodies that challenge the best design, in sensors or in a few voxels of any material.
     /// Default 30; later ones win more seldom.
     pub challengers: usize,
-    /// Under what images are shown by turns, so that designs do not depend on the first touch of
+    /// Conditions under which images are shown in turn, so that designs do not depend on the first touch of
     /// the ground or exploit length limits.
     pub perturbations: ByTurns,
 }

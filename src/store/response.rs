@@ -181,7 +181,7 @@ impl From<Teachable> for Taught {
 }
 
 impl RobotResponse {
-    /// What rollouts under random images told of a gait.
+    /// What rollouts with random images told of a gait.
     pub(crate) fn new(
         id: &str,
         gait: &Gait,

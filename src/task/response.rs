@@ -306,7 +306,7 @@ impl Fit {
     }
 }
 
-/// What rollouts under random images tell of a gait.
+/// What rollouts with random images tell of a gait.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Response {
     /// By how much a place that is wider by one rest width moves the body to the right \[voxel

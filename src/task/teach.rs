@@ -14,7 +14,7 @@ use crate::task::fitness::clipped_margin;
 use crate::task::refine::{Challenge, Refinement, WeightedImage};
 use crate::task::response::{Design, Evidence, Example, Gait, Lesson, Moments, Response, SENSORS, dot};
 
-/// What rollouts under random images count beside those around the latest design. They are farther
+/// What rollouts with random images count beside those around the latest design. They are farther
 /// from it, but more, and each tells more of the slopes.
 const RANDOM_WEIGHT: f64 = 0.3;
 

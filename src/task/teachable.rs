@@ -54,7 +54,7 @@ pub struct Teachable {
     pub accuracy: Estimate,
 }
 
-/// What a gait could be taught of a lesson, by its rollouts under random images; `None` if these
+/// What a gait could be taught of a lesson, by its rollouts with random images; `None` if these
 /// are too few to be halved.
 ///
 /// The estimates are means over two designs. Each is solved with one half of the rollouts and of

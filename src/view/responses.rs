@@ -41,7 +41,7 @@ pub fn response(console: &Console, finished: &Finished, out: &Path) {
     let rows = file.robots.iter().map(|robot| row(robot, is_taught, file.setting.windows > 0));
     console.table(&headers, &rows.collect::<Vec<_>>());
     let count = file.setting.conditions.len();
-    console.line(&format!("{count} conditions by turns; voxel lengths, right positive"));
+    console.line(&format!("{count} conditions (start, length limits); voxel lengths, right positive"));
     if written {
         console.line(&format!("wrote {} and {}", out.display(), out.with_extension("csv").display()));
     }

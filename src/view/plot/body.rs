@@ -43,7 +43,7 @@ pub fn body(body: &Body, of: &str) -> Figure {
     let counts = body.counts();
     let faint = Words::default().colour(colour::FAINT);
     let notes = [
-        format!("{} × {} places,", body.height(), body.width()),
+        format!("{} × {} grid,", body.height(), body.width()),
         format!("{},", counted(counts.total, "voxel", "voxels")),
         format!("{},", counted(counts.muscle, "muscle", "muscles")),
         counted(counts.sensor, "sensor", "sensors"),
