@@ -1,4 +1,4 @@
-//! `fitness = "response"`: the body's probe is measured under random images, the run is the same
+//! `fitness = "response"`: the body's probe is measured with random images, the run is the same
 //! bits however it is run, and what reads a run reads this one.
 #![allow(clippy::disallowed_methods)]
 

@@ -27,7 +27,7 @@ impl EvaluationConfig {
 }
 
 impl Config {
-    /// Whether fitness is a response: of the bodies' probes, under random images.
+    /// Whether fitness is a response: of the bodies' probes, with random images.
     pub fn measures_response(&self) -> bool {
         self.evaluation.fitness == Fitness::Response
     }

@@ -537,7 +537,7 @@ struct Trainer<'a> {
     dataset: &'a Dataset,
     training: &'a Training,
     probing: Probing,
-    /// Displacements of each gait under random images that are known before.
+    /// Displacements of each gait with random images that are known before.
     measured: Vec<Batch>,
 }
 
@@ -666,7 +666,7 @@ impl Trainer<'_> {
             }
         }
         let Some((walker, seeing, mut teacher)) = best else {
-            let text = "none of the chosen robots is stable under random images: there is nothing to train";
+            let text = "none of the chosen robots is stable with random images: there is nothing to train";
             return Err(Error::input(text.to_string()).hint("choose others with --robots".to_string()));
         };
         let mut rollouts = Kept { config, conditions: probing.conditions(), log };
