@@ -20,8 +20,8 @@ Examples:
   morphcog reproduce mine.toml --set seeds=[1,2] --out mine
 
 Evolves every experiment from every seed, audits robots until enough are found physical, tests them
-on held-out images, finds the networks that are as accurate, and prints the paper's table. Ctrl-C stops it
-anywhere; the same command goes on.";
+on held-out images, finds the networks that are as accurate, and prints the paper's table. Ctrl-C
+stops it anywhere; the same command goes on.";
 
 #[derive(Debug, Args)]
 pub(super) struct ReproduceArgs {

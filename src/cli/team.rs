@@ -27,8 +27,9 @@ Examples:
   morphcog team --archive runs/pairs/*/ --split validation --images 400
 
 A robot votes for the classes of the side it walks to, if it walks farther than 3 voxel lengths;
-most votes win; in a tie, the class with the largest sum of walks. A second answer is that sum of walks alone. No weight of the votes is trained. team.json
-keeps every walk: the same command goes on after Ctrl-C, and with more runs.";
+most votes win; in a tie, the class with the largest sum of walks. A second answer is that sum of
+walks alone. No weight of the votes is trained. team.json keeps every walk: the same command goes on
+after Ctrl-C, and with more runs.";
 
 /// What is said of `--archive`: elsewhere the newest run is the default.
 const ARCHIVE: &str = "A run.json, or its folder, or runs of the gallery; several may follow, and the option may be \

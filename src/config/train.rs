@@ -35,8 +35,8 @@ pub struct TrainConfig {
     /// Bodies that challenge the best design, in sensors or in a few voxels of any material.
     /// Default 30; later ones win more seldom.
     pub challengers: usize,
-    /// Conditions under which images are shown in turn, so that designs do not depend on the first touch of
-    /// the ground or exploit length limits.
+    /// Conditions under which images are shown in turn, so that designs do not depend on the first
+    /// touch of the ground or exploit length limits.
     pub perturbations: ByTurns,
 }
 

@@ -305,7 +305,7 @@ pub struct PerturbedRollout {
     /// Displacement under each training image, voxel lengths (a mirrored rollout's mirrored back);
     /// none if unstable.
     pub displacements: Option<Vec<f64>>,
-    /// Share of the images answered correctly in the unchanged rollout under which it still walks the
+    /// Share of the images answered correctly in the unchanged rollout for which it still walks the
     /// correct way.
     pub kept: f64,
     /// Walks under them, in the correct direction, as a share of the unchanged rollout's.

@@ -67,8 +67,8 @@ impl Assignment {
         }
     }
 
-    /// Whether a displacement is the correct answer to an image of a group: farther than `threshold`,
-    /// the correct way.
+    /// Whether a displacement is the correct answer to an image of a group: farther than
+    /// `threshold`, the correct way.
     pub fn is_right(self, group: Group, displacement: f64, threshold: f64) -> bool {
         Direction::of(displacement, threshold) == Some(self.expected(group))
     }

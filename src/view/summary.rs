@@ -220,7 +220,7 @@ pub fn evaluation(console: &Console, report: &EvalFile, capacity: Option<&Capaci
     let Some(out) = out else { return };
     console.line(&format!("wrote {} and {}", out.display(), out.with_extension("csv").display()));
     if capacity.is_none() && is_test {
-        console.info(&format!("what network are they worth? morphcog capacity --eval {}", in_shell(out)));
+        console.info(&format!("which networks are as accurate? morphcog capacity --eval {}", in_shell(out)));
     }
 }
 
