@@ -7,7 +7,10 @@ use crate::base::ranks::Ranks;
 use crate::base::text::counted;
 use crate::commands::plan::Plan;
 use crate::commands::table::Row;
-use crate::commands::tasks::{self, Place, Run, Steps, Summary, Task, another, is_of, written};
+use crate::commands::tasks::all::check_test;
+use crate::commands::tasks::steps::{is_of, written};
+use crate::commands::tasks::task::another;
+use crate::commands::tasks::{self, Place, Run, Steps, Summary, Task};
 use crate::commands::{audit, capacity, eval, plan, table};
 use crate::config::Config;
 use crate::data::dataset::Split;
@@ -92,7 +95,7 @@ pub fn reproduce(options: &Options, stop: &AtomicBool, observer: &dyn Observer) 
     let experiments = plan.experiments()?;
     for (_, config) in &experiments {
         let dataset = Whereabouts::given(place.data.as_deref()).load(&config.data, &Split::ALL)?;
-        tasks::check_test(config, &dataset, HowMany::Evenly(plan.images), "images")?;
+        check_test(config, &dataset, HowMany::Evenly(plan.images), "images")?;
     }
     let runs = tasks::run_all(&tasks, place, options.jobs, stop, observer)?;
     let (rows, capacities) = (Vec::new(), Vec::new());

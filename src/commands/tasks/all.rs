@@ -1,0 +1,208 @@
+//! All tasks, several at once.
+
+use crate::base::error::{Error, ErrorKind};
+use crate::base::observer::{Generation, Observer, Work};
+use crate::base::text::counted;
+use crate::commands::tasks::steps::{is_done, run};
+use crate::commands::tasks::task::{Place, Run, Task};
+use crate::config::Config;
+use crate::data::dataset::{Dataset, Split};
+use crate::search::{held_out, train, training};
+use crate::store::images::{HeldOut, HowMany};
+use crate::store::names::{DATA_FOLDER, TASK_JSON};
+use crate::store::task::TaskFile;
+use crate::store::whereabouts::Whereabouts;
+use serde_json::Value;
+use std::collections::btree_map::Entry;
+use std::collections::{BTreeMap, BTreeSet};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
+
+/// How tasks ended.
+#[derive(Clone, Debug, Default)]
+pub struct Summary {
+    /// Tasks that are done, now or before.
+    pub done: usize,
+    /// Numbers of the tasks that failed.
+    pub failed: Vec<usize>,
+    /// Tasks that other processes are at.
+    pub elsewhere: usize,
+    /// Tasks that were stopped or did not begin.
+    pub open: usize,
+}
+
+/// Whether there are images for tasks that have not begun, also for their tests: else they would
+/// fail, one after the other, or when hours of work are done.
+///
+/// # Errors
+/// If not.
+pub fn check_data<'a>(tasks: impl Iterator<Item = (usize, &'a Task)>, place: &Place) -> Result<(), Error> {
+    let has_begun = |task: &Task| place.folder(task).join(DATA_FOLDER).exists();
+    let mut datasets: BTreeMap<String, Dataset> = BTreeMap::new();
+    let mut known = BTreeSet::new();
+    for (number, task) in tasks.filter(|(_, task)| !has_begun(task)) {
+        let config = match &task.run {
+            Run::Evolve(config, _) => config,
+            Run::Train(training) => &training.config,
+        };
+        let test = task.steps.eval.as_ref().filter(|step| step.split == HeldOut::Test);
+        let splits = if test.is_some() { &Split::ALL[..] } else { &[Split::Train] };
+        let name = format!("{:?}", (splits, &config.data.dataset, &config.data.dir, &config.data.builtin));
+        let dataset = match datasets.entry(name.clone()) {
+            Entry::Occupied(loaded) => loaded.into_mut(),
+            Entry::Vacant(place_of) => {
+                place_of.insert(Whereabouts::given(place.data.as_deref()).load(&config.data, splits)?)
+            }
+        };
+        let named = |error: Error| error.within(&format!("task {number} ({})", task.name));
+        match &task.run {
+            Run::Evolve(config, _) => {
+                training::Training::images(config, dataset).map_err(named)?;
+                held_out::check(config, &[], "data.images_per_class", dataset).map_err(named)?;
+            }
+            Run::Train(training) => {
+                train::with_images(training.config.clone(), &[], dataset, &()).map_err(named)?;
+            }
+        }
+        let Some(step) = test.filter(|step| known.insert((name, step.images, config.classes()))) else {
+            continue;
+        };
+        check_test(config, dataset, step.images, "eval.images").map_err(named)?;
+    }
+    Ok(())
+}
+
+/// Whether there are so many test images; `key` says where they are asked for.
+///
+/// # Errors
+/// If not.
+pub(crate) fn check_test(
+    config: &Config,
+    dataset: &Dataset,
+    images: HowMany,
+    key: &str,
+) -> Result<(), Error> {
+    let drawn = held_out::test_images(&config.classes(), dataset, images, 1);
+    drawn.map(|_| ()).map_err(|error| error.within(&format!("{key} = {images}")))
+}
+
+/// Does all tasks here, `jobs` at once; `None`: one per core. One that fails does not stop others.
+///
+/// # Errors
+/// If the folder cannot be made, or there are no images.
+pub fn run_all(
+    tasks: &[Task],
+    place: &Place,
+    jobs: Option<usize>,
+    stop: &AtomicBool,
+    observer: &dyn Observer,
+) -> Result<Summary, Error> {
+    let is_open = |task: &&Task| {
+        let known = TaskFile::read(&place.folder(task).join(TASK_JSON)).ok().flatten();
+        !is_done(known.as_ref(), task)
+    };
+    let numbered: Vec<(usize, &Task)> = (1..).zip(tasks).filter(|(_, task)| is_open(task)).collect();
+    check_data(numbered.iter().copied(), place)?;
+    std::fs::create_dir_all(&place.out).map_err(|error| Error::writing(&place.out, &error))?;
+    let before = tasks.len() - numbered.len();
+    let cores = || std::thread::available_parallelism().map_or(1, usize::from);
+    let threads = place.threads.unwrap_or_else(cores);
+    let jobs = jobs.unwrap_or(threads).min(numbered.len()).max(1);
+    let place = Place { threads: Some((threads / jobs).max(1)), ..place.clone() };
+    let sum = |tasks: &mut dyn Iterator<Item = &Task>| tasks.map(Task::amount).fold(0, u64::saturating_add);
+    let total = sum(&mut tasks.iter());
+    let known = total - sum(&mut numbered.iter().map(|(_, task)| *task));
+    if !numbered.is_empty() {
+        let label =
+            format!("{} of {}, {jobs} at once:", numbered.len(), counted(tasks.len(), "task", "tasks"));
+        let train = tasks.iter().all(|task| matches!(task.run, Run::Train(_)));
+        let unit = if train { "challengers" } else { "generations" };
+        observer.begins(&Work { label, total, known, unit });
+    }
+    let all = All { observer, known, parts: numbered.iter().map(|_| AtomicU64::new(0)).collect() };
+    let next = AtomicUsize::new(0);
+    let summary = Mutex::new(Summary { done: before, ..Summary::default() });
+    let worker = || {
+        while !stop.load(Ordering::Relaxed) {
+            let index = next.fetch_add(1, Ordering::Relaxed);
+            let Some((number, task)) = numbered.get(index) else { break };
+            let part = Part { all: &all, index, amount: task.amount(), name: &task.name };
+            let ended = catch_unwind(AssertUnwindSafe(|| run(task, &place, stop, &part)));
+            let ended = ended.unwrap_or_else(|_| {
+                Err(Error::other("a bug of morphcog; what it said stands above".to_string()))
+            });
+            let mut summary = summary.lock().unwrap_or_else(PoisonError::into_inner);
+            match ended {
+                Ok(()) => {
+                    summary.done += 1;
+                    part.is_at(part.amount);
+                    observer.note(&format!(
+                        "task {number} ({}): done, {} of {}",
+                        task.name,
+                        summary.done,
+                        tasks.len()
+                    ));
+                }
+                Err(error) if error.kind == ErrorKind::Stopped => {}
+                Err(error) if error.kind == ErrorKind::Occupied => summary.elsewhere += 1,
+                Err(error) => {
+                    let hint = error.hint.as_ref().map_or(String::new(), |hint| format!("; {hint}"));
+                    observer.warning(&format!("task {number} ({}) failed: {error}{hint}", task.name));
+                    summary.failed.push(*number);
+                }
+            }
+        }
+    };
+    std::thread::scope(|scope| {
+        for _ in 0..jobs {
+            scope.spawn(worker);
+        }
+    });
+    let mut summary = summary.into_inner().unwrap_or_else(PoisonError::into_inner);
+    summary.failed.sort_unstable();
+    summary.open = tasks.len() - summary.done - summary.failed.len() - summary.elsewhere;
+    Ok(summary)
+}
+
+/// One progress over all tasks.
+struct All<'o> {
+    observer: &'o dyn Observer,
+    /// Generations of tasks that were done before.
+    known: u64,
+    /// Generations done of each other task.
+    parts: Vec<AtomicU64>,
+}
+
+/// A task's part in it.
+struct Part<'a, 'o> {
+    all: &'a All<'o>,
+    index: usize,
+    amount: u64,
+    name: &'a str,
+}
+
+impl Part<'_, '_> {
+    fn is_at(&self, done: u64) {
+        let All { observer, known, parts } = self.all;
+        parts[self.index].fetch_max(done.min(self.amount), Ordering::Relaxed);
+        let done = parts.iter().map(|part| part.load(Ordering::Relaxed));
+        observer.progress(done.fold(*known, u64::saturating_add));
+    }
+}
+
+impl Observer for Part<'_, '_> {
+    fn generation(&self, generation: &Generation) {
+        self.is_at(generation.done);
+    }
+
+    fn finding(&self, _kind: &str, fields: &Value) {
+        if let Some(challenger) = fields.get("challenger").and_then(Value::as_u64) {
+            self.is_at(challenger);
+        }
+    }
+
+    fn warning(&self, text: &str) {
+        self.all.observer.warning(&format!("{}: {text}", self.name));
+    }
+}

@@ -1,0 +1,98 @@
+//! How far tasks are, read from their folders.
+
+use crate::base::error::Error;
+use crate::commands::tasks::steps::is_done;
+use crate::commands::tasks::task::{Place, Run, Task};
+use crate::store::lock;
+use crate::store::names::{METRICS, TASK_JSON, TASK_LOCK};
+use crate::store::task::{State, TaskFile};
+use serde::Serialize;
+use std::io::{Read, Seek, SeekFrom};
+use std::path::Path;
+
+/// Bytes at the end of a metrics.csv that hold its last whole row; rows have about 150.
+const ROW: u64 = 4096;
+
+/// How far a task is, as its folder says.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Status {
+    /// Its number, from 1.
+    pub task: usize,
+    /// Its name.
+    pub name: String,
+    /// How far it is.
+    pub state: State,
+    /// Generations done, of how many; none for a training.
+    pub generations: Option<[u64; 2]>,
+    /// Wall-clock time so far \[s\]; of a running task, that of its run as far as it is written.
+    pub seconds: Option<f64>,
+    /// Time it will probably take still \[s\], as far as that is known.
+    pub seconds_left: Option<f64>,
+    /// What it failed with, or who is at it.
+    pub about: Option<String>,
+}
+
+/// How far all tasks are.
+///
+/// # Errors
+/// If a folder cannot be read.
+pub fn status(tasks: &[Task], place: &Place) -> Result<Vec<Status>, Error> {
+    let mut all = Vec::new();
+    for (number, task) in (1..).zip(tasks) {
+        all.push(status_of(number, task, &place.folder(task))?);
+    }
+    // A task of which nothing else is known takes as long as those that are done.
+    let done: Vec<f64> = all.iter().filter(|s| s.state == State::Done).filter_map(|s| s.seconds).collect();
+    let mean = (!done.is_empty()).then(|| done.iter().sum::<f64>() / done.len() as f64);
+    for status in all.iter_mut().filter(|s| s.state != State::Done && s.seconds_left.is_none()) {
+        status.seconds_left = mean.map(|mean| (mean - status.seconds.unwrap_or(0.0)).max(0.0));
+    }
+    Ok(all)
+}
+
+fn status_of(number: usize, task: &Task, folder: &Path) -> Result<Status, Error> {
+    let known = TaskFile::read(&folder.join(TASK_JSON))?;
+    let held = lock::state(&folder.join(TASK_LOCK)).unwrap_or(lock::State::Free);
+    let (state, about) = match (&known, held) {
+        (_, lock::State::Held(holder)) => (State::Running, holder.map(|holder| holder.to_string())),
+        (None, _) => (State::Waiting, None),
+        (Some(known), _) if is_done(Some(known), task) => (State::Done, None),
+        (Some(TaskFile { state: State::Failed, error, .. }), _) => (State::Failed, error.clone()),
+        (Some(TaskFile { state: State::Running, .. }), lock::State::Stale(holder)) => {
+            (State::Stopped, Some(format!("{holder} was ended")))
+        }
+        (Some(_), _) => (State::Stopped, None),
+    };
+    let (generations, of_run) = match &task.run {
+        Run::Evolve(config, _) => {
+            let (done, seconds) = last_generation(&folder.join(METRICS)).unwrap_or((0, 0.0));
+            (Some([done, config.generations]), Some((done, seconds)).filter(|_| state != State::Waiting))
+        }
+        Run::Train(_) => (None, None),
+    };
+    let seconds = match (state, of_run) {
+        (State::Waiting, _) => None,
+        (State::Running, Some((_, seconds))) => Some(seconds),
+        _ => known.map(|known| known.seconds),
+    };
+    let left = |(done, seconds): (u64, f64)| {
+        let todo = task.amount().saturating_sub(done);
+        (done > 0 && todo > 0).then(|| seconds * todo as f64 / done as f64)
+    };
+    let seconds_left = if state == State::Done { Some(0.0) } else { of_run.and_then(left) };
+    Ok(Status { task: number, name: task.name.clone(), state, generations, seconds, seconds_left, about })
+}
+
+/// Generations that a metrics.csv has, and the wall-clock time they took \[s\]. Only the end of the
+/// file is read: a long run's has megabytes.
+fn last_generation(path: &Path) -> Option<(u64, f64)> {
+    let mut file = std::fs::File::open(path).ok()?;
+    let length = file.metadata().ok()?.len();
+    file.seek(SeekFrom::Start(length.saturating_sub(ROW))).ok()?;
+    let mut text = Vec::new();
+    file.read_to_end(&mut text).ok()?;
+    let text = String::from_utf8_lossy(&text);
+    let line = text.split_inclusive('\n').rfind(|line| line.ends_with('\n'))?.trim_end();
+    let generation: u64 = line.split(',').next()?.parse().ok()?;
+    Some((generation + 1, line.rsplit(',').next()?.parse().ok()?))
+}

@@ -1,0 +1,218 @@
+//! One task: its run, then its steps, as far as they are not done.
+
+use crate::base::error::{Error, ErrorKind};
+use crate::base::observer::Observer;
+use crate::base::ranks::Ranks;
+use crate::commands::tasks::task::{Place, Run, Task, selection};
+use crate::commands::{audit, eval};
+use crate::search::showing::task_of;
+use crate::search::{evolve, showing, train, validation};
+use crate::store::audit::{AuditFile, RobotAudit};
+use crate::store::eval::EvalFile;
+use crate::store::folder::IfExists;
+use crate::store::images::HowMany;
+use crate::store::lock::Lock;
+use crate::store::names::{AUDIT_JSON, RUN_JSON, TASK_JSON, TASK_LOCK};
+use crate::store::robots::{Selection, Source};
+use crate::store::run::Robot;
+use crate::store::setting::RunRef;
+use crate::store::task::{State, TaskFile};
+use crate::task::direction;
+use std::collections::BTreeSet;
+use std::sync::atomic::AtomicBool;
+use std::time::Instant;
+
+/// Does a task, or goes on with it.
+///
+/// # Errors
+/// Why it failed; that it was stopped; that another process is at it.
+pub fn run(task: &Task, place: &Place, stop: &AtomicBool, observer: &dyn Observer) -> Result<(), Error> {
+    let folder = place.folder(task);
+    std::fs::create_dir_all(&folder).map_err(|error| Error::writing(&folder, &error))?;
+    let lock = folder.join(TASK_LOCK);
+    let _lock = Lock::take(&lock, stop, observer).map_err(|refusal| {
+        let held = format!("{}: another process is at this task", folder.display());
+        refusal.into_error(&lock, &held, "let it end, or stop it")
+    })?;
+    let path = folder.join(TASK_JSON);
+    let known = TaskFile::read(&path)?;
+    if is_done(known.as_ref(), task) {
+        return Ok(());
+    }
+    let mut file = TaskFile::new(task.settings(), task.asked());
+    let before = known.map_or(0.0, |known| known.seconds);
+    file.seconds = before;
+    file.write(&path)?;
+    let began = Instant::now();
+    let ended = steps(task, place, stop, observer);
+    file.seconds = before + began.elapsed().as_secs_f64();
+    (file.state, file.error) = match &ended {
+        Ok(()) => (State::Done, None),
+        Err(error) if error.kind == ErrorKind::Stopped => (State::Stopped, None),
+        Err(error) => (State::Failed, Some(error.message.clone())),
+    };
+    file.write(&path)?;
+    ended
+}
+
+/// Whether all of a task is done. More generations, or other steps, are still to do.
+pub(super) fn is_done(known: Option<&TaskFile>, task: &Task) -> bool {
+    known.is_some_and(|known| {
+        known.state == State::Done && known.settings == task.settings() && known.asked == task.asked()
+    })
+}
+
+/// The run, and the steps after it. What was done before is not done again.
+fn steps(task: &Task, place: &Place, stop: &AtomicBool, observer: &dyn Observer) -> Result<(), Error> {
+    let folder = place.folder(task);
+    let stopped = || Error::stopped("stopped; what is done so far is kept".to_string());
+    match &task.run {
+        Run::Evolve(config, name) => {
+            let options = evolve::Options {
+                config: (**config).clone(),
+                name: name.clone(),
+                out: folder.clone(),
+                if_exists: IfExists::Resume,
+                data: place.data.clone(),
+                threads: place.threads,
+                ranks: Ranks::ALONE,
+            };
+            let finished = evolve::evolve(&options, stop, observer).map_err(elsewhere)?;
+            if written(finished.stopped, finished.unwritten)? {
+                return Err(stopped());
+            }
+        }
+        Run::Train(training) => {
+            let options = train::Options {
+                archive: training.archive.clone(),
+                robots: selection("robots", &training.robots)?,
+                groups: training.groups.clone(),
+                seed: Some(training.seed),
+                set: training.set.clone(),
+                name: task.name.clone(),
+                out: folder.clone(),
+                if_exists: IfExists::Resume,
+                data: place.data.clone(),
+                threads: place.threads,
+            };
+            if train::train(&options, stop, observer).map_err(elsewhere)?.validated.is_none() {
+                return Err(stopped());
+            }
+        }
+    }
+    let archive = folder.join(RUN_JSON);
+    if let Some(step) = &task.steps.audit {
+        let robots = match selection("audit.robots", &step.robots)? {
+            Selection::Validated(best) => {
+                let options = validation::Options {
+                    archive: archive.clone(),
+                    best: Some(best),
+                    data: place.data.clone(),
+                    threads: place.threads,
+                };
+                let found = validation::validate(&options, stop, observer)?.ok_or_else(stopped)?;
+                Selection::Ids(found.into_iter().map(|robot| robot.id).collect())
+            }
+            robots => robots,
+        };
+        let options = audit::Options {
+            source: audit::Source::Archive(archive.clone()),
+            robots,
+            seed: 1,
+            criteria: step.criteria.clone(),
+            data: place.data.clone(),
+            out: folder.join(AUDIT_JSON),
+            threads: place.threads,
+            ranks: Ranks::ALONE,
+        };
+        let finished = audit::audit(&options, stop, observer)?;
+        if written(finished.stopped, finished.unwritten)? {
+            return Err(stopped());
+        }
+    }
+    if let Some(step) = &task.steps.eval {
+        let sources = [Source::read(&archive)?];
+        let options = eval::Options {
+            archives: vec![archive],
+            robots: selection("eval.robots", &step.robots)?.physical(step.physical_only),
+            images: step.images,
+            split: step.split,
+            validation: None,
+            seed: 1,
+            threshold: direction::THRESHOLD,
+            cycles: showing::CYCLES,
+            data: place.data.clone(),
+            dataset: None,
+            out: folder.join(eval::own_name(step.split)),
+            threads: place.threads,
+            ranks: Ranks::ALONE,
+        };
+        if let Ok(known) = EvalFile::read(&options.out)
+            && is_of(&known, &sources, &options)
+            && is_of_robots(&known, &sources[0], &options)?
+        {
+            return Ok(());
+        }
+        let finished = eval::eval(&options, stop, observer)?;
+        if written(finished.file.stopped, finished.unwritten)? {
+            return Err(stopped());
+        }
+    }
+    Ok(())
+}
+
+/// Tasks have no options of their own, as hints of `evolve` and `train` name them; and a run of
+/// another kind in the folder is no process that works there.
+fn elsewhere(error: Error) -> Error {
+    match &error.hint {
+        Some(hint) if hint.contains("--force") || hint.contains("--resume") => {
+            let hint = "move that folder away, or name another with --out".to_string();
+            Error { kind: ErrorKind::Input, ..error }.hint(hint)
+        }
+        _ => error,
+    }
+}
+
+/// Whether an evaluation is whole, and of these runs and images; its robots are another question.
+pub(crate) fn is_of(known: &EvalFile, sources: &[Source], options: &eval::Options) -> bool {
+    let runs: Vec<RunRef> = sources.iter().map(RunRef::of).collect();
+    let same = (known.seed, known.split, HowMany::Evenly(known.images.len()), known.threshold)
+        == (options.seed, options.split, options.images, options.threshold);
+    let is_ours = known.program_version == env!("CARGO_PKG_VERSION");
+    is_ours && !known.stopped && known.trained_on.is_none() && known.runs == runs && same
+}
+
+/// Whether an evaluation is of the robots that would be chosen from a run now: verdicts may be others
+/// than they were.
+fn is_of_robots(known: &EvalFile, source: &Source, options: &eval::Options) -> Result<bool, Error> {
+    let run = &source.run;
+    let is_known = |robot: &Robot| known.robots.iter().any(|other| other.id == robot.id);
+    if known.selected != options.robots.describe() {
+        return Ok(false);
+    }
+    if options.robots.validated().is_some() {
+        // Validation images choose the same robots again, of those that are physical now.
+        let audit = AuditFile::if_any(run, &source.path)?;
+        let is_physical = |robot: &Robot| {
+            audit.as_ref().and_then(|audit| audit.robot(&robot.id)).is_some_and(RobotAudit::is_physical)
+        };
+        let wants_physical = matches!(options.robots, Selection::Physical(_));
+        return Ok(!wants_physical || run.elites.iter().filter(|robot| is_known(robot)).all(is_physical));
+    }
+    let grouping = run.config.grouping()?;
+    let chosen = options.robots.of(std::slice::from_ref(source), options.seed)?;
+    let mut ids: BTreeSet<&str> = BTreeSet::new();
+    ids.extend(chosen.iter().filter(|c| task_of(&grouping, c.robot).is_some()).map(|c| c.robot.id.as_str()));
+    Ok(ids == known.robots.iter().map(|robot| robot.id.as_str()).collect())
+}
+
+/// What later steps read from its file, which must be there.
+pub(crate) fn written<T>(found: T, unwritten: Option<Error>) -> Result<T, Error> {
+    match unwritten {
+        None => Ok(found),
+        Some(error) => {
+            let hint = error.hint.clone().map_or(String::new(), |hint| format!("{hint}; "));
+            Err(error.hint(format!("{hint}the same command goes on")))
+        }
+    }
+}

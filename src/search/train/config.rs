@@ -1,0 +1,124 @@
+//! The config of a training: that of its gaits with another task, and as many images as there are.
+
+use crate::base::error::Error;
+use crate::base::observer::Observer;
+use crate::config::evaluation::EvaluationConfig;
+use crate::config::task::TaskConfig;
+use crate::config::validation::{LEAST, ValidationConfig};
+use crate::config::{BodyConfig, Config, DataConfig, reading};
+use crate::data::dataset::{Dataset, Split};
+use crate::search::held_out;
+use crate::search::training::{Training, scarcest};
+use crate::store::whereabouts::Whereabouts;
+use crate::task::fitness::Fitness;
+use crate::task::protocol::{Protocol, RolloutMode};
+use std::path::Path;
+
+/// Least number of training images of a class.
+const LEAST_PER_CLASS: usize = 2;
+
+/// The config of the run that is made: that of the walkers' run with another task, perhaps another
+/// seed, and the keys that are set.
+///
+/// # Errors
+/// What is wrong with these.
+pub(crate) fn config_of(
+    of_walkers: &Config,
+    groups: &[Vec<u8>; 2],
+    seed: Option<u64>,
+    set: &[String],
+) -> Result<Config, Error> {
+    let evaluation = EvaluationConfig { fitness: Fitness::MeanClipped };
+    let base = Config {
+        seed: seed.unwrap_or(of_walkers.seed),
+        generations: 1,
+        task: TaskConfig { groups: Some(groups.clone()), ..TaskConfig::default() },
+        data: DataConfig { train_images: None, ..of_walkers.data.clone() },
+        protocol: Protocol { rollout: RolloutMode::Fresh, ..of_walkers.protocol.clone() },
+        evaluation,
+        validation: ValidationConfig { best: 1, ..of_walkers.validation },
+        ..of_walkers.clone()
+    };
+    let asked = base.clone();
+    let check = |config: &Config| fixed(config, &asked).and_then(|()| config.validate());
+    let config = reading::changed(base, set, check, |error| error)?;
+    let BodyConfig { height, width, .. } = of_walkers.body;
+    if (config.body.height, config.body.width) != (height, width) {
+        let found = format!("{} × {} voxels", config.body.height, config.body.width);
+        return Err(Error::value("body", found, &format!("{height} × {width}, as the gaits have")));
+    }
+    if config.task != asked.task {
+        return Err(Error::at(
+            "task",
+            "expected the groups that are trained to be said once, not as a key, too",
+        ));
+    }
+    if config.seed != asked.seed {
+        return Err(Error::value("seed", config.seed, &format!("{}, as said elsewhere", asked.seed)));
+    }
+    Ok(config)
+}
+
+/// Whether a config has what trainings have, and nothing in its place.
+fn fixed(config: &Config, asked: &Config) -> Result<(), Error> {
+    let fixed = [
+        ("generations", config.generations != asked.generations, "has rounds and challengers"),
+        (
+            "data.images_per_class",
+            config.data.images_per_class != asked.data.images_per_class,
+            "has train.images_per_class",
+        ),
+        ("evaluation", config.evaluation != asked.evaluation, "has a fitness of its own"),
+        ("protocol.rollout", config.protocol.rollout != asked.protocol.rollout, "has fresh rollouts"),
+    ];
+    match fixed.into_iter().find(|(_, is_set, _)| *is_set) {
+        Some((key, _, has)) => Err(Error::at(key, format!("expected without: a training {has}"))),
+        None => Ok(()),
+    }
+}
+
+/// The same with as many training images as there are beside those that validate; of few images
+/// fewer validate than the config asks for, too. `before`: what the gaits were trained on.
+///
+/// # Errors
+/// If there are too few to train on, or to validate with.
+pub(crate) fn with_images(
+    config: Config,
+    before: &[usize],
+    dataset: &Dataset,
+    observer: &dyn Observer,
+) -> Result<Config, Error> {
+    let classes = config.classes();
+    let fewest = scarcest(dataset, &classes, LEAST_PER_CLASS)?;
+    let ValidationConfig { images, best } = config.validation;
+    let mut per_class = config.train.images_per_class.min((fewest * 3 / 4).max(1));
+    let mut validation = config.validation;
+    let wanted = images.div_ceil(classes.len());
+    if best > 0 && fewest - per_class < wanted {
+        per_class = per_class.min((fewest * 2 / 3).max(1));
+        let there = (fewest - per_class).min(wanted) * classes.len();
+        // What was asked for by a number of one's own is kept, or refused.
+        let is_asked = images != ValidationConfig::default().images;
+        if !is_asked && (LEAST..images).contains(&there) {
+            observer
+                .warning(&format!("validating on {there} images in place of {images}: there are no more"));
+            validation.images = there;
+        }
+    }
+    let data = DataConfig { images_per_class: per_class, ..config.data.clone() };
+    let config = Config { data, validation, ..config };
+    config.validate()?;
+    held_out::check(&config, before, "train.images_per_class", dataset)?;
+    Ok(config)
+}
+
+/// Whether a run's gaits, when they have evolved, can be trained to tell these groups apart: to be
+/// known before they evolve.
+///
+/// # Errors
+/// If the config, or the images there are, do not allow it.
+pub fn check(evolved: &Config, groups: &[Vec<u8>; 2], data: Option<&Path>) -> Result<(), Error> {
+    let config = config_of(evolved, groups, None, &[])?;
+    let dataset = Whereabouts::given(data).load(&config.data, &[Split::Train])?;
+    with_images(config, &Training::indices(evolved, &dataset)?, &dataset, &()).map(|_| ())
+}

@@ -1,0 +1,170 @@
+//! What a training simulates, kept in `training.json`, so that one that goes on has it again.
+
+use crate::base::Grid;
+use crate::base::error::Error;
+use crate::base::files::{read_text, write_atomically};
+use crate::base::observer::{Observer, Work};
+use crate::body::Body;
+use crate::config::{Config, reading};
+use crate::store::training::{Batch, FILE, File};
+use crate::task::evaluation::fresh_rollouts;
+use crate::task::perturbation::Condition;
+use crate::task::teach::{Plan, Rollouts};
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::time::{Duration, Instant};
+
+/// How often the rollouts are saved. A power cut costs as much.
+const SAVE_EVERY: Duration = Duration::from_secs(5);
+
+/// What is simulated, and was in sessions before.
+pub(super) struct Log<'a> {
+    path: PathBuf,
+    key: String,
+    batches: Vec<Batch>,
+    /// Batches asked for so far.
+    asked: usize,
+    /// Rollouts in them.
+    pub(super) simulated: usize,
+    saved: (usize, Instant),
+    /// Rollouts of the work that began last; none if others are counted than rollouts.
+    done: Option<AtomicU64>,
+    pub(super) stop: &'a AtomicBool,
+    observer: &'a dyn Observer,
+}
+
+impl<'a> Log<'a> {
+    pub(super) fn open(
+        path: PathBuf,
+        key: String,
+        stop: &'a AtomicBool,
+        observer: &'a dyn Observer,
+    ) -> Result<Self, Error> {
+        let mut batches = Vec::new();
+        if path.exists() {
+            let text = read_text(&path).map_err(|error| Error::reading(&path, &error))?;
+            let name = path.display().to_string();
+            let anew = || "train anew with --force".to_string();
+            let file: File =
+                reading::read_versioned(&text, &name, FILE.0, FILE.1).map_err(|e| e.hint(anew()))?;
+            if file.key != key {
+                let text = format!(
+                    "{name}: expected the training that began here: other robots, images or settings"
+                );
+                return Err(Error::usage(text).hint(
+                    "go on with those, write elsewhere with --out, or train anew with --force".to_string(),
+                ));
+            }
+            batches = file.rollouts;
+        }
+        let saved = (batches.len(), Instant::now());
+        Ok(Log { path, key, batches, asked: 0, simulated: 0, saved, done: None, stop, observer })
+    }
+
+    /// Work begins whose rollouts are counted.
+    pub(super) fn begins(&mut self, label: String, rollouts: usize) {
+        self.observer.begins(&Work::new(label, rollouts as u64, "rollouts"));
+        self.done = Some(AtomicU64::new(0));
+    }
+
+    /// A round begins, or, where there are none, the look at the robot as it is.
+    pub(super) fn begins_round(&mut self, robot: &str, number: usize, plan: &Plan) {
+        match plan.rounds {
+            0 => self.begins(format!("{robot}: as it is:"), plan.images),
+            rounds => self.begins(format!("{robot}: round {number} of {rounds}:"), plan.images),
+        }
+    }
+
+    /// Work begins of which each challenger is told by itself.
+    pub(super) fn begins_challenges(&mut self, challengers: usize) {
+        self.observer.begins(&Work::new("refining:".to_string(), challengers as u64, "challengers"));
+        self.done = None;
+    }
+
+    fn rolled(&self, count: u64) {
+        if let Some(done) = &self.done {
+            self.observer.progress(done.fetch_add(count, Ordering::Relaxed) + count);
+        }
+    }
+
+    /// Rollouts of a body under stimuli and conditions; the first are `known`.
+    pub(super) fn rollouts(
+        &mut self,
+        body: &Body,
+        (stimuli, conditions): (&[Grid<f64>], &[Condition]),
+        known: &[Option<f64>],
+        config: &Config,
+    ) -> Result<Batch, Error> {
+        let number = self.asked;
+        self.asked += 1;
+        self.simulated += stimuli.len();
+        if let Some(batch) = self.batches.get(number) {
+            return match batch.len() == stimuli.len() {
+                true => {
+                    self.rolled(batch.len() as u64);
+                    Ok(batch.clone())
+                }
+                false => {
+                    let text = format!(
+                        "{}: rollouts {number}: expected {}, found {}",
+                        self.path.display(),
+                        stimuli.len(),
+                        batch.len()
+                    );
+                    Err(Error::input(text).hint("train anew with --force".to_string()))
+                }
+            };
+        }
+        let setting = (&config.physics, &config.protocol);
+        let known = &known[..known.len().min(stimuli.len())];
+        let (stimuli, conditions) = (&stimuli[known.len()..], &conditions[known.len()..]);
+        self.rolled(known.len() as u64);
+        let told = |count| self.rolled(count);
+        let found = fresh_rollouts(body, stimuli, conditions, setting, &told, self.stop);
+        let (found, _) = found.map_err(|_| stopped())?;
+        let batch: Batch = known.iter().copied().chain(found.into_iter().map(Result::ok)).collect();
+        self.batches.push(batch.clone());
+        if self.saved.1.elapsed() >= SAVE_EVERY {
+            self.save()?;
+        }
+        Ok(batch)
+    }
+
+    pub(super) fn save(&mut self) -> Result<(), Error> {
+        if self.saved.0 == self.batches.len() && self.path.exists() {
+            return Ok(());
+        }
+        let file = File {
+            format: FILE.0.to_string(),
+            format_version: FILE.1,
+            key: self.key.clone(),
+            rollouts: self.batches.clone(),
+        };
+        let text = serde_json::to_string(&file).expect("numbers are finite and keys are text") + "\n";
+        write_atomically(&self.path, text.as_bytes()).map_err(|error| Error::writing(&self.path, &error))?;
+        self.saved = (self.batches.len(), Instant::now());
+        Ok(())
+    }
+}
+
+pub(super) fn stopped() -> Error {
+    Error::stopped("stopped; what was simulated is saved".to_string())
+        .hint("the same command with --resume goes on".to_string())
+}
+
+/// Rollouts that are kept.
+pub(super) struct Kept<'a, 'b> {
+    pub(super) config: &'a Config,
+    pub(super) conditions: &'a [Condition],
+    pub(super) log: &'a mut Log<'b>,
+}
+
+impl Rollouts for Kept<'_, '_> {
+    type Error = Error;
+
+    fn roll(&mut self, body: &Body, stimuli: &[Grid<f64>], conditions: &[usize]) -> Result<Batch, Error> {
+        let conditions: Vec<Condition> =
+            conditions.iter().map(|number| self.conditions[*number].clone()).collect();
+        self.log.rollouts(body, (stimuli, &conditions), &[], self.config)
+    }
+}
