@@ -15,7 +15,7 @@ mod sweep;
 mod tasks;
 mod team;
 mod train;
-mod words;
+mod values;
 
 use crate::analysis::gallery;
 use crate::base::error::{Error, ErrorKind};

@@ -145,7 +145,7 @@ fn what_cannot_be_compared_is_refused() {
     sandbox.write("gallery.json", published);
     sandbox.run("capacity --eval gallery.json --physical-only").ended(2, &["published"]);
     sandbox.run("capacity --eval runs/3/run.json").ended(3, &["morphcog-eval"]);
-    sandbox.run("capacity --eval nowhere.json").ended(3, &["nowhere.json"]);
+    sandbox.run("capacity --eval nowhere.json").ended(3, &["nowhere.json", "hint: morphcog eval makes one"]);
 }
 
 #[test]

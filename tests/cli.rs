@@ -1023,7 +1023,9 @@ fn what_an_evaluation_is_asked_for_must_make_sense() {
     for wrong in ["--threshold nan", "--threshold=-1", "--threshold inf", "--images 1"] {
         sandbox.run(&format!("eval -a run/run.json --cycles 1 {wrong}")).ended(2, &[&wrong[..8]]);
     }
-    sandbox.run("eval -a nowhere/run.json").ended(3, &["nowhere/run.json"]);
+    sandbox
+        .run("eval -a nowhere/run.json")
+        .ended(3, &["nowhere/run.json", "hint: expected a run.json, its folder"]);
     std::fs::create_dir(sandbox.path("empty")).unwrap();
     sandbox.run("eval -a empty").ended(3, &["empty/run.json"]);
     // The same robots twice would count twice.

@@ -101,6 +101,12 @@ impl Error {
         Error::input(format!("{}: cannot be read: {error}", path.display()))
     }
 
+    /// The same, and where there is no such file, what makes one or is meant instead.
+    pub fn reading_or(path: &Path, error: &io::Error, hint: &str) -> Self {
+        let text = Error::reading(path, error);
+        if error.kind() == io::ErrorKind::NotFound { text.hint(hint.to_string()) } else { text }
+    }
+
     /// A file cannot be written; if there is no room for it, with what to do.
     pub fn writing(path: &Path, error: &io::Error) -> Self {
         let place = match path.parent() {

@@ -2,7 +2,7 @@
 
 use crate::cli::audit::AuditArgs;
 use crate::cli::capacity::CapacityArgs;
-use crate::cli::choice::{Archives, ROBOTS, run_json, threads};
+use crate::cli::choice::{Archives, ROBOTS, run_json};
 use crate::cli::demo::DemoArgs;
 use crate::cli::plot::PlotArgs;
 use crate::cli::report::ReportArgs;
@@ -12,7 +12,7 @@ use crate::cli::serve::ServeArgs;
 use crate::cli::sweep::SweepArgs;
 use crate::cli::team::TeamArgs;
 use crate::cli::train::TrainArgs;
-use crate::cli::words::{held_out, offering};
+use crate::cli::values::{decimal, held_out, offering, seed, threads, whole};
 use crate::cli::{audit, capacity, demo, plot, report, reproduce, response, serve, sweep, team, train};
 use crate::commands::plan::PAPER_TOML;
 use crate::commands::replay::Shown;
@@ -221,10 +221,10 @@ pub(super) struct EvolveArgs {
     #[arg(long, value_name = "KEY=VALUE", help = SET)]
     pub(super) set: Vec<String>,
     /// Random seed.
-    #[arg(long, value_parser = clap::value_parser!(u64).range(..=config::MAX_NUMBER))]
+    #[arg(long, value_parser = seed())]
     pub(super) seed: Option<u64>,
     /// Number of generations.
-    #[arg(short, long, value_parser = clap::value_parser!(u64).range(1..=config::MAX_NUMBER))]
+    #[arg(short, long, value_parser = whole::<u64>(1..=config::MAX_NUMBER))]
     pub(super) generations: Option<u64>,
     /// Threads (default: one per core); the result does not depend on it.
     #[arg(long, value_parser = threads())]
@@ -263,22 +263,22 @@ pub(super) struct EvalArgs {
     #[arg(short, long, visible_aliases = ["robot", "select"], default_value = "top:10", help = ROBOTS)]
     pub(super) robots: Vec<Selection>,
     /// Validation images in all, for best-validation (default: those of the config, or 400).
-    #[arg(long, value_name = "IMAGES", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    #[arg(long, value_name = "IMAGES", value_parser = whole::<u32>(1..=1_000_000))]
     pub(super) validation: Option<u32>,
     /// Only robots that morphcog audit found physical.
     #[arg(long)]
     pub(super) physical_only: bool,
     /// Random seed for drawing images, and robots with random:N.
-    #[arg(long, default_value_t = 1)]
+    #[arg(long, default_value_t = 1, value_parser = whole::<u64>(0..))]
     pub(super) seed: u64,
     /// A dataset other than the run's, such as builtin: its test images are shown.
     #[arg(long, value_name = "NAME")]
     pub(super) dataset: Option<String>,
     /// Displacements up to this many voxel lengths are wrong.
-    #[arg(long, default_value_t = direction::THRESHOLD)]
+    #[arg(long, default_value_t = direction::THRESHOLD, value_parser = decimal())]
     pub(super) threshold: f64,
     /// Actuation cycles per image.
-    #[arg(long, default_value_t = showing::CYCLES, value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    #[arg(long, default_value_t = showing::CYCLES, value_parser = whole::<u32>(1..=10_000))]
     pub(super) cycles: u32,
     /// Folder with the images.
     #[arg(long, value_name = "DIR")]
@@ -297,7 +297,7 @@ pub(super) struct ReplayArgs {
     #[arg(short, long, visible_aliases = ["robots", "select"], default_value = "best", help = ROBOT)]
     pub(super) robot: Selection,
     /// Random seed for random:1.
-    #[arg(long, default_value_t = 1)]
+    #[arg(long, default_value_t = 1, value_parser = whole::<u64>(0..))]
     pub(super) seed: u64,
     /// Only robots that morphcog audit found physical: "best" is the best of them.
     #[arg(long)]
@@ -322,14 +322,14 @@ pub(super) struct ReplayArgs {
     #[arg(short, long, value_name = "FILE")]
     pub(super) out: Option<PathBuf>,
     /// Width of GIF and PNG in pixels.
-    #[arg(long, default_value_t = 480)]
+    #[arg(long, default_value_t = 480, value_parser = whole::<u32>(0..))]
     pub(super) width: u32,
     /// Control steps from one frame of the GIF to the next: 1 is the robot's own time, more is
     /// faster and a smaller file.
-    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=500))]
+    #[arg(long, default_value_t = 1, value_parser = whole::<u16>(1..=500))]
     pub(super) every: u16,
     /// Frames of the GIF per second: 25 with --every 2 is the robot's own time in half the frames.
-    #[arg(long, default_value_t = 50, value_parser = clap::value_parser!(u32).range(1..=50))]
+    #[arg(long, default_value_t = 50, value_parser = whole::<u32>(1..=50))]
     pub(super) fps: u32,
     /// How GIF and PNG draw the world: plain, or as in the paper's videos.
     #[arg(long, default_value_t = Look::Plain, value_parser = offering(["plain", "paper"], str::parse::<Look>))]
@@ -382,7 +382,7 @@ pub(super) enum DataCommand {
         #[command(flatten)]
         dataset: DatasetArgs,
         /// Images per class.
-        #[arg(short, long, default_value_t = 16)]
+        #[arg(short, long, default_value_t = 16, value_parser = whole::<usize>(0..))]
         samples: usize,
         /// The test images instead of the training images.
         #[arg(long)]

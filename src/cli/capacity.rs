@@ -2,7 +2,7 @@
 
 use crate::base::error::Error;
 use crate::base::signals;
-use crate::cli::choice::threads;
+use crate::cli::values::threads;
 use crate::commands::capacity;
 use crate::commands::capacity::Options;
 use crate::config::capacity::CapacityConfig;

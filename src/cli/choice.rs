@@ -6,7 +6,6 @@ use crate::base::error::Error;
 use crate::base::named;
 use crate::base::signals;
 use crate::base::stop::NEVER;
-use crate::base::threads::MOST_THREADS;
 use crate::commands::one_by_one;
 use crate::commands::one_by_one::Named;
 use crate::store::folder;
@@ -15,7 +14,7 @@ use crate::store::run::RunFile;
 use crate::view::console::Console;
 use crate::view::reporters::Reporter;
 use clap::Args;
-use clap::builder::{PathBufValueParser, RangedI64ValueParser, TypedValueParser};
+use clap::builder::{PathBufValueParser, TypedValueParser};
 use std::path::PathBuf;
 
 /// Archives, of a command that takes several.
@@ -102,9 +101,4 @@ pub(super) fn run_json() -> impl TypedValueParser<Value = PathBuf> {
 /// Reads the path of a run.json, or of its folder, or the name of shipped runs.
 pub(super) fn run_jsons() -> impl TypedValueParser<Value = Runs> {
     PathBufValueParser::new().try_map(|path| folder::run_json(path).map(Runs))
-}
-
-/// Reads a number of threads, or of what needs one each.
-pub(super) fn threads() -> RangedI64ValueParser<u16> {
-    clap::value_parser!(u16).range(1..=i64::from(MOST_THREADS))
 }

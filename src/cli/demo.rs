@@ -3,11 +3,10 @@
 use crate::base::error::{Error, ErrorKind};
 use crate::base::ranks::Ranks;
 use crate::base::{shipped, signals};
-use crate::cli::choice::threads;
+use crate::cli::values::{seed, threads};
 use crate::cli::{replay_best, test};
 use crate::commands::replay::Shown;
 use crate::commands::{eval, replay};
-use crate::config;
 use crate::data::builtin::BuiltinDigits;
 use crate::data::dataset::{Dataset, Split};
 use crate::search::showing::CYCLES;
@@ -57,7 +56,7 @@ const TEST_IMAGES: usize = 200;
 #[derive(Debug, Args)]
 pub(super) struct DemoArgs {
     /// Random seed.
-    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u64).range(..=config::MAX_NUMBER))]
+    #[arg(long, default_value_t = 1, value_parser = seed())]
     seed: u64,
     /// Run folder.
     #[arg(short, long, value_name = "DIR", default_value = "runs/demo")]

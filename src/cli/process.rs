@@ -3,9 +3,10 @@
 use crate::base::error::{Error, ErrorKind};
 use crate::base::ranks::Ranks;
 use crate::base::text::is_unseen;
+use crate::cli::values::with_negative_numbers;
 use crate::cli::{Cli, run};
 use crate::view::console::{Console, Mode};
-use clap::Parser;
+use clap::{CommandFactory, FromArgMatches};
 use std::ffi::OsString;
 use std::io;
 use std::sync::OnceLock;
@@ -32,7 +33,8 @@ const LEAD_SPEAKS: Duration = Duration::from_secs(2);
 /// is to say is said by then.
 pub fn main(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     let arguments: Vec<OsString> = arguments.into_iter().collect();
-    let cli = match Cli::try_parse_from(&arguments) {
+    let matches = with_negative_numbers(Cli::command()).try_get_matches_from(&arguments);
+    let cli = match matches.and_then(|matches| Cli::from_arg_matches(&matches)) {
         Ok(cli) => cli,
         Err(help) => return say(&help, &arguments),
     };

@@ -3,6 +3,7 @@
 use crate::base::error::Error;
 use crate::base::signals;
 use crate::cli::tasks::{Command, What, Where, asked, ended};
+use crate::cli::values::decimal;
 use crate::commands::plan::{PAPER_TOML, Plan};
 use crate::commands::reproduce;
 use crate::commands::reproduce::Options;
@@ -30,7 +31,7 @@ pub(super) struct ReproduceArgs {
     plan: String,
     /// More than 0, up to 1: generations are multiplied by it, test images and trainings by its
     /// square root.
-    #[arg(long, default_value_t = 1.0)]
+    #[arg(long, default_value_t = 1.0, value_parser = decimal())]
     scale: f64,
     /// Change a key, such as seeds=[1,2] or experiment.1.config=mine.toml (experiments are counted
     /// from 1); without a value, it is reset to its default; may be given several times.

@@ -3,6 +3,7 @@
 use crate::base::error::Error;
 use crate::base::signals;
 use crate::cli::choice::Archives;
+use crate::cli::values::whole;
 use crate::serve::server::Server;
 use crate::serve::{Options, Service};
 use crate::store::folder;
@@ -27,7 +28,7 @@ pub(super) struct ServeArgs {
     #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,
     /// Port (default: one that is free).
-    #[arg(short, long, default_value_t = 0, hide_default_value = true)]
+    #[arg(short, long, default_value_t = 0, hide_default_value = true, value_parser = whole::<u16>(0..=65535))]
     port: u16,
     /// Do not open the browser.
     #[arg(long)]

@@ -4,9 +4,8 @@ use crate::base::error::Error;
 use crate::base::text::counted;
 use crate::base::{shipped, signals};
 use crate::cli::choice;
-use crate::cli::choice::threads;
 use crate::cli::choice::{Archives, selected};
-use crate::cli::words::held_out;
+use crate::cli::values::{held_out, threads, whole};
 use crate::commands::team;
 use crate::commands::team::Options;
 use crate::store::folder;
@@ -56,7 +55,7 @@ pub(super) struct TeamArgs {
     #[arg(long, default_value_t = HeldOut::Test, value_name = "SPLIT", value_parser = held_out())]
     split: HeldOut,
     /// Random seed for drawing images, and robots with random:N.
-    #[arg(long, default_value_t = 1)]
+    #[arg(long, default_value_t = 1, value_parser = whole::<u64>(0..))]
     seed: u64,
     /// Folder with the images.
     #[arg(long, value_name = "DIR")]

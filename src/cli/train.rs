@@ -5,10 +5,9 @@ use crate::base::named;
 use crate::base::ranks::Ranks;
 use crate::base::signals;
 use crate::cli::choice;
-use crate::cli::choice::threads;
 use crate::cli::choice::{ROBOTS, run_json, selected};
+use crate::cli::values::{seed, threads};
 use crate::commands::audit;
-use crate::config;
 use crate::config::audit::Criteria;
 use crate::search::train::{Finished, Options, groups};
 use crate::search::{evolve, train};
@@ -53,7 +52,7 @@ pub(super) struct TrainArgs {
     #[arg(short, long, visible_aliases = ["robot", "select"], default_value = "top:4", help = ROBOTS)]
     robots: Vec<Selection>,
     /// Random seed (default: that of the archive's run).
-    #[arg(long, value_parser = clap::value_parser!(u64).range(..=config::MAX_NUMBER))]
+    #[arg(long, value_parser = seed())]
     seed: Option<u64>,
     /// Change a key, such as train.rounds=10 or data.dataset=fashion-mnist; may be given several
     /// times.

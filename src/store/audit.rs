@@ -105,7 +105,8 @@ impl AuditFile {
     /// # Errors
     /// What is wrong with the file, with its line and key.
     pub fn read(path: &Path) -> Result<Self, Error> {
-        let text = read_text(path).map_err(|error| Error::reading(path, &error))?;
+        let text =
+            read_text(path).map_err(|error| Error::reading_or(path, &error, "morphcog audit makes one"))?;
         AuditFile::parse(&text, &path.display().to_string())
     }
 

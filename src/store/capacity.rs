@@ -104,7 +104,8 @@ impl CapacityFile {
     /// # Errors
     /// What is wrong with the file, with its line and key.
     pub fn read(path: &Path) -> Result<Self, Error> {
-        let text = read_text(path).map_err(|error| Error::reading(path, &error))?;
+        let text = read_text(path)
+            .map_err(|error| Error::reading_or(path, &error, "morphcog capacity makes one"))?;
         reading::read_versioned(&text, &path.display().to_string(), FORMAT, FORMAT_VERSION)
     }
 

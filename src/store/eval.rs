@@ -331,7 +331,8 @@ impl EvalFile {
     /// # Errors
     /// What is wrong with the file, with its line and key.
     pub fn read(path: &Path) -> Result<Self, Error> {
-        let text = read_text(path).map_err(|error| Error::reading(path, &error))?;
+        let text =
+            read_text(path).map_err(|error| Error::reading_or(path, &error, "morphcog eval makes one"))?;
         let name = path.display().to_string();
         let file: EvalFile = reading::read_versioned(&text, &name, FORMAT, FORMAT_VERSION)?;
         let checked = file.setting.as_ref().map_or(Ok(()), Setting::check);

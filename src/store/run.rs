@@ -28,6 +28,9 @@ pub const FORMAT: &str = "morphcog-run";
 /// Version of its schema; a reader refuses newer ones.
 pub const FORMAT_VERSION: u32 = 1;
 
+/// What stands for a run on the command line.
+const WHAT_RUNS: &str = "expected a run.json, its folder, or runs that ship, such as gallery:zero_one";
+
 /// A robot: a genome, its body, and what it did on the training images.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -137,7 +140,7 @@ impl RunFile {
     /// # Errors
     /// What is wrong with the file, with its line and key.
     pub fn read(path: &Path) -> Result<Self, Error> {
-        let text = read_text(path).map_err(|error| Error::reading(path, &error))?;
+        let text = read_text(path).map_err(|error| Error::reading_or(path, &error, WHAT_RUNS))?;
         RunFile::parse(&text, &path.display().to_string())
     }
 

@@ -259,7 +259,8 @@ impl TeamFile {
     /// # Errors
     /// What is wrong with it.
     pub fn read(path: &Path) -> Result<Self, Error> {
-        let text = read_text(path).map_err(|error| Error::reading(path, &error))?;
+        let text =
+            read_text(path).map_err(|error| Error::reading_or(path, &error, "morphcog team makes one"))?;
         let name = path.display().to_string();
         let file: TeamFile = reading::read_versioned(&text, &name, FORMAT, FORMAT_VERSION)?;
         file.check().map_err(|error| error.within(&name))?;

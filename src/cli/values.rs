@@ -1,0 +1,132 @@
+//! What values of the command line are: words for shells to complete ([`offering`]), and numbers, with
+//! what was expected in their errors.
+
+use crate::base::threads::MOST_THREADS;
+use crate::config;
+use crate::store::images::HeldOut;
+use clap::builder::{PossibleValue, TypedValueParser};
+use clap::{Arg, Command};
+use std::ffi::OsStr;
+use std::ops::{Bound, RangeBounds};
+
+/// Reads a value as `parser` does, which also says what is wrong with it. Shells offer the words, and
+/// help lists them.
+pub(super) fn offering<P: TypedValueParser>(
+    words: impl IntoIterator<Item = &'static str>,
+    parser: P,
+) -> Offering<P> {
+    Offering { words: words.into_iter().collect(), parser }
+}
+
+/// What [`offering`] makes.
+#[derive(Clone)]
+pub(super) struct Offering<P> {
+    words: Vec<&'static str>,
+    parser: P,
+}
+
+impl<P: TypedValueParser> TypedValueParser for Offering<P> {
+    type Value = P::Value;
+
+    fn parse_ref(
+        &self,
+        command: &Command,
+        argument: Option<&Arg>,
+        value: &OsStr,
+    ) -> Result<P::Value, clap::Error> {
+        self.parser.parse_ref(command, argument, value)
+    }
+
+    fn possible_values(&self) -> Option<Box<dyn Iterator<Item = PossibleValue> + '_>> {
+        Some(Box::new(self.words.iter().map(PossibleValue::new)))
+    }
+}
+
+/// Reads which images that robots are not trained on.
+pub(super) fn held_out() -> impl TypedValueParser<Value = HeldOut> {
+    offering(["test", "validation"], str::parse::<HeldOut>)
+}
+
+/// Reads a whole number in a range.
+pub(super) fn whole<T>(
+    range: impl RangeBounds<u64> + Clone + Send + Sync + 'static,
+) -> impl TypedValueParser<Value = T>
+where
+    T: TryFrom<u64> + Clone + Send + Sync + 'static,
+{
+    move |text: &str| {
+        let number = text.parse().ok().filter(|number| range.contains(number));
+        number.and_then(|number| T::try_from(number).ok()).ok_or_else(|| {
+            let least = match range.start_bound() {
+                Bound::Included(least) => *least,
+                _ => 0,
+            };
+            match range.end_bound() {
+                Bound::Included(most) => format!("expected a whole number from {least} to {most}"),
+                _ => format!("expected a whole number from {least}"),
+            }
+        })
+    }
+}
+
+/// Reads a seed that is kept in a config.
+pub(super) fn seed() -> impl TypedValueParser<Value = u64> {
+    whole(..=config::MAX_NUMBER)
+}
+
+/// Reads a number of threads, or of what needs one each.
+pub(super) fn threads() -> impl TypedValueParser<Value = u16> {
+    whole(1..=u64::from(MOST_THREADS))
+}
+
+/// Reads a number with decimals.
+pub(super) fn decimal() -> impl TypedValueParser<Value = f64> {
+    |text: &str| {
+        let number = text.parse().ok().filter(|number: &f64| number.is_finite());
+        number.ok_or_else(|| "expected a number, such as 0.5".to_string())
+    }
+}
+
+/// A command whose options take values that look like negative numbers: each says for itself what it
+/// expected.
+pub(super) fn with_negative_numbers(command: Command) -> Command {
+    let allowing = |argument: Arg| match argument.get_action().takes_values() {
+        true => argument.allow_negative_numbers(true),
+        false => argument,
+    };
+    command.mut_args(allowing).mut_subcommands(with_negative_numbers)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cli::Cli;
+    use clap::CommandFactory;
+
+    /// What is said of a command line.
+    fn said(line: &str) -> String {
+        let command = with_negative_numbers(Cli::command());
+        let words = std::iter::once("morphcog").chain(line.split_whitespace());
+        command.try_get_matches_from(words).map_or_else(|error| error.to_string(), |_| String::new())
+    }
+
+    #[test]
+    fn numbers_that_are_none_or_out_of_range_say_which_are_expected() {
+        for (line, expected) in [
+            ("evolve --generations 1e9", "'--generations <GENERATIONS>': expected a whole number from 1 to"),
+            ("evolve --seed -1", "'--seed <SEED>': expected a whole number from 0 to"),
+            ("eval --seed 1.5", "'--seed <SEED>': expected a whole number from 0\n"),
+            ("eval --threads 0", "'--threads <THREADS>': expected a whole number from 1 to"),
+            ("eval --threshold far", "'--threshold <THRESHOLD>': expected a number, such as 0.5\n"),
+            ("reproduce --scale nan", "'--scale <SCALE>': expected a number, such as 0.5\n"),
+            ("serve --port 65536", "'--port <PORT>': expected a whole number from 0 to 65535\n"),
+        ] {
+            assert!(said(line).contains(expected), "{line}: {}", said(line));
+        }
+        for line in
+            ["evolve --seed 9223372036854775807", "eval --threshold -1", "eval --seed 18446744073709551615"]
+        {
+            assert_eq!(said(line), "");
+        }
+    }
+}
