@@ -249,7 +249,7 @@ fn what_cannot_be_measured_is_one_clear_error_and_writes_nothing() {
         ("--images 100001", ["--images 100001", "60 to 100000"]),
         ("--error 1", ["--error 1", "below 1"]),
         ("--error=-0.1", ["--error -0.1", "0 or more"]),
-        ("--error nan", ["--error NaN", "0 or more"]),
+        ("--error nan", ["--error", "expected a number"]),
         ("-o run/run.json", ["run/run.json", "overwrite"]),
         ("-o run/eval.json", ["run/eval.json", "expected another name"]),
         ("-o map.png", ["map.png", "the picture"]),

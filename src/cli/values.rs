@@ -123,9 +123,11 @@ mod tests {
         ] {
             assert!(said(line).contains(expected), "{line}: {}", said(line));
         }
-        for line in
-            ["evolve --seed 9223372036854775807", "eval --threshold -1", "eval --seed 18446744073709551615"]
-        {
+        for line in [
+            "evolve -c a.toml --seed 9223372036854775807",
+            "eval --threshold -1",
+            "eval --seed 18446744073709551615",
+        ] {
             assert_eq!(said(line), "");
         }
     }
