@@ -190,7 +190,8 @@ fn a_training_is_told_as_one_and_its_command_trains() {
         "{command}"
     );
     // Gaits may have other pixels, windows and rounds: what the run had is said, defaults too.
-    for set in ["stimulus.margin=0", "stimulus.level=0.5", "train.windows=0", "train.rounds=6"] {
+    for set in ["stimulus.margin=[11, 2, 6, 10]", "stimulus.level=0.25", "train.windows=0", "train.rounds=6"]
+    {
         assert!(command.contains(&format!(" --set '{set}' ")), "{set}: {command}");
     }
     // All of its flags are understood; it ends at the archive.
