@@ -12,7 +12,7 @@ use crate::cli::serve::ServeArgs;
 use crate::cli::sweep::SweepArgs;
 use crate::cli::team::TeamArgs;
 use crate::cli::train::TrainArgs;
-use crate::cli::values::{decimal, held_out, offering, seed, threads, whole};
+use crate::cli::values::{MOST, decimal, held_out, offering, seed, threads, whole};
 use crate::cli::{audit, capacity, demo, plot, report, reproduce, response, serve, sweep, team, train};
 use crate::commands::plan::PAPER_TOML;
 use crate::commands::replay::Shown;
@@ -269,7 +269,7 @@ pub(super) struct EvalArgs {
     #[arg(long)]
     pub(super) physical_only: bool,
     /// Random seed for drawing images, and robots with random:N.
-    #[arg(long, default_value_t = 1, value_parser = whole::<u64>(0..))]
+    #[arg(long, default_value_t = 1, value_parser = seed())]
     pub(super) seed: u64,
     /// A dataset other than the run's, such as builtin: its test images are shown.
     #[arg(long, value_name = "NAME")]
@@ -297,7 +297,7 @@ pub(super) struct ReplayArgs {
     #[arg(short, long, visible_aliases = ["robots", "select"], default_value = "best", help = ROBOT)]
     pub(super) robot: Selection,
     /// Random seed for random:1.
-    #[arg(long, default_value_t = 1, value_parser = whole::<u64>(0..))]
+    #[arg(long, default_value_t = 1, value_parser = seed())]
     pub(super) seed: u64,
     /// Only robots that morphcog audit found physical: "best" is the best of them.
     #[arg(long)]
@@ -322,7 +322,7 @@ pub(super) struct ReplayArgs {
     #[arg(short, long, value_name = "FILE")]
     pub(super) out: Option<PathBuf>,
     /// Width of GIF and PNG in pixels.
-    #[arg(long, default_value_t = 480, value_parser = whole::<u32>(0..))]
+    #[arg(long, default_value_t = 480, value_parser = whole::<u32>(0..=MOST))]
     pub(super) width: u32,
     /// Control steps from one frame of the GIF to the next: 1 is the robot's own time, more is
     /// faster and a smaller file.
@@ -382,7 +382,7 @@ pub(super) enum DataCommand {
         #[command(flatten)]
         dataset: DatasetArgs,
         /// Images per class.
-        #[arg(short, long, default_value_t = 16, value_parser = whole::<usize>(0..))]
+        #[arg(short, long, default_value_t = 16, value_parser = whole::<usize>(0..=MOST))]
         samples: usize,
         /// The test images instead of the training images.
         #[arg(long)]

@@ -7,7 +7,7 @@ use crate::base::signals;
 use crate::base::text::counted;
 use crate::cli::choice;
 use crate::cli::choice::{Archives, ROBOTS, selected};
-use crate::cli::values::{threads, whole};
+use crate::cli::values::{seed, threads};
 use crate::commands::audit;
 use crate::commands::audit::{Options, Source};
 use crate::config::audit::Criteria;
@@ -41,7 +41,7 @@ pub(super) struct AuditArgs {
     #[arg(short, long, visible_aliases = ["robot", "select"], default_value = "all", help = ROBOTS)]
     robots: Vec<Selection>,
     /// Random seed for random:N.
-    #[arg(long, default_value_t = 1, value_parser = whole::<u64>(0..))]
+    #[arg(long, default_value_t = 1, value_parser = seed())]
     seed: u64,
     /// Criteria: a TOML file (or JSON); missing keys have their defaults.
     #[arg(long, value_name = "FILE")]

@@ -3,7 +3,7 @@
 use crate::base::error::Error;
 use crate::cli::choice;
 use crate::cli::choice::{Archives, ROBOTS, selected};
-use crate::cli::values::{offering, whole};
+use crate::cli::values::{MOST, offering, seed, whole};
 use crate::commands::one_by_one;
 use crate::commands::one_by_one::Named;
 use crate::commands::replay::{Options, Shown};
@@ -44,7 +44,7 @@ pub(super) struct PlotArgs {
     #[arg(short, long, visible_aliases = ["robots", "select"], help = format!("{ROBOTS} [default: best]"))]
     robot: Vec<Selection>,
     /// Random seed for random:N.
-    #[arg(long, default_value_t = 1, value_parser = whole::<u64>(0..))]
+    #[arg(long, default_value_t = 1, value_parser = seed())]
     seed: u64,
     /// Only robots that morphcog audit found physical: "best" is the best of them.
     #[arg(long)]
@@ -59,7 +59,7 @@ pub(super) struct PlotArgs {
     #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,
     /// Control steps between the poses of snapshots (default: as suits the walk).
-    #[arg(long, value_parser = whole::<u32>(1..))]
+    #[arg(long, value_parser = whole::<u32>(1..=MOST))]
     every: Option<u32>,
     /// File; its ending (.svg, .png) says the format (default: both, plot-<kind>[-<robot>] beside
     /// run.json).

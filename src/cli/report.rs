@@ -4,7 +4,7 @@ use crate::base::error::Error;
 use crate::base::number;
 use crate::cli::choice;
 use crate::cli::choice::{Archives, Runs, run_jsons};
-use crate::cli::values::whole;
+use crate::cli::values::{MOST, whole};
 use crate::commands::report;
 use crate::store::folder;
 use crate::view::console::Console;
@@ -31,7 +31,7 @@ pub(super) struct ReportArgs {
     runs: Vec<Runs>,
     /// Robots that can be watched, the fittest of each run; the more, the fewer frames each has
     /// (the page stays below 20 MB).
-    #[arg(long, value_name = "ROBOTS", default_value_t = 100, value_parser = whole::<usize>(0..))]
+    #[arg(long, value_name = "ROBOTS", default_value_t = 100, value_parser = whole::<usize>(0..=MOST))]
     rollouts: usize,
     /// Folder with the images.
     #[arg(long, value_name = "DIR")]

@@ -7,7 +7,7 @@ use crate::base::signals;
 use crate::base::text::counted;
 use crate::cli::choice;
 use crate::cli::choice::{ROBOTS, run_json, selected};
-use crate::cli::values::{decimal, threads, whole};
+use crate::cli::values::{MOST, decimal, seed, threads, whole};
 use crate::commands::one_by_one;
 use crate::commands::one_by_one::Named;
 use crate::search::train::groups;
@@ -56,7 +56,7 @@ pub(super) struct ResponseArgs {
     #[arg(long, value_name = "KEY=VALUE", requires = "task")]
     set: Vec<String>,
     /// Most rollouts of a robot, each with a random image (60 or more); all earlier ones are reused.
-    #[arg(short = 'n', long, default_value_t = 1000, value_parser = whole::<usize>(0..))]
+    #[arg(short = 'n', long, default_value_t = 1000, value_parser = whole::<usize>(0..=MOST))]
     images: usize,
     /// Relative error of the slopes at which a robot's measurement ends; 0: only after --images
     /// rollouts.
@@ -64,7 +64,7 @@ pub(super) struct ResponseArgs {
     error: f64,
     /// Random seed for the images (default: that of the run, as train has it), and for random:N
     /// (default: 1).
-    #[arg(long, value_parser = whole::<u64>(0..))]
+    #[arg(long, value_parser = seed())]
     seed: Option<u64>,
     /// Folder with the images of the task.
     #[arg(long, value_name = "DIR")]

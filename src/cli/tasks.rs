@@ -3,7 +3,7 @@
 use crate::base::error::Error;
 use crate::base::{atlas, signals};
 use crate::cli::process;
-use crate::cli::values::{threads, whole};
+use crate::cli::values::{MOST, threads, whole};
 use crate::commands::tasks;
 use crate::commands::tasks::{Place, Summary, Task};
 use crate::store::folder::in_shell;
@@ -22,7 +22,7 @@ const NUMBERS: [&str; 3] = ["HQ_TASK_ID", "SLURM_ARRAY_TASK_ID", "PBS_ARRAY_INDE
 pub(super) struct What {
     /// Do one task, or go on with it: its number from 1 (default: that of HQ_TASK_ID,
     /// SLURM_ARRAY_TASK_ID or PBS_ARRAY_INDEX).
-    #[arg(long, value_name = "N", num_args = 0..=1, value_parser = whole::<usize>(0..))]
+    #[arg(long, value_name = "N", num_args = 0..=1, value_parser = whole::<usize>(0..=MOST))]
     pub(super) task: Option<Option<usize>>,
     /// Print one command per task, for GNU parallel, HyperQueue or xargs.
     #[arg(long)]

@@ -5,7 +5,7 @@ use crate::base::text::counted;
 use crate::base::{shipped, signals};
 use crate::cli::choice;
 use crate::cli::choice::{Archives, selected};
-use crate::cli::values::{held_out, threads, whole};
+use crate::cli::values::{held_out, seed, threads};
 use crate::commands::team;
 use crate::commands::team::Options;
 use crate::store::folder;
@@ -55,7 +55,7 @@ pub(super) struct TeamArgs {
     #[arg(long, default_value_t = HeldOut::Test, value_name = "SPLIT", value_parser = held_out())]
     split: HeldOut,
     /// Random seed for drawing images, and robots with random:N.
-    #[arg(long, default_value_t = 1, value_parser = whole::<u64>(0..))]
+    #[arg(long, default_value_t = 1, value_parser = seed())]
     seed: u64,
     /// Folder with the images.
     #[arg(long, value_name = "DIR")]

@@ -7,7 +7,7 @@ use crate::store::images::HeldOut;
 use clap::builder::{PossibleValue, TypedValueParser};
 use clap::{Arg, Command};
 use std::ffi::OsStr;
-use std::ops::{Bound, RangeBounds};
+use std::ops::RangeInclusive;
 
 /// Reads a value as `parser` does, which also says what is wrong with it. Shells offer the words, and
 /// help lists them.
@@ -47,31 +47,26 @@ pub(super) fn held_out() -> impl TypedValueParser<Value = HeldOut> {
     offering(["test", "validation"], str::parse::<HeldOut>)
 }
 
+/// The most that is read where the program sets no limit, or a lower one elsewhere.
+pub(super) const MOST: u64 = u32::MAX as u64;
+
 /// Reads a whole number in a range.
-pub(super) fn whole<T>(
-    range: impl RangeBounds<u64> + Clone + Send + Sync + 'static,
-) -> impl TypedValueParser<Value = T>
+pub(super) fn whole<T>(range: RangeInclusive<u64>) -> impl TypedValueParser<Value = T>
 where
     T: TryFrom<u64> + Clone + Send + Sync + 'static,
 {
     move |text: &str| {
         let number = text.parse().ok().filter(|number| range.contains(number));
         number.and_then(|number| T::try_from(number).ok()).ok_or_else(|| {
-            let least = match range.start_bound() {
-                Bound::Included(least) => *least,
-                _ => 0,
-            };
-            match range.end_bound() {
-                Bound::Included(most) => format!("expected a whole number from {least} to {most}"),
-                _ => format!("expected a whole number from {least}"),
-            }
+            let (least, most) = (range.start(), range.end());
+            format!("expected a whole number from {least} to {most}")
         })
     }
 }
 
-/// Reads a seed that is kept in a config.
+/// Reads a seed: a number that a config can keep.
 pub(super) fn seed() -> impl TypedValueParser<Value = u64> {
-    whole(..=config::MAX_NUMBER)
+    whole(0..=config::MAX_NUMBER)
 }
 
 /// Reads a number of threads, or of what needs one each.
@@ -115,7 +110,11 @@ mod tests {
         for (line, expected) in [
             ("evolve --generations 1e9", "'--generations <GENERATIONS>': expected a whole number from 1 to"),
             ("evolve --seed -1", "'--seed <SEED>': expected a whole number from 0 to"),
-            ("eval --seed 1.5", "'--seed <SEED>': expected a whole number from 0\n"),
+            ("eval --seed 1.5", "'--seed <SEED>': expected a whole number from 0 to"),
+            (
+                "replay --width 4294967296",
+                "'--width <WIDTH>': expected a whole number from 0 to 4294967295\n",
+            ),
             ("eval --threads 0", "'--threads <THREADS>': expected a whole number from 1 to"),
             ("eval --threshold far", "'--threshold <THRESHOLD>': expected a number, such as 0.5\n"),
             ("reproduce --scale nan", "'--scale <SCALE>': expected a number, such as 0.5\n"),
@@ -126,7 +125,7 @@ mod tests {
         for line in [
             "evolve -c a.toml --seed 9223372036854775807",
             "eval --threshold -1",
-            "eval --seed 18446744073709551615",
+            "eval --seed 9223372036854775807",
         ] {
             assert_eq!(said(line), "");
         }
