@@ -7,7 +7,7 @@ mod common;
 use assert_cmd::Command;
 use common::program::{PROGRAM, SETTINGS, Said, Sandbox, files, said};
 use morphcog::store::run::Robot;
-use morphcog::task::response::Gait;
+use morphcog::task::gait::Gait;
 
 /// Runs the program where no file may become larger than this number of blocks (of 512 or 1024
 /// bytes): to it, a full disk.

@@ -128,7 +128,7 @@ mod tests {
     use crate::store::names::RESPONSE_JSON;
     use crate::store::response::ResponseFile;
     use crate::store::robots::Source;
-    use crate::task::response::Gait;
+    use crate::task::gait::Gait;
 
     #[test]
     fn the_response_that_ships_with_the_gaits_is_what_the_training_begins_with() {

@@ -4,8 +4,9 @@ use crate::base::Grid;
 use crate::base::random::{Purpose, stream};
 use crate::body::{Body, Material};
 use crate::sim::Physics;
+use crate::task::gait::{Gait, random_image};
 use crate::task::perturbation::Condition;
-use crate::task::response::{Gait, Response, Shown, random_image};
+use crate::task::response::{Response, Shown};
 use std::ops::Range;
 
 /// Random images, numbered from 0, and the conditions under which a gait's probe is shown them by

@@ -6,8 +6,8 @@ use crate::base::random::{Purpose, stream};
 use crate::config::evaluation::LEAST_IMAGES;
 use crate::sim::Physics;
 use crate::task::fitness::response_so_far;
+use crate::task::gait::random_image;
 use crate::task::perturbation::{Condition, of_response};
-use crate::task::response::random_image;
 
 /// Which random images evolution shows: others than a training's, which are 0.
 const OF_EVOLUTION: u64 = 1 << 32;

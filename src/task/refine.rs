@@ -14,7 +14,9 @@ use crate::body::{Body, Material};
 use crate::genome::other_voxel;
 use crate::sim::{Physics, width};
 use crate::task::fitness::clipped_margin;
-use crate::task::response::{CHOICES, Design, Evidence, Example, Gait, Lesson, Moments};
+use crate::task::gait::{CHOICES, Design, Gait};
+use crate::task::lesson::{Example, Lesson};
+use crate::task::response::{Evidence, Moments};
 use crate::task::teach::{Image, Rollouts};
 
 /// Images of the first look at a challenger; each next look takes twice as many. With fewer, good

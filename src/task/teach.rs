@@ -11,8 +11,10 @@ use crate::base::random::{Purpose, Stream, stream};
 use crate::body::{Body, Material};
 use crate::sim::Physics;
 use crate::task::fitness::clipped_margin;
+use crate::task::gait::{Design, Gait, SENSORS};
+use crate::task::lesson::{Example, Lesson};
 use crate::task::refine::{Challenge, Refinement, WeightedImage};
-use crate::task::response::{Design, Evidence, Example, Gait, Lesson, Moments, Response, SENSORS, dot};
+use crate::task::response::{Evidence, Moments, Response, dot};
 
 /// What rollouts with random images count beside those around the latest design. They are farther
 /// from it, but more, and each tells more of the slopes.
@@ -414,7 +416,8 @@ fn nowhere(displacement: Option<f64>) -> f64 {
 mod tests {
     use super::*;
     use crate::body::Body;
-    use crate::task::response::{CHOICES, Shown, random_image};
+    use crate::task::gait::{CHOICES, random_image};
+    use crate::task::response::Shown;
     use std::convert::Infallible;
 
     /// A body that walks by the widths of its places, less and less far, and otherwise where they

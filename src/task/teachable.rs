@@ -8,7 +8,8 @@ use crate::base::random::{Purpose, stream};
 use crate::base::stop::{Stopped, check};
 use crate::body::Material;
 use crate::task::fitness::ENOUGH;
-use crate::task::response::{Example, Lesson, Response, Shown};
+use crate::task::lesson::{Example, Lesson};
+use crate::task::response::{Response, Shown};
 use std::f64::consts::{PI, SQRT_2};
 use std::sync::atomic::AtomicBool;
 
@@ -235,7 +236,7 @@ mod tests {
     use crate::base::stop::NEVER;
     use crate::body::Body;
     use crate::sim::Physics;
-    use crate::task::response::Gait;
+    use crate::task::gait::Gait;
 
     const THRESHOLD: f64 = 3.0;
 

@@ -15,8 +15,8 @@ use crate::store::response::ResponseFile;
 use crate::store::robots::{Selection, Source};
 use crate::store::run::Robot;
 use crate::store::training::{Batch, Drawn, Elsewhere, Origin};
+use crate::task::gait::Gait;
 use crate::task::protocol::{Protocol, RolloutMode};
-use crate::task::response::Gait;
 use std::collections::BTreeSet;
 
 /// A gait to be tried.

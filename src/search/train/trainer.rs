@@ -14,10 +14,12 @@ use crate::search::windows::{Found, Windows};
 use crate::store::images::ImageRef;
 use crate::store::training::Batch;
 use crate::store::whereabouts::see;
+use crate::task::gait::Gait;
 use crate::task::grouping::balanced;
+use crate::task::lesson::Example;
 use crate::task::perturbation::Condition;
 use crate::task::refine::Challenge;
-use crate::task::response::{Example, Gait, Response};
+use crate::task::response::Response;
 use crate::task::teach::{Image, Plan, Round, Taught, Teacher};
 
 /// What all gaits are trained with.

@@ -1,0 +1,195 @@
+//! A gait: a body as something that walks, whose places can be made of other materials.
+
+use crate::base::Grid;
+use crate::base::random::Stream;
+use crate::body::{Body, Material};
+use crate::sim::{Physics, width};
+use std::ops::Range;
+
+/// What a place can be made of, without changing what walks.
+pub const CHOICES: [Material; 3] = [Material::Soft, Material::SensorExpand, Material::SensorShrink];
+
+/// What a [lesson](super::lesson) makes places of: sensors. A response is measured with sensors at all places, and
+/// says nothing of soft voxels. A soft voxel is not the same as a sensor at rest: it has no goal, so the sides
+/// that it shares are as wide as its neighbour wants, and its springs are others (`physics.md`,
+/// "Actuation").
+pub const SENSORS: [Material; 2] = [CHOICES[CHOSEN.start], CHOICES[CHOSEN.start + 1]];
+
+/// Where these stand in [`CHOICES`].
+pub(super) const CHOSEN: Range<usize> = 1..CHOICES.len();
+
+/// Probability that a place is wide in a random image, and that it is narrow. A design has about as
+/// many of either: larger values say nothing of what is between, as under grey pixels; smaller ones
+/// tell less of the slopes.
+const EXTREME: f64 = 0.4;
+
+/// A body as something that walks: what its soft voxels and sensors are made of is left open.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Gait {
+    body: Body,
+    places: Vec<(usize, usize)>,
+}
+
+/// A material of [`CHOICES`] for each place of a gait, in the places' order.
+pub type Design = Vec<Material>;
+
+impl Gait {
+    /// The gait of a body; `None` if it has neither soft voxels nor sensors.
+    pub fn of(body: &Body) -> Option<Self> {
+        let is_place = |material: &Material| CHOICES.contains(material);
+        let places: Vec<_> =
+            body.voxels().iter().filter(|(_, m)| is_place(m)).map(|(place, _)| place).collect();
+        (!places.is_empty()).then(|| Gait { body: body.clone(), places })
+    }
+
+    /// (Row, column) of each soft voxel and sensor, row-major.
+    pub fn places(&self) -> &[(usize, usize)] {
+        &self.places
+    }
+
+    /// What the places of its own body are made of.
+    pub fn design(&self) -> Design {
+        self.places.iter().map(|place| self.body.voxels()[*place]).collect()
+    }
+
+    /// The body with these materials at its places.
+    ///
+    /// # Panics
+    /// If the design has not one material for each place.
+    pub fn built(&self, design: &[Material]) -> Body {
+        assert_eq!(design.len(), self.places.len(), "a design has one material for each place");
+        let mut voxels = self.body.voxels().clone();
+        for (place, material) in self.places.iter().zip(design) {
+            voxels[*place] = *material;
+        }
+        Body::new(voxels).expect("a body with other materials is as large as before")
+    }
+
+    /// The body with an expanding sensor at every place: what its response is measured with.
+    pub fn probe(&self) -> Body {
+        self.body.probe()
+    }
+
+    /// The body with this design, but that all its sensors expand.
+    pub fn probe_of(&self, design: &[Material]) -> Body {
+        let expanding = |material: &Material| match material {
+            Material::Soft => Material::Soft,
+            _ => Material::SensorExpand,
+        };
+        self.built(&design.iter().map(expanding).collect::<Vec<_>>())
+    }
+
+    /// The image under which [`probe_of`](Gait::probe_of) a design walks as the design does under a
+    /// stimulus.
+    pub fn as_probe(&self, design: &[Material], stimulus: &Grid<f64>) -> Grid<f64> {
+        let mut image = stimulus.clone();
+        for (place, material) in self.places.iter().zip(design) {
+            if *material == Material::SensorShrink {
+                image[*place] = 1.0 - stimulus.or_default(*place);
+            }
+        }
+        image
+    }
+
+    /// The target width of each place under an image \[rest widths\].
+    pub fn widths(&self, design: &[Material], stimulus: &Grid<f64>, physics: &Physics) -> Vec<f64> {
+        let width = |(place, material): (&(usize, usize), &Material)| {
+            width(*material, stimulus.or_default(*place), physics)
+        };
+        self.places.iter().zip(design).map(width).collect()
+    }
+}
+
+/// The pixel under which an expanding sensor is as wide as a soft voxel; 0 or 1 if it never is.
+fn resting(physics: &Physics) -> f64 {
+    let [narrow, wide] = [0.0, 1.0].map(|pixel| width(Material::SensorExpand, pixel, physics));
+    let rest = width(Material::Soft, 0.0, physics);
+    if wide > narrow { ((rest - narrow) / (wide - narrow)).clamp(0.0, 1.0) } else { 0.0 }
+}
+
+/// An image under which each place of a probe is, independently of all others, as wide as can be
+/// (with probability 0.4), as narrow as can be (0.4), or at rest (0.2).
+pub fn random_image(height: usize, width: usize, physics: &Physics, random: &mut Stream) -> Grid<f64> {
+    let rest = resting(physics);
+    Grid::from_fn(height, width, |_, _| {
+        let drawn = random.unit();
+        if drawn < EXTREME {
+            1.0
+        } else if drawn < 2.0 * EXTREME {
+            0.0
+        } else {
+            rest
+        }
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::base::random::{Purpose, stream};
+
+    fn random(child: u64) -> Stream {
+        stream(1, Purpose::RandomImages, 0, child)
+    }
+
+    fn physics() -> Physics {
+        Physics::default()
+    }
+
+    #[test]
+    fn a_gait_is_what_walks_and_its_designs_are_what_it_is_made_of() {
+        let body: Body = "2635/3104".parse().unwrap();
+        let gait = Gait::of(&body).unwrap();
+        assert_eq!(gait.places(), [(0, 0), (0, 1), (0, 3)]);
+        assert_eq!(gait.built(&gait.design()), body);
+        assert_eq!(gait.probe(), "6636/3104".parse().unwrap());
+        let image = Grid::from_fn(2, 4, |_, column| if column == 1 { 1.0 } else { 0.25 });
+        assert_eq!(gait.widths(&gait.design(), &image, &physics()), [1.0, 1.6, 1.35]);
+        assert_eq!(Gait::of(&"3/1".parse().unwrap()), None);
+    }
+
+    #[test]
+    fn random_images_make_places_wide_narrow_or_at_rest_independently_of_each_other() {
+        let physics = physics();
+        let mut random = random(0);
+        let gait = Gait::of(&"65".parse().unwrap()).unwrap();
+        let rest = gait.widths(&[Material::Soft; 2], &Grid::from_fn(1, 2, |_, _| 0.0), &physics)[0];
+        let drawn: Vec<Vec<f64>> = (0..4000)
+            .map(|_| {
+                let image = random_image(1, 2, &physics, &mut random);
+                gait.widths(&[Material::SensorExpand; 2], &image, &physics)
+            })
+            .collect();
+        let share = |kind: &dyn Fn(&[f64]) -> bool| {
+            drawn.iter().filter(|widths| kind(widths)).count() as f64 / 4000.0
+        };
+        for (width, expected) in [(1.6, 0.4), (0.6, 0.4), (rest, 0.2)] {
+            for place in 0..2 {
+                let share = share(&|widths| (widths[place] - width).abs() < 1e-9);
+                assert!((share - expected).abs() < 0.03, "{width} at {place}: {share}");
+            }
+        }
+        let both = share(&|widths| widths.iter().all(|width| (width - 1.6).abs() < 1e-9));
+        assert!((both - 0.16).abs() < 0.03, "{both}");
+    }
+
+    #[test]
+    fn a_probe_can_be_as_wide_as_any_design_under_any_image() {
+        let gait = Gait::of(&"562/365".parse().unwrap()).unwrap();
+        let image = Grid::from_fn(2, 3, |row, column| 0.1 * (3 * row + column) as f64);
+        let mut random = random(3);
+        for _ in 0..30 {
+            let design: Design = gait.places().iter().map(|_| CHOICES[random.below(3)]).collect();
+            let probe = Gait::of(&gait.probe_of(&design)).unwrap().design();
+            let is_soft = |material: &Material| *material == Material::Soft;
+            assert!(probe.iter().map(is_soft).eq(design.iter().map(is_soft)));
+            let seen = gait.as_probe(&design, &image);
+            let (found, expected) =
+                (gait.widths(&probe, &seen, &physics()), gait.widths(&design, &image, &physics()));
+            assert!(
+                found.iter().zip(&expected).all(|(a, b)| (a - b).abs() < 1e-12),
+                "{found:?} {expected:?}"
+            );
+        }
+    }
+}

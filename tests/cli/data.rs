@@ -1,0 +1,99 @@
+//! Datasets: what is missing or broken.
+
+use crate::common::program::{Sandbox, said};
+
+#[test]
+fn missing_data_are_refused_naming_file_place_and_remedy() {
+    let sandbox = Sandbox::tiny();
+    std::fs::create_dir(sandbox.path("empty")).unwrap();
+    let words = ["train-images-idx3-ubyte", "morphcog data fetch mnist"];
+    let run = "evolve -c tiny.toml -o run --set data.dataset=mnist";
+    sandbox.run(run).ended(3, &["data/mnist", "morphcog data fetch mnist"]);
+    sandbox.run(&format!("{run} --data empty")).ended(3, &[&words[..], &["empty", "--data"]].concat());
+    let mut command = sandbox.command(run.split(' '));
+    command.env("MORPHCOG_DATA", sandbox.path("empty"));
+    said(command).ended(3, &[&words[..], &["MORPHCOG_DATA"]].concat());
+    sandbox.run(&format!("{run} --set data.dir=empty")).ended(3, &[&words[..], &["[data] dir"]].concat());
+    sandbox.run("data info mnist").ended(3, &["data/mnist", "morphcog data fetch mnist"]);
+    sandbox.run("data info ../x").ended(3, &["../x"]);
+    assert!(!sandbox.path("run").exists());
+}
+
+#[test]
+fn broken_data_are_refused_naming_the_file() {
+    let sandbox = Sandbox::tiny();
+    sandbox.write("data/mnist/train-images-idx3-ubyte", [0u8, 0, 8, 3, 0, 0, 0, 9, 0, 0]);
+    sandbox.write("data/mnist/train-labels-idx1-ubyte", [0u8, 0, 8, 1, 0, 0, 0, 9]);
+    let run = "evolve -c tiny.toml -o run --set data.dataset=mnist";
+    sandbox.run(run).ended(3, &["train-images-idx3-ubyte"]);
+    sandbox.write("data/mnist/train-images-idx3-ubyte", "this is no image");
+    sandbox.run(run).ended(3, &["train-images-idx3-ubyte"]);
+    // Also where the other split can be used.
+    sandbox.write("data/mnist/t10k-images-idx3-ubyte", [0u8, 0, 8, 3, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 9]);
+    sandbox.write("data/mnist/t10k-labels-idx1-ubyte", [0u8, 0, 8, 1, 0, 0, 0, 1, 5]);
+    let said = sandbox.run("data info mnist").ended(3, &["error: train: ", "train-images-idx3-ubyte"]);
+    assert!(said.out.contains("test: 1 image"), "{said:?}");
+    assert!(!said.err.contains("warning"), "{said:?}");
+    for file in ["train-images-idx3-ubyte", "train-labels-idx1-ubyte"] {
+        std::fs::remove_file(sandbox.path("data/mnist").join(file)).unwrap();
+    }
+    sandbox.run("data info mnist").ended(0, &["warning: train: "]);
+}
+
+#[test]
+fn every_image_is_shown_if_all_are_asked_for() {
+    let sandbox = Sandbox::tiny();
+    let mut labels = vec![0_u8, 0, 0, 1, 1, 0, 7, 1];
+    let header = |magic: u8, sizes: &[u32]| {
+        let mut bytes = vec![0, 0, 8, magic];
+        sizes.iter().for_each(|size| bytes.extend(size.to_be_bytes()));
+        bytes
+    };
+    for split in ["train", "t10k"] {
+        let count = labels.len() as u32;
+        let pixels: Vec<u8> = (0..count * 64).map(|place| (place * 37 % 251) as u8).collect();
+        let images = [header(3, &[count, 8, 8]), pixels].concat();
+        sandbox.write(&format!("own/{split}-images-idx3-ubyte"), images);
+        sandbox
+            .write(&format!("own/{split}-labels-idx1-ubyte"), [header(1, &[count]), labels.clone()].concat());
+        labels.push(0);
+    }
+    let set = "--set data.dataset=own --set data.train_images=[0,3]";
+    sandbox.run(&format!("evolve -q -c tiny.toml {set} --data own -o run")).ended(0, &[]);
+    sandbox.run("eval -q -a run --data own --images all --cycles 1 --robots top:1").ended(0, &[]);
+    let eval: serde_json::Value = serde_json::from_str(&sandbox.read("run/eval.json")).unwrap();
+    let shown: Vec<u64> =
+        eval["images"].as_array().unwrap().iter().map(|image| image["index"].as_u64().unwrap()).collect();
+    // Class after class; no sevens, which the run does not know.
+    assert_eq!(shown, [0, 1, 2, 5, 8, 3, 4, 7]);
+    // A report's commands ask for the same.
+    sandbox.run("report -q run --rollouts 0 --data own").ended(0, &[]);
+    assert!(sandbox.read("run/report.html").contains("--images all"));
+    sandbox.run("team -q -a run --data own --classes 0,1 --images all -o team.json").ended(0, &[]);
+    let team: serde_json::Value = serde_json::from_str(&sandbox.read("team.json")).unwrap();
+    assert_eq!(team["images"].as_array().unwrap().len(), 8);
+    sandbox
+        .run("eval -q -a run --data own --images most")
+        .ended(2, &["--images", "expected all, or a number"]);
+}
+
+#[test]
+fn what_contradicts_itself_or_asks_for_too_much_is_refused() {
+    let sandbox = Sandbox::new();
+    sandbox.run("-q data info --json").ended(2, &["--quiet", "--json"]);
+    sandbox.run("data info -q --json").ended(2, &["--quiet", "--json"]);
+    let mut command = sandbox.command(["data", "info"]);
+    command.env("RAYON_NUM_THREADS", "100000");
+    said(command).ended(2, &["RAYON_NUM_THREADS = 100000", "at most 1024"]);
+}
+
+#[test]
+fn data_info_and_sheet_work_on_the_built_in_digits() {
+    let sandbox = Sandbox::new();
+    let info = sandbox.run("data info").ended(0, &[]).out;
+    assert!(info.contains("10000 images of 28 × 28") && info.contains("5000 images"), "{info}");
+    sandbox.run("data sheet -o made.png --samples 2 --test").ended(0, &[]);
+    assert!(std::fs::read(sandbox.path("made.png")).unwrap().starts_with(b"\x89PNG"));
+    sandbox.run("data sheet -o none.png --samples 0").ended(2, &["--samples"]);
+    assert!(!sandbox.path("none.png").exists());
+}

@@ -1,0 +1,36 @@
+//! The command line, as its users meet it: what it prints, where it writes, how it ends.
+
+#[path = "../common/mod.rs"]
+mod common;
+
+mod configs;
+mod data;
+mod eval;
+mod help;
+mod output;
+mod replay;
+mod robots;
+mod simulate;
+
+use common::program::{Sandbox, files};
+use std::collections::BTreeMap;
+use std::sync::OnceLock;
+
+/// A finished tiny run and what belongs to it, made once; copy it with [`with_run`].
+fn run_once() -> &'static BTreeMap<String, Vec<u8>> {
+    static RUN: OnceLock<BTreeMap<String, Vec<u8>>> = OnceLock::new();
+    RUN.get_or_init(|| {
+        let sandbox = Sandbox::tiny();
+        sandbox.run("evolve -q -c tiny.toml -o run").ended(0, &[]);
+        files(&sandbox.path("run"))
+    })
+}
+
+/// A sandbox with a finished run in `run`.
+fn with_run() -> Sandbox {
+    let sandbox = Sandbox::tiny();
+    run_once().iter().for_each(|(name, content)| {
+        sandbox.write(&format!("run/{name}"), content);
+    });
+    sandbox
+}

@@ -1,0 +1,357 @@
+//! Where the words go: `--json`, `--quiet`, terminals, pipes and full disks.
+
+use crate::common::program::{PROGRAM, Sandbox, said};
+use crate::simulate::scenario;
+use crate::with_run;
+use morphcog::store::eval::EvalFile;
+use std::collections::BTreeSet;
+use std::path::Path;
+
+#[test]
+fn no_table_shows_a_minus_nothing() {
+    let sandbox = with_run();
+    let mut run: serde_json::Value = serde_json::from_str(&sandbox.read("run/run.json")).unwrap();
+    for elite in run["elites"].as_array_mut().unwrap() {
+        elite["objective"] = (-0.001).into();
+        elite["displacements"] = serde_json::json!([-0.001, 0.001]);
+    }
+    sandbox.write("run/run.json", run.to_string());
+    let mut said = sandbox.run("eval -a run -n 4 --cycles 1 --robots top:2").ended(0, &[]).out;
+    said += &sandbox.run("replay -a run --format html").ended(0, &[]).out;
+    sandbox.run("report -q --archive run --rollouts 1").ended(0, &[]);
+    sandbox.run("plot -q archive --archive run").ended(0, &[]);
+    sandbox.run("plot -q body --archive run -o body.svg").ended(0, &[]);
+    for file in ["run/report.html", "run/plot-archive.svg", "body.svg"] {
+        said += &sandbox.read(file);
+    }
+    for nothing in
+        ["-0.00<", "-0.00 ", "−0.00", "-0.0<", "-0.0 ", "-0.0]", "−0.0<", "−0.0 ", "+0.0<", "+0.0 "]
+    {
+        let at =
+            said.find(nothing).map(|at| said[at.saturating_sub(60)..].chars().take(90).collect::<String>());
+        assert_eq!(at, None, "{nothing:?}");
+    }
+}
+
+#[test]
+fn speed_is_measured_in_processor_time_and_says_so() {
+    let sandbox = Sandbox::new();
+    let said = sandbox.run("bench --json").ended(0, &[]);
+    let clocks: Vec<_> = said.json_lines().iter().map(|line| line["clock"].clone()).collect();
+    let expected = if cfg!(any(target_os = "linux", target_os = "macos")) { "processor" } else { "wall" };
+    assert!(clocks.len() >= 5 && clocks.iter().all(|clock| clock == expected), "{clocks:?}");
+    assert!(sandbox.run("bench --help").ended(0, &[]).out.contains("processor time"));
+}
+
+#[test]
+fn quiet_leaves_results_only() {
+    let sandbox = Sandbox::tiny();
+    let said = sandbox.run("evolve --quiet -c tiny.toml -o run").ended(0, &[]);
+    assert!(said.err.is_empty() && said.out.contains("cells filled"), "{said:?}");
+    let said = sandbox.run("evolve -c tiny.toml -o loud").ended(0, &["evolving in", "generation"]);
+    assert!(said.out.contains("cells filled"));
+    let said = sandbox.run("eval -q -a run/run.json -n 2 --cycles 1").ended(0, &[]);
+    assert!(said.err.is_empty() && said.out.contains("accuracy"));
+}
+
+#[test]
+fn with_json_every_line_on_stdout_is_json() {
+    let sandbox = with_run();
+    let events = |args: &str, code: i32| -> Vec<String> {
+        let lines = sandbox.run(&format!("--json {args}")).ended(code, &[]).json_lines();
+        assert!(!lines.is_empty(), "{args}");
+        lines.iter().map(|line| line["event"].as_str().unwrap().to_string()).collect()
+    };
+    let evolve = events("evolve -c tiny.toml -o new", 0);
+    assert_eq!(evolve.iter().filter(|name| *name == "generation").count(), 13);
+    assert_eq!(evolve.last().unwrap(), "finished");
+    events("eval -a run/run.json -n 4 --cycles 1", 0);
+    events("replay -a run/run.json", 0);
+    events("replay -a run/run.json --format terminal", 0);
+    events("gallery", 0);
+    events("config", 0);
+    events("data info", 0);
+    events("data sheet -o sheet.png --samples 1", 0);
+    assert_eq!(events("evolve -c tiny.toml -o run", 5), ["error"]);
+    assert_eq!(events("eval -a nowhere.json", 3), ["error"]);
+    assert_eq!(events("evolve -c tiny.toml -o x --set a=1", 2), ["error"]);
+}
+
+/// The rows of tables in the documentation, from a heading on: what the first cell names, and the
+/// whole row.
+fn documented(name: &str, heading: &str) -> Vec<(Vec<String>, String)> {
+    let text = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join(name)).unwrap();
+    let (_, text) = text.split_once(heading).unwrap();
+    let row = |line: &str| {
+        let line = line.replace("\\|", "¦");
+        let first = line.strip_prefix("| ")?.split(" | ").next()?.replace('¦', "|");
+        let names = first.split('`').skip(1).step_by(2).map(str::to_string).collect::<Vec<_>>();
+        Some((names, line))
+    };
+    text.lines().filter_map(row).collect()
+}
+
+#[test]
+fn every_event_of_json_is_documented_with_its_fields() {
+    let rows = documented("docs/command-line.md", "### JSON");
+    let row = |event: &str| {
+        let found = rows.iter().find(|(names, _)| names.len() == 1 && names[0] == event);
+        &found.unwrap_or_else(|| panic!("the event {event} is not documented")).1
+    };
+    // All that the source has.
+    let mut open = vec![Path::new(env!("CARGO_MANIFEST_DIR")).join("src")];
+    let mut events = BTreeSet::new();
+    while let Some(path) = open.pop() {
+        if path.is_dir() {
+            open.extend(std::fs::read_dir(path).unwrap().map(|entry| entry.unwrap().path()));
+            continue;
+        }
+        let Ok(source) = std::fs::read_to_string(&path) else { continue };
+        let code = source.split("#[cfg(test)]").next().unwrap();
+        for call in [".event(", ".finding("] {
+            let names = code.split(call).skip(1).filter_map(|rest| rest.trim_start().strip_prefix('"'));
+            events.extend(names.map(|name| name.split('"').next().unwrap().to_string()));
+        }
+    }
+    assert!(events.len() > 20, "{events:?}");
+    events.iter().for_each(|event| {
+        row(event);
+    });
+    // Those of quick commands, as they come.
+    let sandbox = with_run();
+    sandbox.write("plan.toml", "config = \"tiny.toml\"\nseeds = [3]\n");
+    let train = "train -a run --robots all --task 0|1 --out taught --set train.random_images=20 --set \
+                 train.windows=4 --set stimulus.reduction=area --set train.rounds=1 --set train.images=4 --set \
+                 train.final_images=4 --set train.challengers=1 --set protocol.control_steps=50 --set \
+                 validation.images=40";
+    let mut seen = BTreeSet::new();
+    for args in [
+        "evolve -c tiny.toml -o new",
+        train,
+        "train -a run --robots all --task 0|1 --out own --set train.rounds=0 --set train.random_images=20 \
+         --set train.final_images=4 --set train.challengers=1 --set validation.images=40",
+        "response -a taught --images 60",
+        "eval -a run -n 20 --cycles 1",
+        "capacity --eval run/eval.json --set trainings=2 --set sizes=[1,3]",
+        "team -a run --classes 0,1 --images 20",
+        "replay -a run --format png",
+        "report run --rollouts 0",
+        "data info",
+        "data sheet",
+        "gallery",
+        "sweep plan.toml",
+        "sweep plan.toml --status",
+        "sweep plan.toml --collect",
+        "eval -a nowhere.json",
+    ] {
+        let said = sandbox.run(&format!("{args} --json"));
+        assert_eq!(said.code, Some(if args.contains("nowhere") { 3 } else { 0 }), "{said:#?}");
+        for line in said.json_lines() {
+            let event = line["event"].as_str().unwrap();
+            for field in line.as_object().unwrap().keys().filter(|field| *field != "event") {
+                assert!(row(event).contains(&format!("`{field}`")), "{args}: {event} has {field}");
+            }
+            seen.insert(event.to_string());
+        }
+    }
+    // These take longer.
+    events.retain(|event| !["speed", "reproduced"].contains(&event.as_str()));
+    assert_eq!(seen, events);
+}
+
+#[test]
+fn a_written_file_is_named_for_programs() {
+    let sandbox = with_run();
+    for (args, file) in
+        [("report run --rollouts 0", "run/report.html"), ("data sheet -o sheet.png --samples 1", "sheet.png")]
+    {
+        let lines = sandbox.run(&format!("{args} --json")).ended(0, &[]).json_lines();
+        let last = lines.last().unwrap();
+        assert_eq!((&last["event"], &last["file"]), (&"result".into(), &file.into()), "{lines:?}");
+        assert!(last["text"].as_str().unwrap().starts_with(&format!("wrote {file}")), "{last}");
+    }
+}
+
+#[test]
+fn every_column_of_a_test_and_of_an_audit_is_explained() {
+    let sandbox = Sandbox::tiny();
+    // Some of its robots are walkers.
+    sandbox
+        .run("evolve -q -c tiny.toml -o run --generations 40 --set protocol.control_steps=150")
+        .ended(0, &[]);
+    let rows = documented("docs/analysing.md", "## Test");
+    let explained: Vec<&str> = rows.iter().flat_map(|(names, _)| names).map(String::as_str).collect();
+    let explained = [explained, vec!["robot", "task", "change"]].concat();
+    let mut columns = 0;
+    for args in [
+        "eval -a run -n 20 --cycles 1 --robots best-validation:1 --validation 40",
+        "audit -a run --robots top:4 --set least_walk=0 --set threshold=0",
+    ] {
+        let said = sandbox.run(args).ended(0, &[]).out;
+        let lines: Vec<&str> = said.lines().collect();
+        // A header stands above a rule.
+        for pair in lines.windows(2).filter(|pair| pair[1].starts_with("--")) {
+            for column in pair[0].split("  ").map(str::trim).filter(|column| !column.is_empty()) {
+                assert!(explained.contains(&column), "{column} is not explained");
+                columns += 1;
+            }
+        }
+    }
+    assert_eq!(columns, 13 + 9 + 8 + 4);
+}
+
+#[test]
+fn rows_of_a_collected_sweep_are_numbers_or_null_for_programs() {
+    let sandbox = Sandbox::tiny();
+    let plan = "config = \"tiny.toml\"\nseeds = [1, 2]\n[vary]\nmap_elites.parents = [4]\n[eval]\nrobots = \
+                \"top:2\"\nimages = 20\n";
+    sandbox.write("plan.toml", plan);
+    sandbox.run("sweep plan.toml --out all -q --task 1").ended(0, &[]);
+    let lines = sandbox.run("sweep plan.toml --out all --collect --json").ended(0, &["not all"]).json_lines();
+    let rows: Vec<_> = lines.iter().filter(|line| line["event"] == "collected").collect();
+    let [done, waiting] = rows.as_slice() else { panic!("{lines:?}") };
+    let eval: EvalFile = serde_json::from_str(&sandbox.read("all/tiny-parents=4-seed1/eval.json")).unwrap();
+    let mean = &eval.means["0|1"];
+    assert_eq!((done["number"].as_u64(), done["state"].as_str()), (Some(1), Some("done")));
+    assert_eq!((done["accuracy"].as_f64(), done["robots"].as_u64()), (Some(mean.accuracy), Some(2)));
+    let ends = [&done["accuracy_low"], &done["accuracy_high"]].map(|end| end.as_f64());
+    assert_eq!(ends, mean.interval.unwrap().map(Some));
+    assert_eq!(done["varied"], serde_json::json!({ "map_elites.parents": 4, "seed": 1 }));
+    assert_eq!((&waiting["state"], &waiting["accuracy"]), (&"waiting".into(), &serde_json::Value::Null));
+    // The columns of the table.
+    let table = sandbox.read("all/sweep.csv");
+    let columns = table.lines().next().unwrap().split(',').filter(|column| !column.starts_with("varied_"));
+    assert!(columns.clone().count() > 15);
+    columns.for_each(|column| assert!(done.get(column).is_some(), "{column}"));
+    // Nothing is empty, and every file is named.
+    let results: Vec<_> = lines.iter().filter(|line| line["event"] == "result").collect();
+    assert!(results.len() >= 3 && results.len() + rows.len() == lines.len(), "{lines:?}");
+    assert_eq!(results[0]["file"], "all/sweep.csv");
+    assert!(results.iter().all(|line| line["text"] != "" && line["file"].is_string()), "{results:?}");
+}
+
+#[test]
+fn how_far_tasks_are_has_no_column_without_a_name() {
+    let sandbox = Sandbox::tiny();
+    sandbox.write("plan.toml", "config = \"tiny.toml\"\nseeds = [3]\n");
+    let status = || sandbox.run("sweep plan.toml --out all --status").ended(0, &[]).out;
+    let plain = status();
+    assert!(plain.lines().next().unwrap().ends_with("  left"), "{plain}");
+    assert!(plain.lines().all(|line| line.trim_end() == line), "{plain:?}");
+    assert!(plain.ends_with("1 task: 1 waiting\n"), "one task is no tasks: {plain}");
+    sandbox.run("sweep plan.toml --out all -q").ended(0, &[]);
+    let path = "all/tiny-seed3/task.json";
+    let mut task: serde_json::Value = serde_json::from_str(&sandbox.read(path)).unwrap();
+    (task["state"], task["error"]) = ("failed".into(), "no room".into());
+    sandbox.write(path, task.to_string());
+    let failed = status();
+    assert!(failed.lines().next().unwrap().ends_with("  about"), "{failed}");
+    assert!(failed.contains("no room") && failed.ends_with("1 task: 1 failed\n"), "{failed}");
+}
+
+#[test]
+fn away_from_a_terminal_there_are_no_escape_sequences_with_or_without_no_color() {
+    let sandbox = with_run();
+    for value in [None, Some("1"), Some("")] {
+        for args in [
+            "evolve -c tiny.toml -o run",
+            "eval -a run/run.json -n 2 --cycles 1",
+            "replay -a run/run.json --format terminal",
+        ] {
+            let mut command = sandbox.command(args.split(' '));
+            value.map(|value| command.env("NO_COLOR", value));
+            let said = said(command);
+            assert!(!said.out.contains('\x1b') && !said.err.contains('\x1b'), "{said:?}");
+        }
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn a_reader_that_goes_away_is_no_error() {
+    let sandbox = with_run();
+    let rollout = scenario(&sandbox, "disc_5x5_00");
+    assert_eq!(rollout.control_steps, 500);
+    for args in [
+        "simulate scenario.json",
+        "config zero_one.toml",
+        "completions bash",
+        "man",
+        "gallery",
+        "evolve -c tiny.toml -o piped",
+    ] {
+        let mut child = sandbox.start(args);
+        drop(child.stdout.take());
+        let ended = child.wait_with_output().unwrap();
+        let err = String::from_utf8_lossy(&ended.stderr);
+        assert!(
+            ended.status.success() && !err.contains("panicked") && !err.contains("error"),
+            "{args}: {ended:?}"
+        );
+    }
+    // Nobody waits for the rest of a rollout that would take minutes.
+    let forever = r#"{"body": [[3]], "control_steps": 1000000}"#;
+    sandbox.write("forever.json", forever);
+    let mut child = sandbox.start("simulate forever.json");
+    drop(child.stdout.take());
+    assert!(child.wait().unwrap().success());
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_disk_is_an_error_and_is_said() {
+    let sandbox = with_run();
+    scenario(&sandbox, "disc_5x5_00");
+    for args in [
+        "simulate scenario.json",
+        "config zero_one.toml",
+        "man",
+        "completions zsh",
+        "gallery",
+        "--json gallery",
+        "--help",
+    ] {
+        let full = std::fs::File::options().write(true).open("/dev/full").unwrap();
+        let mut command = std::process::Command::new(PROGRAM);
+        let ended =
+            command.current_dir(sandbox.path("")).args(args.split(' ')).stdout(full).output().unwrap();
+        let err = String::from_utf8_lossy(&ended.stderr);
+        assert!(
+            !ended.status.success() && ended.status.code().is_some_and(|c| c != 101),
+            "{args}: {ended:?}"
+        );
+        assert!(err.contains("No space left") && !err.contains("panicked"), "{args}: {err}");
+    }
+}
+
+#[test]
+fn where_nothing_can_be_written_it_says_where() {
+    let sandbox = with_run();
+    scenario(&sandbox, "disc_5x5_00");
+    sandbox.write("file", "in the way");
+    for args in [
+        "evolve -c tiny.toml -o file",
+        "evolve -c tiny.toml -o file/run",
+        "replay -a run/run.json -o file/walk.gif",
+        "replay -a run/run.json -o file/walk.html",
+        "simulate scenario.json -o file/traj.csv",
+        "simulate scenario.json -o run",
+        "data sheet -o file/sheet.png",
+        "replay -a run/run.json -o nowhere/walk.png",
+    ] {
+        let place = args.rsplit(' ').next().unwrap();
+        sandbox.run(args).ended(1, &[place]);
+    }
+    assert_eq!(sandbox.read("file"), "in the way");
+}
+
+#[test]
+fn an_instruction_set_that_is_not_there_is_an_error_that_names_those_that_are() {
+    let sandbox = Sandbox::new();
+    for (set, code) in [("avx1024", 2), ("", 0), ("baseline", 0)] {
+        let mut command = sandbox.command(["gallery"]);
+        command.env("MORPHCOG_ISA", set);
+        let words: &[&str] = if code == 2 { &["MORPHCOG_ISA=avx1024", "baseline"] } else { &[] };
+        said(command).ended(code, words);
+    }
+}
