@@ -89,6 +89,24 @@ fn what_lies_beside_the_run_is_in_it_and_several_runs_go_together() {
 }
 
 #[test]
+fn runs_of_one_name_and_seed_are_told_apart_and_so_are_their_copies() {
+    let sandbox = Sandbox::tiny();
+    for (run, groups) in [("a", "[[0],[1]]"), ("b", "[[0],[2]]")] {
+        let images = "--set data.train_images= --set data.images_per_class=1";
+        sandbox
+            .run(&format!("evolve -q -c tiny.toml --set task.groups={groups} {images} -o runs/{run}"))
+            .ended(0, &[]);
+    }
+    sandbox.run("report runs/a runs/b --rollouts 0").ended(0, &[]);
+    let page = sandbox.read("runs/report.html");
+    let links = between(&page, "<a href=\"#run", "</a>");
+    assert_eq!(links.len(), 2, "{links:?}");
+    assert!(links[0].ends_with("(runs/a)") && links[1].ends_with("(runs/b)"), "{links:?}");
+    let copies = between(&page, "morphcog report --archive ", "<");
+    assert!(copies.len() == 2 && copies[0] != copies[1], "{copies:?}");
+}
+
+#[test]
 fn what_was_found_of_another_state_of_a_run_is_left_out_and_what_was_stopped_is_said() {
     let sandbox = sandbox();
     sandbox.run("eval -q --archive runs/3 --images 20 --cycles 1 --robots top:2").ended(0, &[]);

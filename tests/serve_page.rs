@@ -258,6 +258,34 @@ fn a_drawing_is_fitted_unless_that_is_turned_off() {
 }
 
 #[test]
+fn what_was_erased_is_not_seen_at_any_size_of_the_drawing() {
+    let sandbox = Sandbox::new();
+    let Some(mut browser) = browser(&sandbox) else { return };
+    let server = Server::start(&sandbox, "");
+    let mut tab = quick(&mut browser, &server);
+    // A line of ten pixels whose upper part is erased, and one that is erased whole.
+    for (line, erased, rows) in [
+        ("[[14, 6], [14, 16]]", "[[14, 6], [14, 8]]", 19..=21),
+        ("[[2, 14], [26, 14]]", "[[0, 14], [28, 14]]", 0..=0),
+        ("[[1, 14], [27, 14]]", "[[0, 11], [28, 11], [28, 16], [0, 16]]", 0..=28),
+    ] {
+        let seen = tab.eval(&format!(
+            "import('/pad.js').then(({{ Pad }}) => {{
+               const pad = new Pad(document.createElement('canvas'), () => {{}});
+               pad.set([{{ erasing: false, points: {line} }}, {{ erasing: true, points: {erased} }}]);
+               return pad.rows;
+             }})"
+        ));
+        let is_dark = |row: &Value| {
+            row.as_array().unwrap().iter().any(|pixel| pixel.as_f64().expect("a number") > 127.0)
+        };
+        let dark = seen.as_array().unwrap().iter().filter(|row| is_dark(row)).count();
+        assert!(rows.contains(&dark), "{line} without {erased}: {dark} rows");
+    }
+    assert_eq!(tab.complaints(), Vec::<String>::new());
+}
+
+#[test]
 fn a_run_that_begins_while_the_page_is_open_appears_grows_and_ends_on_it() {
     let sandbox = Sandbox::new();
     let Some(mut browser) = browser(&sandbox) else { return };
@@ -310,7 +338,10 @@ fn an_audit_that_appears_while_the_page_is_open_is_said_and_can_be_chosen_by() {
     tab.eval("(() => { const s = document.getElementById('audit'); s.value = 'fragile'; s.onchange(); })()");
     let few = tab.text("#count");
     assert!(few.contains(" of "), "{few}");
-    // What was chosen stays, the robot walks on.
+    // What was chosen stays, the robot walks on, and keys stay where they are.
+    tab.eval("document.querySelector('#cards [data-robot]').focus()");
+    let held = "document.activeElement.dataset.robot";
+    let card = tab.eval(held);
     sandbox.write("run/audit.json", with_reason("seen once more"));
     tab.wait("document.getElementById('about').textContent.includes('seen once more')");
     assert_eq!(
@@ -318,6 +349,7 @@ fn an_audit_that_appears_while_the_page_is_open_is_said_and_can_be_chosen_by() {
         ("fragile".into(), few)
     );
     assert_eq!((tab.text("#who"), begun()), (who, before));
+    assert_eq!((tab.eval(held), card.is_string()), (card, true));
     assert_eq!(tab.complaints(), Vec::<String>::new());
 }
 
@@ -328,9 +360,18 @@ fn a_body_that_is_built_and_the_robot_it_makes_are_in_sight_together() {
     let server = Server::start(&sandbox, "");
     let mut tab = browser.tab(1280, 800, false);
     open(&mut tab, &server);
+    as_fast_as_possible(&mut tab);
+    tab.click("#tab-test");
+    tab.click("#thumbs button");
+    at_end(&mut tab);
     tab.click("#tab-editor");
     tab.wait("!document.getElementById('editor').hidden");
     tab.eval("window.scrollTo(0, 0)");
+    // Nothing moves any more, and yet the stage has the size that it has room for.
+    tab.wait(
+        "document.getElementById('world').getBoundingClientRect().bottom <= \
+         document.getElementById('play').getBoundingClientRect().top",
+    );
     for id in ["grid", "world", "verdict"] {
         let bottom = tab.eval(&format!("document.getElementById('{id}').getBoundingClientRect().bottom"));
         assert!((1.0..=800.0).contains(&bottom.as_f64().unwrap()), "{id} ends at {bottom}");
@@ -371,6 +412,9 @@ fn a_team_walks_on_small_stages_and_its_votes_are_counted() {
         open(&mut tab, &server);
         as_fast_as_possible(&mut tab);
         let alone = tab.text("#who");
+        // All three are called tiny, and have one seed.
+        let names = "new Set([...document.getElementById('archive').options].map((o) => o.textContent)).size";
+        assert_eq!(tab.eval(names), tab.eval("document.getElementById('archive').options.length"));
         tab.click("#tab-team");
         assert_eq!(tab.text("#who"), "The team");
         draw(&mut tab, &zero());

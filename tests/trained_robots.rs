@@ -2,6 +2,9 @@
 //! what the documentation says of them.
 #![allow(clippy::disallowed_methods)]
 
+mod common;
+
+use common::program::{Sandbox, said};
 use morphcog::base::Grid;
 use morphcog::base::stop::NEVER;
 use morphcog::body::Body;
@@ -96,6 +99,23 @@ fn they_walk_to_the_bit_as_in_their_test() {
         let known: Vec<Option<f64>> =
             shown.iter().map(|place| eval.robots[0].displacements[*place]).collect();
         assert_eq!(walks(&run, &mnist, &images), known, "{}", folder.display());
+    }
+}
+
+#[test]
+fn the_baselines_beside_them_are_those_that_eval_finds_today() {
+    let Some(data) = std::env::var_os("MORPHCOG_DATA").filter(|_| mnist().is_some()) else { return };
+    for folder in ["data/trained/zero-one-1", "data/four_digit/2v013"] {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join(folder);
+        let sandbox = Sandbox::new();
+        let mut command =
+            sandbox.command(["eval", "--quiet", "--cycles", "1", "--out", "eval.json", "--archive"]);
+        command.arg(&folder).arg("--data").arg(&data);
+        said(command).ended(0, &[]);
+        let (then, now) =
+            (EvalFile::read(&folder.join("eval.json")), EvalFile::read(&sandbox.path("eval.json")));
+        let (then, now) = (then.unwrap(), now.unwrap());
+        assert_eq!((&then.images, &then.baselines), (&now.images, &now.baselines), "{}", folder.display());
     }
 }
 

@@ -19,9 +19,11 @@ from __future__ import annotations
 import html as _html
 import io as _io
 import json as _json
+import operator as _operator
 import os as _os
 import subprocess as _subprocess
 import sys as _sys
+import threading as _threading
 from collections.abc import Mapping as _Mapping
 from dataclasses import dataclass as _dataclass
 
@@ -61,6 +63,23 @@ def _array(value, dtype, dimensions, what, expected):
     if _np.dtype(dtype).kind == "u" and not _np.array_equal(converted, given):
         raise Error(f"{what}: expected {expected}, found numbers from {given.min()} to {given.max()}")
     return _np.ascontiguousarray(converted)
+
+
+def _whole(value, what, least, most=2**63 - 1):
+    """A whole number within bounds, or none."""
+    if value is None:
+        return None
+    try:
+        number = _operator.index(value)
+    except TypeError:
+        number = None
+    if number is None or not least <= number <= most:
+        raise Error(f"{what}={value!r}: expected a whole number from {least} to {most}")
+    return number
+
+
+def _threads(value):
+    return _whole(value, "threads", 1, _morphcog.MOST_THREADS)
 
 
 def _body(value, what="body"):
@@ -107,11 +126,12 @@ def displacements(bodies, stimuli, *, control_steps=None, config=None, threads=N
     shape, type or range, and for bodies that are not connected.
     """
     bodies = [_body(body, f"body {number}") for number, body in enumerate(bodies)]
-    return _morphcog.displacements(bodies, _stimuli(stimuli), control_steps, _config(config), threads)
+    steps = _whole(control_steps, "control_steps", 1, _morphcog.MAX_STEPS)
+    return _morphcog.displacements(bodies, _stimuli(stimuli), steps, _config(config), _threads(threads))
 
 
 class World:
-    """One simulation of a body on flat ground, step by step.
+    """One simulation of a body on flat ground, step by step; threads that share it take turns.
 
     The stimulus may change at every control step. config: whose physics and start are used (default:
     the paper's). start_row: row of the body's bottom row at the start, 2 stands on the ground.
@@ -119,47 +139,63 @@ class World:
 
     def __init__(self, body, *, start_row=None, config=None):
         body = _body(body)
+        start_row = _whole(start_row, "start_row", 0, _morphcog.MAX_ROW)
         self._world = _morphcog.WorldData(body, start_row, _config(config))
-        self._stimulus = _np.zeros(body.shape)
+        self._turn = _threading.RLock()
+        self._seen(_np.zeros(body.shape))
+
+    def _seen(self, pixels):
+        # An assignment to one pixel would not reach the simulation.
+        self._stimulus = pixels.copy()
+        self._stimulus.flags.writeable = False
 
     @property
     def stimulus(self):
-        """What the sensors see: float64 (rows, columns) from 0 to 1; dark at the start."""
-        return self._stimulus.copy()
+        """What the sensors see: float64 (rows, columns) from 0 to 1; dark at the start. To change it, assign an
+        array of all pixels."""
+        return self._stimulus
 
     @stimulus.setter
     def stimulus(self, pixels):
         pixels = _array(pixels, _np.float64, 2, "stimulus", "pixels from 0 to 1 of shape (rows, columns)")
-        self._world.set_stimulus(pixels)
-        self._stimulus = pixels.copy()
+        with self._turn:
+            self._world.set_stimulus(pixels)
+            self._seen(pixels)
 
     def step(self, count=1):
         """Simulates control steps. Raises Unstable if the simulation ends in one of them."""
-        self._world.step(count)
+        count = _whole(count, "count", 0)
+        with self._turn:
+            self._world.step(count)
 
     def reset(self):
         """Begins anew; the stimulus stays."""
-        self._world.reset()
+        with self._turn:
+            self._world.reset()
 
     @property
     def control_step(self):
         """Control steps so far."""
-        return self._world.control_step
+        with self._turn:
+            return self._world.control_step
 
     @property
     def points(self):
         """Corners of all voxels: float64 (points, 2), voxel lengths from the start's left edge and the ground."""
-        return self._world.points
+        with self._turn:
+            return self._world.points
 
     @property
     def voxels(self):
         """Corners of each voxel as indices into points, clockwise from the top left: (voxels, 4)."""
-        return self._world.voxels
+        with self._turn:
+            return self._world.voxels
 
     @property
     def centre(self):
         """Centre of mass, the mean of all points: float64 (2,), voxel lengths."""
-        return _np.array(self._world.centre)
+        with self._turn:
+            return _np.array(self._world.centre)
 
     def __repr__(self):
         x, y = self.centre
@@ -274,6 +310,11 @@ def load_run(folder):
     return Run(folder)
 
 
+def _value(value):
+    """A value of a config's key as text; numpy's numbers and arrays too."""
+    return value if isinstance(value, str) else _json.dumps(value, default=lambda other: _np.asarray(other).tolist())
+
+
 def evolve(
     config, *, generations=None, seed=None, set=(), out=None, resume=False, force=False, data=None, threads=None
 ):
@@ -286,14 +327,16 @@ def evolve(
     if isinstance(set, str):
         changes = [set]
     elif isinstance(set, _Mapping):
-        changes = [f"{key}={value if isinstance(value, str) else _json.dumps(value)}" for key, value in set.items()]
+        changes = [f"{key}={_value(value)}" for key, value in set.items()]
     else:
         changes = list(set)
+    if resume and force:
+        raise Error("resume=True, force=True: expected one of them: resume goes on with a run, force replaces it")
     changes += [] if seed is None else [f"seed={seed}"]
     changes += [] if generations is None else [f"generations={generations}"]
     path = lambda value: None if value is None else _os.fspath(value)
     return Run(
-        _morphcog.evolve_run(_os.fspath(config), changes, path(out), resume, force, path(data), threads)
+        _morphcog.evolve_run(_os.fspath(config), changes, path(out), resume, force, path(data), _threads(threads))
     )
 
 

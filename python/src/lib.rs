@@ -1,10 +1,11 @@
 //! The Python module `morphcog._morphcog`; what users import stands in `morphcog/__init__.py`.
 
+use exceptions::{Error as MorphcogError, Unstable};
 use morphcog::base::Grid;
 use morphcog::base::error::{Error, ErrorKind};
 use morphcog::base::ranks::Ranks;
 use morphcog::base::stop::Stopped;
-use morphcog::base::threads::pool;
+use morphcog::base::threads::{MOST_THREADS, pool};
 use morphcog::body::{Body, Material};
 use morphcog::commands::replay;
 use morphcog::config;
@@ -19,8 +20,7 @@ use morphcog::task::protocol::{MAX_ROW, MAX_STEPS, Protocol, RolloutMode};
 use morphcog::task::stimulus::stimulus;
 use morphcog::view::html;
 use numpy::{PyArray1, PyArray2, PyArray3, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
-use pyo3::create_exception;
-use pyo3::exceptions::{PyException, PyRuntimeError};
+use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 use rayon::prelude::*;
 use std::path::PathBuf;
@@ -28,13 +28,14 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::Duration;
 
-create_exception!(
-    morphcog,
-    MorphcogError,
-    PyException,
-    "What morphcog refuses or fails with, in its own words."
-);
-create_exception!(morphcog, Unstable, MorphcogError, "A simulation became unstable and ended.");
+/// Exceptions, named as Python shows them.
+mod exceptions {
+    use pyo3::create_exception;
+    use pyo3::exceptions::PyException;
+
+    create_exception!(morphcog, Error, PyException, "What morphcog refuses or fails with, in its own words.");
+    create_exception!(morphcog, Unstable, Error, "A simulation became unstable and ended.");
+}
 
 /// Images and labels.
 type Labelled<'py> = (Bound<'py, PyArray3<u8>>, Bound<'py, PyArray1<u8>>);
@@ -342,9 +343,6 @@ fn displacements<'py>(
     let bodies = bodies.iter().map(body).collect::<PyResult<Vec<Body>>>()?;
     let (physics, protocol) = setting(config);
     let control_steps = control_steps.unwrap_or(protocol.control_steps);
-    if !(1..=MAX_STEPS).contains(&control_steps) {
-        return Err(refused(format!("control_steps={control_steps}: expected 1 to {MAX_STEPS}")));
-    }
     let protocol = Protocol { rollout: RolloutMode::Fresh, control_steps, ..protocol };
     let view = stimuli.as_array();
     let seen_by = |number: usize, place: usize| {
@@ -479,6 +477,9 @@ fn command(py: Python, arguments: Vec<std::ffi::OsString>, program: String) -> u
 fn _morphcog(module: &Bound<'_, PyModule>) -> PyResult<()> {
     let py = module.py();
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
+    module.add("MOST_THREADS", MOST_THREADS)?;
+    module.add("MAX_STEPS", MAX_STEPS)?;
+    module.add("MAX_ROW", MAX_ROW)?;
     module.add("Error", py.get_type::<MorphcogError>())?;
     module.add("Unstable", py.get_type::<Unstable>())?;
     module.add_class::<Config>()?;

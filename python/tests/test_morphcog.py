@@ -2,6 +2,7 @@
 
 import json
 import os
+import pickle
 import signal
 import subprocess
 import sys
@@ -113,6 +114,12 @@ def test_a_controller_can_drive_every_sensor_at_every_step():
         (lambda: mc.displacements([SENSOR, WALKER], np.zeros((1, 2, 3))), ["image 0, body 1"]),
         (lambda: mc.World([[3, 3], [3]]), ["different lengths"]),
         (lambda: mc.World(SENSOR, start_row=1), ["start_row=1", "on the ground"]),
+        (lambda: mc.World(SENSOR, start_row=-1), ["start_row=-1", "from 0 to"]),
+        (lambda: mc.World(SENSOR).step(-1), ["count=-1"]),
+        (lambda: mc.World(SENSOR).step(1.5), ["count=1.5", "whole number"]),
+        (lambda: mc.displacements([SENSOR], np.zeros((1, 2, 3)), threads=0), ["threads=0", "from 1 to 1024"]),
+        (lambda: mc.stimuli(np.zeros((1, 0, 28), np.uint8), "zero_one.toml"), ["0 x 28 pixels"]),
+        (lambda: mc.evolve("quickstart.toml", resume=True, force=True), ["resume", "force"]),
         (lambda: mc.from_evogym([[4, 3]]), ["vertical actuator"]),
         (lambda: mc.from_evogym([[5]]), ["0 to 3"]),
         (lambda: mc.stimuli(np.zeros((1, 28, 28)), "zero_one.toml"), ["whole numbers", "float64"]),
@@ -131,6 +138,38 @@ def test_what_cannot_be_is_refused_with_what_was_expected(call, words):
         call()
     for word in words:
         assert word in str(error.value)
+
+
+def test_an_error_has_the_name_that_it_is_caught_by():
+    for error in [mc.Error, mc.Unstable]:
+        assert error is getattr(mc, error.__name__) and error.__module__ == "morphcog"
+        assert str(pickle.loads(pickle.dumps(error("what")))) == "what"
+
+
+def test_the_stimulus_of_a_world_changes_as_a_whole_only():
+    world = mc.World(SENSOR)
+    with pytest.raises(ValueError):
+        world.stimulus[0, 0] = 1
+    seen = np.ones((2, 3))
+    world.stimulus = seen
+    seen[0, 0] = 0
+    assert world.stimulus.min() == 1
+
+
+def test_threads_that_share_a_world_take_turns():
+    world = mc.World(WALKER)
+    worker = threading.Thread(target=lambda: world.step(300))
+    worker.start()
+    while worker.is_alive():
+        assert world.points.shape[1] == 2 and world.control_step in (0, 300)
+    assert world.control_step == 300
+
+
+def test_keys_take_numbers_of_numpy(tmp_path):
+    changes = {"map_elites.parents": np.int64(3), "task.groups": np.array([[0], [1]])}
+    config = mc.evolve("quickstart.toml", generations=1, set=changes, out=tmp_path / "run").config
+    config = json.loads(config.to_json())
+    assert config["map_elites"]["parents"] == 3 and config["task"]["groups"] == [[0], [1]]
 
 
 def test_a_folder_that_holds_a_run_is_not_written_over(run):

@@ -29,6 +29,8 @@ const MOST_IMAGES: usize = 4;
 pub struct Dossier {
     /// Its run.json.
     pub path: PathBuf,
+    /// How many runs before it have its name and seed; none if it is the only one.
+    pub namesake: Option<usize>,
     /// The run.
     pub run: RunFile,
     /// How it came along; none without a metrics.csv.
@@ -117,7 +119,7 @@ pub fn gather(
     with_rollouts: bool,
     warn: &dyn Fn(&str),
 ) -> Result<Gathered, Error> {
-    let mut runs = Vec::new();
+    let mut runs: Vec<Dossier> = Vec::new();
     for path in archives {
         let run = RunFile::read(path)?;
         let folder = path.parent().unwrap_or(Path::new(""));
@@ -128,7 +130,15 @@ pub fn gather(
         let whereabouts = Whereabouts::given(data).and_of(path);
         let images = if with_rollouts { images(&run, path, &whereabouts)? } else { Vec::new() };
         let findings = Findings::read(folder, &[&run], warn);
-        runs.push(Dossier { path: path.clone(), run, progress, findings, images });
+        runs.push(Dossier { path: path.clone(), namesake: None, run, progress, findings, images });
+    }
+    let named: Vec<(String, u64)> =
+        runs.iter().map(|dossier| (dossier.run.name.clone(), dossier.run.config.seed)).collect();
+    let count =
+        |name: &(String, u64), among: &[(String, u64)]| among.iter().filter(|other| *other == name).count();
+    for (number, dossier) in runs.iter_mut().enumerate() {
+        let name = &named[number];
+        dossier.namesake = (count(name, &named) > 1).then(|| count(name, &named[..number]));
     }
     different(runs.iter().map(|dossier| (dossier.path.as_path(), &dossier.run)))?;
     let together = match archives.len() {
@@ -281,7 +291,14 @@ mod tests {
 
     fn dossier(robots: &[(&str, f64)]) -> Dossier {
         let (path, run) = (PathBuf::from("run.json"), samples::run(robots));
-        Dossier { path, run, progress: None, findings: Findings::default(), images: Vec::new() }
+        Dossier {
+            path,
+            namesake: None,
+            run,
+            progress: None,
+            findings: Findings::default(),
+            images: Vec::new(),
+        }
     }
 
     #[test]

@@ -1,8 +1,10 @@
 //! [`Course`]: how a run went so far, for the page's curves.
 
 use crate::base::error::Error;
+use crate::base::files::exists;
 use crate::store::folder;
 use crate::store::metrics::{Moment, moments};
+use crate::store::names::METRICS;
 use serde::Serialize;
 use std::path::Path;
 
@@ -34,9 +36,10 @@ impl Course {
     /// Of the run of a run.json that was asked for so many generations.
     ///
     /// # Errors
-    /// If its `metrics.csv` cannot be read.
+    /// If its `metrics.csv` is there and cannot be read.
     pub fn of(archive: &Path, asked: u64) -> Result<Self, Error> {
-        let moments = moments(archive)?;
+        // Runs of the gallery and the atlas come without one, and one that has just begun has none yet.
+        let moments = if exists(&archive.with_file_name(METRICS)) { moments(archive)? } else { Vec::new() };
         let done = moments.len();
         let left = asked.saturating_sub(done as u64);
         // As fast as in its last fifth.

@@ -159,11 +159,12 @@ pub fn read(stream: &mut TcpStream) -> Result<Option<Request>, Response> {
     stream.set_write_timeout(Some(TO_WRITE)).map_err(|error| broken(&error))?;
     let mut bytes = Vec::new();
     let (mut request, begin) = loop {
-        if let Some(found) = parse(&bytes)? {
-            break found;
-        }
-        if bytes.len() > MAX_HEAD {
+        let found = parse(&bytes)?;
+        if found.as_ref().map_or(bytes.len(), |(_, begin)| *begin) > MAX_HEAD {
             return Err(Response::refusal(431, "the request's head is too long"));
+        }
+        if let Some(found) = found {
+            break found;
         }
         match more(stream, &mut bytes, deadline) {
             Ok(0) if bytes.is_empty() => return Ok(None),

@@ -76,10 +76,15 @@ impl ImageSets {
                     notes.retain(|(of, _)| *of != name);
                     sets.push(set);
                 }
-                Err(error) if notes.iter().all(|(_, told)| *told != error.message) => {
-                    notes.push((name, error.message));
+                Err(error) => {
+                    // Of several runs that lack the same folder the first says so.
+                    let run = collection.path.as_ref().map(|path| format!("{}: ", path.display()));
+                    let of_run = run.and_then(|run| error.message.strip_prefix(&run));
+                    let what = of_run.unwrap_or(&error.message);
+                    if notes.iter().all(|(_, told)| !told.ends_with(what)) {
+                        notes.push((name, error.message));
+                    }
                 }
-                Err(_) => {}
             }
         }
         sets.push(Dataset::load(BUILTIN, &[], &[Split::Test]).map_err(refuse)?);

@@ -350,7 +350,8 @@ impl<'a> Refinement<'a> {
     }
 
     /// What a challenger with the champion's gait tells of the slopes: on each image by how much it
-    /// is wider, and by how much farther it walks.
+    /// is wider, and by how much farther it walks. A soft voxel counts as one rest width, which it
+    /// is only nearly: what is learnt here proposes challengers, and decides nothing.
     fn learn(&mut self, challenger: &Body, order: &[usize], found: &[f64]) {
         let cells = self.body.height() * self.body.width();
         let mut set = Moments::new(cells);

@@ -92,6 +92,14 @@ pub enum StimulusError {
         /// Columns of the body.
         width: usize,
     },
+    /// The image has no rows or no columns of pixels.
+    #[error("an image of {height} x {width} pixels shows nothing; both sides must be at least 1")]
+    NoPixels {
+        /// Its rows.
+        height: usize,
+        /// Its columns.
+        width: usize,
+    },
     /// Keeping every s-th row and column needs sides that divide the image's.
     #[error(
         "the body's {axis} ({body}) do not divide the image's ({image}), so no stride takes one to the other; \
@@ -127,6 +135,7 @@ impl StimulusError {
     pub fn key(&self) -> &'static str {
         match self {
             StimulusError::Empty { .. } => "body",
+            StimulusError::NoPixels { .. } => "data",
             StimulusError::Stride { .. } => "stimulus.reduction",
             StimulusError::Margin { .. } => "stimulus.margin",
             StimulusError::Level(_) => "stimulus.level",
@@ -148,6 +157,9 @@ pub fn stimulus(
 ) -> Result<Grid<f64>, StimulusError> {
     if height == 0 || width == 0 {
         return Err(StimulusError::Empty { height, width });
+    }
+    if image.height() == 0 || image.width() == 0 {
+        return Err(StimulusError::NoPixels { height: image.height(), width: image.width() });
     }
     params.validate()?;
     let middle = match params.margin {

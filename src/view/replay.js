@@ -39,6 +39,7 @@
     const known = over && [...rollout.judge.left, ...rollout.judge.right].includes(phases[p].class);
     return "says " + says.join(" or ") + (known ? (says.includes(phases[p].class) ? ": correct" : ": wrong") : "");
   };
+  $("answers").hidden = $("verdict").hidden = !rollout.judge;
   const moved = (f) => origin(f, 0) - origin(phases[phaseOf(f)].first, 0);
   const signed = (d) => {
     if (!Number.isFinite(d)) return "?";

@@ -94,7 +94,7 @@ proptest! {
         (body, stimulus) in symmetric_bodies().prop_flat_map(stimuli)
     ) {
         // A symmetric robot falls with its middle exactly on a vertex of the ground, and rounding
-        // then decides on which side it first touches (physics.md, "Measured").
+        // then decides on which side it first touches (physics.md, "What agreement can be had").
         prop_assume!(voxels(&body, &stimulus) != voxels(&body.mirrored(), &stimulus.mirrored()));
         let physics = Physics::default();
         let start = Start { column: 0, row: 3 };

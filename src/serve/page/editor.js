@@ -10,7 +10,7 @@ const FIRST = ["4444444", "4444445", "5444465", "5544465", "5544445", "5444444",
 export class Editor {
   // `live(subject, steps)` is asked for a simulation, `see()` tells what the picture is now.
   constructor(materials, { live, see, say, chosen }) {
-    Object.assign(this, { materials, say, see, material: 3, cursor: null, painting: null, before: [], stimulus: null, steps: 500 });
+    Object.assign(this, { materials, live, say, see, material: 3, cursor: null, painting: null, before: [], stimulus: null, steps: 500 });
     this.cells = FIRST.map((row) => [...row].map(Number));
     this.encoding = AREA("threshold");
     const grid = $("grid");
@@ -175,7 +175,7 @@ export class Editor {
     this.steps = loaded.control_steps;
     // What it saw is shown until there is another picture.
     this.stimulus = loaded.stimulus;
+    this.live();
     this.say(loaded.note ? new Error(loaded.note) : null);
-    $("live").click();
   }
 }

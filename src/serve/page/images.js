@@ -7,7 +7,7 @@ const PAGE = 15;
 
 export class Images {
   constructor(chosen) {
-    this.chosen = chosen; this.sets = []; this.set = null; this.class = 0; this.from = 0; this.index = null;
+    this.chosen = chosen; this.sets = []; this.set = null; this.class = 0; this.from = 0; this.picked = null;
     $("set").onchange = () => this.open($("set").value);
     $("newer").onclick = () => this.turn(-PAGE);
     $("older").onclick = () => this.turn(PAGE);
@@ -57,15 +57,17 @@ export class Images {
       paint(canvas, image.pixels, ink);
       const button = element("button", { type: "button", title: label }, canvas);
       button.setAttribute("aria-label", label);
-      button.setAttribute("aria-pressed", String(image.index === this.index));
+      button.setAttribute("aria-pressed", String(this.picked?.set === this.set.name && this.picked.index === image.index));
       button.onclick = () => this.choose(image);
       return button;
     }));
   }
 
+  // The image that is shown to the robot; null: another picture is.
+  mark(picked) { if (picked || this.picked) { this.picked = picked; this.draw(); } }
+
   choose(image) {
-    this.index = image.index;
-    this.draw();
+    this.mark({ set: this.set.name, index: image.index });
     this.chosen({ image: { set: this.set.name, index: image.index }, about: `a ${image.label} (${this.set.name} test image ${image.index})` });
   }
 

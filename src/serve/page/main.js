@@ -30,9 +30,16 @@ const shownTo = () => (who?.own && editor.stimulus ? { stimulus: editor.stimulus
 // The page's state, for tests: waiting for the hand to rest, simulating, over.
 const mark = (state) => { document.documentElement.dataset.state = state; };
 
+// What was said of the walk before.
+const forget = () => {
+  $("verdict").dataset.state = "idle";
+  for (const id of ["says", "moved", "step"]) $(id).textContent = "";
+};
+
 const start = () => {
   clearTimeout(timer);
   if (!who) return;
+  forget();
   mark("living");
   simulation?.stop();
   team.stop();
@@ -86,6 +93,7 @@ const look = () => {
 let glancing = 0;
 const pad = new Pad($("pad"), (done) => {
   const next = { shown: { drawing: pad.rows }, about: "your drawing" };
+  images.mark(null);
   if (done) return show(next, AFTER_STROKE);
   picture = next; editor.stimulus = null;
   clearTimeout(timer);
@@ -214,7 +222,7 @@ const tick = (now) => {
 };
 
 const play = () => {
-  if (who?.team && !team.over) return void team.change({ paused: !team.walk?.paused }).then(() => { team.walk.stale = true; }, say);
+  if (who?.team && !team.over) return void team.change({ paused: !team.walk?.paused }).then(() => { if (team.walk) team.walk.stale = true; }, say);
   if (!simulation || simulation.over) return start();
   simulation.play(!simulation.playing).catch(say);
   drawn = null;
@@ -257,9 +265,10 @@ setInterval(() => {
 tabs(["draw", "test"], (id) => { if (id === "draw") pad.draw(); else images.draw(); });
 tabs(["robots", "team", "editor"], (id) => {
   if (id === "team") together();
-  else if (id === "robots" && who?.team && robots.robot) choose(robots.robot, robots.from);
+  else if (who?.team && robots.robot) choose(robots.robot, robots.from);
   document.querySelector("main").dataset.tab = id;
-  if (id === "editor") editor.draw();
+  // The stage has another size there.
+  redraw();
 });
 for (const material of materials.list.slice(1)) {
   $("legend").append(element("li", {}, Drawing.swatch(material), material.name));

@@ -8,8 +8,8 @@ const SIDE = 28, RADIUS = 1.15;
 const BOX = 20, MOST = 6;
 
 // Ink where a line is nearer than the pen's radius, fading over a pixel.
-const mark = (ink, [ax, ay], [bx, by], erasing) => {
-  const dx = bx - ax, dy = by - ay, long = dx * dx + dy * dy, wide = erasing ? 2 * RADIUS : RADIUS;
+const mark = (ink, [ax, ay], [bx, by], erasing, scale = 1) => {
+  const dx = bx - ax, dy = by - ay, long = dx * dx + dy * dy, wide = erasing ? 2 * RADIUS * scale : RADIUS;
   for (let r = 0; r < SIDE; r++) for (let c = 0; c < SIDE; c++) {
     const x = c + 0.5 - ax, y = r + 0.5 - ay;
     const t = long > 0 ? Math.min(1, Math.max(0, (x * dx + y * dy) / long)) : 0;
@@ -19,10 +19,10 @@ const mark = (ink, [ax, ay], [bx, by], erasing) => {
   }
 };
 
-// Strokes, moved and scaled about a point; the pen stays as wide as it is.
+// Strokes, moved and scaled about a point; the pen stays as wide as it is, the eraser takes away what it took.
 const render = (strokes, [cx, cy], scale) => {
   const ink = new Float64Array(SIDE * SIDE), to = ([x, y]) => [(x - cx) * scale + SIDE / 2, (y - cy) * scale + SIDE / 2];
-  for (const { erasing, points } of strokes) points.forEach((point, k) => mark(ink, to(points[Math.max(0, k - 1)]), to(point), erasing));
+  for (const { erasing, points } of strokes) points.forEach((point, k) => mark(ink, to(points[Math.max(0, k - 1)]), to(point), erasing, scale));
   return ink;
 };
 
@@ -34,6 +34,7 @@ const fitted = (strokes, ink) => {
   const [left, right, top, bottom] = [Math.min(...xs), Math.max(...xs) + 1, Math.min(...ys), Math.max(...ys) + 1];
   const scale = Math.min(MOST, (BOX - pen) / Math.max(right - left - pen, bottom - top - pen, 1)), middle = [(left + right) / 2, (top + bottom) / 2];
   const once = render(strokes, middle, scale), mass = once.reduce((sum, v) => sum + v, 0);
+  if (!mass) return ink;
   const off = (of) => once.reduce((sum, v, k) => sum + v * (of(k) + 0.5 - SIDE / 2), 0) / mass / scale;
   return render(strokes, [middle[0] + off((k) => k % SIDE), middle[1] + off((k) => Math.floor(k / SIDE))], scale);
 };
@@ -46,7 +47,7 @@ export class Pad {
     this.cursor = null; this.down = false; this.drawing = null;
     canvas.addEventListener("pointerdown", (e) => this.begin(e));
     canvas.addEventListener("pointermove", (e) => this.move(e));
-    for (const end of ["pointerup", "pointercancel"]) canvas.addEventListener(end, () => this.finish());
+    for (const end of ["pointerup", "pointercancel", "lostpointercapture"]) canvas.addEventListener(end, (e) => { if (e.pointerId === this.pointer) this.finish(); });
     canvas.addEventListener("keydown", (e) => this.key(e));
     canvas.addEventListener("focus", () => this.draw());
     canvas.addEventListener("blur", () => { this.cursor = null; this.lift(); this.draw(); });
@@ -88,7 +89,9 @@ export class Pad {
   }
 
   begin(e) {
-    if (e.button > 0) return;
+    // A palm or a second finger draws nothing.
+    if (e.button > 0 || this.drawing) return;
+    this.pointer = e.pointerId;
     e.preventDefault();
     this.canvas.focus({ preventScroll: true });
     try { this.canvas.setPointerCapture(e.pointerId); } catch { /* the pointer has gone already */ }
@@ -98,7 +101,7 @@ export class Pad {
   }
 
   move(e) {
-    if (!this.drawing) return;
+    if (!this.drawing || e.pointerId !== this.pointer) return;
     for (const each of e.getCoalescedEvents?.().length ? e.getCoalescedEvents() : [e]) {
       const to = this.place(each);
       this.stroke(this.drawing, to);

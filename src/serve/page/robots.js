@@ -22,8 +22,11 @@ export class Robots {
   }
 
   names() {
-    const wanted = this.list.map(({ name, robots, generations, asked }) =>
-      `${name} (${robots} robots${asked && generations < asked ? `, generation ${generations} of ${asked}` : ""})`);
+    // Runs of one name and seed are told apart by their folders.
+    const repeated = ({ name, path }) => path && this.list.filter((other) => other.name === name).length > 1;
+    for (const one of this.list) one.called = repeated(one) ? `${one.name}, ${one.path.replace(/\/[^/]*$/, "")}` : one.name;
+    const wanted = this.list.map(({ called, robots, generations, asked }) =>
+      `${called} (${robots} ${robots === 1 ? "robot" : "robots"}${asked && generations < asked ? `, generation ${generations} of ${asked}` : ""})`);
     const select = $("archive");
     wanted.forEach((text, k) => { if (k < select.length) select.options[k].textContent = text; else select.add(new Option(text, k)); });
   }
@@ -36,7 +39,7 @@ export class Robots {
     const now = this.list[this.index];
     if (!now || !this.from) return;
     if (now.changes !== before) {
-      const index = this.index, from = { index, ...await get("/api/archives/" + index) };
+      const index = this.index, from = await this.archive(index);
       if (this.index !== index) return;
       this.from = from;
       const same = from.robots.find((robot) => robot.id === this.robot?.id);
@@ -48,6 +51,8 @@ export class Robots {
     }
     await this.progress();
   }
+
+  async archive(index) { return { ...await get("/api/archives/" + index), index, name: this.list[index].called }; }
 
   // The curves of a run, and how long it will go on.
   async progress() {
@@ -68,7 +73,7 @@ export class Robots {
   async open(index) {
     this.index = index; this.all = false;
     $("archive").value = index;
-    const from = { index, ...await get("/api/archives/" + index) };
+    const from = await this.archive(index);
     if (this.index !== index) return;
     this.from = from;
     for (const id of ["task", "audit"]) $(id).value = "";
@@ -96,14 +101,17 @@ export class Robots {
   show() {
     const { robots, bins } = this.from, task = $("task").value, verdict = $("audit").value;
     const kept = robots.filter((robot) => (!task || robot.task === task) && (!verdict || robot.audit?.verdict === verdict));
-    $("count").textContent = kept.length === robots.length ? `${robots.length} robots, fittest first` : `${kept.length} of ${robots.length} robots`;
+    $("count").textContent = kept.length === robots.length ? robots.length === 1 ? "1 robot" : `${robots.length} robots, fittest first` : `${kept.length} of ${robots.length} robots`;
     const few = this.all ? kept : kept.slice(0, FEW);
     $("more").hidden = few.length === kept.length;
     $("more").textContent = `Show all ${kept.length}`;
+    const held = document.activeElement, place = ["cards", "map"].find((id) => $(id).contains(held));
     $("cards").replaceChildren(...few.map((robot) => this.card(robot)));
     $("map").hidden = bins.length !== 3 || robots.length === 0;
     if (!$("map").hidden) this.map(kept);
     this.mark();
+    // A run under way is read anew under the reader's hands.
+    if (place) [...$(place).querySelectorAll("[data-robot]")].find((button) => button.dataset.robot === held.dataset.robot)?.focus({ preventScroll: true });
   }
 
   card(robot) {

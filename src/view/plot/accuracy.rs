@@ -106,6 +106,7 @@ const MEAN: Pen = Pen { colour: scales::VERMILLION, width: 1.2, dashes: None };
 const BAND: u8 = 46;
 const LARGER: Pen = Pen { colour: colour::INK, width: 0.9, dashes: Some([3.0, 2.0]) };
 const PIXEL: Pen = Pen { colour: colour::INK, width: 0.9, dashes: Some([0.9, 1.6]) };
+const NEAREST: Pen = Pen { colour: colour::INK, width: 0.9, dashes: Some([7.0, 1.6]) };
 
 /// Mean of a task's robots with its interval, and the baselines.
 fn lines(canvas: &mut Canvas, plot: &Plot, report: &EvalFile, task: &str, [from, to]: [f64; 2]) {
@@ -117,7 +118,9 @@ fn lines(canvas: &mut Canvas, plot: &Plot, report: &EvalFile, task: &str, [from,
         canvas.line([x(mean.accuracy), from], [x(mean.accuracy), to], MEAN);
     }
     if let Some(baselines) = report.baselines.get(task) {
-        for (share, pen) in [(baselines.larger_group, LARGER), (baselines.best_single_pixel, PIXEL)] {
+        let known = [(baselines.larger_group, LARGER), (baselines.best_single_pixel, PIXEL)];
+        let nearest = baselines.nearest_training_image.map(|share| (share, NEAREST));
+        for (share, pen) in known.into_iter().chain(nearest) {
             canvas.line([x(share), from], [x(share), to], pen);
         }
     }
@@ -135,12 +138,19 @@ fn legend(canvas: &mut Canvas, report: &EvalFile, top: f64) -> f64 {
     let has_interval = report.means.values().any(|mean| mean.interval.is_some());
     let interval = if has_interval { ", 95 % interval" } else { "" };
     let dot = Pen::new(scales::BLUE, 1.1);
-    let lines = [
+    let mut lines = vec![
         (dot, "robot, 95 % interval".to_string()),
         (MEAN, value("mean", mean.map(|mean| mean.accuracy)) + interval),
         (LARGER, value("larger group", baselines.map(|b| b.larger_group))),
         (PIXEL, value("best pixel", baselines.map(|b| b.best_single_pixel))),
     ];
+    // Unknown on another dataset than the runs'.
+    if report.baselines.values().any(|b| b.nearest_training_image.is_some()) {
+        lines.push((
+            NEAREST,
+            value("nearest training image", baselines.and_then(|b| b.nearest_training_image)),
+        ));
+    }
     let column = (COLUMN - 2.0 * MARGIN) / 2.0;
     for (k, (pen, text)) in lines.iter().enumerate() {
         let at = [MARGIN + 4.0 + (k % 2) as f64 * column, top + 6.0 + (k / 2) as f64 * 11.0];
@@ -153,5 +163,5 @@ fn legend(canvas: &mut Canvas, report: &EvalFile, top: f64) -> f64 {
         }
         canvas.fitted([at[0] + 18.0, at[1]], text, column - 22.0, Words::default());
     }
-    top + 20.0
+    top - 2.0 + 11.0 * lines.len().div_ceil(2) as f64
 }

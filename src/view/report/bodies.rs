@@ -3,6 +3,7 @@
 use crate::base::number;
 use crate::body::{Body, Material};
 use crate::commands::report::Dossier;
+use crate::store::folder::in_shell;
 use crate::store::run::Robot;
 use crate::view::colour::{MARK_WIDTH, mark, mark_colour, placed};
 use crate::view::html::escape;
@@ -27,7 +28,7 @@ pub(super) fn button(
 ) -> String {
     let about = about(dossier, robot);
     let rollout = rollouts.id(run, &robot.id).unwrap_or_default();
-    let command = format!("morphcog replay --robot {} --archive {}", robot.id, dossier.path.display());
+    let command = format!("morphcog replay --robot {} --archive {}", robot.id, in_shell(&dossier.path));
     format!(
         "<button type=\"button\" style=\"{style}\" data-robot=\"{}\" data-rollout=\"{}\" data-about=\"{}\" \
          data-command=\"{}\" \
@@ -74,8 +75,11 @@ pub(super) fn bodies(run: usize, dossier: &Dossier, rollouts: &Rollouts) -> Stri
         .filter(|robot| seen.insert(robot.id.clone()))
         .map(|robot| {
             let id = escape(&robot.id);
-            let walks: Vec<String> =
-                robot.displacements.iter().take(4).map(|d| number::signed(*d, 1)).collect();
+            // Walks of a training are from raised starts and so on: other ones than those that are played.
+            let walks: Vec<String> = match dossier.run.follows_protocol() {
+                true => robot.displacements.iter().take(4).map(|d| number::signed(*d, 1)).collect(),
+                false => vec![format!("fitness {}", number::fixed(robot.objective, 2))],
+            };
             let content = format!(
                 "{}<span>{id}</span><small>{}: {}</small>",
                 picture(&robot.body),

@@ -52,8 +52,13 @@
     }));
     const task = section.querySelector("select.task");
     const choose = () => section.querySelectorAll("[data-task]").forEach((map) => { map.hidden = map.dataset.task !== task.value; });
-    if (task) { task.addEventListener("change", choose); choose(); }
     const first = section.querySelector("button[data-first]");
+    if (task) {
+      // The map that the first robot is on.
+      task.value = first?.closest("[data-task]").dataset.task ?? task.value;
+      task.addEventListener("change", choose);
+      choose();
+    }
     if (first) play(first, false);
   }
 

@@ -19,15 +19,18 @@ use crate::store::training::Origin;
 use crate::task::direction;
 use crate::task::fitness::Fitness;
 use crate::task::margins::Margins;
+use crate::task::perturbation::ByTurns;
 use crate::task::protocol::RolloutMode;
 use crate::task::stimulus::Encoding;
 use crate::view::html::escape;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// A run in short.
+/// A run in short, with its folder if another one is called the same.
 pub(super) fn name(dossier: &Dossier) -> String {
-    format!("{}, seed {}", dossier.run.name, dossier.run.config.seed)
+    let folder = dossier.path.parent().filter(|_| dossier.namesake.is_some());
+    let folder = folder.map_or(String::new(), |folder| format!(" ({})", folder.display()));
+    format!("{}, seed {}{folder}", dossier.run.name, dossier.run.config.seed)
 }
 
 /// The page's title.
@@ -56,8 +59,8 @@ fn rewarded(fitness: Fitness) -> &'static str {
             "the smallest distance walked in the correct direction, or minus the largest one in the wrong direction"
         }
         Fitness::MeanClipped => {
-            "the mean distance walked in the correct direction, clipped at ten voxel lengths, both groups weighing \
-             the same"
+            "the mean distance walked in the correct direction, in tens of voxel lengths and clipped to −1 and 1, both \
+             groups weighing the same"
         }
         Fitness::Response => {
             "how far apart the two images of a pair, opposites of each other, move the body with all soft voxels \
@@ -76,7 +79,7 @@ fn evolved(dossier: &Dossier) -> String {
     format!(
         "were encoded by compositional pattern-producing networks and evolved with MAP-Elites for {} \
          generations{evaluations}, seed {}, using morphcog {}. The archive's dimensions are the numbers of muscle, \
-         sensor and all voxels in seven bins each{}; {} of its {} cells can be filled. Each generation mutated up \
+         sensor and all voxels in seven bins each{}; {} of the {} cells that can be filled were filled. Each generation mutated up \
          to {} elites; an offspring replaced an elite only if it was strictly fitter.",
         run.generations,
         run.config.seed,
@@ -96,10 +99,10 @@ fn trained(run: &RunFile, origin: &Origin) -> String {
         windows => format!(" (and one of {windows} windows of the images)"),
     };
     let taught = match rounds {
-        0 => "Its soft voxels and sensors were kept".to_string(),
+        0 => "Its sensors were kept".to_string(),
         _ => format!(
             "The response of its gait was measured under {random_images} random images. By a linear model of that, \
-             soft voxels and sensors{window} were chosen, in {rounds} rounds of {images} training images"
+             its sensors{window} were chosen, in {rounds} rounds of {images} training images"
         ),
     };
     format!(
@@ -108,6 +111,15 @@ fn trained(run: &RunFile, origin: &Origin) -> String {
          some sensors or voxels, challenged it on {final_images} training images at a time.",
         origin.name, origin.generations, run.program_version, run.config.seed,
     )
+}
+
+/// Under what else the images of a training were shown, by turns.
+fn perturbed(run: &RunFile) -> String {
+    let ByTurns { start, length_limits } = run.config.train.perturbations;
+    let start = (start > 0).then(|| format!("from starts raised by up to {start} voxels"));
+    let limits = length_limits.then(|| "half of the time with length limits beyond all goals".to_string());
+    let both: Vec<String> = start.into_iter().chain(limits).collect();
+    if both.is_empty() { String::new() } else { format!(" ({})", both.join(", ")) }
 }
 
 /// A paragraph that could go into a paper.
@@ -138,10 +150,11 @@ pub(super) fn methods(dossier: &Dossier) -> String {
     let images: Vec<String> =
         config.classes().into_iter().map(|class| format!("{} of class {class}", counts(class))).collect();
     let shown = if run.origin.is_some() { "The fitness is that on" } else { "Robots were trained on" };
+    let conditions = if run.origin.is_some() { perturbed(run) } else { String::new() };
     let mut text = format!(
         "Bodies of at most {height} × {width} voxels (rigid, soft, two phases of muscle, shrinking and expanding \
          sensors) {made} {shown} {} images of {} ({}); each image{margin} was shown for {steps} control steps \
-         ({cycles} actuation cycles) in {rollout}, a sensor's stimulus being {encoding}. Fitness is {}.",
+         ({cycles} actuation cycles) in {rollout}{conditions}, a sensor's stimulus being {encoding}. Fitness is {}.",
         run.training_images.len(),
         run.dataset.name,
         images.join(", "),
@@ -170,9 +183,11 @@ pub(super) fn methods(dossier: &Dossier) -> String {
     if let Some(audit) = &dossier.findings.audit {
         let physical = audit.robots.iter().filter(|robot| robot.is_physical()).count();
         text += &format!(
-            " Of {} robots audited under changes of start, time step, material and stimulus, {physical} kept their \
-             behaviour.",
-            audit.robots.len()
+            " {} audited under changes of start, time step, material and stimulus; {physical} kept the behaviour.",
+            match audit.robots.len() {
+                1 => "One robot was".to_string(),
+                robots => format!("{robots} robots were"),
+            }
         );
     }
     format!("<p>{}</p>\n", escape(&text))
@@ -181,7 +196,8 @@ pub(super) fn methods(dossier: &Dossier) -> String {
 /// The commands that make a run and its tests again; audits with other criteria, and networks
 /// trained with other hyperparameters, need these besides.
 pub(super) fn commands(dossier: &Dossier) -> String {
-    let again = format!("again/{}-seed{}", dossier.run.name, dossier.run.config.seed);
+    let number = dossier.namesake.map_or(String::new(), |before| format!("-{}", before + 1));
+    let again = format!("again/{}-seed{}{number}", dossier.run.name, dossier.run.config.seed);
     let [again, eval] =
         [again.clone(), format!("{again}/{EVAL_JSON}")].map(|path| in_shell(Path::new(&path)));
     let mut lines = made_by(dossier, &again);
@@ -290,7 +306,7 @@ fn settings(file: &CapacityFile) -> String {
         && !usual.sizes().eq(points.iter().map(|point| point.size))
     {
         let step = points.windows(2).next().map_or(1, |two| two[1].size.saturating_sub(two[0].size).max(1));
-        text += &format!(" --set sizes=[{least},{most}] --set step={step}");
+        text += &format!(" --set 'sizes=[{least},{most}]' --set step={step}");
     }
     text
 }
