@@ -265,7 +265,7 @@ fn what_was_erased_is_not_seen_at_any_size_of_the_drawing() {
     let mut tab = quick(&mut browser, &server);
     // A line of ten pixels whose upper part is erased, and one that is erased whole.
     for (line, erased, rows) in [
-        ("[[14, 6], [14, 16]]", "[[14, 6], [14, 8]]", 19..=21),
+        ("[[14, 6], [14, 16]]", "[[14, 6], [14, 8]]", 19..=22),
         ("[[2, 14], [26, 14]]", "[[0, 14], [28, 14]]", 0..=0),
         ("[[1, 14], [27, 14]]", "[[0, 11], [28, 11], [28, 16], [0, 16]]", 0..=28),
     ] {

@@ -105,18 +105,16 @@ fn they_walk_to_the_bit_as_in_their_test() {
 #[test]
 fn the_baselines_beside_them_are_those_that_eval_finds_today() {
     let Some(data) = std::env::var_os("MORPHCOG_DATA").filter(|_| mnist().is_some()) else { return };
-    for folder in ["data/trained/zero-one-1", "data/four_digit/2v013"] {
-        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join(folder);
-        let sandbox = Sandbox::new();
-        let mut command =
-            sandbox.command(["eval", "--quiet", "--cycles", "1", "--out", "eval.json", "--archive"]);
-        command.arg(&folder).arg("--data").arg(&data);
-        said(command).ended(0, &[]);
-        let (then, now) =
-            (EvalFile::read(&folder.join("eval.json")), EvalFile::read(&sandbox.path("eval.json")));
-        let (then, now) = (then.unwrap(), now.unwrap());
-        assert_eq!((&then.images, &then.baselines), (&now.images, &now.baselines), "{}", folder.display());
-    }
+    // One of them: the rule is the same for all.
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("data/four_digit/2v013");
+    let sandbox = Sandbox::new();
+    let mut command =
+        sandbox.command(["eval", "--quiet", "--cycles", "1", "--out", "eval.json", "--archive"]);
+    command.arg(&folder).arg("--data").arg(&data);
+    said(command).ended(0, &[]);
+    let [then, now] =
+        [folder.join("eval.json"), sandbox.path("eval.json")].map(|file| EvalFile::read(&file).unwrap());
+    assert_eq!((then.images, then.baselines), (now.images, now.baselines));
 }
 
 #[test]
