@@ -282,12 +282,12 @@ fn run_replay(args: ReplayArgs, console: &Console) -> Result<(), Error> {
     let folder = pictures::folder(archive.as_deref(), &robot)?;
     let options = replay::Options { robot, physical_only, archive, images, data, dataset };
     if is_first_look {
-        console.line(&format!("no run under runs/: the best body of {}", shipped::ZERO_ONE));
+        console.info(&format!("no run under runs/: the best body of {}", shipped::ZERO_ONE));
     }
     let is_any = options.dataset.is_none() && options.data.is_none() && options.images.is_empty();
     let replay = match replay::replay(&options) {
         Err(error) if is_first_look && is_any && error.kind == ErrorKind::Input => {
-            console.line(&format!("{}; it sees the program's own digits instead", error.message));
+            console.info(&format!("{}; it sees the program's own digits instead", error.message));
             replay::replay(&replay::Options { dataset: Some(BUILTIN.to_string()), ..options })
         }
         replay => replay,
@@ -325,7 +325,7 @@ fn the_one(search: &one_by_one::Options, console: &Console) -> Result<Named, Err
 
 fn run_simulate(args: &SimulateArgs, console: &Console) -> Result<(), Error> {
     match &args.out {
-        Some(path) => simulate::to_file(&args.scenario, args.points, path),
+        Some(path) => simulate::to_file(&args.scenario, args.points, path, &*signals::stop_flag()?),
         None => {
             let scenario = simulate::Scenario::read(&args.scenario)?;
             let written = |row: String| {

@@ -105,6 +105,27 @@ fn a_measurement_is_the_same_bytes_on_any_threads() {
 }
 
 #[test]
+fn robots_that_were_measured_before_are_kept_with_what_they_could_be_taught() {
+    // In another cell, for it has fewer muscles.
+    let other = WALKER.replace("/3333333", "/2222222");
+    let sandbox = run_of(&[WALKER, &other]);
+    let ids = sandbox.run_file("run").elites.into_iter().map(|robot| robot.id).collect::<Vec<_>>();
+    for (id, images) in ids.iter().zip([60, 80]) {
+        let line = format!("response -q -a run --robots {id} --task 3|14 -n {images} --error 0");
+        sandbox.run(&line).ended(0, &[]);
+    }
+    let file = responses(&sandbox, "run/response.json");
+    assert_eq!(file.robots.iter().filter(|robot| robot.taught.is_some()).count(), 2);
+    // A file that names places which the body does not have is said, and measured again.
+    let text = sandbox.read("run/response.json");
+    let broken = text.replacen("{\"row\":0,", "{\"row\":99,", 1);
+    assert_ne!(text, broken);
+    sandbox.write("run/response.json", broken);
+    let line = format!("response -q -a run --robots {} -n 60 --error 0", ids[0]);
+    sandbox.run(&line).ended(0, &["run/response.json: robots.1.places", "measured again"]);
+}
+
+#[test]
 fn what_could_be_taught_is_said_for_the_config_that_the_training_would_have() {
     let sandbox = run_of(&[WALKER]);
     let measured = |out: &str, set: &str| {

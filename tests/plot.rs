@@ -124,6 +124,9 @@ fn seeds_become_one_figure_and_robots_one_each() {
     let sandbox = with_run();
     sandbox.run("evolve -q -c tiny.toml --seed 4 -o other").ended(0, &[]);
     sandbox.run("plot progress -a run/run.json -a other/run.json -o both.svg").ended(0, &[]);
+    // Without a name it goes above both, and not over a figure of one of them.
+    sandbox.run("plot progress -q -a run/run.json -a other/run.json").ended(0, &[]);
+    assert!(sandbox.path("plot-progress.svg").exists() && !sandbox.path("run/plot-progress.svg").exists());
     for kind in ["archive", "body"] {
         sandbox.run(&format!("plot {kind} -a run -o run/")).ended(2, &["--out run/", "a folder"]);
     }

@@ -356,6 +356,15 @@ split = "validation"
     }
     let said = sandbox.run("sweep plans/pairs.toml --out pairs --collect").ended(0, &[]);
     assert!(said.out.contains("1|3") && said.out.contains("validation"), "{}", said.out);
+    // One that is stopped says so, and goes on.
+    let one = "sweep plans/pairs.toml --out one --task 1";
+    let mut child = sandbox.start(&format!("{one} --set set=[\"train.challengers=1000000\"]"));
+    wait_for(&sandbox.path("one/walkers-1v3-seed3/training.json"));
+    common::program::terminate(&child);
+    assert_eq!(child.wait().unwrap().code(), Some(75));
+    let task: serde_json::Value =
+        serde_json::from_str(&sandbox.read("one/walkers-1v3-seed3/task.json")).unwrap();
+    assert_eq!(task["state"], "stopped");
     // Which classes there are, only the images tell.
     sandbox
         .run("sweep plans/pairs.toml --out pairs --set pairs=[1,12]")

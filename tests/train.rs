@@ -55,6 +55,12 @@ fn a_training_is_a_run_that_every_command_understands() {
     }
     // Its config is one that can be read, and asks for the same again.
     Config::load(&sandbox.path("taught/config.toml").to_string_lossy(), &[]).unwrap();
+    // Another gait makes another training, with the same config.
+    let is_other = |id: &&String| Some(*id) != robot.parent.as_ref();
+    let other = walkers.elites.iter().map(|elite| &elite.id).find(is_other).unwrap();
+    let train = train.replace("top:3", other).replace("-o taught", "-o other");
+    sandbox.run(&train).ended(0, &[]);
+    sandbox.run("eval -q -a taught other --images 12 --cycles 1").ended(0, &[]);
 }
 
 #[test]
@@ -76,9 +82,13 @@ fn a_training_ends_with_the_same_bytes_on_any_threads_and_after_any_stop() {
     let whole: serde_json::Value = serde_json::from_str(&sandbox.read("one/training.json")).unwrap();
     let count = whole["rollouts"].as_array().unwrap().len();
     assert!(count >= 4, "{count}");
-    for kept in [0, 1, count / 2, count - 1] {
+    for (kept, of_last) in [(0, 0), (1, 17), (1, 40), (count / 2, 3), (count - 1, 1000)] {
         let mut cut = whole.clone();
-        cut["rollouts"].as_array_mut().unwrap().truncate(kept);
+        let batches = cut["rollouts"].as_array_mut().unwrap();
+        batches.truncate(kept);
+        if let Some(last) = batches.last_mut() {
+            last.as_array_mut().unwrap().truncate(of_last);
+        }
         for name in ["run.json", "elites.csv", "validation.json", "audit.json", "audit.csv"] {
             _ = std::fs::remove_file(sandbox.path("two").join(name));
         }
@@ -87,7 +97,7 @@ fn a_training_ends_with_the_same_bytes_on_any_threads_and_after_any_stop() {
         for file in same {
             assert!(
                 sandbox.read(&format!("one/{file}")) == sandbox.read(&format!("two/{file}")),
-                "{kept}: {file}"
+                "{kept} {of_last}: {file}"
             );
         }
     }

@@ -309,6 +309,9 @@ fn the_best_robot_is_the_first_on_validation_images_where_the_run_ranked_them_el
     ranking["run_sha256"] = "0".repeat(64).into();
     sandbox.write("run/validation.json", ranking.to_string());
     is_best(&fittest.id);
+    // One that is broken is no reason to show another robot.
+    sandbox.write("run/validation.json", &ranking.to_string()[..60]);
+    sandbox.run("replay -a run/run.json --format png").ended(3, &["run/validation.json", "delete it"]);
     std::fs::remove_file(sandbox.path("run/validation.json")).unwrap();
     is_best(&fittest.id);
 }

@@ -74,6 +74,35 @@ fn a_run_remembers_where_its_images_were() {
 }
 
 #[test]
+fn a_sweep_over_a_run_looks_where_the_run_remembers() {
+    let sandbox = with_run();
+    sandbox.write(
+        "plan.toml",
+        "archive = \"runs/one\"\nrobots = \"top:1\"\npairs = [0, 1]\n\
+         set = [\"train.random_images=40\", \"train.rounds=1\", \"train.images=10\", \"train.final_images=10\", \
+         \"train.challengers=1\", \"validation.images=20\"]\n[eval]\nimages = 8\n",
+    );
+    sandbox.run("sweep -q plan.toml --out all").ended(0, &[]);
+    // Another place is no better than none.
+    sandbox.run("sweep -q plan.toml --out again --data nowhere").ended(3, &["nowhere"]);
+}
+
+#[test]
+fn a_training_that_takes_the_place_of_another_takes_nothing_of_it() {
+    let sandbox = with_run();
+    write_dataset(&sandbox, "elsewhere", 2);
+    let little = "--set train.random_images=40 --set train.rounds=1 --set train.images=10 \
+                  --set train.final_images=10 --set train.challengers=1 --set validation.images=20";
+    let train = format!("train -q -a runs/one --task 0|1 --robots top:1 {little} -o taught");
+    sandbox.run(&format!("{train} --data elsewhere")).ended(0, &[]);
+    let of = |sandbox: &Sandbox| sandbox.run_file("taught").dataset;
+    let before = of(&sandbox);
+    sandbox.run(&format!("{train} --force")).ended(0, &[]);
+    assert_ne!(of(&sandbox), before);
+    assert_eq!(of(&sandbox), sandbox.run_file("runs/one").dataset);
+}
+
+#[test]
 fn where_the_images_lie_is_no_part_of_the_run() {
     let sandbox = with_run();
     write_dataset(&sandbox, "elsewhere/shapes", 1);
@@ -218,4 +247,9 @@ fn mnist_is_known_by_any_name() {
     let event = &info("mine", &["--json"]).json_lines()[0];
     assert_eq!(event["known_as"], serde_json::json!({"train": "mnist", "test": "mnist"}));
     assert!(!info("mnist", &[]).err.contains("these are the images of"));
+    // Under the name of another published dataset it would be taken for that.
+    let mut command =
+        sandbox.command("eval -a gallery:zero_one-1 --images 4 --dataset fashion-mnist".split(' '));
+    command.env("MORPHCOG_DATA", &mnist);
+    said(command).ended(3, &["are those of mnist, not of fashion-mnist"]);
 }

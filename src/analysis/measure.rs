@@ -187,8 +187,9 @@ pub fn measure(options: &Options, stop: &AtomicBool, observer: &dyn Observer) ->
             Err(error) => return Err(error),
         }
         if !file.robots.is_empty() {
-            let before = measuring.earlier.iter().find(|(path, _)| *path == options.out);
-            let whole = before.map_or_else(|| file.clone(), |(_, before)| file.with_others_of(before));
+            // Another process may have measured robots of this run meanwhile.
+            let before = ResponseFile::read(&options.out).ok();
+            let whole = before.map_or_else(|| file.clone(), |before| file.with_others_of(&before));
             unwritten.tried(whole.write(&options.out), |text| observer.warning(text));
         }
     }
@@ -304,7 +305,7 @@ fn task(options: &Options, provenance: &Provenance, seed: u64) -> Result<Option<
     let classes = groups.concat();
     let per_class = IMAGES_PER_CLASS.min(scarcest(&dataset, &classes, LEAST_PER_CLASS)?);
     let failed = |error: DatasetError| Error::input(error.to_string());
-    let drawn = dataset.draw(Split::Train, &classes, per_class, seed, 0).map_err(failed)?;
+    let drawn = dataset.draw(Split::Train, &classes, per_class, seed).map_err(failed)?;
     let labels = classes.iter().flat_map(|class| std::iter::repeat_n(*class, per_class));
     let images = labels.zip(drawn).map(|(label, index)| ImageRef { index, label }).collect();
     let task = Task { groups: groups.clone(), config, dataset, images };

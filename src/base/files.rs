@@ -5,7 +5,7 @@ use flate2::read::GzDecoder;
 use std::ffi::{OsStr, OsString};
 use std::fs::File;
 use std::io::{self, Read, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Beginning and end of the names of temporary files, around the name of the file to be written.
 const TEMPORARY: [&str; 2] = [".", ".tmp"];
@@ -24,6 +24,14 @@ pub fn read_text(path: &Path) -> io::Result<String> {
         Some(Place::Compressed(file)) => Box::new(GzDecoder::new(File::open(file)?)),
         None => Box::new(File::open(path)?),
     };
+    read_limited(source)
+}
+
+/// Reads a text to its end.
+///
+/// # Errors
+/// What the system says; if it is no UTF-8; if it has more than 256 megabytes.
+pub fn read_limited(source: impl Read) -> io::Result<String> {
     let mut text = String::new();
     let read = source.take(MOST_TEXT + 1).read_to_string(&mut text)?;
     match read as u64 > MOST_TEXT {
@@ -56,7 +64,7 @@ pub fn write_whole(path: &Path, write: impl FnOnce(&mut File) -> io::Result<()>)
     if std::fs::metadata(path).is_ok_and(|found| !found.is_file() && !found.is_dir()) {
         return write(&mut File::options().write(true).open(path)?);
     }
-    let path = &path.canonicalize().unwrap_or_else(|_| path.to_path_buf());
+    let path = &led_to(path);
     let folder = folder_of(path);
     let mut prefix = OsString::from(TEMPORARY[0]);
     // Names have at most 255 bytes.
@@ -71,6 +79,12 @@ pub fn write_whole(path: &Path, write: impl FnOnce(&mut File) -> io::Result<()>)
     file.as_file().sync_all()?;
     file.persist(path).map_err(|error| error.error)?;
     sync_folder(folder)
+}
+
+/// Where a path leads; also of a symbolic link to a file that is not there yet.
+fn led_to(path: &Path) -> PathBuf {
+    let beside = |link: PathBuf| path.with_file_name(link);
+    path.canonicalize().or_else(|_| path.read_link().map(beside)).unwrap_or_else(|_| path.to_path_buf())
 }
 
 /// Whether [`write_atomically`] would find its place; nothing is left behind.
@@ -183,6 +197,13 @@ mod tests {
         std::os::unix::fs::symlink("real.json", &link).unwrap();
         write_atomically(&link, b"new").unwrap();
         assert_eq!(std::fs::read(&real).unwrap(), b"new");
+        assert!(link.symlink_metadata().unwrap().is_symlink());
+        // Also where what it leads to is not there yet.
+        std::fs::create_dir(folder.path().join("scratch")).unwrap();
+        let link = folder.path().join("later.json");
+        std::os::unix::fs::symlink("scratch/later.json", &link).unwrap();
+        write_atomically(&link, b"later").unwrap();
+        assert_eq!(std::fs::read(folder.path().join("scratch/later.json")).unwrap(), b"later");
         assert!(link.symlink_metadata().unwrap().is_symlink());
     }
 

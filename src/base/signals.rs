@@ -37,6 +37,13 @@ impl Drop for StopFlag {
     }
 }
 
+/// Lets a file that may grow no larger be an error that can be told, not the end of the process.
+pub fn heed_file_limit() {
+    // Where it cannot be handled, it ends the process, as is usual.
+    #[cfg(unix)]
+    let _ = flag::register(signal_hook::consts::SIGXFSZ, Arc::default());
+}
+
 /// A flag that SIGINT, SIGTERM and SIGUSR1 set; a second SIGINT ends the process at once. When it
 /// goes, signals end the process again.
 ///

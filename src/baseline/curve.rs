@@ -76,9 +76,25 @@ pub fn first_crossing([c0, c1, c2]: [f64; 3], value: f64, (from, to): (f64, f64)
     within.min_by(f64::total_cmp).map(Crossing::At)
 }
 
+/// The first x at which a point is at or above a value. `None` if none is.
+pub fn first_of(points: &[(f64, f64)], value: f64) -> Option<Crossing> {
+    let place = points.iter().position(|(_, y)| *y >= value)?;
+    let (x, y) = points[place];
+    Some(if place == 0 && y > value { Crossing::Below { below: x } } else { Crossing::At(x) })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn of_few_points_the_first_that_reaches_a_value_is_told() {
+        let points = [(1.0, 0.5), (3.0, 0.7)];
+        assert_eq!(first_of(&points, 0.2), Some(Crossing::Below { below: 1.0 }));
+        assert_eq!(first_of(&points, 0.5), Some(Crossing::At(1.0)));
+        assert_eq!(first_of(&points, 0.6), Some(Crossing::At(3.0)));
+        assert_eq!((first_of(&points, 0.8), first_of(&[], 0.1)), (None, None));
+    }
 
     #[test]
     fn a_parabola_through_points_of_one_is_that_one() {

@@ -117,8 +117,12 @@ pub(super) fn run(args: AuditArgs, console: &Console, ranks: Ranks) -> Result<()
             return Err(error);
         }
         if finished.stopped {
-            let audited = finished.file.robots.len();
-            let text = format!("stopped; {} audited and saved", counted(audited, "robot is", "robots are"));
+            let text = match finished.file.robots.len() {
+                0 => "stopped before the first robot was audited; nothing is written".to_string(),
+                audited => {
+                    format!("stopped; {} audited and saved", counted(audited, "robot is", "robots are"))
+                }
+            };
             return Err(Error::stopped(text).hint("the same command goes on".to_string()));
         }
     }

@@ -2,6 +2,7 @@
 
 use crate::base::error::{Error, ErrorKind};
 use crate::base::ranks::Ranks;
+use crate::base::signals;
 use crate::base::text::is_unseen;
 use crate::cli::values::with_negative_numbers;
 use crate::cli::{Cli, run};
@@ -32,6 +33,7 @@ const LEAD_SPEAKS: Duration = Duration::from_secs(2);
 /// Runs the command line with these arguments, the program's name first; the exit code. Whatever there
 /// is to say is said by then.
 pub fn main(arguments: impl IntoIterator<Item = OsString>) -> u8 {
+    signals::heed_file_limit();
     let arguments: Vec<OsString> = arguments.into_iter().collect();
     let matches = with_negative_numbers(Cli::command()).try_get_matches_from(&arguments);
     let cli = match matches.and_then(|matches| Cli::from_arg_matches(&matches)) {

@@ -220,7 +220,11 @@ pub(super) fn ended(summary: &Summary, count: usize) -> Result<(), Error> {
             format!("{count_failed} of {count} tasks failed: {numbers}; {done} are done, {open} are open");
         return Err(Error::other(text).hint("the same command tries them again".to_string()));
     }
-    if *open > 0 || *elsewhere > 0 {
+    if *open == 0 && *elsewhere > 0 {
+        let text = format!("{done} of {count} tasks are done; other processes are at {elsewhere}");
+        return Err(Error::occupied(text).hint("the same command does what they leave".to_string()));
+    }
+    if *open > 0 {
         let at = if *elsewhere > 0 {
             format!(", {elsewhere} in the hands of other processes")
         } else {

@@ -15,6 +15,7 @@ use crate::store::folder;
 use crate::store::folder::IfExists;
 use crate::store::names::{AUDIT_JSON, RUN_JSON};
 use crate::store::robots::Selection;
+use crate::store::whereabouts::Whereabouts;
 use crate::task::grouping::groups_text;
 use crate::view::console::Console;
 use crate::view::reporters::Reporter;
@@ -139,7 +140,9 @@ pub(super) fn after_evolution(evolution: &evolve::Options) -> Result<Options, Er
     let name = name(&archive, groups, None);
     let of_training = out.with_file_name(&name);
     // What would stop the training is said before gaits evolve for an hour.
-    train::check(config, groups, data.as_deref())?;
+    let given = Whereabouts::given(data.as_deref());
+    let whereabouts = if *if_exists == IfExists::Resume { given.and_of(&archive) } else { given };
+    train::check(config, groups, &whereabouts)?;
     if *if_exists == IfExists::Refuse {
         folder::vacant(&of_training)?;
     }

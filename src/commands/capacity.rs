@@ -275,7 +275,11 @@ fn curve_of(kind: Kind, points: Vec<Point>, accuracy: f64) -> Curve {
     let means: Vec<(f64, f64)> = points.iter().map(|point| (point.size as f64, point.mean)).collect();
     let fit = curve::parabola(&means);
     let within = means.first().zip(means.last()).map(|(first, last)| (first.0, last.0));
-    let capacity = fit.zip(within).and_then(|(fit, within)| curve::first_crossing(fit, accuracy, within));
+    let capacity = match fit.zip(within) {
+        Some((fit, within)) => curve::first_crossing(fit, accuracy, within),
+        // Of fewer than three sizes there is no parabola.
+        None => curve::first_of(&means, accuracy),
+    };
     Curve { network: kind.name().to_string(), points, fit, capacity }
 }
 
@@ -303,13 +307,18 @@ fn robots<'a>(report: &'a EvalFile, options: &Options) -> Result<Vec<&'a RobotRe
     };
     let audits: Result<Vec<_>, Error> = report.runs.iter().map(audit).collect();
     let audits = audits?;
-    let physical = |robot: &&RobotReport| {
-        audits
-            .get(robot.run)
-            .and_then(|audit| audit.robot(&robot.id))
-            .is_some_and(|found| found.is_physical())
-    };
-    let physical: Vec<&RobotReport> = report.robots.iter().filter(physical).collect();
+    let mut physical: Vec<&RobotReport> = Vec::new();
+    for robot in &report.robots {
+        match audits.get(robot.run).and_then(|audit| audit.robot(&robot.id)) {
+            Some(found) if found.is_physical() => physical.push(robot),
+            Some(_) => {}
+            None => {
+                let text = format!("{name}: robot {} has not been audited", robot.id);
+                return Err(Error::input(text)
+                    .hint("morphcog audit goes on with the robots that are missing".to_string()));
+            }
+        }
+    }
     if physical.is_empty() {
         return Err(Error::input(format!("{name}: none of {} robots is physical", report.robots.len())));
     }

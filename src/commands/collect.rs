@@ -146,7 +146,8 @@ impl Found {
         let splits = split.map_or(vec![HeldOut::Test, HeldOut::Validation], |split| vec![split]);
         let tests = splits.iter().map(|split| folder.join(own_name(*split))).filter(|path| path.exists());
         let eval = tests.into_iter().find_map(|path| EvalFile::of_runs(&path, &[run]).map_err(told).ok());
-        Found { validated: ranking(source).unwrap_or_default(), audit, eval }
+        let validated = ranking(source).map_err(told).ok().flatten().unwrap_or_default();
+        Found { validated, audit, eval }
     }
 
     fn of_task(&self, run: &RunFile, recognises: String, seconds: f64) -> RunRow {

@@ -57,7 +57,7 @@ impl<'a> HeldOutImages<'a> {
                 let runs: Vec<_> = sources.iter().map(|source| &source.run).collect();
                 // Now, or before: those of `validation.json`.
                 let count = |source: &Source| match options.robots.validated() {
-                    Some(_) => Some(options.validation.unwrap_or(config.validation.images)),
+                    Some(_) => Ok(Some(options.validation.unwrap_or(config.validation.images))),
                     None => shown_for_validation(source),
                 };
                 let besides = chosen_by(sources, dataset, count)?;
@@ -145,7 +145,7 @@ impl<'a> HeldOutImages<'a> {
         let mut choice = Vec::new();
         for label in self.config.classes() {
             let count = self.dataset.indices_of(Split::Train, label).len().min(PIXEL_IMAGES_PER_CLASS);
-            let drawn = self.dataset.draw(Split::Train, &[label], count, self.options.seed, 0);
+            let drawn = self.dataset.draw(Split::Train, &[label], count, self.options.seed);
             let drawn = drawn.map_err(|error| Error::input(error.to_string()))?;
             let others = drawn.into_iter().filter(|index| !shown.contains(index));
             choice.extend(others.map(|index| ImageRef { index, label }));
@@ -171,11 +171,11 @@ fn labelled(list: &[(Grid<f64>, u8)]) -> Vec<Labelled<'_>> {
 pub(crate) fn chosen_by(
     sources: &[Source],
     dataset: &Dataset,
-    count: impl Fn(&Source) -> Option<usize>,
+    count: impl Fn(&Source) -> Result<Option<usize>, Error>,
 ) -> Result<BTreeSet<usize>, Error> {
     let mut all = BTreeSet::new();
     for source in sources {
-        if let Some(count) = count(source) {
+        if let Some(count) = count(source)? {
             let of_run = held_out::images(&[&source.run], dataset, "--validation", count)?;
             all.extend(of_run.into_iter().map(|image| image.index));
         }

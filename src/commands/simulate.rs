@@ -1,8 +1,9 @@
 //! `morphcog simulate`: any body under any stimuli.
 
 use crate::base::Grid;
-use crate::base::error::Error;
-use crate::base::files::{read_text, write_whole};
+use crate::base::error::{Error, ErrorKind};
+use crate::base::files::{read_limited, read_text, write_whole};
+use crate::base::stop::check;
 use crate::body::Body;
 use crate::config::reading;
 use crate::sim::{Physics, Start, System, World};
@@ -11,8 +12,9 @@ use crate::task::protocol::{MAX_COLUMN, MAX_ROW, MAX_STEPS};
 use serde::de::{Error as _, IgnoredAny, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer};
 use std::fmt;
-use std::io::{BufWriter, Write};
+use std::io::{self, BufWriter, Write};
 use std::path::Path;
+use std::sync::atomic::AtomicBool;
 
 /// A body, what it sees, and for how long. The keys of a reference trajectory are understood too;
 /// its results are passed over.
@@ -119,7 +121,7 @@ impl Scenario {
     /// What is wrong with the file, with its line and key.
     pub fn read(path: &Path) -> Result<Self, Error> {
         if path == Path::new("-") {
-            let text = std::io::read_to_string(std::io::stdin());
+            let text = read_limited(std::io::stdin());
             let text = text.map_err(|error| Error::reading(Path::new("standard input"), &error))?;
             return Scenario::parse(&text, "standard input");
         }
@@ -271,8 +273,9 @@ pub fn simulate(
 /// its end.
 ///
 /// # Errors
-/// As [`Scenario::read`] and [`simulate`], and if the file cannot be written, or is the scenario's.
-pub fn to_file(from: &Path, points: bool, path: &Path) -> Result<(), Error> {
+/// As [`Scenario::read`] and [`simulate`], and if the file cannot be written, or is the scenario's; if
+/// it was stopped: the file is then as it was.
+pub fn to_file(from: &Path, points: bool, path: &Path, stop: &AtomicBool) -> Result<(), Error> {
     let scenario = &Scenario::read(from)?;
     if path.exists() && path.canonicalize().ok() == from.canonicalize().ok() {
         let text =
@@ -285,6 +288,10 @@ pub fn to_file(from: &Path, points: bool, path: &Path) -> Result<(), Error> {
     let written = write_whole(path, |file| {
         let (mut file, mut failed) = (BufWriter::new(file), None);
         outcome = simulate(scenario, points, |line| {
+            if let Err(stopped) = check(stop) {
+                failed = Some(io::Error::new(io::ErrorKind::Interrupted, stopped));
+                return Err(stopped.into());
+            }
             file.write_all(line.as_bytes()).map_err(|error| {
                 let said = Error::writing(path, &error);
                 failed = Some(error);
@@ -293,6 +300,9 @@ pub fn to_file(from: &Path, points: bool, path: &Path) -> Result<(), Error> {
         });
         failed.map_or_else(|| file.flush(), Err)
     });
+    if matches!(&outcome, Err(error) if error.kind == ErrorKind::Stopped) {
+        return Err(Error::other(format!("{}: not written: the simulation was stopped", path.display())));
+    }
     written.map_err(|error| Error::writing(path, &error))?;
     outcome
 }

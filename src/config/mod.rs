@@ -255,9 +255,15 @@ impl Config {
         let built_in =
             || BUILT_IN.iter().find(|(own, _)| *own == name || own.strip_suffix(".toml") == Some(name));
         let path = folder.join(name);
+        // A folder may have the name of a built-in config.
+        let is_no_file = |error: &std::io::Error| match error.kind() {
+            std::io::ErrorKind::NotFound => true,
+            std::io::ErrorKind::IsADirectory => built_in().is_some(),
+            _ => false,
+        };
         let text = match read_text(&path) {
             Ok(text) => return Config::parse(&text, &path.to_string_lossy(), overrides),
-            Err(error) if error.kind() == std::io::ErrorKind::NotFound => match built_in() {
+            Err(error) if is_no_file(&error) => match built_in() {
                 Some((_, text)) => (*text).to_string(),
                 None => {
                     let names = BUILT_IN.map(|(name, _)| name).join(", ");

@@ -3,8 +3,9 @@
 use crate::base::Grid;
 use crate::base::random::{Purpose, stream};
 use crate::data::builtin::{BuiltinDigits, BuiltinError};
+use crate::data::catalogue::MNIST_CONTENT;
 use crate::data::files;
-use crate::data::files::{FilesError, Place, StoredSplit};
+use crate::data::files::{FETCHABLE, FilesError, Place, StoredSplit};
 pub use crate::data::info::Split;
 use crate::data::info::{DatasetInfo, SplitInfo};
 use std::collections::BTreeMap;
@@ -22,6 +23,16 @@ pub enum DatasetError {
     /// There are no such built-in digits.
     #[error(transparent)]
     Builtin(#[from] BuiltinError),
+    /// MNIST lies where another published dataset is looked for.
+    #[error("{place}: these {split} images are those of mnist, not of {dataset}")]
+    Mnist {
+        /// Name of the dataset.
+        dataset: String,
+        /// Where they are.
+        place: String,
+        /// The split.
+        split: Split,
+    },
     /// The split was not asked for when the dataset was loaded.
     #[error("{dataset}: the {split} images were not loaded")]
     NotLoaded {
@@ -98,6 +109,14 @@ impl Dataset {
         let mut splits = BTreeMap::new();
         for &split in wanted {
             let (labels, stored) = files::load(name, &place, split)?;
+            // Results would say that they are of the other.
+            if name != FETCHABLE[0]
+                && FETCHABLE.contains(&name)
+                && MNIST_CONTENT.contains(&stored.fingerprint.as_str())
+            {
+                let (dataset, place) = (name.to_string(), place.path.display().to_string());
+                return Err(DatasetError::Mnist { dataset, place, split });
+            }
             splits.insert(split, Loaded::new(labels, Images::Stored(stored)));
         }
         Ok(Dataset { name: name.to_string(), folder: Some(place.path), origin: place.origin, splits })
@@ -213,7 +232,6 @@ impl Dataset {
         classes: &[u8],
         per_class: usize,
         seed: u64,
-        generation: u64,
     ) -> Result<Vec<usize>, DatasetError> {
         self.loaded(split)?;
         let mut drawn = Vec::new();
@@ -224,7 +242,7 @@ impl Dataset {
                 return Err(DatasetError::TooFew { dataset, split, class, wanted: per_class, found });
             }
             let child = 256 * split.code() + u64::from(class);
-            let picked = stream(seed, Purpose::Images, generation, child).sample(all.len(), per_class);
+            let picked = stream(seed, Purpose::Images, 0, child).sample(all.len(), per_class);
             drawn.extend(picked.into_iter().map(|i| all[i]));
         }
         Ok(drawn)
@@ -260,18 +278,17 @@ mod tests {
     #[test]
     fn draws_are_even_distinct_and_fixed_by_seed_and_generation() {
         let data = digits();
-        let drawn = data.draw(Split::Test, &[4, 9], 100, 5, 0).unwrap();
+        let drawn = data.draw(Split::Test, &[4, 9], 100, 5).unwrap();
         let labels: Vec<u8> = drawn.iter().map(|&i| data.label(Split::Test, i).unwrap()).collect();
         assert!(labels[..100].iter().all(|&l| l == 4) && labels[100..].iter().all(|&l| l == 9));
         let mut distinct = drawn.clone();
         distinct.sort_unstable();
         distinct.dedup();
         assert_eq!(distinct.len(), 200);
-        assert_eq!(drawn, data.draw(Split::Test, &[4, 9], 100, 5, 0).unwrap());
-        assert_eq!(drawn[..100], data.draw(Split::Test, &[4], 100, 5, 0).unwrap());
-        assert_ne!(drawn, data.draw(Split::Test, &[4, 9], 100, 5, 1).unwrap());
-        assert_ne!(drawn, data.draw(Split::Test, &[4, 9], 100, 6, 0).unwrap());
-        let error = data.draw(Split::Test, &[4], 501, 5, 0).unwrap_err();
+        assert_eq!(drawn, data.draw(Split::Test, &[4, 9], 100, 5).unwrap());
+        assert_eq!(drawn[..100], data.draw(Split::Test, &[4], 100, 5).unwrap());
+        assert_ne!(drawn, data.draw(Split::Test, &[4, 9], 100, 6).unwrap());
+        let error = data.draw(Split::Test, &[4], 501, 5).unwrap_err();
         assert!(matches!(error, DatasetError::TooFew { class: 4, wanted: 501, found: 500, .. }), "{error}");
     }
 
@@ -281,7 +298,7 @@ mod tests {
         let error = data.image(Split::Train, 10_000).unwrap_err().to_string();
         assert_eq!(error, "builtin: there is no train image 10000: there are 10000, counted from 0");
         assert!(matches!(data.label(Split::Test, 0), Err(DatasetError::NotLoaded { .. })));
-        assert!(matches!(data.draw(Split::Test, &[1], 1, 1, 0), Err(DatasetError::NotLoaded { .. })));
+        assert!(matches!(data.draw(Split::Test, &[1], 1, 1), Err(DatasetError::NotLoaded { .. })));
         assert_eq!((data.len(Split::Test), data.fingerprint(Split::Test)), (0, None));
     }
 

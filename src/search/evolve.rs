@@ -100,13 +100,17 @@ pub fn evolve(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> 
     let training = Training::of(config, &dataset)?;
     held_out::check(config, &[], "data.images_per_class", &dataset)?;
     let mutations = Mutations { seed: config.seed, spec: config.body_spec(), params: &config.genome, stop };
-    mutations.random_immigrant(0, 0).map_err(unmade)?;
+    let first = mutations.random_immigrant(0, 0).map_err(unmade);
     // Open. Only the leading rank has a folder.
     let ranks = options.ranks;
-    let folder = ranks
-        .leads()
-        .then(|| RunFolder::open(&options.out, options.if_exists, stop, observer))
-        .transpose()?;
+    let open = || RunFolder::open(&options.out, options.if_exists, stop, observer);
+    let opened = first.and_then(|_| ranks.leads().then(open).transpose());
+    // One that was stopped meanwhile is waited for by none.
+    let is_stopped = matches!(&opened, Err(error) if error.kind == ErrorKind::Stopped);
+    if !ranks.all(!is_stopped) {
+        return Err(Stopped.into());
+    }
+    let folder = opened?;
     let saved = match &folder {
         Some(folder) if resumes => resume::saved(folder, config, &training, |text| observer.warning(&text))?,
         _ => None,

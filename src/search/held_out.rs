@@ -157,7 +157,7 @@ pub(crate) fn test_images(
     let mut images = Vec::new();
     for (place, &label) in classes.iter().enumerate() {
         let share = count / classes.len() + usize::from(place < count % classes.len());
-        let drawn = dataset.draw(Split::Test, &[label], share, seed, 0);
+        let drawn = dataset.draw(Split::Test, &[label], share, seed);
         let drawn = drawn.map_err(|error| {
             let most = classes.iter().map(|&c| dataset.indices_of(Split::Test, c).len()).min().unwrap_or(0);
             let hint = format!("ask for at most {} images, or for all", most * classes.len());

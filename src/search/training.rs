@@ -61,7 +61,7 @@ impl Training {
         match &config.data.train_images {
             Some(indices) => Ok(indices.clone()),
             None => dataset
-                .draw(Split::Train, &config.classes(), config.data.images_per_class, config.seed, 0)
+                .draw(Split::Train, &config.classes(), config.data.images_per_class, config.seed)
                 .map_err(|error| {
                     let there = dataset.classes(Split::Train);
                     Error::input(format!("data.images_per_class: {error}"))

@@ -1,7 +1,7 @@
 //! A run's folder: made, locked, and never overwritten by accident.
 
 use crate::base::error::Error;
-use crate::base::files::{check_writable, remove_half_written, write_atomically};
+use crate::base::files::{check_writable, read_text, remove_half_written, write_atomically};
 use crate::base::named;
 use crate::base::observer::Observer;
 use crate::config::Config;
@@ -40,6 +40,8 @@ pub enum IfExists {
 #[derive(Debug)]
 pub struct RunFolder {
     path: PathBuf,
+    /// Whether it replaces what is in it.
+    replaces: bool,
     _lock: Lock,
 }
 
@@ -90,7 +92,7 @@ impl RunFolder {
                 }
             }
         }
-        Ok(RunFolder { path: path.to_path_buf(), _lock: lock })
+        Ok(RunFolder { path: path.to_path_buf(), replaces: if_exists == IfExists::Overwrite, _lock: lock })
     }
 
     /// Where it is.
@@ -102,11 +104,20 @@ impl RunFolder {
     /// what this run was asked for with.
     ///
     /// # Errors
-    /// What the system says.
+    /// If a file of that name, without a run beside it, is somebody else's; what the system says.
     pub(crate) fn write_config(&self, config: &Config) -> Result<(), Error> {
         let path = self.path.join(CONFIG);
-        if Config::load(&path.to_string_lossy(), &[]).is_ok_and(|there| there == *config) {
+        let there = Config::load(&path.to_string_lossy(), &[]);
+        if there.as_ref().is_ok_and(|there| there == config) {
             return Ok(());
+        }
+        // A run that was killed before its first checkpoint leaves one that a program wrote.
+        let is_written =
+            || there.is_ok_and(|there| read_text(&path).is_ok_and(|text| text == there.to_toml()));
+        if !self.replaces && path.exists() && vacant(&self.path).is_ok() && !is_written() {
+            let text = format!("{}: there is a file of that name that says something else", path.display());
+            let hint = "move it away, write elsewhere with --out, or replace it by --force";
+            return Err(Error::occupied(text).hint(hint.to_string()));
         }
         write_atomically(&path, config.to_toml().as_bytes()).map_err(|error| Error::writing(&path, &error))
     }
@@ -141,7 +152,9 @@ pub fn name_of(config: &str) -> String {
         && beside.exists()
         && let Ok(run) = RunFile::read(&beside)
     {
-        return run.name;
+        // Nothing that leads elsewhere, whatever the file says.
+        let name = Path::new(&run.name).file_name();
+        return name.map_or("run".to_string(), |name| name.to_string_lossy().into_owned());
     }
     path.file_stem().map_or("run".to_string(), |stem| stem.to_string_lossy().into_owned())
 }

@@ -104,11 +104,13 @@ impl Refusal {
 struct Manner {
     /// Whether the file system's own locks are tried.
     by_system: bool,
+    /// Whether others may have taken the system's lock elsewhere at the same time.
+    is_contended: bool,
     beat: Duration,
     dead_after: Duration,
 }
 
-const USUAL: Manner = Manner { by_system: true, beat: BEAT, dead_after: DEAD_AFTER };
+const USUAL: Manner = Manner { by_system: true, is_contended: false, beat: BEAT, dead_after: DEAD_AFTER };
 
 /// A taken lock; let go when it is dropped.
 #[derive(Debug)]
@@ -130,6 +132,16 @@ impl Lock {
     /// If another process has it; if it is stopped while it waits; what the system says.
     pub fn take(path: &Path, stop: &AtomicBool, observer: &dyn Observer) -> Result<Self, Refusal> {
         Lock::take_in(path, USUAL, stop, observer)
+    }
+
+    /// The same of a lock that processes on several machines want at once, as those of a cluster's
+    /// job begin with the same task. A file system's locks may be known on one machine only, so it
+    /// looks after half a second whether its name is still there.
+    ///
+    /// # Errors
+    /// As [`Lock::take`].
+    pub fn take_contended(path: &Path, stop: &AtomicBool, observer: &dyn Observer) -> Result<Self, Refusal> {
+        Lock::take_in(path, Manner { is_contended: true, ..USUAL }, stop, observer)
     }
 
     fn take_in(
@@ -155,7 +167,7 @@ impl Lock {
         }
         let own = Holder { host, process: std::process::id(), beats: 0 };
         write(path, &own)?;
-        if !is_locked {
+        if !is_locked || manner.is_contended {
             // Two that found it free at once: the one whose name stays has it.
             std::thread::sleep(LOOK);
             if read(path)?.is_none_or(|now| !is_same(&now, &own)) {
@@ -186,7 +198,8 @@ impl Drop for Lock {
     }
 }
 
-/// What a lock file says; it takes no time, and no lock.
+/// What a lock file says; it takes no time, and the system's lock for a moment only, to see whether
+/// it is held.
 ///
 /// # Errors
 /// What the system says.
@@ -292,8 +305,12 @@ mod tests {
     use crate::base::stop::NEVER;
 
     /// No locks of the system, and a quick heart.
-    const WITHOUT: Manner =
-        Manner { by_system: false, beat: Duration::from_millis(40), dead_after: Duration::from_millis(400) };
+    const WITHOUT: Manner = Manner {
+        by_system: false,
+        is_contended: false,
+        beat: Duration::from_millis(40),
+        dead_after: Duration::from_millis(400),
+    };
 
     fn path(folder: &tempfile::TempDir) -> PathBuf {
         folder.path().join("lock")
@@ -383,6 +400,24 @@ mod tests {
         let long_ago = SystemTime::now() - Duration::from_secs(3600);
         File::options().write(true).open(&path).unwrap().set_modified(long_ago).unwrap();
         assert!(matches!(state(&path).unwrap(), State::Stale(_)));
+    }
+
+    #[test]
+    fn where_the_system_s_locks_are_one_machine_s_the_name_that_stays_has_it() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = path(&folder);
+        std::thread::scope(|threads| {
+            threads.spawn(|| {
+                std::thread::sleep(LOOK / 3);
+                elsewhere(&path);
+            });
+            let Err(Refusal::Held(Some(holder))) = Lock::take_contended(&path, &NEVER, &()) else {
+                panic!("taken by two")
+            };
+            assert_eq!(holder.host, "another-machine");
+        });
+        std::fs::write(&path, "").unwrap();
+        drop(Lock::take_contended(&path, &NEVER, &()).unwrap());
     }
 
     #[test]

@@ -79,6 +79,16 @@ pub struct Setting {
     pub windows: usize,
 }
 
+impl Setting {
+    /// Whether both asked what gaits could be taught of the same task, seen in the same way.
+    fn asks_as(&self, other: &Setting) -> bool {
+        let asked = |setting: &Setting| {
+            (setting.task.clone(), setting.dataset.clone(), setting.stimulus, setting.windows)
+        };
+        asked(self) == asked(other)
+    }
+}
+
 /// Why a measurement ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
@@ -226,7 +236,17 @@ impl ResponseFile {
     pub fn read(path: &Path) -> Result<Self, Error> {
         let text = read_text(path)
             .map_err(|error| Error::reading_or(path, &error, "morphcog response makes one"))?;
-        reading::read_versioned(&text, &path.display().to_string(), FORMAT, FORMAT_VERSION)
+        let name = path.display().to_string();
+        let file: ResponseFile = reading::read_versioned(&text, &name, FORMAT, FORMAT_VERSION)?;
+        for (number, robot) in file.robots.iter().enumerate() {
+            let places = robot.places.iter().map(|place| (place.row, place.column));
+            let gait = Gait::of(&robot.body);
+            if !gait.is_some_and(|gait| gait.places().iter().copied().eq(places)) {
+                let text = "expected the soft voxels and sensors of its body, row-major";
+                return Err(Error::at(&format!("robots.{}.places", number + 1), text).within(&name));
+            }
+        }
+        Ok(file)
     }
 
     /// The file at a path, if there is one. One that cannot be read is told, and left aside.
@@ -270,7 +290,7 @@ impl ResponseFile {
         if earlier.is_of(&self.run_sha256, self.setting.seed, &self.setting.conditions) {
             let is_other = |robot: &&RobotResponse| self.robots.iter().all(|own| own.id != robot.id);
             for robot in earlier.robots.iter().filter(is_other) {
-                let taught = robot.taught.filter(|_| earlier.setting == self.setting);
+                let taught = robot.taught.filter(|_| earlier.setting.asks_as(&self.setting));
                 all.robots.push(RobotResponse { taught, ..robot.clone() });
             }
         }

@@ -204,7 +204,7 @@ impl Selection {
             Selection::Ids(ids) => {
                 // A robot named twice is one robot.
                 let named = ids.iter().map(|id| match id == BEST {
-                    true => Ok(best(&fittest, sources).into_iter().collect()),
+                    true => Ok(best(&fittest, sources)?.into_iter().collect()),
                     false => by_id(&fittest, id),
                 });
                 let named: Result<Vec<_>, Error> = named.collect();
@@ -234,8 +234,12 @@ impl Selection {
 
 /// The best of some robots, given fittest first: the first on validation images if all runs ranked
 /// their robots by those, and ranked one of these; else the fittest.
-fn best<'a>(fittest: &[Chosen<'a>], sources: &'a [Source]) -> Option<Chosen<'a>> {
-    let rankings: Option<Vec<Vec<Validated>>> = sources.iter().map(ranking).collect();
+///
+/// # Errors
+/// If a file of rankings cannot be read.
+fn best<'a>(fittest: &[Chosen<'a>], sources: &'a [Source]) -> Result<Option<Chosen<'a>>, Error> {
+    let rankings: Result<Vec<Option<Vec<Validated>>>, Error> = sources.iter().map(ranking).collect();
+    let rankings: Option<Vec<Vec<Validated>>> = rankings?.into_iter().collect();
     let mut first: Option<(Chosen, f64)> = None;
     for (source, ranked) in rankings.iter().flatten().enumerate() {
         for Validated { id, task, balanced_accuracy, .. } in ranked {
@@ -248,7 +252,7 @@ fn best<'a>(fittest: &[Chosen<'a>], sources: &'a [Source]) -> Option<Chosen<'a>>
             }
         }
     }
-    first.map(|(chosen, _)| chosen).or(fittest.first().copied())
+    Ok(first.map(|(chosen, _)| chosen).or(fittest.first().copied()))
 }
 
 /// The robot of an id, or of the unique beginning of one. Of several runs that have it all, as when

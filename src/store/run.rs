@@ -238,10 +238,11 @@ impl RunFile {
     }
 
     /// Whether both are of one run, however far it had got: the same config and seed make the same
-    /// robots.
+    /// robots. Trainings have gaits of their own besides.
     fn is_one_with(&self, other: &RunFile) -> bool {
         let essence = |run: &RunFile| (run.config.essence(), run.dataset.clone());
-        self.fingerprint() == other.fingerprint() || essence(self) == essence(other)
+        let are_evolved = self.origin.is_none() && other.origin.is_none();
+        self.fingerprint() == other.fingerprint() || are_evolved && essence(self) == essence(other)
     }
 
     /// Its fittest elite; of equals the one in the first cell.
@@ -324,9 +325,7 @@ impl RunFile {
             let measures: Vec<usize> = [muscle, sensor, total].into_iter().chain(task).collect();
             let solution: Vec<u8> = robot.body.voxels().cells().iter().map(|voxel| voxel.code()).collect();
             let about = (&robot.id, &robot.task, robot.generation);
-            // Empty where it did not have to be shown an image.
-            let displacements = table::padded(&robot.displacements, images);
-            (index, robot.objective, measures, solution, about, displacements)
+            (index, robot.objective, measures, solution, about, &robot.displacements)
         });
         table::csv(columns, rows)
     }

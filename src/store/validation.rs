@@ -1,6 +1,7 @@
 //! `validation.json`: the robots of a run that were chosen on validation images.
 
-use crate::base::files::read_text;
+use crate::base::error::Error;
+use crate::base::files::{exists, read_text};
 use crate::config::reading;
 use crate::store::names::VALIDATION_JSON;
 use crate::store::robots::Source;
@@ -42,25 +43,39 @@ pub(crate) struct ValidationFile {
 }
 
 impl ValidationFile {
-    /// What is in a file; `None` if that cannot be read: then robots are chosen anew.
-    pub fn read(path: &Path) -> Option<Self> {
-        let text = read_text(path).ok()?;
-        reading::read_versioned(&text, &path.display().to_string(), FORMAT.0, FORMAT.1).ok()
+    /// What is in a file, if there is one.
+    ///
+    /// # Errors
+    /// If it cannot be read.
+    pub fn read(path: &Path) -> Result<Option<Self>, Error> {
+        if !exists(path) {
+            return Ok(None);
+        }
+        let text = read_text(path).map_err(|error| Error::reading(path, &error))?;
+        let hint = || "delete it: morphcog eval --robots best-validation:1 chooses robots anew".to_string();
+        reading::read_versioned(&text, &path.display().to_string(), FORMAT.0, FORMAT.1)
+            .map(Some)
+            .map_err(|error| error.hint(hint()))
     }
 }
 
 /// The best robots of a run on validation images, as far as they are known for the run as it is;
 /// `None` if none are.
-pub(crate) fn ranking(source: &Source) -> Option<Vec<Validated>> {
+///
+/// # Errors
+/// If the file that says so cannot be read.
+pub(crate) fn ranking(source: &Source) -> Result<Option<Vec<Validated>>, Error> {
     let file = ValidationFile::read(&source.path.with_file_name(VALIDATION_JSON))?;
-    (file.run_sha256 == source.run.fingerprint() && !file.robots.is_empty()).then_some(file.robots)
+    let is_of = |file: &ValidationFile| file.run_sha256 == source.run.fingerprint();
+    Ok(file.filter(|file| is_of(file) && !file.robots.is_empty()).map(|file| file.robots))
 }
 
 /// How many images the robots in the `validation.json` beside a run were chosen by; `None` without
 /// such a file.
-pub(crate) fn shown(source: &Source) -> Option<usize> {
-    ValidationFile::read(&source.path.with_file_name(VALIDATION_JSON))?
-        .robots
-        .first()
-        .map(|robot| robot.images)
+///
+/// # Errors
+/// If it cannot be read.
+pub(crate) fn shown(source: &Source) -> Result<Option<usize>, Error> {
+    let file = ValidationFile::read(&source.path.with_file_name(VALIDATION_JSON))?;
+    Ok(file.and_then(|file| file.robots.first().map(|robot| robot.images)))
 }

@@ -162,7 +162,8 @@ pub fn make(console: &Console, wanted: &Wanted) -> Result<Vec<PathBuf>, Error> {
             _ => short.iter().for_each(|error| console.warning(&format!("{error}; left out"))),
         }
         let figure = plot::progress(&lines);
-        write(Made { figure, stem: stem(paths.first().copied(), wanted.kind, "") })?;
+        let stem = folder::beside_all(&archives, &format!("plot-{}", wanted.kind));
+        write(Made { figure, stem })?;
         sweeps::differences(console, &lines);
     } else if wanted.kind.is_of_robot() {
         for robot in &wanted.robots {

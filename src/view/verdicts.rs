@@ -11,10 +11,11 @@ use std::path::Path;
 pub fn audit(console: &Console, finished: &Finished, out: &Path) {
     let Finished { file, asked, stopped, unwritten } = finished;
     let robots: Vec<&RobotAudit> = asked.iter().filter_map(|id| file.robot(id)).collect();
+    let is_written = unwritten.is_none() && !(*stopped && file.robots.is_empty());
     if console.mode() == Mode::Json {
         let short = |robot: &&RobotAudit| RobotAudit { rollouts: Vec::new(), ..(*robot).clone() };
         let done = serde_json::json!({
-            "file": unwritten.is_none().then(|| out.display().to_string()), "stopped": stopped, "run": file.run,
+            "file": is_written.then(|| out.display().to_string()), "stopped": stopped, "run": file.run,
             "elites": file.elites,
             "robots": robots.iter().map(short).collect::<Vec<_>>(),
         });
@@ -35,7 +36,7 @@ pub fn audit(console: &Console, finished: &Finished, out: &Path) {
     ));
     breaking(console, &robots);
     let csv = out.with_extension("csv");
-    if unwritten.is_none() {
+    if is_written {
         console.line(&format!("wrote {} and {}", out.display(), csv.display()));
     }
     if file.robots.len() < file.elites {

@@ -55,6 +55,47 @@ fn a_file_in_this_folder_comes_before_the_built_in_config_of_its_name() {
 }
 
 #[test]
+fn a_folder_of_the_name_of_a_built_in_config_does_not_hide_it() {
+    let sandbox = Sandbox::new();
+    std::fs::create_dir(sandbox.path("zero_one")).unwrap();
+    sandbox.run("config zero_one").ended(0, &[]);
+    std::fs::create_dir(sandbox.path("other")).unwrap();
+    sandbox.run("config other").ended(3, &["other: cannot be read"]);
+}
+
+#[test]
+fn a_config_that_is_somebody_elses_is_not_overwritten_unasked() {
+    let sandbox = Sandbox::tiny();
+    let foreign = "# Of a page\nbaseURL = \"x\"\n";
+    sandbox.write("site/config.toml", foreign);
+    sandbox.run("evolve -q -c tiny.toml -o site").ended(5, &["site/config.toml", "--force"]);
+    assert_eq!(sandbox.read("site/config.toml"), foreign);
+    assert!(!sandbox.path("site/run.json").exists());
+    // One's own, with what was written about it, is the config of its run, but not of another.
+    let own = format!("# Why so\n{TINY}");
+    sandbox.write("own/config.toml", &own);
+    sandbox.run("evolve -q -c own/config.toml -o own --set seed=9").ended(5, &["own/config.toml"]);
+    sandbox.run("evolve -q -c own/config.toml -o own").ended(0, &[]);
+    assert_eq!(sandbox.read("own/config.toml"), own);
+    sandbox.run("evolve -q -c tiny.toml -o site --force").ended(0, &[]);
+    // What the program wrote, and no run came of, is in nobody's way.
+    std::fs::create_dir(sandbox.path("begun")).unwrap();
+    std::fs::copy(sandbox.path("site/config.toml"), sandbox.path("begun/config.toml")).unwrap();
+    sandbox.run("evolve -q -c tiny.toml -o begun --set seed=9").ended(0, &[]);
+}
+
+#[test]
+fn the_name_in_a_run_file_leads_nowhere() {
+    let sandbox = crate::with_run();
+    let text = sandbox.read("run/run.json");
+    let named = text.replace("\"name\":\"tiny\"", "\"name\":\"../escaped\"");
+    assert_ne!(named, text);
+    sandbox.write("run/run.json", named);
+    sandbox.run("evolve -q -c run/config.toml -g 1").ended(0, &[]);
+    assert!(sandbox.path("runs/escaped-seed3/run.json").exists());
+}
+
+#[test]
 fn toml_and_json_with_the_same_keys_make_the_same_run() {
     let sandbox = Sandbox::tiny();
     let table: toml::Table = toml::from_str(TINY).unwrap();

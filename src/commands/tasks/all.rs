@@ -5,7 +5,7 @@ use crate::base::observer::{Generation, Observer, Work};
 use crate::base::text::counted;
 use crate::commands::tasks::steps::{is_done, run};
 use crate::commands::tasks::task::{Place, Run, Task};
-use crate::config::Config;
+use crate::config::{Config, DataConfig};
 use crate::data::dataset::{Dataset, Split};
 use crate::search::{held_out, train, training};
 use crate::store::images::{HeldOut, HowMany};
@@ -42,18 +42,18 @@ pub fn check_data<'a>(tasks: impl Iterator<Item = (usize, &'a Task)>, place: &Pl
     let mut datasets: BTreeMap<String, Dataset> = BTreeMap::new();
     let mut known = BTreeSet::new();
     for (number, task) in tasks.filter(|(_, task)| !has_begun(task)) {
-        let config = match &task.run {
-            Run::Evolve(config, _) => config,
-            Run::Train(training) => &training.config,
+        let given = Whereabouts::given(place.data.as_deref());
+        let (config, whereabouts) = match &task.run {
+            Run::Evolve(config, _) => (&**config, given),
+            Run::Train(training) => (&training.config, given.and_of(&training.archive)),
         };
         let test = task.steps.eval.as_ref().filter(|step| step.split == HeldOut::Test);
         let splits = if test.is_some() { &Split::ALL[..] } else { &[Split::Train] };
-        let name = format!("{:?}", (splits, &config.data.dataset, &config.data.dir, &config.data.builtin));
+        let DataConfig { dataset, dir, builtin, .. } = &config.data;
+        let name = format!("{:?}", (splits, dataset, dir, builtin, &whereabouts));
         let dataset = match datasets.entry(name.clone()) {
             Entry::Occupied(loaded) => loaded.into_mut(),
-            Entry::Vacant(place_of) => {
-                place_of.insert(Whereabouts::given(place.data.as_deref()).load(&config.data, splits)?)
-            }
+            Entry::Vacant(place_of) => place_of.insert(whereabouts.load(&config.data, splits)?),
         };
         let named = |error: Error| error.within(&format!("task {number} ({})", task.name));
         match &task.run {
@@ -123,6 +123,8 @@ pub fn run_all(
     let all = All { observer, known, parts: numbered.iter().map(|_| AtomicU64::new(0)).collect() };
     let next = AtomicUsize::new(0);
     let summary = Mutex::new(Summary { done: before, ..Summary::default() });
+    // Tasks that other processes were at.
+    let elsewhere: Mutex<Vec<&Task>> = Mutex::new(Vec::new());
     let worker = || {
         while !stop.load(Ordering::Relaxed) {
             let index = next.fetch_add(1, Ordering::Relaxed);
@@ -145,7 +147,9 @@ pub fn run_all(
                     ));
                 }
                 Err(error) if error.kind == ErrorKind::Stopped => {}
-                Err(error) if error.kind == ErrorKind::Occupied => summary.elsewhere += 1,
+                Err(error) if error.kind == ErrorKind::Occupied => {
+                    elsewhere.lock().unwrap_or_else(PoisonError::into_inner).push(*task);
+                }
                 Err(error) => {
                     let hint = error.hint.as_ref().map_or(String::new(), |hint| format!("; {hint}"));
                     observer.warning(&format!("task {number} ({}) failed: {error}{hint}", task.name));
@@ -161,6 +165,10 @@ pub fn run_all(
     });
     let mut summary = summary.into_inner().unwrap_or_else(PoisonError::into_inner);
     summary.failed.sort_unstable();
+    // Some of them may be done by now.
+    let elsewhere = elsewhere.into_inner().unwrap_or_else(PoisonError::into_inner);
+    summary.elsewhere = elsewhere.iter().filter(|task| is_open(task)).count();
+    summary.done += elsewhere.len() - summary.elsewhere;
     summary.open = tasks.len() - summary.done - summary.failed.len() - summary.elsewhere;
     Ok(summary)
 }

@@ -30,7 +30,7 @@ pub fn run(task: &Task, place: &Place, stop: &AtomicBool, observer: &dyn Observe
     let folder = place.folder(task);
     std::fs::create_dir_all(&folder).map_err(|error| Error::writing(&folder, &error))?;
     let lock = folder.join(TASK_LOCK);
-    let _lock = Lock::take(&lock, stop, observer).map_err(|refusal| {
+    let _lock = Lock::take_contended(&lock, stop, observer).map_err(|refusal| {
         let held = format!("{}: another process is at this task", folder.display());
         refusal.into_error(&lock, &held, "let it end, or stop it")
     })?;
@@ -95,7 +95,11 @@ fn steps(task: &Task, place: &Place, stop: &AtomicBool, observer: &dyn Observer)
                 data: place.data.clone(),
                 threads: place.threads,
             };
-            if train::train(&options, stop, observer).map_err(elsewhere)?.validated.is_none() {
+            let trained = train::train(&options, stop, observer).map_err(|error| match error.kind {
+                ErrorKind::Stopped => stopped(),
+                _ => elsewhere(error),
+            })?;
+            if trained.validated.is_none() {
                 return Err(stopped());
             }
         }
@@ -164,10 +168,16 @@ fn steps(task: &Task, place: &Place, stop: &AtomicBool, observer: &dyn Observer)
 /// Tasks have no options of their own, as hints of `evolve` and `train` name them; and a run of
 /// another kind in the folder is no process that works there.
 fn elsewhere(error: Error) -> Error {
-    match &error.hint {
-        Some(hint) if hint.contains("--force") || hint.contains("--resume") => {
+    match (error.kind, &error.hint) {
+        (ErrorKind::Occupied | ErrorKind::Input, Some(hint))
+            if hint.contains("--force") || hint.contains("--resume") =>
+        {
             let hint = "move that folder away, or name another with --out".to_string();
             Error { kind: ErrorKind::Input, ..error }.hint(hint)
+        }
+        (ErrorKind::Other, Some(hint)) => {
+            let hint = hint.replace("with --resume the same command", "the same command");
+            error.hint(hint)
         }
         _ => error,
     }

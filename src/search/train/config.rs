@@ -12,7 +12,6 @@ use crate::search::training::{Training, scarcest};
 use crate::store::whereabouts::Whereabouts;
 use crate::task::fitness::Fitness;
 use crate::task::protocol::{Protocol, RolloutMode};
-use std::path::Path;
 
 /// Least number of training images of a class.
 const LEAST_PER_CLASS: usize = 2;
@@ -117,8 +116,8 @@ pub(crate) fn with_images(
 ///
 /// # Errors
 /// If the config, or the images there are, do not allow it.
-pub fn check(evolved: &Config, groups: &[Vec<u8>; 2], data: Option<&Path>) -> Result<(), Error> {
+pub fn check(evolved: &Config, groups: &[Vec<u8>; 2], whereabouts: &Whereabouts) -> Result<(), Error> {
     let config = config_of(evolved, groups, None, &[])?;
-    let dataset = Whereabouts::given(data).load(&config.data, &[Split::Train])?;
+    let dataset = whereabouts.load(&config.data, &[Split::Train])?;
     with_images(config, &Training::indices(evolved, &dataset)?, &dataset, &()).map(|_| ())
 }

@@ -41,7 +41,7 @@ pub(super) fn origin(source: &Source, config: &Config, dataset: &Dataset) -> Res
     for earlier in here {
         trained_on.extend(earlier.indices);
         if let Some(Drawn { classes, images_per_class, seed }) = earlier.drawn {
-            let drawn = dataset.draw(Split::Train, &classes, images_per_class, seed, 0);
+            let drawn = dataset.draw(Split::Train, &classes, images_per_class, seed);
             trained_on.extend(drawn.map_err(|error| Error::input(error.to_string()))?);
         }
     }

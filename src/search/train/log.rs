@@ -17,6 +17,10 @@ use std::time::{Duration, Instant};
 /// How often the rollouts are saved. A power cut costs as much.
 const SAVE_EVERY: Duration = Duration::from_secs(5);
 
+/// Rollouts a thread that are simulated before it is looked whether they are to be saved. Fewer let
+/// threads wait for each other more often.
+const PART: usize = 32;
+
 /// What is simulated, and was in sessions before.
 pub(super) struct Log<'a> {
     path: PathBuf,
@@ -26,6 +30,7 @@ pub(super) struct Log<'a> {
     asked: usize,
     /// Rollouts in them.
     pub(super) simulated: usize,
+    /// Rollouts that are in the file, and when it was written.
     saved: (usize, Instant),
     /// Rollouts of the work that began last; none if others are counted than rollouts.
     done: Option<AtomicU64>,
@@ -57,7 +62,7 @@ impl<'a> Log<'a> {
             }
             batches = file.rollouts;
         }
-        let saved = (batches.len(), Instant::now());
+        let saved = (count(&batches), Instant::now());
         Ok(Log { path, key, batches, asked: 0, simulated: 0, saved, done: None, stop, observer })
     }
 
@@ -98,40 +103,45 @@ impl<'a> Log<'a> {
         let number = self.asked;
         self.asked += 1;
         self.simulated += stimuli.len();
-        if let Some(batch) = self.batches.get(number) {
-            return match batch.len() == stimuli.len() {
-                true => {
-                    self.rolled(batch.len() as u64);
-                    Ok(batch.clone())
-                }
-                false => {
-                    let text = format!(
-                        "{}: rollouts {number}: expected {}, found {}",
-                        self.path.display(),
-                        stimuli.len(),
-                        batch.len()
-                    );
-                    Err(Error::input(text).hint("train anew with --force".to_string()))
-                }
-            };
-        }
+        let begun = match self.batches.get(number) {
+            Some(batch) if batch.len() == stimuli.len() => {
+                self.rolled(batch.len() as u64);
+                return Ok(batch.clone());
+            }
+            // It was stopped within its last batch.
+            Some(batch) if batch.len() < stimuli.len() && number + 1 == self.batches.len() => {
+                self.batches.pop()
+            }
+            Some(batch) => {
+                let (path, wanted, found) = (self.path.display(), stimuli.len(), batch.len());
+                let text = format!("{path}: rollouts {number}: expected {wanted}, found {found}");
+                return Err(Error::input(text).hint("train anew with --force".to_string()));
+            }
+            None => None,
+        };
         let setting = (&config.physics, &config.protocol);
-        let known = &known[..known.len().min(stimuli.len())];
-        let (stimuli, conditions) = (&stimuli[known.len()..], &conditions[known.len()..]);
-        self.rolled(known.len() as u64);
-        let told = |count| self.rolled(count);
-        let found = fresh_rollouts(body, stimuli, conditions, setting, &told, self.stop);
-        let (found, _) = found.map_err(|_| stopped())?;
-        let batch: Batch = known.iter().copied().chain(found.into_iter().map(Result::ok)).collect();
-        self.batches.push(batch.clone());
-        if self.saved.1.elapsed() >= SAVE_EVERY {
-            self.save()?;
+        self.batches.push(begun.unwrap_or_else(|| known[..known.len().min(stimuli.len())].to_vec()));
+        self.rolled(self.batches[number].len() as u64);
+        // A part at a time: what is stopped goes on after the last one.
+        let part = PART * rayon::current_num_threads();
+        while self.batches[number].len() < stimuli.len() {
+            let begin = self.batches[number].len();
+            let end = stimuli.len().min(begin + part);
+            let (stimuli, conditions) = (&stimuli[begin..end], &conditions[begin..end]);
+            let told = |count| self.rolled(count);
+            let found = fresh_rollouts(body, stimuli, conditions, setting, &told, self.stop);
+            let (found, _) = found.map_err(|_| stopped())?;
+            self.batches[number].extend(found.into_iter().map(Result::ok));
+            if self.saved.1.elapsed() >= SAVE_EVERY {
+                self.save()?;
+            }
         }
-        Ok(batch)
+        Ok(self.batches[number].clone())
     }
 
     pub(super) fn save(&mut self) -> Result<(), Error> {
-        if self.saved.0 == self.batches.len() && self.path.exists() {
+        let rollouts = count(&self.batches);
+        if self.saved.0 == rollouts && self.path.exists() {
             return Ok(());
         }
         let file = File {
@@ -142,9 +152,13 @@ impl<'a> Log<'a> {
         };
         let text = serde_json::to_string(&file).expect("numbers are finite and keys are text") + "\n";
         write_atomically(&self.path, text.as_bytes()).map_err(|error| Error::writing(&self.path, &error))?;
-        self.saved = (self.batches.len(), Instant::now());
+        self.saved = (rollouts, Instant::now());
         Ok(())
     }
+}
+
+fn count(batches: &[Batch]) -> usize {
+    batches.iter().map(Vec::len).sum()
 }
 
 pub(super) fn stopped() -> Error {

@@ -8,6 +8,7 @@ use crate::commands::report::Dossier;
 use crate::config::capacity::CapacityConfig;
 use crate::config::train::TrainConfig;
 use crate::config::{Config, Settings, flatten};
+use crate::data::dataset::BUILTIN;
 use crate::search::showing;
 use crate::store::capacity::CapacityFile;
 use crate::store::eval::Mean;
@@ -141,7 +142,7 @@ pub(super) fn methods(dossier: &Dossier) -> String {
         ),
     };
     let steps = config.protocol.control_steps;
-    let cycles = number::fixed(f64::from(steps) / f64::from(config.physics.cycle_steps), 0);
+    let cycles = (f64::from(steps) / f64::from(config.physics.cycle_steps) * 100.0).round() / 100.0;
     let rollout = match config.protocol.rollout {
         RolloutMode::Fresh => "a rollout of its own from the initial state",
         RolloutMode::Sequential => "one continuous rollout for all images",
@@ -252,8 +253,13 @@ fn made_by(dossier: &Dossier, again: &str) -> Vec<String> {
         let known = exists(&config);
         let missing = format!("# CONFIG: the key \"config\" of {}", dossier.path.display());
         let config = if known { in_shell(&config) } else { "CONFIG".to_string() };
-        let line = format!("morphcog evolve --config {config} --out {again}");
-        return if known { vec![line] } else { vec![missing, line] };
+        let name = &run.dataset.name;
+        let (images, data) = match name == BUILTIN {
+            true => (None, ""),
+            false => (Some(format!("# IMAGES: the folder with the files of {name}")), " --data IMAGES"),
+        };
+        let line = format!("morphcog evolve --config {config}{data} --out {again}");
+        return (!known).then_some(missing).into_iter().chain(images).chain([line]).collect();
     };
     let gaits = format!("# GAITS: run {}, SHA-256 of its content {}…", origin.name, short(&origin.sha256));
     let robot = run.elites.first().and_then(|robot| robot.parent.as_deref());
@@ -269,12 +275,14 @@ fn made_by(dossier: &Dossier, again: &str) -> Vec<String> {
     vec![gaits, format!("{line} --out {again}")]
 }
 
-/// The keys of `[stimulus]` and `[train]` with their values, those at their defaults too.
+/// The keys of `[stimulus]`, `[train]` and `[validation]` with their values, those at their defaults too.
 fn seeing_and_training(config: &Config) -> Settings {
     let mut settings = Settings::new();
-    for (section, keys) in
-        [("stimulus", toml::Value::try_from(config.stimulus)), ("train", toml::Value::try_from(config.train))]
-    {
+    for (section, keys) in [
+        ("stimulus", toml::Value::try_from(config.stimulus)),
+        ("train", toml::Value::try_from(config.train)),
+        ("validation", toml::Value::try_from(config.validation)),
+    ] {
         flatten(
             section,
             keys.expect("every field is a number, text or table, which TOML has"),
