@@ -133,7 +133,11 @@ fn what_cannot_be_compared_is_refused() {
     with("--set cnn.kernel=6 --set cnn.pooling=none").ended(3, &["cnn.kernel = 6", "up to 5"]);
     with("--set mlp.rate=1").ended(2, &["mlp.rate"]);
     with("--physical-only").ended(3, &["audit.json", "morphcog audit"]);
-    sandbox.run("audit -q -a runs/3 runs/4 --robots top:1 --set perturbations.time_step=[2]").ended(0, &[]);
+    for run in ["runs/3", "runs/4"] {
+        sandbox
+            .run(&format!("audit -q -a {run} --robots top:1 --set perturbations.time_step=[2]"))
+            .ended(0, &[]);
+    }
     with("--physical-only").ended(3, &["has not been audited", "morphcog audit goes on"]);
     with("-o runs/eval.json").ended(2, &["overwrite"]);
     with("-o runs/c.svg").ended(2, &["--out runs/c.svg", "the figure"]);

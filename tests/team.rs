@@ -227,7 +227,7 @@ fn a_test_that_was_stopped_goes_on_and_ends_with_the_same_bytes_on_any_threads()
 fn validation_images_are_none_that_a_run_was_trained_on() {
     let sandbox = pairs();
     sandbox.run(&format!("{TEAM} -q --split validation --images 30")).ended(0, &[]);
-    let team = read(&sandbox, "pairs/team.json");
+    let team = read(&sandbox, "pairs/team-validation.json");
     for run in ["pairs/0v1", "pairs/0v4", "pairs/1v4"] {
         let trained = sandbox.run_file(run).training_images;
         assert!(!trained.is_empty() && team.images.iter().all(|image| !trained.contains(image)), "{run}");

@@ -7,7 +7,9 @@ use common::program::{Sandbox, TINY, files, gaits};
 use morphcog::config::Config;
 use morphcog::data::dataset::Split;
 use morphcog::search::training::Training;
+use morphcog::store::run::Robot;
 use morphcog::store::whereabouts::load_dataset;
+use morphcog::task::gait::Gait;
 
 /// A little of everything: seconds in place of minutes.
 const LITTLE: &str = "--set train.random_images=40 --set train.rounds=2 --set train.images=24 \
@@ -56,9 +58,10 @@ fn a_training_is_a_run_that_every_command_understands() {
     // Its config is one that can be read, and asks for the same again.
     Config::load(&sandbox.path("taught/config.toml").to_string_lossy(), &[]).unwrap();
     // Another gait makes another training, with the same config.
-    let is_other = |id: &&String| Some(*id) != robot.parent.as_ref();
-    let other = walkers.elites.iter().map(|elite| &elite.id).find(is_other).unwrap();
-    let train = train.replace("top:3", other).replace("-o taught", "-o other");
+    let is_other =
+        |elite: &&Robot| Some(&elite.id) != robot.parent.as_ref() && Gait::of(&elite.body).is_some();
+    let other = walkers.elites.iter().find(is_other).unwrap();
+    let train = train.replace("top:3", &other.id).replace("-o taught", "-o other");
     sandbox.run(&train).ended(0, &[]);
     sandbox.run("eval -q -a taught other --images 12 --cycles 1").ended(0, &[]);
 }

@@ -80,7 +80,7 @@ fn a_sweep_over_a_run_looks_where_the_run_remembers() {
         "plan.toml",
         "archive = \"runs/one\"\nrobots = \"top:1\"\npairs = [0, 1]\n\
          set = [\"train.random_images=40\", \"train.rounds=1\", \"train.images=10\", \"train.final_images=10\", \
-         \"train.challengers=1\", \"validation.images=20\"]\n[eval]\nimages = 8\n",
+         \"train.challengers=1\", \"train.images_per_class=30\", \"validation.images=40\"]\n[eval]\nimages = 8\n",
     );
     sandbox.run("sweep -q plan.toml --out all").ended(0, &[]);
     // Another place is no better than none.
@@ -92,7 +92,8 @@ fn a_training_that_takes_the_place_of_another_takes_nothing_of_it() {
     let sandbox = with_run();
     write_dataset(&sandbox, "elsewhere", 2);
     let little = "--set train.random_images=40 --set train.rounds=1 --set train.images=10 \
-                  --set train.final_images=10 --set train.challengers=1 --set validation.images=20";
+                  --set train.final_images=10 --set train.challengers=1 --set train.images_per_class=30 \
+                  --set validation.images=40";
     let train = format!("train -q -a runs/one --task 0|1 --robots top:1 {little} -o taught");
     sandbox.run(&format!("{train} --data elsewhere")).ended(0, &[]);
     let of = |sandbox: &Sandbox| sandbox.run_file("taught").dataset;

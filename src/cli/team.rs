@@ -10,7 +10,6 @@ use crate::commands::team;
 use crate::commands::team::Options;
 use crate::store::folder;
 use crate::store::images::{HeldOut, HowMany};
-use crate::store::names::TEAM_JSON;
 use crate::store::robots::{BEST, Selection};
 use crate::view::console::Console;
 use crate::view::reporters::Reporter;
@@ -83,7 +82,7 @@ pub(super) fn run(args: TeamArgs, console: &Console) -> Result<(), Error> {
         split: args.split,
         seed: args.seed,
         data: args.data,
-        out: args.out.unwrap_or_else(|| folder::beside_all(&archives, TEAM_JSON)),
+        out: args.out.unwrap_or_else(|| folder::beside_all(&archives, team::own_name(args.split))),
         threads: args.threads.map(usize::from),
         archives,
     };

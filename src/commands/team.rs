@@ -15,7 +15,7 @@ use crate::search::showing::{CYCLES, Walker, control_steps, task_of};
 use crate::store::eval::Trial;
 use crate::store::folder::check_out;
 use crate::store::images::{HeldOut, HowMany, ImageRef};
-use crate::store::names::TEAM_JSON;
+use crate::store::names::{TEAM_JSON, TEAM_VALIDATION_JSON};
 use crate::store::robots::{BEST, Chosen, Selection, Source};
 use crate::store::run::different;
 use crate::store::team::{FORMAT, FORMAT_VERSION, Member, TeamBaselines, TeamFile};
@@ -77,7 +77,7 @@ pub fn team(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Re
     };
     for source in &sources {
         source.has_task()?;
-        check_out(&options.out, &source.path, TEAM_JSON)?;
+        check_out(&options.out, &source.path, own_name(options.split))?;
         same_data(first, source)?;
     }
     different(sources.iter().map(|source| (source.path.as_path(), &source.run)))?;
@@ -210,6 +210,14 @@ fn classes(options: &Options, dataset: &Dataset) -> Result<Vec<u8>, Error> {
         return Err(Error::usage(format!("--images {asked}: expected {least} or more, one of each class")));
     }
     Ok(classes)
+}
+
+/// What results on these images are called if nothing is said.
+pub fn own_name(split: HeldOut) -> &'static str {
+    match split {
+        HeldOut::Test => TEAM_JSON,
+        HeldOut::Validation => TEAM_VALIDATION_JSON,
+    }
 }
 
 /// The two groups that a robot tells apart.

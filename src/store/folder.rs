@@ -9,7 +9,8 @@ use crate::store::lock;
 use crate::store::lock::Lock;
 use crate::store::names::{
     AUDIT_JSON, CAPACITY_JSON, CHECKPOINTS, CONFIG, DATA_FOLDER, ELITES, EVAL_JSON, EVAL_VALIDATION_JSON,
-    LOCK, METRICS, RESPONSE_JSON, RUN_JSON, TASK_JSON, TASK_LOCK, TEAM_JSON, TRAINING_JSON, VALIDATION_JSON,
+    LOCK, METRICS, RESPONSE_JSON, RUN_JSON, TASK_JSON, TASK_LOCK, TEAM_JSON, TEAM_VALIDATION_JSON,
+    TRAINING_JSON, VALIDATION_JSON,
 };
 use crate::store::run::RunFile;
 use std::ffi::OsStr;
@@ -22,8 +23,16 @@ pub const RUNS: &str = "runs";
 const OF_RUN: &str = "expected another name: this would overwrite a file of a run";
 
 /// What commands find, beside a run.
-const RESULTS: [&str; 7] =
-    [AUDIT_JSON, CAPACITY_JSON, EVAL_JSON, EVAL_VALIDATION_JSON, RESPONSE_JSON, TEAM_JSON, VALIDATION_JSON];
+const RESULTS: [&str; 8] = [
+    AUDIT_JSON,
+    CAPACITY_JSON,
+    EVAL_JSON,
+    EVAL_VALIDATION_JSON,
+    RESPONSE_JSON,
+    TEAM_JSON,
+    TEAM_VALIDATION_JSON,
+    VALIDATION_JSON,
+];
 
 /// What to do with a folder that holds a run already.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

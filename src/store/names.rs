@@ -17,6 +17,8 @@ pub const RESPONSE_JSON: &str = "response.json";
 
 /// What `team` found.
 pub const TEAM_JSON: &str = "team.json";
+/// The same on validation images.
+pub const TEAM_VALIDATION_JSON: &str = "team-validation.json";
 
 /// What a training keeps of its rollouts, beside `run.json`.
 pub const TRAINING_JSON: &str = "training.json";
