@@ -146,10 +146,7 @@ fn legend(canvas: &mut Canvas, report: &EvalFile, top: f64) -> f64 {
     ];
     // Unknown on another dataset than the runs'.
     if report.baselines.values().any(|b| b.nearest_training_image.is_some()) {
-        lines.push((
-            NEAREST,
-            value("nearest training image", baselines.and_then(|b| b.nearest_training_image)),
-        ));
+        lines.push((NEAREST, value("nearest image", baselines.and_then(|b| b.nearest_training_image))));
     }
     let column = (COLUMN - 2.0 * MARGIN) / 2.0;
     for (k, (pen, text)) in lines.iter().enumerate() {
