@@ -65,6 +65,13 @@ mod tests {
         assert_eq!(found.info.splits[&Split::Test].per_class[&3], 2);
         assert!(matches!(found.problems.as_slice(), [(Split::Train, _)]));
         assert!(found.published.is_empty());
-        assert_eq!(info("builtin", &[]).unwrap().info.splits.len(), 2);
+        let builtin = info("builtin", &[]).unwrap().info;
+        assert_eq!((builtin.splits.len(), builtin.differences()), (2, Vec::new()));
+        write("train-images-idx3-ubyte", [idx::header(&[2, 2, 1]), vec![0, 255, 0, 9]].concat());
+        write("train-labels-idx1-ubyte", [idx::header(&[2]), vec![3, 4]].concat());
+        assert_eq!(
+            info("mnist", &given).unwrap().info.differences(),
+            ["train images have 2 × 1 pixels, test images 1 × 1", "there are no test images of class 4"]
+        );
     }
 }

@@ -18,6 +18,31 @@ pub struct DatasetInfo {
     pub splits: BTreeMap<Split, SplitInfo>,
 }
 
+impl DatasetInfo {
+    /// In what training and test images differ where results should not depend on it: sizes, and
+    /// classes that only one split has.
+    pub fn differences(&self) -> Vec<String> {
+        let [Some(train), Some(test)] = Split::ALL.map(|split| self.splits.get(&split)) else {
+            return Vec::new();
+        };
+        let size = |split: &SplitInfo| format!("{} × {}", split.height, split.width);
+        let mut all = Vec::new();
+        if size(train) != size(test) {
+            all.push(format!("train images have {} pixels, test images {}", size(train), size(test)));
+        }
+        for (split, has, lacks) in [("test", train, test), ("train", test, train)] {
+            let missing: Vec<String> = (has.per_class.keys())
+                .filter(|class| !lacks.per_class.contains_key(class))
+                .map(u8::to_string)
+                .collect();
+            if !missing.is_empty() {
+                all.push(format!("there are no {split} images of class {}", missing.join(", ")));
+            }
+        }
+        all
+    }
+}
+
 /// What a run records about one split.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SplitInfo {

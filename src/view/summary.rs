@@ -325,6 +325,7 @@ pub fn dataset(console: &Console, found: &Found) {
         console
             .warning(&format!("{split}: these are the images of {known}, here under the name {}", info.name));
     }
+    info.differences().iter().for_each(|text| console.warning(text));
     for (split, problem) in &found.problems {
         console.warning(&format!("{split}: {problem}"));
     }
