@@ -169,7 +169,7 @@ fn steps(task: &Task, place: &Place, stop: &AtomicBool, observer: &dyn Observer)
 /// another kind in the folder is no process that works there.
 fn elsewhere(error: Error) -> Error {
     match (error.kind, &error.hint) {
-        (ErrorKind::Occupied | ErrorKind::Input, Some(hint))
+        (ErrorKind::Occupied | ErrorKind::Input | ErrorKind::Usage, Some(hint))
             if hint.contains("--force") || hint.contains("--resume") =>
         {
             let hint = "move that folder away, or name another with --out".to_string();

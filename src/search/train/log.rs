@@ -18,8 +18,8 @@ use std::time::{Duration, Instant};
 const SAVE_EVERY: Duration = Duration::from_secs(5);
 
 /// Rollouts a thread that are simulated before it is looked whether they are to be saved. Fewer let
-/// threads wait for each other more often.
-const PART: usize = 32;
+/// threads wait for each other more often, and leave fewer to be simulated side by side.
+const PART: usize = 128;
 
 /// What is simulated, and was in sessions before.
 pub(super) struct Log<'a> {

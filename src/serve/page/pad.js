@@ -89,9 +89,9 @@ export class Pad {
   }
 
   begin(e) {
-    // A palm or a second finger draws nothing.
-    if (e.button > 0 || this.drawing) return;
-    this.pointer = e.pointerId;
+    // A second finger draws nothing, nor does a palm beside a pen.
+    if (e.button > 0 || this.drawing && (!e.isPrimary || this.kind === "pen" && e.pointerType === "touch")) return;
+    this.pointer = e.pointerId; this.kind = e.pointerType;
     e.preventDefault();
     this.canvas.focus({ preventScroll: true });
     try { this.canvas.setPointerCapture(e.pointerId); } catch { /* the pointer has gone already */ }

@@ -74,10 +74,10 @@ fn panel(canvas: &mut Canvas, at: [f64; 2], size: [f64; 2], y: &Axis, task: &Tas
     // Where the smallest size is above the robots already, nothing crosses.
     let (found, crossing) = match curve.capacity {
         Some(below @ Crossing::Below { .. }) => {
-            (format!("capacity {below}: the fit begins above the robots"), None)
+            (format!("capacity {below}: the curve begins above the robots"), None)
         }
         Some(at @ Crossing::At(size)) => (format!("capacity {at} {unit}"), Some(size)),
-        None => ("no capacity: the fit never reaches the robots".to_string(), None),
+        None => ("no capacity: the curve never reaches the robots".to_string(), None),
     };
     let title = format!("{}, {kind}", task.task);
     canvas.text([at[0], at[1] - 5.0], &title, Words::default().bold());
@@ -183,7 +183,7 @@ mod tests {
         let mut below = file(Some(Crossing::Below { below: 1.0 }));
         below.tasks.iter_mut().for_each(|task| task.accuracy = 0.3);
         let below = capacity(&below).svg();
-        assert!(below.contains("capacity &lt; 1: the fit begins above") && !below.contains("capacity 1"));
+        assert!(below.contains("capacity &lt; 1: the curve begins above") && !below.contains("capacity 1"));
         assert_eq!(below.matches("<circle").count(), svg.matches("<circle").count() - 4);
     }
 
