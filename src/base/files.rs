@@ -97,7 +97,7 @@ pub fn check_writable(path: &Path) -> io::Result<()> {
         Ok(found) if !found.is_file() => Ok(()),
         _ => {
             let open = |name: &Path| File::options().write(true).create_new(true).open(name);
-            tempfile::Builder::new().make_in(folder_of(path), open).map(|_| ())
+            tempfile::Builder::new().make_in(folder_of(&led_to(path)), open).map(|_| ())
         }
     }
 }

@@ -140,8 +140,7 @@ pub(super) fn after_evolution(evolution: &evolve::Options) -> Result<Options, Er
     let name = name(&archive, groups, None);
     let of_training = out.with_file_name(&name);
     // What would stop the training is said before gaits evolve for an hour.
-    let given = Whereabouts::given(data.as_deref());
-    let whereabouts = if *if_exists == IfExists::Resume { given.and_of(&archive) } else { given };
+    let whereabouts = Whereabouts::given(data.as_deref()).and_of_resumed(*if_exists, &archive);
     train::check(config, groups, &whereabouts)?;
     if *if_exists == IfExists::Refuse {
         folder::vacant(&of_training)?;

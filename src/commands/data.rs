@@ -42,7 +42,10 @@ pub fn info(name: &str, given: &[Place]) -> Result<Found, DatasetError> {
     let files = info.splits.values().flat_map(|split| &split.files);
     let published = files.filter(|file| known.iter().any(|k| k.sha256 == file.sha256));
     let published = published.map(|file| file.name.clone()).collect();
-    let known = info.splits.iter().filter_map(|(&split, found)| Some((split, known_as(found)?)));
+    let known = info
+        .splits
+        .iter()
+        .filter_map(|(&split, found)| Some((split, known_as(&found.fingerprint, &found.files)?)));
     let others = known.filter(|(_, known)| *known != name).collect();
     Ok(Found { info, published, others, problems })
 }

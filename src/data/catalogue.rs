@@ -1,7 +1,7 @@
 //! What can be downloaded, from where, and how to know that it is the right thing.
 
 use crate::data::files::FETCHABLE;
-use crate::data::info::{FileInfo, SplitInfo};
+use crate::data::info::FileInfo;
 
 /// A file to be downloaded, as published.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -115,14 +115,14 @@ impl Catalogue {
     }
 }
 
-/// The dataset that a split is known to be of, whatever it is called where it was found: MNIST by
+/// The dataset that a split is known to be of by its fingerprint and files, whatever it is called where it was found: MNIST by
 /// its content, Fashion-MNIST by its files as published.
-pub fn known_as(split: &SplitInfo) -> Option<&'static str> {
+pub fn known_as(fingerprint: &str, files: &[FileInfo]) -> Option<&'static str> {
     let are_published = |published: &Published| {
         let is_one = |file: &FileInfo| published.iter().any(|(_, _, sha256)| *sha256 == file.sha256);
-        split.files.len() == 2 && split.files.iter().all(is_one)
+        files.len() == 2 && files.iter().all(is_one)
     };
-    if MNIST_CONTENT.contains(&split.fingerprint.as_str()) {
+    if MNIST_CONTENT.contains(&fingerprint) {
         return Some("mnist");
     }
     are_published(&FASHION_MNIST).then_some("fashion-mnist")
@@ -148,22 +148,15 @@ mod tests {
 
     #[test]
     fn splits_are_known_by_their_content_or_their_published_files() {
-        let split = |fingerprint: &str, files: &[&str]| SplitInfo {
-            images: 1,
-            height: 1,
-            width: 1,
-            fingerprint: fingerprint.to_string(),
-            per_class: Default::default(),
-            files: files
-                .iter()
-                .map(|sha256| FileInfo { name: String::new(), bytes: 1, sha256: sha256.to_string() })
-                .collect(),
+        let named = |fingerprint: &str, files: &[&str]| {
+            let file = |sha256: &&str| FileInfo { name: String::new(), bytes: 1, sha256: sha256.to_string() };
+            known_as(fingerprint, &files.iter().map(file).collect::<Vec<_>>())
         };
-        assert_eq!(known_as(&split(MNIST_CONTENT[1], &[])), Some("mnist"));
+        assert_eq!(named(MNIST_CONTENT[1], &[]), Some("mnist"));
         let [(_, _, images), (_, _, labels), ..] = FASHION_MNIST;
-        assert_eq!(known_as(&split("", &[images, labels])), Some("fashion-mnist"));
+        assert_eq!(named("", &[images, labels]), Some("fashion-mnist"));
         // With other labels they are other data.
-        assert_eq!(known_as(&split("", &[images, "0"])), None);
-        assert_eq!(known_as(&split("", &[])), None);
+        assert_eq!(named("", &[images, "0"]), None);
+        assert_eq!(named("", &[]), None);
     }
 }

@@ -3,7 +3,7 @@
 use crate::base::Grid;
 use crate::base::random::{Purpose, stream};
 use crate::data::builtin::{BuiltinDigits, BuiltinError};
-use crate::data::catalogue::MNIST_CONTENT;
+use crate::data::catalogue::known_as;
 use crate::data::files;
 use crate::data::files::{FETCHABLE, FilesError, Place, StoredSplit};
 pub use crate::data::info::Split;
@@ -23,11 +23,13 @@ pub enum DatasetError {
     /// There are no such built-in digits.
     #[error(transparent)]
     Builtin(#[from] BuiltinError),
-    /// MNIST lies where another published dataset is looked for.
-    #[error("{place}: these {split} images are those of mnist, not of {dataset}")]
-    Mnist {
+    /// A published dataset lies where another one is looked for.
+    #[error("{place}: these {split} images are those of {found}, not of {dataset}")]
+    Other {
         /// Name of the dataset.
         dataset: String,
+        /// The name that it is published under.
+        found: &'static str,
         /// Where they are.
         place: String,
         /// The split.
@@ -110,12 +112,12 @@ impl Dataset {
         for &split in wanted {
             let (labels, stored) = files::load(name, &place, split)?;
             // Results would say that they are of the other.
-            if name != FETCHABLE[0]
-                && FETCHABLE.contains(&name)
-                && MNIST_CONTENT.contains(&stored.fingerprint.as_str())
+            if FETCHABLE.contains(&name)
+                && let Some(found) =
+                    known_as(&stored.fingerprint, &stored.files).filter(|found| *found != name)
             {
                 let (dataset, place) = (name.to_string(), place.path.display().to_string());
-                return Err(DatasetError::Mnist { dataset, place, split });
+                return Err(DatasetError::Other { dataset, found, place, split });
             }
             splits.insert(split, Loaded::new(labels, Images::Stored(stored)));
         }
@@ -276,7 +278,7 @@ mod tests {
     }
 
     #[test]
-    fn draws_are_even_distinct_and_fixed_by_seed_and_generation() {
+    fn draws_are_even_distinct_and_fixed_by_seed() {
         let data = digits();
         let drawn = data.draw(Split::Test, &[4, 9], 100, 5).unwrap();
         let labels: Vec<u8> = drawn.iter().map(|&i| data.label(Split::Test, i).unwrap()).collect();

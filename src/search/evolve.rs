@@ -92,10 +92,8 @@ pub fn evolve(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> 
         let text = format!("{}: the run in this folder is a training", options.out.display());
         return Err(Error::occupied(text).hint("go on with it by morphcog train --resume".to_string()));
     }
-    let mut whereabouts = Whereabouts::given(options.data.as_deref());
-    if resumes {
-        whereabouts = whereabouts.and_of(&options.out.join(RUN_JSON));
-    }
+    let whereabouts = Whereabouts::given(options.data.as_deref())
+        .and_of_resumed(options.if_exists, &options.out.join(RUN_JSON));
     let dataset = whereabouts.load(&config.data, &[Split::Train])?;
     let training = Training::of(config, &dataset)?;
     held_out::check(config, &[], "data.images_per_class", &dataset)?;

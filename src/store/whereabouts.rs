@@ -7,7 +7,7 @@ use crate::base::files::{read_text, write_atomically};
 use crate::config::{BodyConfig, Config, DataConfig, reading};
 use crate::data::dataset::{BUILTIN, Dataset, DatasetError, Split};
 use crate::data::files::{Place, default_folder, places};
-use crate::store::folder::RunFolder;
+use crate::store::folder::{IfExists, RunFolder};
 use crate::store::images::{DatasetRef, ImageRef};
 use crate::store::names::DATA_FOLDER;
 use crate::task::stimulus::{StimulusParams, stimulus};
@@ -55,6 +55,12 @@ impl Whereabouts {
         self.remembered.push(run_json.with_file_name(DATA_FOLDER));
         self.run_json.get_or_insert_with(|| run_json.to_path_buf());
         self
+    }
+
+    /// The same of the run in a folder, if it goes on: one that is replaced has no say.
+    #[must_use]
+    pub(crate) fn and_of_resumed(self, if_exists: IfExists, run_json: &Path) -> Self {
+        if if_exists == IfExists::Resume { self.and_of(run_json) } else { self }
     }
 
     /// An error about the images that a run asks for, with the file that does.

@@ -132,10 +132,6 @@ mod tests {
         stream(1, Purpose::RandomImages, 0, child)
     }
 
-    fn physics() -> Physics {
-        Physics::default()
-    }
-
     #[test]
     fn a_gait_is_what_walks_and_its_designs_are_what_it_is_made_of() {
         let body: Body = "2635/3104".parse().unwrap();
@@ -144,13 +140,13 @@ mod tests {
         assert_eq!(gait.built(&gait.design()), body);
         assert_eq!(gait.probe(), "6636/3104".parse().unwrap());
         let image = Grid::from_fn(2, 4, |_, column| if column == 1 { 1.0 } else { 0.25 });
-        assert_eq!(gait.widths(&gait.design(), &image, &physics()), [1.0, 1.6, 1.35]);
+        assert_eq!(gait.widths(&gait.design(), &image, &Physics::default()), [1.0, 1.6, 1.35]);
         assert_eq!(Gait::of(&"3/1".parse().unwrap()), None);
     }
 
     #[test]
     fn random_images_make_places_wide_narrow_or_at_rest_independently_of_each_other() {
-        let physics = physics();
+        let physics = Physics::default();
         let mut random = random(0);
         let gait = Gait::of(&"65".parse().unwrap()).unwrap();
         let rest = gait.widths(&[Material::Soft; 2], &Grid::from_fn(1, 2, |_, _| 0.0), &physics)[0];
@@ -184,8 +180,10 @@ mod tests {
             let is_soft = |material: &Material| *material == Material::Soft;
             assert!(probe.iter().map(is_soft).eq(design.iter().map(is_soft)));
             let seen = gait.as_probe(&design, &image);
-            let (found, expected) =
-                (gait.widths(&probe, &seen, &physics()), gait.widths(&design, &image, &physics()));
+            let (found, expected) = (
+                gait.widths(&probe, &seen, &Physics::default()),
+                gait.widths(&design, &image, &Physics::default()),
+            );
             assert!(
                 found.iter().zip(&expected).all(|(a, b)| (a - b).abs() < 1e-12),
                 "{found:?} {expected:?}"

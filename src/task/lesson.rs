@@ -229,10 +229,6 @@ mod tests {
         stream(1, Purpose::RandomImages, 0, child)
     }
 
-    fn physics() -> Physics {
-        Physics::default()
-    }
-
     /// A gait of one row, and images of it.
     fn lesson(places: usize, images: usize, seed: u64) -> (Gait, Vec<Example>, Vec<f64>) {
         let body: Body = "6".repeat(places).parse().unwrap();
@@ -243,12 +239,13 @@ mod tests {
             .map(|_| {
                 let image = Grid::from_fn(1, places, |_, _| f64::from(u8::from(random.unit() < 0.5)));
                 let right = if random.unit() < 0.5 { 1.0 } else { -1.0 };
-                let displacement = 2.0 + dot(&slopes, &gait.widths(&gait.design(), &image, &physics()));
+                let displacement =
+                    2.0 + dot(&slopes, &gait.widths(&gait.design(), &image, &Physics::default()));
                 Example {
                     displacement,
                     right,
                     weight: random.unit(),
-                    ..Example::new(&gait, &image, &physics())
+                    ..Example::new(&gait, &image, &Physics::default())
                 }
             })
             .collect();

@@ -28,9 +28,5 @@ fn run_once() -> &'static BTreeMap<String, Vec<u8>> {
 
 /// A sandbox with a finished run in `run`.
 fn with_run() -> Sandbox {
-    let sandbox = Sandbox::tiny();
-    run_once().iter().for_each(|(name, content)| {
-        sandbox.write(&format!("run/{name}"), content);
-    });
-    sandbox
+    Sandbox::with_run(run_once())
 }

@@ -108,6 +108,15 @@ impl Sandbox {
         sandbox
     }
 
+    /// The same with these files in `run`.
+    pub fn with_run(run: &BTreeMap<String, Vec<u8>>) -> Self {
+        let sandbox = Sandbox::tiny();
+        run.iter().for_each(|(name, content)| {
+            sandbox.write(&format!("run/{name}"), content);
+        });
+        sandbox
+    }
+
     /// Starts a run that does not end by itself, and writes checkpoints all the time.
     pub fn endless(&self, out: &str) -> std::process::Child {
         self.write("long.toml", TINY.replace("generations = 12", "generations = 10000000"));

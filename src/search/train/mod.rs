@@ -108,12 +108,9 @@ pub fn train(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> R
         return Err(Error::usage(text.to_string()).hint("the fittest four are --robots top:4".to_string()));
     }
     let source = Source::read(&options.archive)?;
-    let given = Whereabouts::given(options.data.as_deref());
-    let before = match options.if_exists {
-        IfExists::Resume => given.and_of(&options.out.join(RUN_JSON)),
-        _ => given,
-    };
-    let whereabouts = before.and_of(&options.archive);
+    let whereabouts = Whereabouts::given(options.data.as_deref())
+        .and_of_resumed(options.if_exists, &options.out.join(RUN_JSON))
+        .and_of(&options.archive);
     let config = config_of(&source.run.config, &options.groups, options.seed, &options.set)?;
     let dataset = whereabouts.load(&config.data, &[Split::Train])?;
     let origin = origin(&source, &config, &dataset)?;
