@@ -56,7 +56,7 @@ const MNIST: Published = [
     ("t10k-labels-idx1-ubyte.gz", 4_542, "f7ae60f92e00ec6debd23a6088c31dbd2371eca3ffa0defaefb259924204aec6"),
 ];
 
-/// SHA-256 of the content of MNIST's training and test split (see [`SplitInfo::fingerprint`]): it
+/// SHA-256 of the content of MNIST's training and test split (see [`SplitInfo::fingerprint`](crate::data::info::SplitInfo::fingerprint)): it
 /// is known however it is packed.
 pub const MNIST_CONTENT: [&str; 2] = [
     "c5097fdd51cfdbe7695fd9df3612695696864b5c424f58d843ffdc5d335e9914",
