@@ -4,7 +4,7 @@
 
 mod common;
 
-use common::program::{PROGRAM, Sandbox, TINY, files, without_seconds};
+use common::program::{PROGRAM, Sandbox, TINY, files, gaits, without_seconds};
 use morphcog::base::hash::sha256_hex;
 use morphcog::store::run::RunFile;
 use std::collections::BTreeMap;
@@ -185,14 +185,56 @@ fn when_both_checkpoints_are_broken_it_says_so_and_destroys_nothing() {
     assert_eq!(files(&sandbox.path("run")), before);
 }
 
-#[test]
-fn a_run_whose_checkpoints_are_gone_is_not_started_over_by_resume() {
+/// A folder with six generations of twelve and without checkpoints.
+fn without_checkpoints() -> Sandbox {
     let sandbox = sandbox_half_way();
+    remove_checkpoints(&sandbox);
+    sandbox
+}
+
+fn remove_checkpoints(sandbox: &Sandbox) {
     for name in ["checkpoint.json", "checkpoint.previous.json"] {
         std::fs::remove_file(sandbox.path("run").join(name)).unwrap();
     }
+}
+
+#[test]
+fn a_run_json_alone_is_gone_on_from_with_a_warning_and_the_elites_are_the_same() {
+    let sandbox = without_checkpoints();
+    sandbox
+        .run(&resume_to_12())
+        .ended(0, &["warning:", "no checkpoint", "run.json", "metrics.csv begin anew"]);
+    let (done, whole) = (result(&sandbox, "run"), uninterrupted(&sandbox, 12));
+    assert_eq!((done.run, done.elites), (whole.run, whole.elites));
+    // What is counted begins anew, what is measured does not.
+    let measured = |line: &String| line.split(',').take(7).collect::<Vec<_>>().join(",");
+    let [done, whole] = [done.metrics, whole.metrics].map(|all| all.iter().map(measured).collect::<Vec<_>>());
+    assert_eq!(done, whole);
+    // From now on it has checkpoints.
+    let said = sandbox.run(&resume_to_12()).ended(0, &[]);
+    assert!(!said.err.contains("no checkpoint"), "{}", said.err);
+}
+
+#[test]
+fn without_a_checkpoint_a_broken_run_json_is_an_error_and_stays() {
+    let sandbox = without_checkpoints();
+    let whole = sandbox.read("run/run.json");
+    sandbox.write("run/run.json", &whole[..whole.len() / 2]);
     let before = files(&sandbox.path("run"));
-    sandbox.run(&resume_to_12()).ended(3, &["run.json", "checkpoint", "hint:", "--force"]);
+    sandbox.run(&resume_to_12()).ended(3, &["run/run.json:"]);
+    assert_eq!(files(&sandbox.path("run")), before);
+}
+
+#[test]
+fn a_run_of_gaits_is_not_gone_on_with_without_a_checkpoint() {
+    let sandbox = Sandbox::new();
+    sandbox.write("gaits.toml", gaits());
+    let run = "evolve -q -c gaits.toml -g 2 -o run";
+    sandbox.run(run).ended(0, &[]);
+    remove_checkpoints(&sandbox);
+    let before = files(&sandbox.path("run"));
+    let said = sandbox.run(&format!("{run} --resume"));
+    said.ended(3, &["run.json", "checkpoint", "fitness = response", "hint:", "--force"]);
     assert_eq!(files(&sandbox.path("run")), before);
 }
 

@@ -31,6 +31,12 @@ pub fn name(path: &Path) -> Option<(&str, &str)> {
     parts(path)?.0.split_once(':')
 }
 
+/// Whose a named run is, and the set that it is of: what is before its seed, or its digits.
+pub fn set(path: &Path) -> Option<(&str, &str)> {
+    let (of, run) = name(path)?;
+    Some((of, run.rsplit_once('-')?.0))
+}
+
 /// The folder of the atlas that a named run of it is in; none of other paths.
 pub fn atlas_of(path: &Path) -> Option<PathBuf> {
     let (name, _) = parts(path)?;
@@ -69,5 +75,7 @@ mod tests {
         assert_eq!(named("gallery:zero_one-1/run.json"), Some(("gallery", "zero_one-1")));
         assert_eq!(named("atlas:four_digit-2"), Some(("atlas", "four_digit-2")));
         assert_eq!(named("runs/atlas:four_digit-2"), None);
+        assert_eq!(set(Path::new("gallery:zero_one-1/run.json")), Some(("gallery", "zero_one")));
+        assert_eq!(set(Path::new("runs/atlas:four_digit-2")), None);
     }
 }

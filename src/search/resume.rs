@@ -1,22 +1,25 @@
-//! Going on with a saved run: only from its own checkpoint, under the same config, on the same
-//! images.
+//! Going on with a saved run: from its own checkpoint, or from its `run.json` where that says
+//! enough, under the same config, on the same images.
 
 use crate::base::error::Error;
 use crate::config::{Config, differing};
 use crate::search::training::Training;
 use crate::store::checkpoint;
-use crate::store::checkpoint::Checkpoint;
+use crate::store::checkpoint::{Checkpoint, KnownBodies};
 use crate::store::folder::RunFolder;
-use crate::store::names::RUN_JSON;
+use crate::store::metrics::Totals;
+use crate::store::names::{METRICS, RUN_JSON};
+use crate::store::run::RunFile;
+use std::path::Path;
 
 const ANEW: &str = "start the run anew with --force";
 
 /// What to go on from; `None` if there is no run in the folder yet. A broken newest checkpoint is
-/// passed over, and said with `warn`.
+/// passed over, and a `run.json` without checkpoints gone on from; both are said with `warn`.
 ///
 /// # Errors
-/// If there are only broken checkpoints, or none beside a `run.json`, or the run is another one;
-/// nothing is changed.
+/// If there are only broken checkpoints, or none beside a `run.json` that cannot do without, or the
+/// run is another one; nothing is changed.
 pub(crate) fn saved(
     folder: &RunFolder,
     config: &Config,
@@ -29,20 +32,46 @@ pub(crate) fn saved(
         is_newest_broken = true;
         warn(text);
     };
-    match checkpoint::read(folder.path(), tell)? {
-        Some(saved) => {
-            compatible(&saved, config, training).map_err(|error| error.within(&place))?;
-            if is_newest_broken {
-                checkpoint::take_back(folder.path())?;
+    let saved = match checkpoint::read(folder.path(), tell)? {
+        Some(saved) => saved,
+        None => {
+            let path = folder.path().join(RUN_JSON);
+            if !path.exists() {
+                return Ok(None);
             }
-            Ok(Some(saved))
+            let saved = without_checkpoint(&path)?;
+            warn(format!(
+                "{place}: no checkpoint; going on from {RUN_JSON}: the elites will be the same, but bodies that \
+                 were evaluated before are evaluated again, and the counts of {METRICS} begin anew"
+            ));
+            saved
         }
-        None if folder.path().join(RUN_JSON).exists() => {
-            let text = format!("{place}: there is a {RUN_JSON}, but no checkpoint to go on from");
-            Err(Error::input(text).hint(format!("write elsewhere with --out, or {ANEW}")))
-        }
-        None => Ok(None),
+    };
+    compatible(&saved, config, training).map_err(|error| error.within(&place))?;
+    if is_newest_broken {
+        checkpoint::take_back(folder.path())?;
     }
+    Ok(Some(saved))
+}
+
+/// A checkpoint out of a `run.json` alone. Its elites are all that later generations depend on: a
+/// body that was evaluated before and is no elite can be none when it is evaluated again. Not so
+/// where a response is measured: of gaits that differ in their sensors only, the first stays.
+///
+/// # Errors
+/// If it cannot be read, or its fitness is a response.
+fn without_checkpoint(path: &Path) -> Result<Checkpoint, Error> {
+    let run = RunFile::read(path)?;
+    if run.config.measures_response() {
+        let text =
+            format!("{}: expected a checkpoint beside it: fitness = response needs one", path.display());
+        return Err(Error::input(text).hint(format!("write elsewhere with --out, or {ANEW}")));
+    }
+    let mut known_bodies = KnownBodies::default();
+    for robot in &run.elites {
+        known_bodies.insert(run.config.known_key(&robot.body));
+    }
+    Ok(Checkpoint { run, totals: Totals::default(), known_bodies })
 }
 
 /// Whether a saved run can be gone on with under a config: all that its results depend on must be

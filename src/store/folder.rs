@@ -322,14 +322,19 @@ pub fn beside(archive: &Path, name: &str) -> PathBuf {
 }
 
 /// Where results of several runs together go if nothing is said: to the folder that all lie in; with
-/// named ones, to the present folder.
+/// named ones, to the present folder, under the name of their set if all are of one.
 pub fn beside_all(archives: &[PathBuf], name: &str) -> PathBuf {
-    match archives {
-        [one] => beside(one, name),
-        several => match several.iter().find_map(|path| named::name(path)) {
-            Some((of, _)) => PathBuf::from(format!("{of}-{name}")),
-            None => above(several).join(name),
-        },
+    let [first, others @ ..] = archives else { return PathBuf::from(name) };
+    if others.is_empty() {
+        return beside(first, name);
+    }
+    let Some((of, _)) = archives.iter().find_map(|path| named::name(path)) else {
+        return above(archives).join(name);
+    };
+    match named::set(first).filter(|set| others.iter().all(|other| named::set(other) == Some(*set))) {
+        // `team.json` of `gallery:team` says it already.
+        Some((of, set)) if !name.starts_with(set) => PathBuf::from(format!("{of}-{set}-{name}")),
+        _ => PathBuf::from(format!("{of}-{name}")),
     }
 }
 

@@ -192,11 +192,12 @@ fn robots_that_ship_with_the_program_are_named_where_archives_are() {
     sandbox
         .run("replay -q -a gallery:zero_one --robot best --dataset builtin --images 0 -o walk.png")
         .ended(0, &[]);
-    // Of a set, every run; results go to the present folder.
+    // Of a set, every run; results go to the present folder, under the name of the set.
     sandbox
         .run("eval -q -a gallery:zero_one --dataset builtin --images 2 --cycles 1 --physical-only")
         .ended(0, &[]);
-    let tested: serde_json::Value = serde_json::from_str(&sandbox.read("gallery-eval.json")).unwrap();
+    let tested: serde_json::Value =
+        serde_json::from_str(&sandbox.read("gallery-zero_one-eval.json")).unwrap();
     let robots = tested["robots"].as_array().unwrap();
     assert!(robots.len() >= 2 && robots.iter().all(|robot| robot["task"] == "0|1"), "{robots:?}");
     sandbox.run("plot body -q -a gallery:zero_one-1 --robot best").ended(0, &[]);
