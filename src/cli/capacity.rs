@@ -6,8 +6,9 @@ use crate::cli::values::threads;
 use crate::commands::capacity;
 use crate::commands::capacity::Options;
 use crate::config::capacity::CapacityConfig;
+use crate::store::capacity::CapacityFile;
 use crate::store::folder;
-use crate::store::names::{CAPACITY_JSON, EVAL_JSON};
+use crate::store::names::EVAL_JSON;
 use crate::view::console::Console;
 use crate::view::networks;
 use crate::view::reporters::Reporter;
@@ -60,7 +61,7 @@ pub(super) fn run(args: CapacityArgs, console: &Console) -> Result<(), Error> {
         config: CapacityConfig::load(args.config.as_deref(), &set)?,
         physical_only: args.physical_only,
         data: args.data,
-        out: args.out.unwrap_or_else(|| eval.with_file_name(CAPACITY_JSON)),
+        out: args.out.unwrap_or_else(|| CapacityFile::beside(&eval)),
         threads: args.threads.map(usize::from),
         eval,
     };

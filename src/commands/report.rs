@@ -12,7 +12,7 @@ use crate::store::capacity::CapacityFile;
 use crate::store::eval::EvalFile;
 use crate::store::folder;
 use crate::store::images::ImageRef;
-use crate::store::names::{CAPACITY_JSON, EVAL_JSON, METRICS, RUN_JSON, TEAM_JSON};
+use crate::store::names::{CAPACITY_JSON, EVAL_JSON, METRICS, TEAM_JSON};
 use crate::store::run::{Robot, RunFile, different};
 use crate::store::team::{Member, TeamFile};
 use crate::store::whereabouts::{Whereabouts, load_dataset_of, see};
@@ -53,14 +53,16 @@ pub struct Findings {
 }
 
 impl Findings {
-    /// Those in a folder that are about these runs as they are; verdicts are on one run.
-    fn read(folder: &Path, runs: &[&RunFile], warn: &dyn Fn(&str)) -> Self {
-        let existing = |name: &str| Some(folder.join(name)).filter(|path| exists(path));
+    /// Those that are about these runs as they are, where results of these archives go; verdicts are
+    /// on one run.
+    fn read(archives: &[PathBuf], runs: &[&RunFile], warn: &dyn Fn(&str)) -> Self {
+        let existing = |name: &str| Some(folder::beside_all(archives, name)).filter(|path| exists(path));
         // A report of what can be read is better than none.
         let told = |error: Error| warn(&format!("{error}; left out"));
-        let one = if let [run] = runs { Some(*run) } else { None };
-        let audit =
-            one.and_then(|run| AuditFile::if_any(run, &folder.join(RUN_JSON)).map_err(told).ok()).flatten();
+        let audit = match (runs, archives) {
+            ([run], [path]) => AuditFile::if_any(run, path).map_err(told).ok().flatten(),
+            _ => None,
+        };
         let tested = existing(EVAL_JSON);
         let eval = tested.clone().and_then(|path| EvalFile::of_runs(&path, runs).map_err(told).ok());
         let is_of_it = |capacity: &CapacityFile| match (&eval, &tested) {
@@ -122,14 +124,13 @@ pub fn gather(
     let mut runs: Vec<Dossier> = Vec::new();
     for path in archives {
         let run = RunFile::read(path)?;
-        let folder = path.parent().unwrap_or(Path::new(""));
         let progress = match exists(&path.with_file_name(METRICS)) {
             true => Progress::of(&run, path).map_err(|error| warn(&format!("{error}; left out"))).ok(),
             false => None,
         };
         let whereabouts = Whereabouts::given(data).and_of(path);
         let images = if with_rollouts { images(&run, path, &whereabouts)? } else { Vec::new() };
-        let findings = Findings::read(folder, &[&run], warn);
+        let findings = Findings::read(std::slice::from_ref(path), &[&run], warn);
         runs.push(Dossier { path: path.clone(), namesake: None, run, progress, findings, images });
     }
     let named: Vec<(String, u64)> =
@@ -145,7 +146,7 @@ pub fn gather(
         0 | 1 => Findings::default(),
         _ => {
             let all: Vec<&RunFile> = runs.iter().map(|dossier| &dossier.run).collect();
-            Findings::read(&folder::above(archives), &all, warn)
+            Findings::read(archives, &all, warn)
         }
     };
     let team = match folder::beside_all(archives, TEAM_JSON) {

@@ -6,10 +6,10 @@ use crate::base::table;
 use crate::baseline::curve::Crossing;
 use crate::config::reading;
 use crate::store::eval::EvalFile;
-use crate::store::names::CAPACITY_JSON;
+use crate::store::names::{CAPACITY_JSON, EVAL_JSON};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// What `capacity.json` calls itself.
 pub const FORMAT: &str = "morphcog-capacity";
@@ -109,10 +109,17 @@ impl CapacityFile {
         reading::read_versioned(&text, &path.display().to_string(), FORMAT, FORMAT_VERSION)
     }
 
+    /// Where the analysis of an evaluation goes if nothing is said: `capacity.json` beside it, or
+    /// `gallery-zero_one-capacity.json` beside `gallery-zero_one-eval.json`.
+    pub fn beside(eval: &Path) -> PathBuf {
+        let of = eval.file_name().and_then(|name| name.to_str()?.strip_suffix(EVAL_JSON));
+        eval.with_file_name(format!("{}{CAPACITY_JSON}", of.unwrap_or_default()))
+    }
+
     /// The analysis beside an `eval.json`, if there is one of just the robots and images that the
     /// evaluation is of.
     pub fn of(report: &EvalFile, eval: &Path) -> Option<Self> {
-        let found = Self::read(&eval.with_file_name(CAPACITY_JSON)).ok()?;
+        let found = Self::read(&Self::beside(eval)).ok()?;
         found.is_of(report).then_some(found)
     }
 

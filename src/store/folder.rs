@@ -339,7 +339,7 @@ pub fn beside_all(archives: &[PathBuf], name: &str) -> PathBuf {
 }
 
 /// The folder of a run.json; of several, the nearest that all of them lie in.
-pub fn above(archives: &[PathBuf]) -> PathBuf {
+fn above(archives: &[PathBuf]) -> PathBuf {
     let folders: Vec<&Path> = archives.iter().map(|path| path.parent().unwrap_or(Path::new(""))).collect();
     let Some(first) = folders.first() else { return PathBuf::new() };
     let holds = |folder: &&Path| folders.iter().all(|other| other.starts_with(folder));

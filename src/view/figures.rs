@@ -279,7 +279,7 @@ fn of_run(kind: Kind, path: &Path) -> Result<Figure, Error> {
             Ok(plot::accuracy(&report))
         }
         Kind::Capacity => {
-            let (beside, eval) = (result(path, CAPACITY_JSON), path.with_file_name(EVAL_JSON));
+            let (beside, eval) = (result(path, CAPACITY_JSON), folder::beside(path, EVAL_JSON));
             let file = CapacityFile::read(&beside).map_err(hint)?;
             if beside != *path && exists(&eval) {
                 // Where its robots come from.
@@ -291,10 +291,11 @@ fn of_run(kind: Kind, path: &Path) -> Result<Figure, Error> {
     }
 }
 
-/// A result file: the one beside a run.json, or the file itself that was named instead.
+/// A result file: the one of a run.json, where such results go, or the file itself that was named
+/// instead.
 fn result(path: &Path, name: &str) -> PathBuf {
     match path.file_name().is_some_and(|given| given == RUN_JSON) {
-        true => path.with_file_name(name),
+        true => folder::beside(path, name),
         false => path.to_path_buf(),
     }
 }

@@ -200,6 +200,14 @@ fn robots_that_ship_with_the_program_are_named_where_archives_are() {
         serde_json::from_str(&sandbox.read("gallery-zero_one-eval.json")).unwrap();
     let robots = tested["robots"].as_array().unwrap();
     assert!(robots.len() >= 2 && robots.iter().all(|robot| robot["task"] == "0|1"), "{robots:?}");
+    // And from there they are read.
+    sandbox.run("report -q -a gallery:zero_one --rollouts 0").ended(0, &[]);
+    let page = sandbox.read("gallery-zero_one-report.html");
+    let id = robots[0]["id"].as_str().unwrap();
+    assert!(page.contains("2 builtin test images") && page.contains(id), "the report has the test");
+    sandbox.run("eval -q -a gallery:zero_one-2 --dataset builtin --images 2 --cycles 1").ended(0, &[]);
+    sandbox.run("plot accuracy -q -a gallery:zero_one-2").ended(0, &[]);
+    assert!(sandbox.path("gallery-zero_one-2-plot-accuracy.svg").exists());
     sandbox.run("plot body -q -a gallery:zero_one-1 --robot best").ended(0, &[]);
     let id =
         &morphcog::analysis::gallery::trained(morphcog::base::shipped::ZERO_ONE).unwrap()[0].0.elites[0].id;
@@ -226,6 +234,13 @@ fn runs_of_the_atlas_are_read_compressed_and_leave_their_results_here() {
     sandbox.run("eval -q -a run --robots best --images 4").ended(0, &[]);
     sandbox.run("eval -q -a atlas:tiny-1 --robots best --images 4").ended(0, &[]);
     assert_eq!(results_of("run/eval").1, results_of("atlas-tiny-1-eval").1);
+    sandbox
+        .run("capacity -q --eval atlas-tiny-1-eval.json --set trainings=1 --set clean=true --set mlp.epochs=1 --set sizes=[1,2]")
+        .ended(0, &[]);
+    for kind in ["accuracy", "capacity"] {
+        sandbox.run(&format!("plot {kind} -q -a atlas:tiny-1")).ended(0, &[]);
+        assert!(sandbox.path(&format!("atlas-tiny-1-plot-{kind}.svg")).exists());
+    }
     sandbox.run("plot archive -q -a atlas:tiny").ended(0, &[]);
     sandbox.run("report -q -a atlas:tiny-1 -o report.html").ended(0, &[]);
     assert!(sandbox.read("report.html").contains("robots, 1 were audited"));
