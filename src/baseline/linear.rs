@@ -1,5 +1,5 @@
-//! Classifiers without a body, on the pixels that robots see: least squares, and the nearest
-//! training image. What they answer depends on the images alone, to the bit.
+//! Linear classifiers by least squares: without a body, on the pixels that robots see. What they
+//! answer depends on the images alone, to the bit.
 
 use crate::base::Grid;
 use nalgebra::{Cholesky, DMatrix, DVector};
@@ -87,35 +87,6 @@ impl Linear {
     }
 }
 
-/// The class of the training image nearest to each image (squared differences of pixels; the first
-/// of several that are as near).
-pub fn nearest_neighbours(training: &[Labelled], images: &[&Grid<f64>]) -> Vec<Option<u8>> {
-    let nearest = |image: &&Grid<f64>| {
-        let mut best: Option<(f64, u8)> = None;
-        for (known, class) in training {
-            let distance = squared_distance(image.cells(), known.cells());
-            if best.is_none_or(|(least, _)| distance < least) {
-                best = Some((distance, *class));
-            }
-        }
-        best.map(|(_, class)| class)
-    };
-    images.par_iter().map(nearest).collect()
-}
-
-/// In eight sums, which the processor does at once; always in the same order.
-fn squared_distance(a: &[f64], b: &[f64]) -> f64 {
-    const LANES: usize = 8;
-    let mut sums = [0.0; LANES];
-    let (a, b) = (a.chunks(LANES), b.chunks(LANES));
-    for (a, b) in a.zip(b) {
-        for (sum, (x, y)) in sums.iter_mut().zip(a.iter().zip(b)) {
-            *sum += (x - y) * (x - y);
-        }
-    }
-    sums.iter().sum()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -158,18 +129,5 @@ mod tests {
         let dark: Vec<(Grid<f64>, u8)> = (0..4).map(|k| (Grid::filled(2, 2, 0.0), k % 2)).collect();
         let value = Moments::new(&labelled(&dark)).apart(&[0], &[1]).value(&dark[0].0);
         assert!(value.abs() < 1e-12);
-    }
-
-    #[test]
-    fn the_nearest_image_is_the_image_itself_and_the_first_of_equals() {
-        let images = images();
-        let known = labelled(&images);
-        let shown: Vec<&Grid<f64>> = images.iter().map(|(image, _)| image).collect();
-        let found = nearest_neighbours(&known, &shown);
-        for (answer, (image, _)) in found.iter().zip(&images) {
-            let first = images.iter().find(|(other, _)| other == image).unwrap();
-            assert_eq!(*answer, Some(first.1));
-        }
-        assert_eq!(nearest_neighbours(&[], &shown[..1]), [None]);
     }
 }

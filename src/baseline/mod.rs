@@ -1,8 +1,9 @@
 //! What robots are compared with: networks (paper, "Morphological cognition capacity"), trained on a
-//! library; linear classifiers and the nearest neighbour.
+//! library; linear classifiers and the nearest image.
 
 pub mod curve;
 pub mod linear;
+pub mod nearest;
 #[cfg(feature = "networks")]
 pub mod network;
 pub mod settings;

@@ -288,6 +288,7 @@ fn distance(a: &Robot, b: &Robot) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::store::names::RUN_JSON;
     use crate::store::samples;
 
     fn dossier(robots: &[(&str, f64)]) -> Dossier {
@@ -324,7 +325,8 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         std::fs::write(folder.path().join(EVAL_JSON), "{").unwrap();
         let told = std::cell::RefCell::new(Vec::new());
-        let findings = Findings::read(folder.path(), &[], &|text| told.borrow_mut().push(text.to_string()));
+        let here = [folder.path().join(RUN_JSON)];
+        let findings = Findings::read(&here, &[], &|text| told.borrow_mut().push(text.to_string()));
         assert!(findings.eval.is_none() && findings.audit.is_none() && findings.capacity.is_none());
         assert!(told.borrow().len() == 1 && told.borrow()[0].contains("eval.json"), "{told:?}");
     }

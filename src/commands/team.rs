@@ -6,7 +6,8 @@ use crate::base::error::Error;
 use crate::base::observer::{Observer, Work};
 use crate::base::text::counted;
 use crate::base::threads::pool;
-use crate::baseline::linear::{Labelled, Linear, Moments, nearest_neighbours};
+use crate::baseline::linear::{Labelled, Linear, Moments};
+use crate::baseline::nearest::nearest;
 use crate::commands::eval_images::chosen_by;
 use crate::config::Config;
 use crate::data::dataset::{Dataset, Split};
@@ -26,6 +27,7 @@ use crate::task::direction::THRESHOLD;
 use crate::task::grouping::{self, Group};
 use crate::task::judge::Judge;
 use crate::task::voting::{Accuracy, Ballot, CLIP};
+use rayon::prelude::*;
 use std::collections::BTreeSet;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, AtomicU64};
@@ -342,7 +344,8 @@ fn baselines(
         let walks = pairs.iter().map(|(judge, values)| (judge, Some(values[image])));
         classes[Ballot::count(classes, walks, 0.0, 1.0).by_votes().0]
     };
-    let nearest = nearest_neighbours(&known, &stimuli.iter().collect::<Vec<_>>());
+    let nearest: Vec<Option<u8>> =
+        stimuli.par_iter().map(|stimulus| nearest(known.iter().copied(), stimulus)).collect();
     Ok(Some(TeamBaselines {
         training_images: known.len(),
         linear_one_against_rest: Accuracy::of(stimuli.iter().map(largest).zip(labels())),

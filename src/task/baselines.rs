@@ -1,6 +1,7 @@
 //! Honest neighbours of a robot's accuracy: what takes no body at all.
 
 use crate::base::Grid;
+use crate::baseline::nearest::nearest;
 use crate::task::grouping::{Group, Split};
 
 /// An image as the sensors see it, with its class.
@@ -77,29 +78,13 @@ impl PixelRule {
     }
 }
 
-/// Accuracy of answering with the group of the nearest training image (Euclidean distance). Of several
-/// that are as near, as bodies of few sensors often see, the group that has more of them answers; of
-/// equals that of the first image.
+/// Accuracy of answering with the group of the [`nearest`] training image.
 pub fn nearest_training_image(split: &Split, training: &[Labelled], images: &[Labelled]) -> f64 {
-    let distance = |a: &Grid<f64>, b: &Grid<f64>| {
-        a.cells().iter().zip(b.cells()).map(|(x, y)| (x - y) * (x - y)).sum::<f64>()
-    };
-    let nearest = |image: &Labelled| {
-        let (mut least, mut votes) = (f64::INFINITY, Vec::new());
-        for other in training {
-            let distance = distance(other.stimulus, image.stimulus);
-            if distance < least {
-                (least, votes) = (distance, Vec::new());
-            }
-            if distance == least {
-                votes.extend(split.group(other.class));
-            }
-        }
-        let first = *votes.first()?;
-        let has_more = 2 * votes.iter().filter(|group| **group == first).count() >= votes.len();
-        votes.into_iter().find(|group| (*group == first) == has_more)
-    };
-    share(images, |image| nearest(image).is_some() && nearest(image) == split.group(image.class))
+    let known = || training.iter().filter_map(|other| Some((other.stimulus, split.group(other.class)?)));
+    share(images, |image| {
+        let answer = nearest(known(), image.stimulus);
+        answer.is_some() && answer == split.group(image.class)
+    })
 }
 
 fn share(images: &[Labelled], is_right: impl Fn(&Labelled) -> bool) -> f64 {
