@@ -226,6 +226,19 @@ fn without_a_checkpoint_a_broken_run_json_is_an_error_and_stays() {
 }
 
 #[test]
+fn the_run_of_a_training_is_not_evolved_further() {
+    let sandbox = without_checkpoints();
+    let origin =
+        r#""origin":{"name":"gaits","generations":9,"sha256":"0","trained_on":[]},"generations":6,"stats""#;
+    let trained = sandbox.read("run/run.json").replace(r#""generations":6,"stats""#, origin);
+    assert!(trained.contains(origin));
+    sandbox.write("run/run.json", trained);
+    let before = files(&sandbox.path("run"));
+    sandbox.run(&resume_to_12()).ended(3, &["run.json", "checkpoint", "training", "--force"]);
+    assert_eq!(files(&sandbox.path("run")), before);
+}
+
+#[test]
 fn a_run_of_gaits_is_not_gone_on_with_without_a_checkpoint() {
     let sandbox = Sandbox::new();
     sandbox.write("gaits.toml", gaits());

@@ -59,12 +59,16 @@ pub(crate) fn saved(
 /// where a response is measured: of gaits that differ in their sensors only, the first stays.
 ///
 /// # Errors
-/// If it cannot be read, or its fitness is a response.
+/// If it cannot be read, its fitness is a response, or it is of a training.
 fn without_checkpoint(path: &Path) -> Result<Checkpoint, Error> {
     let run = RunFile::read(path)?;
-    if run.config.measures_response() {
-        let text =
-            format!("{}: expected a checkpoint beside it: fitness = response needs one", path.display());
+    let needs = match run.config.measures_response() {
+        _ if run.origin.is_some() => Some("it is of a training"),
+        true => Some("fitness = response needs one"),
+        false => None,
+    };
+    if let Some(why) = needs {
+        let text = format!("{}: expected a checkpoint beside it: {why}", path.display());
         return Err(Error::input(text).hint(format!("write elsewhere with --out, or {ANEW}")));
     }
     let mut known_bodies = KnownBodies::default();
