@@ -44,7 +44,8 @@ pub(super) struct CapacityArgs {
     /// Folder with the images.
     #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,
-    /// Result file; a CSV and the figure go beside it (default: capacity.json beside eval.json).
+    /// Result file; a CSV and the figure go beside it (default: capacity.json beside eval.json,
+    /// my-capacity.json beside my-eval.json).
     #[arg(short, long, value_name = "FILE")]
     out: Option<PathBuf>,
     /// Threads (default: one per core).

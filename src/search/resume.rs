@@ -32,24 +32,27 @@ pub(crate) fn saved(
         is_newest_broken = true;
         warn(text);
     };
-    let saved = match checkpoint::read(folder.path(), tell)? {
+    let checkpoint = checkpoint::read(folder.path(), tell)?;
+    let has_checkpoint = checkpoint.is_some();
+    let saved = match checkpoint {
         Some(saved) => saved,
         None => {
             let path = folder.path().join(RUN_JSON);
             if !path.exists() {
                 return Ok(None);
             }
-            let saved = without_checkpoint(&path)?;
-            warn(format!(
-                "{place}: no checkpoint; going on from {RUN_JSON}: the elites will be the same, but bodies that \
-                 were evaluated before are evaluated again, and the counts of {METRICS} begin anew"
-            ));
-            saved
+            without_checkpoint(&path)?
         }
     };
     compatible(&saved, config, training).map_err(|error| error.within(&place))?;
     if is_newest_broken {
         checkpoint::take_back(folder.path())?;
+    }
+    if !has_checkpoint {
+        warn(format!(
+            "{place}: no checkpoint; going on from {RUN_JSON}: the elites will be the same, but bodies that were \
+             evaluated before are evaluated again, and the counts of {METRICS} begin anew"
+        ));
     }
     Ok(Some(saved))
 }
@@ -62,10 +65,12 @@ pub(crate) fn saved(
 /// If it cannot be read, its fitness is a response, or it is of a training.
 fn without_checkpoint(path: &Path) -> Result<Checkpoint, Error> {
     let run = RunFile::read(path)?;
-    let needs = match run.config.measures_response() {
-        _ if run.origin.is_some() => Some("it is of a training"),
-        true => Some("fitness = response needs one"),
-        false => None,
+    let needs = if run.origin.is_some() {
+        Some("the run is a training")
+    } else if run.config.measures_response() {
+        Some("fitness = response needs one")
+    } else {
+        None
     };
     if let Some(why) = needs {
         let text = format!("{}: expected a checkpoint beside it: {why}", path.display());
