@@ -35,11 +35,15 @@ fn open(tab: &mut Tab, server: &Server) {
 
 /// Draws on the pad with the mouse; places in pixels of the drawing.
 fn draw(tab: &mut Tab, line: &[[f64; 2]]) {
+    let on_page = on_pad(tab, line);
+    tab.drag(&on_page);
+}
+
+/// Clears the pad, and says where the places of a drawing are on the page.
+fn on_pad(tab: &mut Tab, line: &[[f64; 2]]) -> Vec<[f64; 2]> {
     tab.click("#clear");
     let [x, y, width, height] = tab.place("#pad");
-    let on_page: Vec<[f64; 2]> =
-        line.iter().map(|[c, r]| [x + c / 28.0 * width, y + r / 28.0 * height]).collect();
-    tab.drag(&on_page);
+    line.iter().map(|[c, r]| [x + c / 28.0 * width, y + r / 28.0 * height]).collect()
 }
 
 fn zero() -> Vec<[f64; 2]> {
@@ -254,6 +258,34 @@ fn a_drawing_is_fitted_unless_that_is_turned_off() {
     tab.click("#fit");
     at_end(&mut tab);
     assert_ne!(tab.eval(lit), fitted);
+    assert_eq!(tab.complaints(), Vec::<String>::new());
+}
+
+#[test]
+fn a_stroke_goes_on_when_the_browser_takes_the_pointer_away_and_ends_when_it_is_up() {
+    let sandbox = Sandbox::new();
+    let Some(mut browser) = browser(&sandbox) else { return };
+    let server = Server::start(&sandbox, "");
+    let mut tab = quick(&mut browser, &server);
+    let ink = "[...document.getElementById('pad').getContext('2d').getImageData(0, 0, 300, 300).data].join()";
+    draw(&mut tab, &zero());
+    let whole = tab.eval(ink);
+    let line = on_pad(&mut tab, &zero());
+    let (first, rest) = line.split_at(20);
+    tab.press(first[0]);
+    tab.trace(&first[1..]);
+    tab.eval("document.getElementById('pad').releasePointerCapture(1)");
+    tab.trace(rest);
+    tab.release(rest[20]);
+    assert!(tab.eval(ink) == whole, "the stroke ended when the pointer was taken away");
+    // It was lifted where the page does not learn of it: nothing is drawn any more.
+    tab.press(line[0]);
+    tab.eval(
+        "document.getElementById('pad').dispatchEvent(new PointerEvent('pointermove', { pointerId: 1, buttons: 0 }))",
+    );
+    tab.trace(&[[line[0][0] + 60.0, line[0][1] + 90.0]]);
+    tab.release(line[0]);
+    assert!(tab.eval(ink) == whole, "a pointer that is up draws");
     assert_eq!(tab.complaints(), Vec::<String>::new());
 }
 

@@ -214,10 +214,25 @@ impl Tab<'_> {
 
     /// Draws along a line with the mouse.
     pub fn drag(&mut self, line: &[[f64; 2]]) {
-        self.mouse("mouseMoved", line[0], 0);
-        self.mouse("mousePressed", line[0], 1);
-        line[1..].iter().for_each(|place| self.mouse("mouseMoved", *place, 1));
-        self.mouse("mouseReleased", line[line.len() - 1], 0);
+        self.press(line[0]);
+        self.trace(&line[1..]);
+        self.release(line[line.len() - 1]);
+    }
+
+    /// Puts the mouse down at a place.
+    pub fn press(&mut self, place: [f64; 2]) {
+        self.mouse("mouseMoved", place, 0);
+        self.mouse("mousePressed", place, 1);
+    }
+
+    /// Moves the mouse that is down along a line.
+    pub fn trace(&mut self, line: &[[f64; 2]]) {
+        line.iter().for_each(|place| self.mouse("mouseMoved", *place, 1));
+    }
+
+    /// Lifts the mouse at a place.
+    pub fn release(&mut self, place: [f64; 2]) {
+        self.mouse("mouseReleased", place, 0);
     }
 
     /// Presses a key: its name, and the text it types if it does.

@@ -15,7 +15,10 @@ export class Editor {
     this.encoding = AREA("threshold");
     const grid = $("grid");
     grid.addEventListener("pointerdown", (e) => this.begin(e));
-    grid.addEventListener("pointermove", (e) => { if (this.painting !== null) this.paint(this.at(e), this.painting); });
+    grid.addEventListener("pointermove", (e) => {
+      if (!e.buttons) this.painting = null;
+      if (this.painting !== null) this.paint(this.at(e), this.painting);
+    });
     for (const end of ["pointerup", "pointercancel"]) grid.addEventListener(end, () => { this.painting = null; });
     grid.addEventListener("contextmenu", (e) => e.preventDefault());
     grid.addEventListener("keydown", (e) => this.key(e));

@@ -47,7 +47,9 @@ export class Pad {
     this.cursor = null; this.down = false; this.drawing = null;
     canvas.addEventListener("pointerdown", (e) => this.begin(e));
     canvas.addEventListener("pointermove", (e) => this.move(e));
-    for (const end of ["pointerup", "pointercancel", "lostpointercapture"]) canvas.addEventListener(end, (e) => { if (e.pointerId === this.pointer) this.finish(); });
+    for (const end of ["pointerup", "pointercancel"]) canvas.addEventListener(end, (e) => { if (e.pointerId === this.pointer) this.finish(); });
+    // A browser may take the pointer away while it is still down, as when the page moves under it: the stroke goes on.
+    canvas.addEventListener("lostpointercapture", (e) => { if (this.drawing && e.pointerId === this.pointer) { if (e.buttons) this.hold(); else this.finish(); } });
     canvas.addEventListener("keydown", (e) => this.key(e));
     canvas.addEventListener("focus", () => this.draw());
     canvas.addEventListener("blur", () => { this.cursor = null; this.lift(); this.draw(); });
@@ -94,14 +96,17 @@ export class Pad {
     this.pointer = e.pointerId; this.kind = e.pointerType;
     e.preventDefault();
     this.canvas.focus({ preventScroll: true });
-    try { this.canvas.setPointerCapture(e.pointerId); } catch { /* the pointer has gone already */ }
+    this.hold();
     this.remember(); this.cursor = null;
     this.drawing = this.place(e);
     this.stroke(this.drawing, this.drawing);
   }
 
+  hold() { try { this.canvas.setPointerCapture(this.pointer); } catch { /* the pointer has gone already */ } }
+
   move(e) {
     if (!this.drawing || e.pointerId !== this.pointer) return;
+    if (!e.buttons) return this.finish();
     for (const each of e.getCoalescedEvents?.().length ? e.getCoalescedEvents() : [e]) {
       const to = this.place(each);
       this.stroke(this.drawing, to);
