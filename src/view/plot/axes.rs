@@ -24,7 +24,7 @@ pub struct Axis {
 impl Axis {
     /// A range that holds all of low … high and ends on ticks, with about this number of them.
     pub fn nice(low: f64, high: f64, about: usize) -> Self {
-        let Axis { from, to, step } = Axis::exact(low, high, about);
+        let Axis { from, to, step } = Axis::stepped(low, high, about);
         // What ends on a tick but for rounding stays.
         let slack = 1e-9 * step;
         let down = ((from + slack) / step).floor() * step;
@@ -34,6 +34,13 @@ impl Axis {
 
     /// The range low … high, with about this number of ticks in it.
     pub fn exact(low: f64, high: f64, about: usize) -> Self {
+        let axis = Axis::stepped(low, high, about);
+        // One tick is no scale; around zero, a step longer than either side leaves zero alone.
+        let finer = [2, 4].into_iter().map(|times| Axis::stepped(low, high, times * about.max(1)));
+        std::iter::once(axis.clone()).chain(finer).find(|axis| axis.ticks().len() > 1).unwrap_or(axis)
+    }
+
+    fn stepped(low: f64, high: f64, about: usize) -> Self {
         let finite = |v: f64, other: f64| if v.is_finite() { v.clamp(-1e12, 1e12) } else { other };
         let (low, high) = (finite(low, 0.0), finite(high, 1.0));
         let (low, high) = if high - low > 1e-9 { (low, high) } else { (low - 0.5, low + 0.5) };
@@ -227,6 +234,8 @@ mod tests {
         assert_eq!(labels, ["0.0", "0.2", "0.4", "0.6", "0.8", "1.0"]);
         let exact = Axis::exact(-3.0, 11.0, 4);
         assert_eq!((exact.ticks(), exact.share(4.0)), (vec![0.0, 5.0, 10.0], 0.5));
+        // Steps of fifty would leave one tick, at zero.
+        assert_eq!(Axis::exact(-48.0, 48.0, 4).ticks(), [-40.0, -20.0, 0.0, 20.0, 40.0]);
     }
 
     #[test]
@@ -237,6 +246,8 @@ mod tests {
                 axis.from < axis.to && !axis.ticks().is_empty() && axis.ticks().len() < 50,
                 "{low} {high}"
             );
+            let exact = Axis::exact(low, high, 4).ticks().len();
+            assert!((2..50).contains(&exact), "{low} {high}");
         }
     }
 
