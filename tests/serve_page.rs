@@ -281,7 +281,7 @@ fn a_stroke_goes_on_when_the_browser_takes_the_pointer_away_and_ends_when_it_is_
     // It was lifted where the page does not learn of it: nothing is drawn any more.
     tab.press(line[0]);
     tab.eval(
-        "document.getElementById('pad').dispatchEvent(new PointerEvent('pointermove', { pointerId: 1, buttons: 0 }))",
+        "document.getElementById('pad').dispatchEvent(new PointerEvent('pointermove', { pointerId: 1, pointerType: 'mouse' }))",
     );
     tab.trace(&[[line[0][0] + 60.0, line[0][1] + 90.0]]);
     tab.release(line[0]);

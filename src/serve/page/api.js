@@ -42,6 +42,9 @@ export const bytes = (text) => Uint8Array.from(atob(text), (letter) => letter.ch
 
 export const { element } = Drawing;
 
+// A mouse whose button went up outside the window, unseen. (Of touch not every browser tells the buttons.)
+export const liftedElsewhere = (e) => e.pointerType === "mouse" && !e.buttons;
+
 // Tabs as the ARIA practices have them: arrows move, only the chosen one is in the tab order.
 export const tabs = (ids, chosen) => {
   const choose = (id) => {

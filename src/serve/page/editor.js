@@ -1,6 +1,6 @@
 // The body editor: a grid of voxels, checked by the server, kept in files that `morphcog simulate` reads.
 
-import { $, element, post } from "./api.js";
+import { $, element, liftedElsewhere, post } from "./api.js";
 
 const { css, fit } = Drawing;
 const AREA = (encoding) => ({ reduction: "area", encoding, level: 0.2 });
@@ -16,7 +16,7 @@ export class Editor {
     const grid = $("grid");
     grid.addEventListener("pointerdown", (e) => this.begin(e));
     grid.addEventListener("pointermove", (e) => {
-      if (!e.buttons) this.painting = null;
+      if (liftedElsewhere(e)) this.painting = null;
       if (this.painting !== null) this.paint(this.at(e), this.painting);
     });
     for (const end of ["pointerup", "pointercancel"]) grid.addEventListener(end, () => { this.painting = null; });

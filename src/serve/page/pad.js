@@ -1,6 +1,6 @@
 // The drawing: 28 × 28 pixels, strokes as soft-edged as MNIST's.
 
-import { $ } from "./api.js";
+import { $, liftedElsewhere } from "./api.js";
 
 const { css } = Drawing;
 const SIDE = 28, RADIUS = 1.15;
@@ -106,7 +106,7 @@ export class Pad {
 
   move(e) {
     if (!this.drawing || e.pointerId !== this.pointer) return;
-    if (!e.buttons) return this.finish();
+    if (liftedElsewhere(e)) return this.finish();
     for (const each of e.getCoalescedEvents?.().length ? e.getCoalescedEvents() : [e]) {
       const to = this.place(each);
       this.stroke(this.drawing, to);
