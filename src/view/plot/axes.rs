@@ -35,9 +35,9 @@ impl Axis {
     /// The range low … high, with about this number of ticks in it.
     pub fn exact(low: f64, high: f64, about: usize) -> Self {
         let axis = Axis::stepped(low, high, about);
-        // One tick is no scale; around zero, a step longer than either side leaves zero alone.
-        let finer = [2, 4].into_iter().map(|times| Axis::stepped(low, high, times * about.max(1)));
-        std::iter::once(axis.clone()).chain(finer).find(|axis| axis.ticks().len() > 1).unwrap_or(axis)
+        // One tick is no scale; a step longer than both sides of zero leaves zero alone. With about six, steps
+        // are shorter than half the range, and there are two ticks wherever it begins.
+        if axis.ticks().len() > 1 { axis } else { Axis::stepped(low, high, 6) }
     }
 
     fn stepped(low: f64, high: f64, about: usize) -> Self {
@@ -236,6 +236,9 @@ mod tests {
         assert_eq!((exact.ticks(), exact.share(4.0)), (vec![0.0, 5.0, 10.0], 0.5));
         // Steps of fifty would leave one tick, at zero.
         assert_eq!(Axis::exact(-48.0, 48.0, 4).ticks(), [-40.0, -20.0, 0.0, 20.0, 40.0]);
+        for side in (1..1000).map(|tenths| f64::from(tenths) / 10.0) {
+            assert!((1..10).all(|about| Axis::exact(-side, side, about).ticks().len() > 1), "{side}");
+        }
     }
 
     #[test]
