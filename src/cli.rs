@@ -351,14 +351,21 @@ fn run_data(command: DataCommand, console: &Console) -> Result<(), Error> {
             let catalogue = Catalogue::named(&dataset).map_err(|error| Error::usage(error.to_string()))?;
             let options = FetchOptions { to, mirror, force };
             let fetched = fetch(&catalogue, &options, &Reporter::new(console));
-            let failed = |error: FetchError| match &error {
+            let failed = |error: FetchError| {
+                match &error {
                 FetchError::Disk { path, source } if error::is_full(source) => Error::writing(path, source),
+                FetchError::Mirrors { .. } => Error::other(error.to_string()).hint(
+                    "if you have the files, name their folder with --data; the digits that the program draws \
+                     need none (dataset builtin)"
+                        .to_string(),
+                ),
                 _ => Error::other(error.to_string()),
+            }
             };
             summary::fetched(console, &fetched.map_err(failed)?);
         }
-        DataCommand::Info(DatasetArgs { dataset, data }) => {
-            let found = data::info(&dataset, &given(data.as_deref()));
+        DataCommand::Info(DatasetArgs { dataset, data, transpose }) => {
+            let found = data::info(&dataset, &given(data.as_deref()), transpose);
             let mut found = found.map_err(|error| Error::input(error.to_string()))?;
             // A split that is not there is said; one that cannot be used is an error.
             let is_there = |(_, problem): &(Split, DatasetError)| {
@@ -370,14 +377,17 @@ fn run_data(command: DataCommand, console: &Console) -> Result<(), Error> {
                 return Err(Error::input(format!("{split}: {problem}")));
             }
         }
-        DataCommand::Sheet { dataset: DatasetArgs { dataset, data }, samples, test, out } => {
+        DataCommand::Sheet { dataset: DatasetArgs { dataset, data, transpose }, samples, test, out } => {
             if !out.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("png")) {
                 let text = format!("--out {}: expected a file name that ends in .png", out.display());
                 return Err(Error::usage(text));
             }
             let split = if test { Split::Test } else { Split::Train };
-            let dataset = Dataset::load(&dataset, &given(data.as_deref()), &[split]);
+            let dataset = Dataset::oriented(&dataset, &given(data.as_deref()), &[split], transpose);
             let dataset = dataset.map_err(|error| Error::input(error.to_string()))?;
+            if dataset.is_transposed() && transpose.is_none() {
+                console.info("these files are EMNIST's, mirrored and turned: the images are transposed");
+            }
             let made = sheet::contact_sheet(&dataset, split, samples)
                 .and_then(|sheet| sheet::write_png(&out, &sheet));
             made.map_err(|error| match error {

@@ -1,6 +1,8 @@
 //! `morphcog data fetch` against a small HTTP server on this machine: what is not exactly the
 //! published file never gets to disk, and the next mirror is tried.
 
+use flate2::Compression;
+use flate2::write::GzEncoder;
 use morphcog::base::hash::sha256_hex;
 use morphcog::base::observer::{Observer, Work};
 use morphcog::data::catalogue::{Catalogue, RemoteFile};
@@ -70,6 +72,7 @@ fn catalogue(mirrors: &[&Mirror]) -> Catalogue {
         name: name.to_string(),
         bytes: content.len() as u64,
         sha256: sha256_hex(content),
+        content_sha256: Some(sha256_hex(content)),
     };
     Catalogue {
         name: "mnist".to_string(),
@@ -151,7 +154,7 @@ fn a_file_that_a_mirror_lacks_comes_from_the_next() {
     let fetched = fetch(&catalogue(&[&first, &second]), &to(folder.path()), &log);
     let url = |mirror: &Mirror, name: &str| Outcome::Downloaded(format!("{}/{name}", mirror.address));
     assert_eq!(outcomes(fetched), [url(&second, "images.gz"), url(&first, "labels.gz")]);
-    assert_eq!(log.first(3), ["begins images.gz of 20", "images.gz", "begins images.gz of 20"]);
+    assert_eq!(log.first(3), ["begins images.gz of 20", "begins images.gz of 20", "received 20"]);
 }
 
 #[test]
@@ -219,4 +222,43 @@ fn a_dead_mirror_is_an_error_that_names_it() {
     let options = FetchOptions { mirror: Some(format!("http://{closed}")), ..to(folder.path()) };
     let error = fetch(&catalogue(&[]), &options, &()).unwrap_err().to_string();
     assert!(error.contains(&closed.to_string()) && error.contains("images.gz"), "{error}");
+}
+
+#[test]
+fn the_published_content_is_kept_however_it_is_packed() {
+    let mirror = Mirror::serving(&[("images.gz", IMAGES), ("labels.gz", LABELS)]);
+    let folder = tempfile::tempdir().unwrap();
+    let mut packed = GzEncoder::new(Vec::new(), Compression::best());
+    packed.write_all(IMAGES).unwrap();
+    std::fs::write(folder.path().join("images.gz"), packed.finish().unwrap()).unwrap();
+    std::fs::write(folder.path().join("labels"), LABELS).unwrap();
+    let fetched = fetch(&catalogue(&[&mirror]), &to(folder.path()), &());
+    assert_eq!(outcomes(fetched), [Outcome::Kept, Outcome::Kept]);
+    assert!(mirror.asked().is_empty());
+
+    // One that is not packed and says something else would be as good as the one beside it.
+    std::fs::write(folder.path().join("labels"), "my own").unwrap();
+    let error = fetch(&catalogue(&[&mirror]), &to(folder.path()), &()).unwrap_err().to_string();
+    assert!(error.contains("labels: is there but is not the published file"), "{error}");
+    let forced = FetchOptions { force: true, ..to(folder.path()) };
+    fetch(&catalogue(&[&mirror]), &forced, &()).unwrap();
+    assert_eq!(names(folder.path()), ["images.gz", "labels.gz"]);
+}
+
+#[test]
+fn what_failed_is_said_once_and_no_empty_folder_is_left() {
+    let absent = [Mirror::serving(&[]), Mirror::serving(&[])];
+    let root = tempfile::tempdir().unwrap();
+    let log = Log::default();
+    let error = fetch(&catalogue(&[&absent[0], &absent[1]]), &to(&root.path().join("data/mnist")), &log);
+    let error = error.unwrap_err().to_string();
+    assert_eq!(error.matches("404").count(), 1, "{error}");
+    assert!(absent.iter().all(|mirror| error.matches(&mirror.address).count() == 1), "{error}");
+    assert!(log.0.lock().unwrap().iter().all(|text| text.starts_with("begins")), "warned of it, too");
+    assert!(names(root.path()).is_empty());
+
+    // What was fetched before stays.
+    let half = Mirror::serving(&[("images.gz", IMAGES)]);
+    fetch(&catalogue(&[&half]), &to(&root.path().join("data/mnist")), &()).unwrap_err();
+    assert_eq!(names(&root.path().join("data/mnist")), ["images.gz"]);
 }

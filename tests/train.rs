@@ -3,7 +3,7 @@
 
 mod common;
 
-use common::program::{Sandbox, TINY, files, gaits};
+use common::program::{Sandbox, TINY, files, gaits, write_images};
 use morphcog::config::Config;
 use morphcog::data::dataset::Split;
 use morphcog::search::training::Training;
@@ -421,4 +421,41 @@ fn images_of_an_earlier_training_never_validate_a_later_one() {
         Training::indices(&first.config, &load_dataset(&first.config, None, &[Split::Train]).unwrap());
     let drawn = drawn.unwrap();
     assert!(drawn.len() > first.training_images.len() && drawn.iter().all(|index| before.contains(index)));
+}
+
+#[test]
+fn what_was_made_for_images_of_one_size_is_never_applied_to_another_without_a_word() {
+    let sandbox = Sandbox::new();
+    sandbox.write("run.toml", TINY.replace("\"area\"", "\"area\"\nmargin = 4"));
+    let evolved = sandbox.run("evolve -c run.toml -o walkers").ended(0, &[]);
+    let part = "robots see 20 × 20 of 28 × 28 pixels (stimulus.margin = 4)";
+    assert!(evolved.out.contains(part), "{}", evolved.out);
+    let margins = |run: &str| sandbox.run_file(run).config.stimulus.margin.to_string();
+    let train = format!(
+        "train -a walkers --task 0|1 --robots top:1 {LITTLE} --set train.challengers=0 --set data.dataset=own"
+    );
+    for (size, height, width) in [("square", 14, 14), ("narrow", 17, 5)] {
+        write_images(&sandbox, &format!("{size}/"), [height, width], 1);
+        let whole = format!("all {height} × {width} pixels");
+        let said = sandbox.run(&format!("{train} --data {size} -o {size}-taught"));
+        let said = said.ended(0, &["stimulus.margin = 4", "28 × 28 pixels", &whole]);
+        assert!(said.out.contains(&format!("of an image it sees {whole}")), "{}", said.out);
+        assert_eq!(margins(&format!("{size}-taught")), "0");
+    }
+    // What is asked for is done, and said.
+    let asked = format!("{train} --data square --set stimulus.margin=4 -o asked");
+    sandbox.run(&asked).ended(0, &["6 × 6 of 14 × 14 pixels"]);
+    assert_eq!(margins("asked"), "4");
+    let nothing = format!("{train} --data narrow --set stimulus.margin=4 -o none");
+    sandbox.run(&nothing).ended(3, &["stimulus.margin", "leaves nothing", "with 0 the whole image is seen"]);
+    // Of the same size, what the gaits see is seen.
+    sandbox.run(&format!("train -q -a walkers --task 0|1 --robots top:1 {LITTLE} -o same")).ended(0, &[]);
+    assert_eq!(margins("same"), "4");
+    let response = "response -a walkers --robots top:1 --images 60 --task 0|1 --set data.dataset=own \
+                    --data square --out response.json";
+    sandbox.run(response).ended(0, &["28 × 28 pixels", "all 14 × 14 pixels"]);
+    let measured: serde_json::Value = serde_json::from_str(&sandbox.read("response.json")).unwrap();
+    assert!(measured["stimulus"].get("margin").is_none(), "{measured}");
+    let eval = "eval -a walkers --robots top:1 --images 4 --cycles 1 --dataset own --data square";
+    sandbox.run(eval).ended(0, &["made for images of 28 × 28 pixels", "they see 6 × 6 of 14 × 14 pixels"]);
 }

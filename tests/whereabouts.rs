@@ -4,32 +4,14 @@
 
 mod common;
 
-use common::program::{Sandbox, TINY, said};
+use common::program::{Sandbox, TINY, said, write_images};
 use common::server::Server;
 use morphcog::store::eval::EvalFile;
 use std::fs::{remove_dir_all, remove_file, rename};
 
-/// An IDX dataset of zeros and ones: noise with a bar, of the first ones upright; `seed` decides
-/// which noise.
+/// Images of 10 × 10 pixels in a folder.
 fn write_dataset(sandbox: &Sandbox, folder: &str, seed: u8) {
-    const SIDE: usize = 10;
-    let header = |sizes: &[u32]| {
-        let magic = [0, 0, 8, sizes.len() as u8];
-        [&magic[..], &sizes.iter().flat_map(|size| size.to_be_bytes()).collect::<Vec<_>>()].concat()
-    };
-    for (split, count) in [("train", 120u32), ("t10k", 24)] {
-        let pixel = |image: u32, place: usize| {
-            let (row, column) = (place / SIDE, place % SIDE);
-            let on_bar = if image % 2 == 1 { column / 2 == 2 } else { row / 2 == 2 };
-            let noise = (place as u32 + 31 * image).wrapping_mul(2_654_435_761).to_be_bytes()[0] ^ seed;
-            if on_bar { 255 } else { noise / 3 }
-        };
-        let pixels = (0..count).flat_map(|image| (0..SIDE * SIDE).map(move |place| pixel(image, place)));
-        let images = [header(&[count, SIDE as u32, SIDE as u32]), pixels.collect()].concat();
-        let labels = [header(&[count]), (0..count).map(|image| (image % 2) as u8).collect()].concat();
-        sandbox.write(&format!("{folder}/{split}-images-idx3-ubyte"), images);
-        sandbox.write(&format!("{folder}/{split}-labels-idx1-ubyte"), labels);
-    }
+    write_images(sandbox, &format!("{folder}/"), [10, 10], seed);
 }
 
 /// A run on `shapes`, which lie in `there`.
@@ -253,4 +235,60 @@ fn mnist_is_known_by_any_name() {
         sandbox.command("eval -a gallery:zero_one-1 --images 4 --dataset fashion-mnist".split(' '));
     command.env("MORPHCOG_DATA", &mnist);
     said(command).ended(3, &["are those of mnist, not of fashion-mnist"]);
+}
+
+#[test]
+fn a_run_is_shown_its_images_the_way_it_was_made_with_them_whatever_their_files_are_called() {
+    let sandbox = with_run();
+    sandbox.run(COMMANDS[0]).ended(0, &[]);
+    let before = sandbox.read("runs/one/eval.json");
+    // By their new names they would be transposed.
+    remove_dir_all(sandbox.path("there")).unwrap();
+    write_images(&sandbox, "there/emnist-letters-", [10, 10], 1);
+    sandbox.run(COMMANDS[0]).ended(0, &[]);
+    assert_eq!(sandbox.read("runs/one/eval.json"), before);
+    for command in COMMANDS[1..8].iter() {
+        sandbox.run(command).ended(0, &[]);
+    }
+    // A run that is made with them says how they are seen.
+    let evolve = "evolve -c shapes.toml -g 6 --data there -o";
+    sandbox.run(&format!("{evolve} runs/turned")).ended(0, &["transposed", "data.transpose = false"]);
+    let same = sandbox.run(&format!("{evolve} runs/same --set data.transpose=false")).ended(0, &[]);
+    assert!(!same.err.contains("transposed"), "{}", same.err);
+    let of = |run: &str| sandbox.run_file(run).dataset;
+    assert_eq!(of("runs/same"), of("runs/one"));
+    assert_ne!(of("runs/turned"), of("runs/one"));
+    assert!(!sandbox.read("runs/turned/run.json").contains("transpose"));
+    // And goes on so when they have other names.
+    remove_dir_all(sandbox.path("there")).unwrap();
+    write_dataset(&sandbox, "there", 1);
+    sandbox.run("eval -a runs/turned --images 8 --cycles 1 --robots top:2").ended(0, &[]);
+    let wrong = "evolve -c tiny.toml -o runs/two --set data.transpose=true";
+    sandbox.write("tiny.toml", TINY);
+    sandbox.run(wrong).ended(3, &["data.transpose", "built-in digits"]);
+}
+
+#[test]
+#[cfg(unix)]
+fn a_tilde_in_a_path_is_the_home_folder() {
+    let sandbox = with_run();
+    let at_home = |args: &str| {
+        let mut command = sandbox.command(args.split_whitespace());
+        command.env("HOME", sandbox.path(""));
+        said(command)
+    };
+    let evolve = "evolve -q -c ~/shapes.toml -g 6";
+    at_home(&format!("{evolve} -o runs/two --set data.dir=~/there")).ended(0, &[]);
+    assert_eq!(sandbox.read("runs/two/run.json").matches("~/there").count(), 1);
+    at_home(&format!("{evolve} -o runs/three --data=~/there")).ended(0, &[]);
+    at_home("data info shapes --data=~/there").ended(0, &[]);
+    // What a folder is really called is no home folder.
+    sandbox.run(&format!("{evolve} -o runs/four --data=~there")).ended(3, &["~"]);
+    sandbox.write(
+        "plans/plan.toml",
+        "archive = \"~/runs/one\"\nrobots = \"top:1\"\ngroups = [\"0|1\"]\n\
+         set = [\"train.random_images=40\", \"train.rounds=1\", \"train.images=10\", \"train.final_images=10\", \
+         \"train.challengers=1\", \"train.images_per_class=30\", \"validation.images=40\"]\n",
+    );
+    at_home("sweep plans/plan.toml --list --out all").ended(0, &[]);
 }

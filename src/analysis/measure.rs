@@ -26,7 +26,7 @@ use crate::store::response::{
 };
 use crate::store::robots::{Selection, Source};
 use crate::store::unwritten::Unwritten;
-use crate::store::whereabouts::{Whereabouts, load_dataset_of, seen};
+use crate::store::whereabouts::{Whereabouts, load_dataset_of, say_transposed, seen};
 use crate::task::direction;
 use crate::task::evaluation::fresh_rollouts;
 use crate::task::gait::Gait;
@@ -131,7 +131,7 @@ pub fn measure(options: &Options, stop: &AtomicBool, observer: &dyn Observer) ->
     }
     check_names(options, &subjects)?;
     let seed = options.seed.unwrap_or(config.seed);
-    let task = task(options, &provenance, seed)?;
+    let task = task(options, &provenance, seed, observer)?;
     let probing = Probing::new(&conditions(config, options.images), seed);
     let pool = pool(options.threads)?;
     let run_seed = config.seed;
@@ -288,7 +288,12 @@ struct Task {
 }
 
 /// The task that is asked for.
-fn task(options: &Options, provenance: &Provenance, seed: u64) -> Result<Option<Task>, Error> {
+fn task(
+    options: &Options,
+    provenance: &Provenance,
+    seed: u64,
+    observer: &dyn Observer,
+) -> Result<Option<Task>, Error> {
     let Some(groups) = &options.task else { return Ok(None) };
     let config = train::config_of(&provenance.config, groups, Some(seed), &options.set)?;
     let mut whereabouts = Whereabouts::given(options.data.as_deref());
@@ -297,11 +302,20 @@ fn task(options: &Options, provenance: &Provenance, seed: u64) -> Result<Option<
     }
     same_walks(&provenance.config, &config)?;
     let data = |config: &Config| {
-        let DataConfig { dataset, dir, builtin, .. } = &config.data;
-        (dataset.clone(), dir.clone(), builtin.clone())
+        let DataConfig { dataset, dir, transpose, builtin, .. } = &config.data;
+        (dataset.clone(), dir.clone(), *transpose, builtin.clone())
     };
     let of_run = provenance.dataset.as_ref().filter(|_| data(&config) == data(&provenance.config));
     let dataset = load_dataset_of(of_run, &config, &whereabouts, &[Split::Train])?;
+    say_transposed(&dataset, &config.data, observer);
+    let config = train::sized(
+        config,
+        provenance.dataset.as_ref(),
+        &provenance.config,
+        &dataset,
+        &options.set,
+        observer,
+    );
     let classes = groups.concat();
     let per_class = IMAGES_PER_CLASS.min(scarcest(&dataset, &classes, LEAST_PER_CLASS)?);
     let failed = |error: DatasetError| Error::input(error.to_string());

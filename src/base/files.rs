@@ -27,16 +27,37 @@ pub fn read_text(path: &Path) -> io::Result<String> {
     read_limited(source)
 }
 
-/// Reads a text to its end.
+/// Reads a text to its end: UTF-8, or UTF-16 that begins with its mark, as PowerShell's `>` writes
+/// it.
 ///
 /// # Errors
-/// What the system says; if it is no UTF-8; if it has more than 256 megabytes.
+/// What the system says; if it is no such text; if it has more than 256 megabytes.
 pub fn read_limited(source: impl Read) -> io::Result<String> {
-    let mut text = String::new();
-    let read = source.take(MOST_TEXT + 1).read_to_string(&mut text)?;
-    match read as u64 > MOST_TEXT {
-        true => Err(io::Error::new(io::ErrorKind::FileTooLarge, "expected at most 256 MB of text")),
-        false => Ok(text),
+    let mut bytes = Vec::new();
+    let read = source.take(MOST_TEXT + 1).read_to_end(&mut bytes)?;
+    if read as u64 > MOST_TEXT {
+        return Err(io::Error::new(io::ErrorKind::FileTooLarge, "expected at most 256 MB of text"));
+    }
+    let text = match bytes.as_slice() {
+        [0xff, 0xfe, rest @ ..] => utf16(rest, u16::from_le_bytes),
+        [0xfe, 0xff, rest @ ..] => utf16(rest, u16::from_be_bytes),
+        _ => String::from_utf8(bytes).ok(),
+    };
+    text.ok_or_else(|| io::Error::new(io::ErrorKind::InvalidData, "expected text in UTF-8"))
+}
+
+fn utf16(bytes: &[u8], unit: fn([u8; 2]) -> u16) -> Option<String> {
+    let (pairs, rest) = bytes.as_chunks::<2>();
+    let text: Option<String> = char::decode_utf16(pairs.iter().copied().map(unit)).map(Result::ok).collect();
+    text.filter(|_| rest.is_empty())
+}
+
+/// A path in which a leading `~` stands for the user's home folder, as shells have it: files and
+/// `--option=~/…` get to the program as they are.
+pub fn home_expanded(path: &Path) -> PathBuf {
+    match (path.strip_prefix("~"), std::env::home_dir()) {
+        (Ok(below), Some(home)) if !home.as_os_str().is_empty() => home.join(below),
+        _ => path.to_path_buf(),
     }
 }
 

@@ -401,6 +401,9 @@ pub(super) struct DatasetArgs {
     /// Folder with the files.
     #[arg(long, value_name = "DIR")]
     pub(super) data: Option<PathBuf>,
+    /// Exchange rows and columns of the images, as data.transpose: true or false (default: EMNIST's).
+    #[arg(long, value_name = "BOOL")]
+    pub(super) transpose: Option<bool>,
 }
 
 /// Formats of moving pictures.

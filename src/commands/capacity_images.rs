@@ -36,10 +36,8 @@ pub(crate) struct Seen {
 
 impl Images {
     pub fn of(report: &EvalFile, setting: &Setting, options: &Options) -> Result<Images, Error> {
-        let dataset = whereabouts(options).load(&setting.data, &Split::ALL)?;
-        let [train, test] =
-            Split::ALL.map(|split| dataset.fingerprint(split).expect("both splits were loaded just now"));
-        if train != setting.train_sha256 || report.test_sha256.as_ref() != Some(&test) {
+        let dataset = whereabouts(options).load_of(&setting.train_sha256, &setting.data, &Split::ALL)?;
+        if report.test_sha256 != dataset.fingerprint(Split::Test) {
             let text = format!(
                 "{}: the images here are not those of {} (another SHA-256)",
                 dataset.place(),

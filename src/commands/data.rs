@@ -20,14 +20,15 @@ pub struct Found {
 }
 
 /// Looks at both splits of a dataset, each on its own: one may be there without the other.
+/// `transpose` is as of [`Dataset::oriented`].
 ///
 /// # Errors
 /// Why the training images cannot be loaded, if the test images cannot be either.
-pub fn info(name: &str, given: &[Place]) -> Result<Found, DatasetError> {
+pub fn info(name: &str, given: &[Place], transpose: Option<bool>) -> Result<Found, DatasetError> {
     let mut info: Option<DatasetInfo> = None;
     let mut problems = Vec::new();
     for split in Split::ALL {
-        match Dataset::load(name, given, &[split]) {
+        match Dataset::oriented(name, given, &[split], transpose) {
             Ok(dataset) => match &mut info {
                 Some(info) => info.splits.extend(dataset.info().splits),
                 None => info = Some(dataset.info()),
@@ -60,20 +61,20 @@ mod tests {
     fn info_shows_the_split_that_is_there_and_why_the_other_is_not() {
         let folder = tempfile::tempdir().unwrap();
         let given = places(Some(folder.path()), None, None);
-        assert!(info("mnist", &given).unwrap_err().to_string().contains("train images"));
+        assert!(info("mnist", &given, None).unwrap_err().to_string().contains("train images"));
         let write = |name: &str, bytes: Vec<u8>| std::fs::write(folder.path().join(name), bytes).unwrap();
         write("t10k-images-idx3-ubyte", [idx::header(&[2, 1, 1]), vec![0, 255]].concat());
         write("t10k-labels-idx1-ubyte", [idx::header(&[2]), vec![3, 3]].concat());
-        let found = info("mnist", &given).unwrap();
+        let found = info("mnist", &given, None).unwrap();
         assert_eq!(found.info.splits[&Split::Test].per_class[&3], 2);
         assert!(matches!(found.problems.as_slice(), [(Split::Train, _)]));
         assert!(found.published.is_empty());
-        let builtin = info("builtin", &[]).unwrap().info;
+        let builtin = info("builtin", &[], None).unwrap().info;
         assert_eq!((builtin.splits.len(), builtin.differences()), (2, Vec::new()));
         write("train-images-idx3-ubyte", [idx::header(&[2, 2, 1]), vec![0, 255, 0, 9]].concat());
         write("train-labels-idx1-ubyte", [idx::header(&[2]), vec![3, 4]].concat());
         assert_eq!(
-            info("mnist", &given).unwrap().info.differences(),
+            info("mnist", &given, None).unwrap().info.differences(),
             ["train images have 2 × 1 pixels, test images 1 × 1", "there are no test images of class 4"]
         );
     }

@@ -21,7 +21,7 @@ use crate::store::robots::{Chosen, Selection, Source};
 use crate::store::run::different;
 use crate::store::unwritten::Unwritten;
 use crate::store::validation::Validated;
-use crate::store::whereabouts::{Whereabouts, load_dataset_of};
+use crate::store::whereabouts::{Whereabouts, load_dataset_of, part_of_others, say_transposed, size_of};
 use crate::task::grouping::Grouping;
 use crate::task::protocol::MAX_STEPS;
 use crate::task::stimulus::StimulusParams;
@@ -108,8 +108,16 @@ pub fn eval(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Re
     let dataset = match other {
         None if options.split == HeldOut::Validation => own(&[Split::Train])?,
         None => own(&Split::ALL)?,
-        Some(name) => whereabouts.load(&config.data.of(name), &Split::ALL)?,
+        Some(name) => {
+            let data = config.data.of(name);
+            let dataset = whereabouts.load(&data, &Split::ALL)?;
+            say_transposed(&dataset, &data, observer);
+            dataset
+        }
     };
+    let size = size_of(Some(&first.run.dataset), &config.data.dataset, &dataset);
+    let said = configs().find_map(|config| part_of_others(config, size, &dataset, options.split.split()));
+    said.iter().for_each(|text| observer.warning(text));
     let robots = skilled(options.robots.of(&sources, options.seed)?, &grouping, observer)?;
     let shown = HeldOutImages::draw(config, &sources, &dataset, options)?;
     let test_sha256 = dataset.fingerprint(Split::Test);

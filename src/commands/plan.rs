@@ -73,8 +73,7 @@ impl Plan {
             Err(error) => return Err(Error::reading(Path::new(name), &error)),
             Ok(text) => text,
         };
-        let is_json = name.ends_with(".json");
-        let format = if is_json { reading::Format::Json } else { reading::Format::Toml };
+        let format = reading::Format::of(Path::new(name));
         let plan: Plan = reading::read(&text, format, name)?;
         let folder = Path::new(name).parent().unwrap_or(Path::new(""));
         let placed = |plan: &Plan| Plan { folder: folder.to_path_buf(), ..plan.clone() };

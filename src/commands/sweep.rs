@@ -2,7 +2,7 @@
 //! combination is a task.
 
 use crate::base::error::Error;
-use crate::base::files::read_text;
+use crate::base::files::{home_expanded, read_text};
 use crate::base::hash::sha256_hex;
 use crate::base::named;
 use crate::commands::tasks::task::selection;
@@ -88,7 +88,7 @@ impl SweepPlan {
                 .hint("morphcog schema sweep says what a plan holds; morphcog help sweep has one".to_string())
         })?;
         let name = path.display().to_string();
-        let format = if name.ends_with(".json") { reading::Format::Json } else { reading::Format::Toml };
+        let format = reading::Format::of(path);
         let plan: SweepPlan = reading::read(&text, format, &name)?;
         let check = |plan: &SweepPlan| plan.check();
         reading::changed(plan, overrides, check, |error| reading::placed(error, &text, format, &name))
@@ -248,7 +248,7 @@ impl SweepPlan {
         let folder = path.parent().unwrap_or(Path::new(""));
         if let Some(archive) = &self.archive {
             let is_named = named::is_named(archive);
-            let archive = if is_named { archive.clone() } else { folder.join(archive) };
+            let archive = if is_named { archive.clone() } else { folder.join(home_expanded(archive)) };
             let archive = first_run(archive).map_err(|text| Error::at("archive", text))?;
             let source = Source::read(&archive).map_err(|error| error.within("archive").of("archive"))?;
             let archive = match is_named {

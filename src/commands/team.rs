@@ -22,7 +22,7 @@ use crate::store::run::different;
 use crate::store::team::{FORMAT, FORMAT_VERSION, Member, TeamBaselines, TeamFile};
 use crate::store::unwritten::Unwritten;
 use crate::store::validation::shown as shown_for_validation;
-use crate::store::whereabouts::{Whereabouts, load_dataset_of, see, see_all};
+use crate::store::whereabouts::{Whereabouts, load_dataset_of, part_of_others, see, see_all};
 use crate::task::direction::THRESHOLD;
 use crate::task::grouping::{self, Group};
 use crate::task::judge::Judge;
@@ -90,11 +90,13 @@ pub fn team(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Re
     }
     let config = &first.run.config;
     let dataset = load_dataset_of(Some(&first.run.dataset), config, &whereabouts, &Split::ALL)?;
+    let (size, split) = (dataset.size(Split::Train), options.split.split());
+    let said = sources.iter().find_map(|other| part_of_others(&other.run.config, size, &dataset, split));
+    said.iter().for_each(|text| observer.warning(text));
     let classes = classes(options, &dataset)?;
     let splits = robots.iter().map(|chosen| split_of(&sources[chosen.source], chosen));
     let splits = splits.collect::<Result<Vec<grouping::Split>, Error>>()?;
     covered(&robots, &splits, &classes)?;
-    let split = options.split.split();
     let images = match options.split {
         HeldOut::Test => test_images(&classes, &dataset, options.images, options.seed)?,
         HeldOut::Validation => validation_images(options, &sources, &classes, &dataset)?,

@@ -10,7 +10,7 @@ pub mod train;
 pub mod validation;
 
 use crate::base::error::Error;
-use crate::base::files::read_text;
+use crate::base::files::{home_expanded, read_text};
 use crate::body::MAX_SIDE;
 use crate::config::evaluation::EvaluationConfig;
 use crate::config::reading::Format;
@@ -18,6 +18,7 @@ pub use crate::config::task::TaskConfig;
 use crate::config::train::TrainConfig;
 use crate::config::validation::{LEAST, ValidationConfig};
 use crate::data::builtin::BuiltinDigits;
+use crate::data::dataset::BUILTIN;
 use crate::data::files::check_name;
 use crate::genome::{BodySpec, MutationParams};
 use crate::qd::EmitterParams;
@@ -162,6 +163,10 @@ pub struct DataConfig {
     /// they were. Default `data/<dataset>`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub dir: Option<PathBuf>,
+    /// Whether rows and columns of the images in the files are exchanged, for images that are stored
+    /// mirrored and turned. Default: those of EMNIST, which is known by its names, are.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub transpose: Option<bool>,
     /// Training images by index, in the order in which a sequential rollout sees them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub train_images: Option<Vec<usize>>,
@@ -174,14 +179,20 @@ pub struct DataConfig {
 }
 
 impl DataConfig {
-    /// The same with another dataset, in which its folder and its images mean nothing; its own
-    /// changes nothing.
+    /// The same with another dataset, for which its folder, how its files are read and its images
+    /// mean nothing; its own changes nothing.
     #[must_use]
     pub(crate) fn of(&self, dataset: &str) -> Self {
         if dataset == self.dataset {
             return self.clone();
         }
-        DataConfig { dataset: dataset.to_string(), dir: None, train_images: None, ..self.clone() }
+        DataConfig {
+            dataset: dataset.to_string(),
+            dir: None,
+            transpose: None,
+            train_images: None,
+            ..self.clone()
+        }
     }
 }
 
@@ -254,7 +265,7 @@ impl Config {
     pub(crate) fn load_from(folder: &Path, name: &str, overrides: &[String]) -> Result<Self, Error> {
         let built_in =
             || BUILT_IN.iter().find(|(own, _)| *own == name || own.strip_suffix(".toml") == Some(name));
-        let path = folder.join(name);
+        let path = folder.join(home_expanded(Path::new(name)));
         // A folder may have the name of a built-in config.
         let is_no_file = |error: &std::io::Error| match error.kind() {
             std::io::ErrorKind::NotFound => true,
@@ -284,7 +295,7 @@ impl Config {
     /// # Errors
     /// As [`Config::load`].
     pub fn parse(text: &str, name: &str, overrides: &[String]) -> Result<Self, Error> {
-        let format = if name.ends_with(".json") { Format::Json } else { Format::Toml };
+        let format = Format::of(Path::new(name));
         let config: Config = reading::read(text, format, name).map_err(|error| {
             let is_lacking = error.message.contains("missing field");
             let hint = "morphcog config zero_one.toml prints a whole one to start your own from".to_string();
@@ -364,6 +375,9 @@ impl Config {
             .map_err(|error| Error::value(&format!("physics.{}", error.name), error.value, error.expected))?;
         self.stimulus.validate().map_err(|error| Error::at("stimulus", error))?;
         check_name(&self.data.dataset).map_err(|error| Error::at("data.dataset", error))?;
+        if self.data.dataset == BUILTIN && self.data.transpose == Some(true) {
+            return refuse("data.transpose", true.to_string(), "false: the built-in digits stand upright");
+        }
         self.data.builtin.check().map_err(|error| Error::at("data.builtin", error))?;
         for (key, side) in [("body.height", self.body.height), ("body.width", self.body.width)] {
             if side == 0 || side > MAX_SIDE {

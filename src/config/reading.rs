@@ -1,7 +1,7 @@
 //! Reading configs: errors with file, line and key; `key=value` overrides.
 
 use crate::base::error::Error;
-use crate::base::files::read_text;
+use crate::base::files::{home_expanded, read_text};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
@@ -12,6 +12,14 @@ use std::path::Path;
 pub(crate) enum Format {
     Toml,
     Json,
+}
+
+impl Format {
+    /// The format of a file with this name: JSON if it ends in `.json`, else TOML.
+    pub(crate) fn of(name: &Path) -> Self {
+        let is_json = name.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("json"));
+        if is_json { Format::Json } else { Format::Toml }
+    }
 }
 
 /// Reads settings; `name` is the file's, for messages.
@@ -135,9 +143,9 @@ pub(crate) fn load<T: Serialize + DeserializeOwned + Default>(
     let Some(path) = path else {
         return changed(T::default(), overrides, check, |error| error);
     };
+    let path = &home_expanded(path);
     let text = read_text(path).map_err(|error| Error::reading(path, &error))?;
-    let is_json = path.extension().is_some_and(|ending| ending == "json");
-    let format = if is_json { Format::Json } else { Format::Toml };
+    let format = Format::of(path);
     let name = path.display().to_string();
     let settings = read(&text, format, &name)?;
     changed(settings, overrides, check, |error| placed(error, &text, format, &name))
@@ -263,7 +271,7 @@ pub(crate) fn changed<T: Serialize + DeserializeOwned>(
 const SET: &str = "--set";
 
 /// Whether an override sets a key: itself, the table it is of, or a key of that table.
-fn sets(assignment: &str, key: &str) -> bool {
+pub(crate) fn sets(assignment: &str, key: &str) -> bool {
     let set = assignment.split_once('=').map_or(assignment, |(set, _)| set).trim();
     let is_within = |inner: &str, outer: &str| {
         inner.strip_prefix(outer).is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))

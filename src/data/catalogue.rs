@@ -12,6 +12,8 @@ pub struct RemoteFile {
     pub bytes: u64,
     /// SHA-256 in lower-case hexadecimal.
     pub sha256: String,
+    /// The same of what is in it, however it is packed, as far as it is known.
+    pub content_sha256: Option<String>,
 }
 
 /// A dataset that can be downloaded.
@@ -56,6 +58,14 @@ const MNIST: Published = [
     ("t10k-labels-idx1-ubyte.gz", 4_542, "f7ae60f92e00ec6debd23a6088c31dbd2371eca3ffa0defaefb259924204aec6"),
 ];
 
+/// SHA-256 of what is in the files of MNIST, in their order.
+const MNIST_UNPACKED: [&str; 4] = [
+    "ba891046e6505d7aadcbbe25680a0738ad16aec93bde7f9b65e87a2fc25776db",
+    "65a50cbbf4e906d70832878ad85ccda5333a97f0f4c3dd2ef09a8a9eef7101c5",
+    "0fa7898d509279e482958e8ce81c8e77db3f2f8254e26661ceb7762c4d494ce7",
+    "ff7bcfd416de33731a308c3f266cc351222c34898ecbeaf847f06e48f7ec33f2",
+];
+
 /// SHA-256 of the content of MNIST's training and test split (see [`SplitInfo::fingerprint`](crate::data::info::SplitInfo::fingerprint)): it
 /// is known however it is packed.
 pub const MNIST_CONTENT: [&str; 2] = [
@@ -97,20 +107,21 @@ impl Catalogue {
     /// # Errors
     /// [`UnknownDataset`] for any other name.
     pub fn named(name: &str) -> Result<Self, UnknownDataset> {
-        let (mirrors, files): (&[&str], _) = match name {
-            "mnist" => (&MNIST_MIRRORS, MNIST),
-            "fashion-mnist" => (&FASHION_MNIST_MIRRORS, FASHION_MNIST),
+        let (mirrors, files, unpacked): (&[&str], _, _) = match name {
+            "mnist" => (&MNIST_MIRRORS, MNIST, MNIST_UNPACKED.map(Some)),
+            "fashion-mnist" => (&FASHION_MNIST_MIRRORS, FASHION_MNIST, [None; 4]),
             _ => return Err(UnknownDataset { name: name.to_string() }),
         };
-        let file = |(name, bytes, sha256): (&str, u64, &str)| RemoteFile {
+        let file = |((name, bytes, sha256), content): ((&str, u64, &str), Option<&str>)| RemoteFile {
             name: name.to_string(),
             bytes,
             sha256: sha256.to_string(),
+            content_sha256: content.map(str::to_string),
         };
         Ok(Catalogue {
             name: name.to_string(),
             mirrors: mirrors.iter().map(ToString::to_string).collect(),
-            files: files.map(file).to_vec(),
+            files: files.into_iter().zip(unpacked).map(file).collect(),
         })
     }
 }

@@ -104,13 +104,28 @@ impl Dataset {
     /// [`DatasetError::Files`] naming the file, where it was looked for, what was expected and what
     /// to do.
     pub fn load(name: &str, given: &[Place], wanted: &[Split]) -> Result<Self, DatasetError> {
+        Dataset::oriented(name, given, wanted, None)
+    }
+
+    /// The same; `transpose` says whether rows and columns of the images in the files are exchanged.
+    /// By default those of EMNIST are, which is known by its names. (The built-in digits are in no
+    /// file.)
+    ///
+    /// # Errors
+    /// As [`Dataset::load`].
+    pub fn oriented(
+        name: &str,
+        given: &[Place],
+        wanted: &[Split],
+        transpose: Option<bool>,
+    ) -> Result<Self, DatasetError> {
         if name == BUILTIN {
             return Dataset::builtin(BuiltinDigits::default(), wanted);
         }
         let place = files::choose(name, given)?;
         let mut splits = BTreeMap::new();
         for &split in wanted {
-            let (labels, stored) = files::load(name, &place, split)?;
+            let (labels, stored) = files::load(name, &place, split, transpose)?;
             // Results would say that they are of the other.
             if FETCHABLE.contains(&name)
                 && let Some(found) =
@@ -154,6 +169,21 @@ impl Dataset {
             Some(folder) => format!("{} in {} ({})", self.name, folder.display(), self.origin),
             None => self.name.clone(),
         }
+    }
+
+    /// Height and width of the images of a split; `None` if it was not loaded.
+    pub fn size(&self, split: Split) -> Option<[usize; 2]> {
+        self.splits.get(&split).map(|loaded| match &loaded.images {
+            Images::Stored(stored) => [stored.images.height, stored.images.width],
+            Images::Drawn(_) => [BuiltinDigits::SIDE; 2],
+        })
+    }
+
+    /// Whether rows and columns of the images in its files are exchanged.
+    pub fn is_transposed(&self) -> bool {
+        let is_turned =
+            |loaded: &Loaded| matches!(&loaded.images, Images::Stored(stored) if stored.transposed);
+        self.splits.values().any(is_turned)
     }
 
     /// Number of images in a split; 0 if it was not loaded.
@@ -208,13 +238,15 @@ impl Dataset {
     /// What to record about the dataset.
     pub fn info(&self) -> DatasetInfo {
         let describe = |(&split, loaded): (&Split, &Loaded)| {
-            let (height, width, files) = match &loaded.images {
-                Images::Stored(stored) => (stored.images.height, stored.images.width, stored.files.clone()),
-                Images::Drawn(_) => (BuiltinDigits::SIDE, BuiltinDigits::SIDE, Vec::new()),
+            let [height, width] = self.size(split).expect("the split is loaded");
+            let (transposed, files) = match &loaded.images {
+                Images::Stored(stored) => (stored.transposed, stored.files.clone()),
+                Images::Drawn(_) => (false, Vec::new()),
             };
             let fingerprint = self.fingerprint(split).expect("the split is loaded");
             let per_class = loaded.by_class.iter().map(|(&class, indices)| (class, indices.len())).collect();
-            (split, SplitInfo { images: loaded.labels.len(), height, width, fingerprint, per_class, files })
+            let images = loaded.labels.len();
+            (split, SplitInfo { images, height, width, fingerprint, transposed, per_class, files })
         };
         let splits = self.splits.iter().map(describe).collect();
         let source = self.folder.as_ref().map_or(BUILTIN.to_string(), |folder| folder.display().to_string());

@@ -6,7 +6,7 @@ use crate::base::hash::sha256_hex;
 use crate::base::observer::{Observer, Work};
 use crate::data::catalogue::{Catalogue, RemoteFile};
 use crate::data::files::default_folder;
-use std::fmt;
+use crate::data::idx;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -60,10 +60,18 @@ pub struct Attempt {
     pub error: AttemptError,
 }
 
-impl fmt::Display for Attempt {
-    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        write!(f, "{}: {}", self.url, self.error)
+/// What was tried, and what went wrong: once where that was always the same.
+fn tried(attempts: &[Attempt]) -> String {
+    let mut all: Vec<(String, Vec<&str>)> = Vec::new();
+    for Attempt { url, error } in attempts {
+        let error = error.to_string();
+        match all.iter_mut().find(|(other, _)| *other == error) {
+            Some((_, urls)) => urls.push(url),
+            None => all.push((error, vec![url])),
+        }
     }
+    let one = |(error, urls): &(String, Vec<&str>)| format!("{}: {error}", urls.join(", "));
+    all.iter().map(one).collect::<Vec<_>>().join("; ")
 }
 
 /// Why a dataset was not fetched. Files fetched before the error stay.
@@ -94,7 +102,7 @@ pub enum FetchError {
     #[error(
         "{file} could not be downloaded; try again later, give another mirror with --mirror, or put the file into \
          {} yourself; tried: {}", folder.display(),
-         attempts.iter().map(ToString::to_string).collect::<Vec<_>>().join("; ")
+         tried(attempts)
     )]
     Mirrors {
         /// Name of the file.
@@ -125,12 +133,12 @@ pub struct Fetched {
 }
 
 /// Brings all files of a dataset to disk. Each is checked against its published size and SHA-256
-/// before anything is written, and then written atomically; files that are there and right are
-/// kept.
+/// before anything is written, and then written atomically; files that are there and right, however
+/// they are packed, are kept.
 ///
 /// # Errors
 /// [`FetchError`]. If any file that is there differs from the published one (and `force` is off),
-/// nothing is done.
+/// nothing is done. No empty folder is left.
 pub fn fetch(
     catalogue: &Catalogue,
     options: &FetchOptions,
@@ -140,43 +148,64 @@ pub fn fetch(
     let mirrors = options.mirror.as_ref().map_or(catalogue.mirrors.as_slice(), std::slice::from_ref);
     let mut kept = Vec::new();
     for remote in &catalogue.files {
-        kept.push(!options.force && is_there(&folder.join(&remote.name), remote)?);
+        kept.push(if options.force { None } else { found(&folder, remote)? });
     }
-    std::fs::create_dir_all(&folder).map_err(|source| FetchError::Disk { path: folder.clone(), source })?;
+    let is_new = |folder: &&Path| !folder.as_os_str().is_empty() && !folder.exists();
+    let made: Vec<PathBuf> = folder.ancestors().take_while(is_new).map(Path::to_path_buf).collect();
+    let disk = |path: &Path, source| FetchError::Disk { path: path.to_path_buf(), source };
+    std::fs::create_dir_all(&folder).map_err(|source| disk(&folder, source))?;
     let agent = agent();
-    let mut all = Vec::new();
-    for (remote, kept) in catalogue.files.iter().zip(kept) {
+    let bring = |remote: &RemoteFile| -> Result<Fetched, FetchError> {
+        let (url, bytes) = from_any(&agent, mirrors, remote, observer).map_err(|attempts| {
+            FetchError::Mirrors { file: remote.name.clone(), folder: folder.clone(), attempts }
+        })?;
         let file = folder.join(&remote.name);
-        let outcome = match kept {
-            true => Outcome::Kept,
-            false => {
-                let (url, bytes) = from_any(&agent, mirrors, remote, observer).map_err(|attempts| {
-                    FetchError::Mirrors { file: remote.name.clone(), folder: folder.clone(), attempts }
-                })?;
-                write_atomically(&file, &bytes)
-                    .map_err(|source| FetchError::Disk { path: file.clone(), source })?;
-                Outcome::Downloaded(url)
-            }
-        };
-        all.push(Fetched { file, outcome });
+        write_atomically(&file, &bytes).map_err(|source| disk(&file, source))?;
+        // An unpacked file that says something else would be as good as this one.
+        let is_other = |other: &PathBuf| idx::unpacked(other).ok() != idx::unpacked(&file).ok();
+        let other = unpacked(&folder, remote).filter(|other| options.force && other.exists());
+        if let Some(other) = other.filter(is_other) {
+            std::fs::remove_file(&other).map_err(|source| disk(&other, source))?;
+        }
+        Ok(Fetched { file, outcome: Outcome::Downloaded(url) })
+    };
+    let fetched = catalogue.files.iter().zip(kept).map(|(remote, kept)| match kept {
+        Some(file) => Ok(Fetched { file, outcome: Outcome::Kept }),
+        None => bring(remote),
+    });
+    let fetched: Result<Vec<Fetched>, FetchError> = fetched.collect();
+    if fetched.is_err() {
+        // Those that hold something stay.
+        made.iter().for_each(|folder| drop(std::fs::remove_dir(folder)));
     }
-    Ok(all)
+    fetched
 }
 
-/// Whether the right file is there; another one is an error.
-fn is_there(file: &Path, remote: &RemoteFile) -> Result<bool, FetchError> {
-    match std::fs::read(file) {
-        Ok(bytes) => {
-            let (expected, found) = (remote.sha256.clone(), sha256_hex(&bytes));
-            if expected == found {
-                Ok(true)
-            } else {
-                Err(FetchError::Differs { file: file.to_path_buf(), expected, found })
-            }
+/// The path of a file in a folder once it is unpacked.
+fn unpacked(folder: &Path, remote: &RemoteFile) -> Option<PathBuf> {
+    remote.name.strip_suffix(".gz").map(|name| folder.join(name))
+}
+
+/// The right file, packed or not, if it is there; another one is an error.
+fn found(folder: &Path, remote: &RemoteFile) -> Result<Option<PathBuf>, FetchError> {
+    let packed = folder.join(&remote.name);
+    // What is in it must be known to tell others apart.
+    let unpacked = unpacked(folder, remote).filter(|_| remote.content_sha256.is_some());
+    let mut right = None;
+    for file in [Some(packed), unpacked].into_iter().flatten() {
+        let bytes = match std::fs::read(&file) {
+            Ok(bytes) => bytes,
+            Err(error) if error.kind() == io::ErrorKind::NotFound => continue,
+            Err(source) => return Err(FetchError::Disk { path: file, source }),
+        };
+        let (expected, found) = (remote.sha256.clone(), sha256_hex(&bytes));
+        let content = || idx::unpacked(&file).ok().map(|content| sha256_hex(&content));
+        if found != expected && (remote.content_sha256.is_none() || content() != remote.content_sha256) {
+            return Err(FetchError::Differs { file, expected, found });
         }
-        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(false),
-        Err(source) => Err(FetchError::Disk { path: file.to_path_buf(), source }),
+        right.get_or_insert(file);
     }
+    Ok(right)
 }
 
 /// The client. Limits are for a slow line, not for patience: a mirror that is dead is given up in
@@ -209,11 +238,13 @@ fn from_any(
         let url = format!("{}/{}", mirror.trim_end_matches('/'), remote.name);
         observer.begins(&Work::new(remote.name.clone(), remote.bytes, "bytes"));
         match download(agent, &url, remote, observer) {
-            Ok(bytes) => return Ok((url, bytes)),
-            Err(error) => {
-                observer.warning(&format!("{}: {url}: {error}", remote.name));
-                attempts.push(Attempt { url, error });
+            Ok(bytes) => {
+                if !attempts.is_empty() {
+                    observer.warning(&format!("{}: {}", remote.name, tried(&attempts)));
+                }
+                return Ok((url, bytes));
             }
+            Err(error) => attempts.push(Attempt { url, error }),
         }
     }
     Err(attempts)

@@ -1,6 +1,9 @@
 //! Where the files of a dataset are looked for, and their loading.
 
-use crate::base::hash::hex;
+use crate::base::files::home_expanded;
+use crate::base::hash::{hex, sha256_hex};
+use crate::data::builtin::BuiltinDigits;
+use crate::data::dataset::BUILTIN;
 use crate::data::idx;
 use crate::data::idx::{IdxError, IdxImages};
 use crate::data::info::{FileInfo, Split};
@@ -13,6 +16,11 @@ use std::path::{Path, PathBuf};
 
 /// Datasets that `morphcog data fetch` can download.
 pub const FETCHABLE: [&str; 2] = ["mnist", "fashion-mnist"];
+
+/// Height and width of the images of a dataset of this name, if it is one that everybody has.
+pub(crate) fn published_size(name: &str) -> Option<[usize; 2]> {
+    (name == BUILTIN || FETCHABLE.contains(&name)).then_some([BuiltinDigits::SIDE; 2])
+}
 
 /// A folder in which someone says the data are.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -43,7 +51,7 @@ pub fn places(option: Option<&Path>, environment: Option<OsString>, config: Opti
         ("[data] dir", config.map(Path::to_path_buf)),
     ]
     .into_iter()
-    .filter_map(|(origin, path)| Some(Place { origin: origin.to_string(), path: path? }))
+    .filter_map(|(origin, path)| Some(Place { origin: origin.to_string(), path: home_expanded(&path?) }))
     .collect()
 }
 
@@ -138,10 +146,12 @@ pub enum FilesError {
     },
 }
 
-/// The images of one split as they were stored, and where they came from.
+/// The images of one split, and where they came from.
 #[derive(Clone, Debug)]
 pub(crate) struct StoredSplit {
     pub images: IdxImages,
+    /// Whether their rows and columns are exchanged in the files.
+    pub transposed: bool,
     pub files: Vec<FileInfo>,
     pub fingerprint: String,
 }
@@ -172,14 +182,24 @@ pub(crate) fn choose(name: &str, given: &[Place]) -> Result<Place, FilesError> {
     })
 }
 
-/// The labels and images of one split.
-pub(crate) fn load(name: &str, place: &Place, split: Split) -> Result<(Vec<u8>, StoredSplit), FilesError> {
+/// The labels and images of one split; `transpose` says whether rows and columns of the images are
+/// exchanged, as in EMNIST's files. By default that is known by their names.
+pub(crate) fn load(
+    name: &str,
+    place: &Place,
+    split: Split,
+    transpose: Option<bool>,
+) -> Result<(Vec<u8>, StoredSplit), FilesError> {
     let broken =
         |source: IdxError| FilesError::Broken { advice: advice(name, place, !source.is_io()), source };
     let (image_file, beginning) = find(name, place, split, "images", None)?;
     // Those of another set in the same folder would be as many.
     let (label_file, _) = find(name, place, split, "labels", Some(&beginning))?;
-    let images = idx::read_images(&image_file).map_err(broken)?;
+    let mut images = idx::read_images(&image_file).map_err(broken)?;
+    let transposed = transpose.unwrap_or_else(|| is_emnist(name, place, &image_file));
+    if transposed {
+        images.content = images.content.transposed();
+    }
     let labels = idx::read_labels(&label_file).map_err(broken)?;
     let (expected, found) = (images.content.count, labels.content.len());
     if expected != found {
@@ -202,7 +222,19 @@ pub(crate) fn load(name: &str, place: &Place, split: Split) -> Result<(Vec<u8>, 
         describe(&image_file, images.bytes, &images.sha256),
         describe(&label_file, labels.bytes, &labels.sha256),
     ];
-    Ok((labels.content, StoredSplit { images: images.content, files, fingerprint }))
+    Ok((labels.content, StoredSplit { images: images.content, transposed, files, fingerprint }))
+}
+
+/// Whether images are EMNIST's, which is published with rows and columns exchanged, by the names of
+/// their dataset, file or folder. (The folder of a published dataset may be called anything.)
+fn is_emnist(dataset: &str, place: &Place, image_file: &Path) -> bool {
+    let folder = place.path.canonicalize().unwrap_or_else(|_| place.path.clone());
+    let folder = folder.file_name().filter(|_| !FETCHABLE.contains(&dataset));
+    let names = [Some(dataset.as_ref()), image_file.file_name(), folder];
+    names.into_iter().flatten().any(|name| {
+        let name = name.to_string_lossy();
+        name.split(|c: char| !c.is_ascii_alphanumeric()).any(|word| word.eq_ignore_ascii_case("emnist"))
+    })
 }
 
 /// The standard names (without .gz) of a split's images or labels, the most usual first.
@@ -217,8 +249,9 @@ fn standard_names(split: Split, content: &str) -> Vec<String> {
 }
 
 /// The file of a split's images or labels: one of a standard name, or else the only one whose name
-/// ends in one (EMNIST's `emnist-digits-train-images-idx3-ubyte.gz`). The gzipped one of two that
-/// differ in .gz only. With how its name begins, up to the content; `beginning` is how it must.
+/// ends in one (EMNIST's `emnist-digits-train-images-idx3-ubyte.gz`), in capitals or small letters.
+/// Several, such as a file and the same one gzipped, must hold the same. With how its name begins,
+/// up to the content; `beginning` is how it must.
 fn find(
     name: &str,
     place: &Place,
@@ -234,32 +267,56 @@ fn find(
             return Err(FilesError::Folder { dataset, place: searched, source, advice });
         }
     };
-    let bare = |file: &str| file.strip_suffix(".gz").unwrap_or(file).to_string();
-    let begins_so = |base: &String| beginning.is_none_or(|beginning| begins(base, content) == beginning);
-    let bases: BTreeSet<String> = present.iter().map(|file| bare(file)).filter(begins_so).collect();
     let standard = standard_names(split, content);
-    let ends_so = |base: &&String| standard.iter().any(|name| base.ends_with(name.as_str()));
-    let found: Vec<String> = match standard.iter().find(|name| bases.contains(*name)) {
-        Some(exact) => vec![exact.clone()],
-        None => bases.iter().filter(ends_so).cloned().collect(),
-    };
-    match found.as_slice() {
-        [] => {
-            let usual = &standard[0];
-            let expected = match beginning {
-                Some(beginning) => usual.replacen(begins(usual, content), beginning, 1),
-                None => usual.clone(),
-            };
-            let advice = advice(name, place, false);
-            Err(FilesError::Missing { dataset, split, content, expected, place: searched, advice })
+    // Those of a standard name go before all others, in the order of these names; gzipped ones first.
+    let mut found: Vec<(usize, String, &String)> = Vec::new();
+    for file in present.iter().rev() {
+        let base = bare(file);
+        let is_meant = beginning.is_none_or(|beginning| begins(&base, content) == beginning);
+        if is_meant && standard.iter().any(|name| base.ends_with(name.as_str())) {
+            let place = standard.iter().position(|name| base == *name).unwrap_or(standard.len());
+            found.push((place, base, file));
         }
-        [base] => {
-            let zipped = format!("{base}.gz");
-            let file = place.path.join(if present.contains(&zipped) { &zipped } else { base });
-            Ok((file, begins(base, content).to_string()))
-        }
-        _ => Err(FilesError::Ambiguous { dataset, split, content, place: searched, found }),
     }
+    found.sort_by_key(|(place, ..)| *place);
+    let is_standard = found.first().is_some_and(|(place, ..)| *place < standard.len());
+    found.retain(|(place, ..)| *place < standard.len() || !is_standard);
+    let Some((_, base, file)) = found.first() else {
+        let usual = &standard[0];
+        let expected = match beginning {
+            Some(beginning) => usual.replacen(begins(usual, content), beginning, 1),
+            None => usual.clone(),
+        };
+        let advice = advice(name, place, false);
+        return Err(FilesError::Missing { dataset, split, content, expected, place: searched, advice });
+    };
+    let is_one = is_standard || found.iter().all(|(_, other, _)| other == base);
+    let files: Vec<&String> = found.iter().map(|(.., file)| *file).collect();
+    if !is_one || !hold_the_same(name, place, &files)? {
+        let found = files.into_iter().rev().cloned().collect();
+        return Err(FilesError::Ambiguous { dataset, split, content, place: searched, found });
+    }
+    Ok((place.path.join(file), begins(base, content).to_string()))
+}
+
+/// A file's name as names are compared: in small letters, without the ending of gzipped ones.
+fn bare(file: &str) -> String {
+    let name = file.to_ascii_lowercase();
+    name.strip_suffix(".gz").unwrap_or(&name).to_string()
+}
+
+/// Whether files hold the same when they are unpacked.
+fn hold_the_same(name: &str, place: &Place, files: &[&String]) -> Result<bool, FilesError> {
+    if files.len() < 2 {
+        return Ok(true);
+    }
+    let mut sums = BTreeSet::new();
+    for file in files {
+        let unpacked = idx::unpacked(&place.path.join(file));
+        let broken = |source| FilesError::Broken { advice: advice(name, place, true), source };
+        sums.insert(sha256_hex(&unpacked.map_err(broken)?));
+    }
+    Ok(sums.len() == 1)
 }
 
 /// How a file's name begins, before what it holds.
@@ -267,12 +324,13 @@ fn begins<'a>(base: &'a str, content: &str) -> &'a str {
     &base[..base.rfind(content).unwrap_or(base.len())]
 }
 
-/// Names of the files in a folder; not of hidden ones, as macOS puts beside others.
+/// Names of what a folder holds and is no folder, also of links that lead nowhere: to read them says
+/// so. Not of hidden files, as macOS puts beside others.
 fn file_names(folder: &Path) -> io::Result<BTreeSet<String>> {
     let mut names = BTreeSet::new();
     for entry in std::fs::read_dir(folder)? {
         let entry = entry?;
-        if entry.path().is_file() {
+        if !entry.path().is_dir() {
             names.extend(entry.file_name().into_string().ok().filter(|name| !name.starts_with('.')));
         }
     }
@@ -336,7 +394,8 @@ mod tests {
             write(folder.path(), images, labels, 3);
             let data = Dataset::load("own", &given(folder.path()), &[split]).unwrap();
             assert_eq!((data.len(split), data.label(split, 2).unwrap()), (3, 8), "{images}");
-            assert_eq!(data.image(split, 2).unwrap(), crate::base::Grid::filled(2, 3, 2));
+            let [height, width] = if images.starts_with("emnist") { [3, 2] } else { [2, 3] };
+            assert_eq!(data.image(split, 2).unwrap(), crate::base::Grid::filled(height, width, 2));
             assert_eq!(data.indices_of(split, 9), [1]);
             assert_eq!(data.info().splits[&split].files[0].name, images);
         }
@@ -405,6 +464,97 @@ mod tests {
             message.contains("emnist-digits-train") && message.contains("emnist-letters-train"),
             "{message}"
         );
+    }
+
+    #[test]
+    fn two_files_of_a_standard_name_are_one_only_if_they_hold_the_same() {
+        let folder = tempfile::tempdir().unwrap();
+        let [plain, zipped] = ["", ".gz"].map(|end| format!("train-images-idx3-ubyte{end}"));
+        write(folder.path(), &plain, "train-labels-idx1-ubyte", 3);
+        let bytes = fs::read(folder.path().join(&plain)).unwrap();
+        let mut packed = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::fast());
+        std::io::Write::write_all(&mut packed, &bytes).unwrap();
+        fs::write(folder.path().join(&zipped), packed.finish().unwrap()).unwrap();
+        let data = Dataset::load("own", &given(folder.path()), &[Split::Train]).unwrap();
+        assert_eq!(data.info().splits[&Split::Train].files[0].name, zipped);
+        for other in [zipped.as_str(), "train-images.idx3-ubyte"] {
+            write(folder.path(), other, "train-labels-idx1-ubyte", 3);
+            let mut bytes = bytes.clone();
+            *bytes.last_mut().unwrap() = 99;
+            fs::write(folder.path().join(other), bytes).unwrap();
+            let message = failure("own", folder.path(), Split::Train);
+            assert!(message.contains(&plain) && message.contains(other), "{message}");
+            fs::remove_file(folder.path().join(other)).unwrap();
+        }
+        // A copy that is cut off is no copy.
+        fs::write(folder.path().join(&zipped), [0x1f, 0x8b]).unwrap();
+        let message = failure("own", folder.path(), Split::Train);
+        assert!(message.contains("cannot be unpacked") && message.contains(&zipped), "{message}");
+    }
+
+    #[test]
+    fn names_in_capitals_are_those_in_small_letters() {
+        let folder = tempfile::tempdir().unwrap();
+        write(folder.path(), "TRAIN-IMAGES.IDX3-UBYTE", "Train-Labels-idx1-ubyte.GZ", 3);
+        let data = Dataset::load("own", &given(folder.path()), &[Split::Train]).unwrap();
+        assert_eq!(data.info().splits[&Split::Train].files[1].name, "Train-Labels-idx1-ubyte.GZ");
+    }
+
+    #[test]
+    #[cfg(unix)]
+    fn a_link_that_leads_nowhere_is_broken_and_not_missing() {
+        let folder = tempfile::tempdir().unwrap();
+        write(folder.path(), "train-images-idx3-ubyte", "train-labels-idx1-ubyte", 3);
+        let images = folder.path().join("train-images-idx3-ubyte");
+        fs::rename(&images, folder.path().join("elsewhere")).unwrap();
+        std::os::unix::fs::symlink("elsewhere", &images).unwrap();
+        assert!(Dataset::load("own", &given(folder.path()), &[Split::Train]).is_ok());
+        fs::remove_file(folder.path().join("elsewhere")).unwrap();
+        let message = failure("own", folder.path(), Split::Train);
+        let expected = format!("{}: cannot be read", images.display());
+        assert!(message.starts_with(&expected) && message.contains("link to elsewhere"), "{message}");
+    }
+
+    /// A single image of two rows of three pixels, 0 to 5, and what is seen of it.
+    fn seen(dataset: &str, folder: &Path, prefix: &str, transpose: Option<bool>) -> Vec<Vec<u8>> {
+        let name = |content| folder.join(format!("{prefix}train-{content}-ubyte"));
+        let pixels = [idx::header(&[1, 2, 3]), (0..6).collect()].concat();
+        fs::create_dir_all(folder).unwrap();
+        fs::write(name("images-idx3"), pixels).unwrap();
+        fs::write(name("labels-idx1"), [idx::header(&[1]), vec![7]].concat()).unwrap();
+        let data = Dataset::oriented(dataset, &given(folder), &[Split::Train], transpose).unwrap();
+        let image = data.image(Split::Train, 0).unwrap();
+        (0..image.height()).map(|r| (0..image.width()).map(|c| image[(r, c)]).collect()).collect()
+    }
+
+    #[test]
+    fn emnist_is_transposed_by_its_names_and_other_images_where_that_is_asked_for() {
+        let root = tempfile::tempdir().unwrap();
+        let at = |name: &str| root.path().join(name);
+        let (stored, turned) = (vec![vec![0, 1, 2], vec![3, 4, 5]], vec![vec![0, 3], vec![1, 4], vec![2, 5]]);
+        assert_eq!(seen("own", &at("a"), "emnist-letters-", None), turned);
+        assert_eq!(seen("emnist-digits", &at("b"), "", None), turned);
+        assert_eq!(seen("own", &at("EMNIST"), "", None), turned);
+        assert_eq!(seen("own", &at("c"), "", None), stored);
+        assert_eq!(seen("mnist", &at("EMNIST"), "", None), stored);
+        // One of another name, whose images stand upright.
+        assert_eq!(seen("femnist", &at("d"), "femnist-", None), stored);
+        assert_eq!(seen("own", &at("e"), "", Some(true)), turned);
+        assert_eq!(seen("own", &at("f"), "emnist-letters-", Some(false)), stored);
+    }
+
+    #[test]
+    fn a_transposed_dataset_has_the_fingerprint_of_the_images_as_they_are_seen() {
+        let folder = tempfile::tempdir().unwrap();
+        seen("own", folder.path(), "", None);
+        let load = |transpose| {
+            let data = Dataset::oriented("own", &given(folder.path()), &[Split::Train], transpose).unwrap();
+            data.info().splits[&Split::Train].clone()
+        };
+        let (stored, turned) = (load(None), load(Some(true)));
+        assert_ne!(stored.fingerprint, turned.fingerprint);
+        assert_eq!((turned.height, turned.width, turned.files), (3, 2, stored.files));
+        assert!(turned.transposed && !stored.transposed);
     }
 
     #[test]

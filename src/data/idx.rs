@@ -42,6 +42,19 @@ impl IdxImages {
         let rows = self.pixels.chunks(self.width).skip(first).take(self.height);
         Grid::from_rows(rows.map(<[u8]>::to_vec).collect()).ok()
     }
+
+    /// The same images with rows and columns exchanged.
+    #[must_use]
+    pub fn transposed(mut self) -> Self {
+        let (height, width) = (self.height, self.width);
+        let mut image = Vec::with_capacity(height.saturating_mul(width).min(self.pixels.len()));
+        for pixels in self.pixels.chunks_exact_mut(height * width) {
+            image.clear();
+            image.extend((0..width).flat_map(|c| (0..height).map(move |r| r * width + c)).map(|i| pixels[i]));
+            pixels.copy_from_slice(&image);
+        }
+        IdxImages { height: width, width: height, ..self }
+    }
 }
 
 /// What was read, and which bytes on disk it came from.
@@ -221,13 +234,49 @@ fn with_origin<T>(stored: &[u8], content: T) -> IdxFile<T> {
 
 fn read_file(file: &Path) -> Result<Vec<u8>, IdxError> {
     let io = |source| IdxError::Io { file: file.to_path_buf(), source };
+    let found = std::fs::metadata(file).map_err(|error| io(nowhere(file, error)))?;
+    // To open a pipe would wait for someone who writes to it.
+    if !found.is_file() {
+        return Err(io(io::Error::other("it is not a regular file")));
+    }
     let mut stored = Vec::new();
     File::open(file).map_err(io)?.take(MAX_BYTES + 1).read_to_end(&mut stored).map_err(io)?;
     if stored.len() as u64 > MAX_BYTES {
-        let found = std::fs::metadata(file).map_or(stored.len() as u64, |m| m.len());
-        return Err(IdxError::Large { file: file.to_path_buf(), found });
+        return Err(IdxError::Large { file: file.to_path_buf(), found: found.len() });
     }
     Ok(stored)
+}
+
+/// Why a file is not there: a link to it may lead nowhere.
+fn nowhere(file: &Path, error: io::Error) -> io::Error {
+    match file.read_link() {
+        Ok(to) if error.kind() == io::ErrorKind::NotFound => {
+            io::Error::new(error.kind(), format!("it is a link to {}, which is not there", to.display()))
+        }
+        _ => error,
+    }
+}
+
+/// The content of a file, unpacked if it is gzipped.
+///
+/// # Errors
+/// [`IdxError`] if it cannot be read or unpacked, or has more than [`MAX_BYTES`].
+pub(crate) fn unpacked(file: &Path) -> Result<Vec<u8>, IdxError> {
+    let stored = read_file(file)?;
+    let mut content = Vec::new();
+    let read = reader(&stored).take(MAX_BYTES + 1).read_to_end(&mut content);
+    let found = read.map_err(|source| IdxError::Gzip { file: file.to_path_buf(), source })? as u64;
+    match found > MAX_BYTES {
+        true => Err(IdxError::Large { file: file.to_path_buf(), found }),
+        false => Ok(content),
+    }
+}
+
+fn reader(stored: &[u8]) -> Box<dyn Read + '_> {
+    match stored.starts_with(&[0x1f, 0x8b]) {
+        true => Box::new(MultiGzDecoder::new(stored)),
+        false => Box::new(stored),
+    }
 }
 
 /// The lengths of the N dimensions and the numbers.
@@ -237,9 +286,7 @@ fn decode<const N: usize>(
     what: &'static str,
     axes: &'static str,
 ) -> Result<([usize; N], Vec<u8>), IdxError> {
-    let zipped = stored.starts_with(&[0x1f, 0x8b]);
-    let mut content: Box<dyn Read> =
-        if zipped { Box::new(MultiGzDecoder::new(stored)) } else { Box::new(stored) };
+    let mut content = reader(stored);
     let file = file.to_path_buf();
     let broken = |source| IdxError::Gzip { file: file.clone(), source };
 
@@ -365,6 +412,29 @@ mod tests {
         // 1 GB announced, none there: within the limit, so only the reading finds out.
         let lie = error(&images([1 << 20, 32, 32], &[0; 10]));
         assert!(matches!(lie, IdxError::Short { found: 10, .. }), "{lie}");
+    }
+
+    #[test]
+    fn transposed_images_have_their_rows_and_columns_exchanged() {
+        let pixels: Vec<u8> = (0..12).collect();
+        let images = IdxImages { count: 2, height: 2, width: 3, pixels };
+        let turned = images.clone().transposed();
+        assert_eq!((turned.count, turned.height, turned.width), (2, 3, 2));
+        for index in 0..2 {
+            let (before, after) = (images.image(index).unwrap(), turned.image(index).unwrap());
+            assert!(after.iter().all(|((r, c), &pixel)| pixel == before[(c, r)]));
+        }
+        assert_eq!(turned.transposed(), images);
+    }
+
+    #[test]
+    #[cfg(unix)]
+    fn a_pipe_is_refused_and_not_waited_for() {
+        let folder = tempfile::tempdir().unwrap();
+        let pipe = folder.path().join("train-images-idx3-ubyte");
+        assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+        let error = read_images(&pipe).unwrap_err();
+        assert!(error.is_io() && error.to_string().contains("not a regular file"), "{error}");
     }
 
     #[test]

@@ -53,8 +53,12 @@ pub struct SplitInfo {
     /// Columns per image.
     pub width: usize,
     /// SHA-256 of the content; for files: of the unpacked image file followed by the unpacked label
-    /// file (the same whether they are gzipped or not), for built-in digits: of their parameters.
+    /// file (the same whether they are gzipped or not), the images transposed if they are; for
+    /// built-in digits: of their parameters.
     pub fingerprint: String,
+    /// Whether the images are those of the files with rows and columns exchanged.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub transposed: bool,
     /// Number of images of every class that occurs.
     pub per_class: BTreeMap<u8, usize>,
     /// The files as found, images first; none for built-in digits.

@@ -56,6 +56,8 @@ pub struct Finished {
     pub run: RunFile,
     /// Counts of the whole run.
     pub totals: Totals,
+    /// Height and width of the training images.
+    pub size: [usize; 2],
     /// The best robots of each task on validation images, best first; none if the config asks for
     /// none, or it was stopped.
     pub validated: Vec<Validated>,
@@ -95,6 +97,8 @@ pub fn evolve(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> 
     let whereabouts = Whereabouts::given(options.data.as_deref())
         .and_of_resumed(options.if_exists, &options.out.join(RUN_JSON));
     let dataset = whereabouts.load(&config.data, &[Split::Train])?;
+    whereabouts::say_transposed(&dataset, &config.data, observer);
+    let size = dataset.size(Split::Train).expect("its training images were loaded just now");
     let training = Training::of(config, &dataset)?;
     held_out::check(config, &[], "data.images_per_class", &dataset)?;
     let mutations = Mutations { seed: config.seed, spec: config.body_spec(), params: &config.genome, stop };
@@ -133,6 +137,7 @@ pub fn evolve(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> 
         return Ok(Finished {
             run: file,
             totals,
+            size,
             validated: Vec::new(),
             stopped: !is_whole,
             unwritten: None,
@@ -149,7 +154,8 @@ pub fn evolve(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> 
         false => Some(Vec::new()),
     };
     let stopped = !is_whole || validated.is_none();
-    Ok(Finished { run: file, totals, validated: validated.unwrap_or_default(), stopped, unwritten })
+    let validated = validated.unwrap_or_default();
+    Ok(Finished { run: file, totals, size, validated, stopped, unwritten })
 }
 
 /// The run's metrics.csv, to go on after a generation.

@@ -3,9 +3,11 @@
 
 use crate::base::Grid;
 use crate::base::error::Error;
-use crate::base::files::{read_text, write_atomically};
+use crate::base::files::{home_expanded, read_text, write_atomically};
+use crate::base::observer::Observer;
 use crate::config::{BodyConfig, Config, DataConfig, reading};
 use crate::data::dataset::{BUILTIN, Dataset, DatasetError, Split};
+use crate::data::files;
 use crate::data::files::{Place, default_folder, places};
 use crate::store::folder::{IfExists, RunFolder};
 use crate::store::images::{DatasetRef, ImageRef};
@@ -87,12 +89,51 @@ impl Whereabouts {
         };
         given.extend(there);
         given.extend(places(None, None, config.dir.as_deref()));
-        Dataset::load(&config.dataset, &given, wanted).map_err(|error| match gone {
+        Dataset::oriented(&config.dataset, &given, wanted, config.transpose).map_err(|error| match gone {
             Some(gone) => refuse(error).hint(format!(
                 "the images of this run were in {gone}, which is not there any more; name their folder with --data"
             )),
             None => refuse(error),
         })
+    }
+
+    /// Loads the dataset whose training images have this SHA-256. Where only other splits are wanted,
+    /// it is known by its training images if these are there.
+    ///
+    /// # Errors
+    /// As [`Whereabouts::load`]; or that it is another one: images of the same index would be others.
+    pub(crate) fn load_of(
+        &self,
+        train_sha256: &str,
+        config: &DataConfig,
+        wanted: &[Split],
+    ) -> Result<Dataset, Error> {
+        let load = |config: &DataConfig| -> Result<(Dataset, bool), Error> {
+            let loaded = self.load(config, wanted)?;
+            let of_training = match loaded.fingerprint(Split::Train) {
+                None => self.load(config, &[Split::Train]).ok().and_then(|set| set.fingerprint(Split::Train)),
+                known => known,
+            };
+            let is_it = of_training.is_none_or(|found| found == train_sha256);
+            Ok((loaded, is_it))
+        };
+        let (loaded, is_it) = load(config).map_err(|error| self.asked_by(error))?;
+        if is_it {
+            return Ok(loaded);
+        }
+        // By their names the files may be transposed now, and were not when the run was made, or the
+        // other way round: the sum says which it was.
+        if config.transpose.is_none() && loaded.folder().is_some() {
+            let other = DataConfig { transpose: Some(!loaded.is_transposed()), ..config.clone() };
+            if let Ok((loaded, true)) = load(&other) {
+                return Ok(loaded);
+            }
+        }
+        let text = format!(
+            "{}: the training images here are not those the run was made with (another SHA-256)",
+            loaded.place()
+        );
+        Err(self.asked_by(Error::input(text)).hint("name their folder with --data".to_string()))
     }
 
     /// The folder in which a dataset is looked for if neither the command line nor a run says where
@@ -103,7 +144,7 @@ impl Whereabouts {
         if config.dataset == BUILTIN || is_known {
             return None;
         }
-        let folder = config.dir.clone().unwrap_or_else(|| default_folder(&config.dataset));
+        let folder = config.dir.as_deref().map_or_else(|| default_folder(&config.dataset), home_expanded);
         folder.is_dir().then_some(folder)
     }
 
@@ -119,7 +160,7 @@ impl Whereabouts {
             if found.dataset != dataset {
                 continue;
             }
-            let folder = path.parent().unwrap_or(Path::new("")).join(found.folder);
+            let folder = path.parent().unwrap_or(Path::new("")).join(home_expanded(&found.folder));
             let place = Place { origin: name, path: folder };
             match place.path.is_dir() {
                 true => return Ok((Some(place), None)),
@@ -172,22 +213,52 @@ pub fn load_dataset_of(
     data: &Whereabouts,
     wanted: &[Split],
 ) -> Result<Dataset, Error> {
-    let Some(run) = run else { return data.load(&config.data, wanted) };
-    let loaded = data.load(&config.data, wanted).map_err(|error| data.asked_by(error))?;
-    let train = match loaded.fingerprint(Split::Train) {
-        None => data.load(&config.data, &[Split::Train]).ok().and_then(|set| set.fingerprint(Split::Train)),
-        known => known,
-    };
-    match train.is_none_or(|train| train == run.train_sha256) {
-        true => Ok(loaded),
-        false => {
-            let text = format!(
-                "{}: the training images here are not those the run was made with (another SHA-256)",
-                loaded.place()
-            );
-            Err(data.asked_by(Error::input(text)).hint("name their folder with --data".to_string()))
-        }
+    match run {
+        None => data.load(&config.data, wanted),
+        Some(run) => data.load_of(&run.train_sha256, &config.data, wanted),
     }
+}
+
+/// Says so if images are transposed by their names alone: who stored them upright wants to know.
+pub(crate) fn say_transposed(dataset: &Dataset, config: &DataConfig, observer: &dyn Observer) {
+    if config.transpose.is_none() && dataset.is_transposed() {
+        observer.note(&format!(
+            "{}: EMNIST stores its images mirrored and turned, so they are transposed; \
+             data.transpose = false leaves them as they are",
+            dataset.name()
+        ));
+    }
+}
+
+/// Height and width of the images that a run was made with, as far as that is known: those of the
+/// dataset that is loaded, if the run was made with it, or of one that is published. `data` is none
+/// of the published robots.
+pub(crate) fn size_of(data: Option<&DatasetRef>, name: &str, loaded: &Dataset) -> Option<[usize; 2]> {
+    let is_it = data.is_some_and(|data| loaded.fingerprint(Split::Train) == Some(data.train_sha256.clone()));
+    match is_it {
+        true => loaded.size(Split::Train),
+        false => files::published_size(name),
+    }
+}
+
+/// What is to be said if robots that see a part of their images are shown images of another size
+/// than they were made for: the part is counted in pixels.
+pub(crate) fn part_of_others(
+    config: &Config,
+    size: Option<[usize; 2]>,
+    dataset: &Dataset,
+    split: Split,
+) -> Option<String> {
+    let shown = dataset.size(split).filter(|shown| size != Some(*shown))?;
+    if config.stimulus.margin.is_none() {
+        return None;
+    }
+    let others = match size {
+        Some([height, width]) => format!("images of {height} × {width} pixels"),
+        None => "other images, perhaps of another size".to_string(),
+    };
+    let part = config.stimulus.part(shown);
+    Some(format!("the robots were made for {others}; of these they see {part}"))
 }
 
 /// What a robot of a config sees of an image.

@@ -42,12 +42,16 @@ impl Margins {
         *self == Margins::default()
     }
 
-    /// What is left of an image; `None` if that is nothing.
-    pub fn cut<T: Clone>(&self, image: &Grid<T>) -> Option<Grid<T>> {
+    /// Height and width of what is left of an image of this size; `None` if that is nothing.
+    pub fn left_of(&self, [height, width]: [usize; 2]) -> Option<[usize; 2]> {
         let left =
             |side: usize, a: usize, b: usize| side.checked_sub(a.checked_add(b)?).filter(|left| *left > 0);
-        let rows = left(image.height(), self.top, self.bottom)?;
-        let columns = left(image.width(), self.left, self.right)?;
+        Some([left(height, self.top, self.bottom)?, left(width, self.left, self.right)?])
+    }
+
+    /// What is left of an image; `None` if that is nothing.
+    pub fn cut<T: Clone>(&self, image: &Grid<T>) -> Option<Grid<T>> {
+        let [rows, columns] = self.left_of([image.height(), image.width()])?;
         Some(Grid::from_fn(rows, columns, |r, c| image[(r + self.top, c + self.left)].clone()))
     }
 

@@ -2,6 +2,7 @@
 //! "Task").
 
 use crate::base::Grid;
+use crate::body::MAX_SIDE;
 use crate::task::margins::Margins;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -72,6 +73,18 @@ impl StimulusParams {
         all.into_iter().reduce(least)
     }
 
+    /// The part of an image of this height and width that a body sees, in words.
+    pub fn part(&self, [height, width]: [usize; 2]) -> String {
+        let whole = format!("{height} × {width} pixels");
+        match (self.margin.is_none(), self.margin.left_of([height, width])) {
+            (true, _) => format!("all {whole}"),
+            (false, Some([rows, columns])) => {
+                format!("{rows} × {columns} of {whole} (stimulus.margin = {})", self.margin)
+            }
+            (false, None) => format!("none of {whole} (stimulus.margin = {})", self.margin),
+        }
+    }
+
     /// Checks the level.
     ///
     /// # Errors
@@ -87,6 +100,14 @@ pub enum StimulusError {
     /// The body has no rows or no columns.
     #[error("a body of {height} x {width} voxels has no place for a stimulus; both sides must be at least 1")]
     Empty {
+        /// Rows of the body.
+        height: usize,
+        /// Columns of the body.
+        width: usize,
+    },
+    /// The body has more rows or columns than any.
+    #[error("a body of {height} x {width} voxels: expected at most {MAX_SIDE} rows and columns")]
+    TooLarge {
         /// Rows of the body.
         height: usize,
         /// Columns of the body.
@@ -115,7 +136,8 @@ pub enum StimulusError {
     },
     /// Nothing is left between the margins.
     #[error(
-        "a margin of {margin} leaves nothing of {height} x {width} pixels; the sum of opposite margins must be less than a side"
+        "a margin of {margin} leaves nothing of {height} x {width} pixels; the sum of opposite margins must be \
+         less than a side, and with 0 the whole image is seen"
     )]
     Margin {
         /// Pixels at the edges.
@@ -134,7 +156,7 @@ impl StimulusError {
     /// The key of a config that is to be changed.
     pub fn key(&self) -> &'static str {
         match self {
-            StimulusError::Empty { .. } => "body",
+            StimulusError::Empty { .. } | StimulusError::TooLarge { .. } => "body",
             StimulusError::NoPixels { .. } => "data",
             StimulusError::Stride { .. } => "stimulus.reduction",
             StimulusError::Margin { .. } => "stimulus.margin",
@@ -157,6 +179,9 @@ pub fn stimulus(
 ) -> Result<Grid<f64>, StimulusError> {
     if height == 0 || width == 0 {
         return Err(StimulusError::Empty { height, width });
+    }
+    if height.max(width) > MAX_SIDE {
+        return Err(StimulusError::TooLarge { height, width });
     }
     if image.height() == 0 || image.width() == 0 {
         return Err(StimulusError::NoPixels { height: image.height(), width: image.width() });
@@ -189,10 +214,10 @@ fn strided(image: &Grid<u8>, height: usize, width: usize) -> Result<Grid<f64>, S
     Ok(Grid::from_fn(height, width, |r, c| f64::from(image[(r * rows, c * columns)])))
 }
 
-/// Area-weighted means, 0 … 255. In units of 1/height of a pixel, a voxel is `image.height()` tall
+/// The image on a grid of another size by area-weighted means, 0 … 255. In units of 1/height of a pixel, a voxel is `image.height()` tall
 /// and a pixel `height`: all overlaps are whole numbers, and one division per voxel is the only
 /// rounding.
-fn averaged(image: &Grid<u8>, height: usize, width: usize) -> Grid<f64> {
+pub fn averaged(image: &Grid<u8>, height: usize, width: usize) -> Grid<f64> {
     let overlap = |voxel: usize, voxel_side: usize, pixel: usize, pixel_side: usize| {
         let end = ((voxel + 1) * voxel_side).min((pixel + 1) * pixel_side);
         end - (voxel * voxel_side).max(pixel * pixel_side)
@@ -240,6 +265,8 @@ mod tests {
         assert!(error.to_string().contains("area"), "{error}");
         assert!(stimulus(&ramp(28, 28), 56, 14, &params(Stride, Intensity)).is_err());
         assert!(stimulus(&ramp(28, 28), 0, 14, &params(Area, Intensity)).is_err());
+        let error = stimulus(&ramp(28, 28), 1 << 58, 28, &params(Area, Intensity)).unwrap_err();
+        assert_eq!(error, StimulusError::TooLarge { height: 1 << 58, width: 28 });
     }
 
     #[test]
@@ -309,6 +336,16 @@ mod tests {
         }
         let edge = StimulusParams { margin: Margins::same(4), ..params(Area, Intensity) };
         assert_eq!(stimulus(&image, 1, 1, &edge).unwrap().area(), 1);
+    }
+
+    #[test]
+    fn the_part_that_is_seen_is_said_in_pixels() {
+        let part = |margin| StimulusParams { margin, ..params(Area, Intensity) }.part([17, 28]);
+        assert_eq!(part(Margins::default()), "all 17 × 28 pixels");
+        assert_eq!(part(Margins::same(4)), "9 × 20 of 17 × 28 pixels (stimulus.margin = 4)");
+        let uneven = Margins { top: 1, right: 2, bottom: 3, left: 4 };
+        assert_eq!(part(uneven), "13 × 22 of 17 × 28 pixels (stimulus.margin = [1, 2, 3, 4])");
+        assert_eq!(part(Margins::same(9)), "none of 17 × 28 pixels (stimulus.margin = 9)");
     }
 
     #[test]

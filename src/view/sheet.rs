@@ -3,12 +3,15 @@
 use crate::base::Grid;
 use crate::base::files::write_atomically;
 use crate::data::dataset::{Dataset, DatasetError, Split};
+use crate::task::stimulus::averaged;
 use std::io;
 use std::path::{Path, PathBuf};
 use tiny_skia::{IntSize, Pixmap};
 
-/// Pixels of the picture per pixel of an image.
+/// Pixels of the picture per pixel of a small image, and least side of a large one.
 const SCALE: usize = 3;
+/// Longest side of an image in the picture, pixels.
+const LONGEST: usize = 256;
 /// Pixels of the picture between two images and around them.
 const GAP: usize = 4;
 /// Grey of the gaps.
@@ -24,14 +27,18 @@ pub enum SheetError {
     Dataset(#[from] DatasetError),
     /// Nothing to show, or too much.
     #[error(
-        "a sheet of {classes} classes with {samples} images each has no sensible size; ask for 1 to {MAX_SIDE} \
-         pixels in each direction"
+        "a sheet of {classes} classes with {samples} images each has no sensible size: expected 1 to {MAX_SIDE} \
+         pixels in each direction, found {height} × {width}"
     )]
     Size {
         /// Number of rows of the sheet.
         classes: usize,
         /// Number of columns.
         samples: usize,
+        /// Rows of pixels.
+        height: usize,
+        /// Columns of pixels.
+        width: usize,
     },
     /// The picture cannot be made into a PNG.
     #[error("the contact sheet cannot be made into a PNG: {0}")]
@@ -46,35 +53,41 @@ pub enum SheetError {
     },
 }
 
-/// The first `samples` images of every class of a split, one class per row, each image three times
-/// its size; grey, 0 black.
+/// The first `samples` images of every class of a split, one class per row; grey, 0 black. Small
+/// images have three times their size, larger ones twice, once, or so little that their longest
+/// side has 256 pixels.
 ///
 /// # Errors
 /// [`SheetError::Size`] if that is nothing or too large, [`SheetError::Dataset`] if an image cannot
 /// be had.
 pub fn contact_sheet(dataset: &Dataset, split: Split, samples: usize) -> Result<Grid<u8>, SheetError> {
     let classes = dataset.classes(split);
-    let info = dataset.info();
-    let (tall, wide) =
-        info.splits.get(&split).map_or((0, 0), |s| (s.height * SCALE + GAP, s.width * SCALE + GAP));
-    let side = |count: usize, size: usize| {
-        count.checked_mul(size).map(|n| n + GAP).filter(|n| (GAP + 1..=MAX_SIDE).contains(n))
-    };
-    let (Some(height), Some(width)) = (side(classes.len(), tall), side(samples, wide)) else {
-        return Err(SheetError::Size { classes: classes.len(), samples });
-    };
+    let [rows, columns] = dataset.size(split).map_or([0, 0], shown);
+    let [tall, wide] = [rows + GAP, columns + GAP];
+    let side = |count: usize, size: usize| count.saturating_mul(size).saturating_add(GAP);
+    let (height, width) = (side(classes.len(), tall), side(samples, wide));
+    if classes.is_empty() || samples == 0 || height.max(width) > MAX_SIDE {
+        return Err(SheetError::Size { classes: classes.len(), samples, height, width });
+    }
     let mut sheet = Grid::filled(height, width, PAPER);
     for (row, &class) in classes.iter().enumerate() {
         for (column, &index) in dataset.indices_of(split, class).iter().take(samples).enumerate() {
             let image = dataset.image(split, index)?;
-            for r in 0..image.height() * SCALE {
-                for c in 0..image.width() * SCALE {
-                    sheet[(GAP + row * tall + r, GAP + column * wide + c)] = image[(r / SCALE, c / SCALE)];
-                }
+            for ((r, c), &grey) in averaged(&image, rows, columns).iter() {
+                sheet[(GAP + row * tall + r, GAP + column * wide + c)] = grey.round() as u8;
             }
         }
     }
     Ok(sheet)
+}
+
+/// Height and width in the picture of images of this size.
+fn shown([height, width]: [usize; 2]) -> [usize; 2] {
+    let longest = height.max(width).max(1);
+    [height, width].map(|side| match LONGEST / longest {
+        0 => (side * LONGEST / longest).max(SCALE),
+        scale => side * scale.min(SCALE),
+    })
 }
 
 /// Writes a grey picture as PNG; the file appears whole or not at all.
@@ -99,6 +112,8 @@ fn png(picture: &Grid<u8>) -> Result<Vec<u8>, SheetError> {
 mod tests {
     use super::*;
     use crate::data::builtin::BuiltinDigits;
+    use crate::data::files::places;
+    use crate::data::idx;
 
     #[test]
     fn a_sheet_has_a_row_per_class_and_a_column_per_sample() {
@@ -110,6 +125,29 @@ mod tests {
         let image = data.image(Split::Test, 4).unwrap();
         assert!(image.iter().all(|((r, c), &v)| sheet[(92 + 3 * r, 180 + 3 * c)] == v));
         assert_eq!(sheet[(0, 0)], PAPER);
+    }
+
+    #[test]
+    fn images_of_any_size_fit_in() {
+        assert_eq!(shown([28, 28]), [84, 84]);
+        assert_eq!(shown([100, 20]), [200, 40]);
+        assert_eq!(shown([200, 256]), [200, 256]);
+        assert_eq!(shown([600, 800]), [192, 256]);
+        assert_eq!(shown([1, 784]), [3, 256]);
+        let folder = tempfile::tempdir().unwrap();
+        let write = |name: &str, sizes: &[u32], values: Vec<u8>| {
+            std::fs::write(folder.path().join(name), [idx::header(sizes), values].concat()).unwrap();
+        };
+        // White on the left, black on the right.
+        let image: Vec<u8> = (0..600 * 800).map(|i| if i % 800 < 400 { 255 } else { 0 }).collect();
+        write("train-images-idx3-ubyte", &[2, 600, 800], image.repeat(2));
+        write("train-labels-idx1-ubyte", &[2], vec![0, 9]);
+        let data = Dataset::load("own", &places(Some(folder.path()), None, None), &[Split::Train]).unwrap();
+        let sheet = contact_sheet(&data, Split::Train, 16).unwrap();
+        assert_eq!((sheet.height(), sheet.width()), (2 * 196 + 4, 16 * 260 + 4));
+        assert_eq!([sheet[(100, 4 + 127)], sheet[(100, 4 + 128)]], [255, 0]);
+        let error = contact_sheet(&data, Split::Train, 100).unwrap_err().to_string();
+        assert!(error.contains("found 396 × 26004"), "{error}");
     }
 
     #[test]

@@ -37,6 +37,7 @@ pub fn evolution(console: &Console, finished: &Finished, out: &Path, goes_on: bo
             "folder": out.display().to_string(), "generations": run.generations, "stopped": finished.stopped,
             "best": best,
             "elites": elites, "stats": run.stats, "totals": totals,
+            "sees": run.config.stimulus.part(finished.size),
         });
         return console.event("finished", &done);
     }
@@ -66,6 +67,7 @@ pub fn evolution(console: &Console, finished: &Finished, out: &Path, goes_on: bo
         counted(run.generations, "generation", "generations"),
         duration(totals.seconds)
     ));
+    console.line(&format!("robots see {}", run.config.stimulus.part(finished.size)));
     let showings = (totals.simulated + totals.saved()).max(1) as f64;
     let share = |count: u64| percent(count as f64 / showings);
     console.line(&format!(
@@ -101,12 +103,13 @@ pub fn evolution(console: &Console, finished: &Finished, out: &Path, goes_on: bo
 
 /// After a training: the robot.
 pub fn training(console: &Console, finished: &train::Finished, out: &Path) {
-    let train::Finished { run, rollouts, .. } = finished;
+    let train::Finished { run, rollouts, size, .. } = finished;
     let Some(robot) = run.best() else { return };
     if console.mode() == Mode::Json {
         let done = serde_json::json!({
             "folder": out.display().to_string(), "robot": robot.id, "task": robot.task, "objective": robot.objective,
             "gait_of": robot.parent, "images": run.training_images.len(), "rollouts": rollouts,
+            "sees": run.config.stimulus.part(*size),
         });
         return console.event("trained", &done);
     }
@@ -119,6 +122,7 @@ pub fn training(console: &Console, finished: &train::Finished, out: &Path) {
         run.training_images.len(),
         counted(*rollouts, "rollout", "rollouts")
     ));
+    console.line(&format!("of an image it sees {}", run.config.stimulus.part(*size)));
     console.line(&format!("wrote {}", out.display()));
 }
 
@@ -300,6 +304,9 @@ pub fn dataset(console: &Console, found: &Found) {
         return console.event("dataset", &event);
     }
     console.line(&format!("{}: {} ({})", info.name, info.source, info.origin));
+    if info.splits.values().any(|split| split.transposed) {
+        console.line("its files are EMNIST's, mirrored and turned: its images are transposed");
+    }
     let mut rows = Vec::new();
     for (split, images) in &info.splits {
         console.line(&format!(

@@ -208,6 +208,29 @@ fn a_wrong_set_is_refused_with_2_and_quotes_it() {
         .ended(3, &["--set generations=0: ", "generations = 0"]);
 }
 
+#[test]
+fn configs_are_read_in_utf16_and_under_names_in_capitals() {
+    let sandbox = Sandbox::tiny();
+    sandbox.run("evolve -q -c tiny.toml -o run").ended(0, &[]);
+    // As PowerShell writes `morphcog config … > own.toml`.
+    let units: Vec<u16> = std::iter::once(0xfeff).chain(TINY.encode_utf16()).collect();
+    sandbox.write("OWN.TOML", units.iter().flat_map(|unit| unit.to_le_bytes()).collect::<Vec<u8>>());
+    sandbox.write("BIG.TOML", units.iter().flat_map(|unit| unit.to_be_bytes()).collect::<Vec<u8>>());
+    let table: toml::Table = toml::from_str(TINY).unwrap();
+    sandbox.write("OWN.JSON", serde_json::to_string(&table).unwrap());
+    for name in ["OWN.TOML", "BIG.TOML", "OWN.JSON"] {
+        sandbox.run(&format!("evolve -q -c {name} -o run-{name}")).ended(0, &[]);
+        assert_eq!(sandbox.run_file(&format!("run-{name}")).elites, sandbox.run_file("run").elites);
+    }
+    sandbox.write("half.toml", [0xff, 0xfe, b'a']);
+    sandbox.run("evolve -c half.toml -o none").ended(3, &["half.toml: cannot be read", "UTF-8"]);
+    // A resumed run's own config is compared with it.
+    sandbox.run("evolve -q -c OWN.TOML -o run-OWN.TOML -g 14 --resume").ended(0, &[]);
+    let criteria = "{\"seconds\": \"no\"}";
+    sandbox.write("CRITERIA.JSON", criteria);
+    sandbox.run("audit -a run --criteria CRITERIA.JSON -o a.json").ended(3, &["CRITERIA.JSON:1"]);
+}
+
 /// What `config` prints of `own.toml`, [`TINY`] for gaits, with some overrides.
 fn changed(sandbox: &Sandbox, set: &[&str]) -> toml::Table {
     let set = set.iter().flat_map(|set| ["--set", set]);

@@ -1,6 +1,6 @@
 //! Datasets: what is missing or broken.
 
-use crate::common::program::{Sandbox, said};
+use crate::common::program::{Sandbox, said, write_images};
 
 #[test]
 fn missing_data_are_refused_naming_file_place_and_remedy() {
@@ -96,4 +96,46 @@ fn data_info_and_sheet_work_on_the_built_in_digits() {
     assert!(std::fs::read(sandbox.path("made.png")).unwrap().starts_with(b"\x89PNG"));
     sandbox.run("data sheet -o none.png --samples 0").ended(2, &["--samples"]);
     assert!(!sandbox.path("none.png").exists());
+}
+
+#[test]
+fn data_info_and_sheet_say_that_emnist_is_transposed_and_do_so_with_other_images_if_asked() {
+    let sandbox = Sandbox::new();
+    write_images(&sandbox, "there/emnist-letters-", [6, 9], 1);
+    write_images(&sandbox, "own/", [6, 9], 1);
+    let info = |args: &str| sandbox.run(&format!("data info {args}")).ended(0, &[]).out;
+    let sum = |said: &str| said.lines().find(|line| line.starts_with("train: ")).unwrap().to_string();
+    let emnist = info("letters --data there");
+    assert!(emnist.contains("transposed") && emnist.contains("images of 9 × 6"), "{emnist}");
+    assert!(info("own --data own").contains("images of 6 × 9"));
+    assert_eq!(sum(&info("own --data own --transpose true")), sum(&emnist));
+    assert_eq!(sum(&info("letters --data there --transpose false")), sum(&info("own --data own")));
+    let json = &sandbox.run("data info letters --data there --json").ended(0, &[]).json_lines()[0];
+    assert_eq!(json["splits"]["train"]["transposed"], true);
+    sandbox.run("data sheet letters --data there -o turned.png").ended(0, &["transposed"]);
+    sandbox.run("data sheet own --data own -o stored.png").ended(0, &[]);
+    let [turned, stored] =
+        ["turned.png", "stored.png"].map(|name| std::fs::read(sandbox.path(name)).unwrap());
+    assert_ne!(turned, stored);
+}
+
+#[test]
+#[cfg(unix)]
+fn a_link_that_leads_nowhere_is_an_error() {
+    let sandbox = Sandbox::new();
+    write_images(&sandbox, "own/", [6, 9], 1);
+    std::fs::remove_file(sandbox.path("own/t10k-images-idx3-ubyte")).unwrap();
+    sandbox.run("data info own --data own").ended(0, &["warning: test: "]);
+    std::os::unix::fs::symlink("gone", sandbox.path("own/t10k-images-idx3-ubyte")).unwrap();
+    sandbox
+        .run("data info own --data own")
+        .ended(3, &["error: test: ", "own/t10k-images-idx3-ubyte", "link to gone, which is not there"]);
+}
+
+#[test]
+fn a_download_that_fails_says_what_does_without() {
+    let sandbox = Sandbox::new();
+    let said = sandbox.run("data fetch --mirror http://127.0.0.1:1").ended(1, &["--data", "builtin"]);
+    assert_eq!(said.err.matches("127.0.0.1:1/train-images").count(), 1, "{}", said.err);
+    assert!(!sandbox.path("data").exists());
 }

@@ -169,6 +169,28 @@ impl Sandbox {
     }
 }
 
+/// An IDX dataset of zeros and ones, in files whose paths begin with `prefix`: noise with a bar, of
+/// the first ones upright; `seed` decides which noise.
+pub fn write_images(sandbox: &Sandbox, prefix: &str, [height, width]: [usize; 2], seed: u8) {
+    let header = |sizes: &[u32]| {
+        let magic = [0, 0, 8, sizes.len() as u8];
+        [&magic[..], &sizes.iter().flat_map(|size| size.to_be_bytes()).collect::<Vec<_>>()].concat()
+    };
+    for (split, count) in [("train", 120u32), ("t10k", 24)] {
+        let pixel = |image: u32, place: usize| {
+            let (row, column) = (place / width, place % width);
+            let on_bar = if image % 2 == 1 { column / 2 == 2 } else { row / 2 == 2 };
+            let noise = (place as u32 + 31 * image).wrapping_mul(2_654_435_761).to_be_bytes()[0] ^ seed;
+            if on_bar { 255 } else { noise / 3 }
+        };
+        let pixels = (0..count).flat_map(|image| (0..height * width).map(move |place| pixel(image, place)));
+        let images = [header(&[count, height as u32, width as u32]), pixels.collect()].concat();
+        let labels = [header(&[count]), (0..count).map(|image| (image % 2) as u8).collect()].concat();
+        sandbox.write(&format!("{prefix}{split}-images-idx3-ubyte"), images);
+        sandbox.write(&format!("{prefix}{split}-labels-idx1-ubyte"), labels);
+    }
+}
+
 /// Runs a command. Whatever it is asked, it must not panic.
 #[track_caller]
 pub fn said(mut command: Command) -> Said {

@@ -9,9 +9,12 @@ use crate::config::{BodyConfig, Config, DataConfig, reading};
 use crate::data::dataset::{Dataset, Split};
 use crate::search::held_out;
 use crate::search::training::{Training, scarcest};
-use crate::store::whereabouts::Whereabouts;
+use crate::store::images::DatasetRef;
+use crate::store::whereabouts::{Whereabouts, part_of_others, size_of};
 use crate::task::fitness::Fitness;
+use crate::task::margins::Margins;
 use crate::task::protocol::{Protocol, RolloutMode};
+use crate::task::stimulus::StimulusParams;
 
 /// Least number of training images of a class.
 const LEAST_PER_CLASS: usize = 2;
@@ -73,6 +76,42 @@ fn fixed(config: &Config, asked: &Config) -> Result<(), Error> {
     match fixed.into_iter().find(|(_, is_set, _)| *is_set) {
         Some((key, _, has)) => Err(Error::at(key, format!("expected without: a training {has}"))),
         None => Ok(()),
+    }
+}
+
+/// The same for a dataset: a margin that was not asked for, but is that of the gaits' own images, is
+/// left out where those have another size. `of_gaits` is what the gaits' config says, and
+/// `their_data` which data those are; none of the published robots.
+pub(crate) fn sized(
+    config: Config,
+    their_data: Option<&DatasetRef>,
+    of_gaits: &Config,
+    dataset: &Dataset,
+    set: &[String],
+    observer: &dyn Observer,
+) -> Config {
+    let is_asked = set.iter().any(|assignment| reading::sets(assignment, "stimulus.margin"));
+    let size = size_of(their_data, &of_gaits.data.dataset, dataset);
+    let (said, shown) = (part_of_others(&config, size, dataset, Split::Train), dataset.size(Split::Train));
+    match (said, size, shown) {
+        (None, ..) => config,
+        (Some(_), Some([height, width]), Some(shown)) if !is_asked => {
+            let margin = config.stimulus.margin;
+            let config = Config {
+                stimulus: StimulusParams { margin: Margins::default(), ..config.stimulus },
+                ..config
+            };
+            observer.warning(&format!(
+                "stimulus.margin = {margin} is for the gaits' images of {height} × {width} pixels: \
+                 of these, robots see {}",
+                config.stimulus.part(shown)
+            ));
+            config
+        }
+        (Some(said), ..) => {
+            observer.warning(&said);
+            config
+        }
     }
 }
 

@@ -10,7 +10,7 @@ mod log;
 mod trainer;
 
 pub use config::check;
-pub(crate) use config::{config_of, with_images};
+pub(crate) use config::{config_of, sized, with_images};
 
 use crate::base::error::Error;
 use crate::base::files::write_atomically;
@@ -73,6 +73,8 @@ pub struct Finished {
     pub run: RunFile,
     /// Rollouts simulated in all, validation left out.
     pub rollouts: usize,
+    /// Height and width of the training images.
+    pub size: [usize; 2],
     /// How the robot did on validation images; `None` if that was stopped.
     pub validated: Option<Vec<Validated>>,
 }
@@ -113,6 +115,9 @@ pub fn train(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> R
         .and_of(&options.archive);
     let config = config_of(&source.run.config, &options.groups, options.seed, &options.set)?;
     let dataset = whereabouts.load(&config.data, &[Split::Train])?;
+    whereabouts::say_transposed(&dataset, &config.data, observer);
+    let of_gaits = &source.run;
+    let config = sized(config, Some(&of_gaits.dataset), &of_gaits.config, &dataset, &options.set, observer);
     let origin = origin(&source, &config, &dataset)?;
     let config = with_images(config, &origin.trained_on, &dataset, observer)?;
     let mut training = Training::of(&config, &dataset)?;
@@ -170,7 +175,8 @@ pub fn train(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> R
         0 => Some(Vec::new()),
         _ => validation::at_end(&archive, &dataset, &pool, stop, observer)?,
     };
-    Ok(Finished { run, rollouts: log.simulated, validated })
+    let size = dataset.size(Split::Train).expect("a training loads its training images");
+    Ok(Finished { run, rollouts: log.simulated, size, validated })
 }
 
 /// Whether a training has a folder of its own: that of its gaits would be lost.
