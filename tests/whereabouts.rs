@@ -283,7 +283,7 @@ fn a_tilde_in_a_path_is_the_home_folder() {
     at_home(&format!("{evolve} -o runs/three --data=~/there")).ended(0, &[]);
     at_home("data info shapes --data=~/there").ended(0, &[]);
     // What a folder is really called is no home folder.
-    sandbox.run(&format!("{evolve} -o runs/four --data=~there")).ended(3, &["~"]);
+    sandbox.run("evolve -c shapes.toml -o runs/four --data=~there").ended(3, &["~there"]);
     sandbox.write(
         "plans/plan.toml",
         "archive = \"~/runs/one\"\nrobots = \"top:1\"\ngroups = [\"0|1\"]\n\
