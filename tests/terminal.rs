@@ -7,6 +7,7 @@ mod common;
 use common::program::{PROGRAM, SETTINGS, Sandbox};
 use pty_process::Size;
 use pty_process::blocking::{self, Pty};
+use std::collections::BTreeSet;
 use std::io::{Read, Write};
 use std::process::Child;
 use std::sync::Arc;
@@ -117,15 +118,164 @@ fn ctrl_c_ends_a_film_and_the_terminal_is_as_it_was() {
     film.shows("as before, code=0");
 }
 
+/// What a command shows in a terminal of so many columns, without colours: whatever stood in a line at
+/// any time is a line.
+fn shown(sandbox: &Sandbox, args: &str, columns: u16) -> Vec<String> {
+    let (pty, place) = blocking::open().unwrap();
+    pty.resize(Size::new(24, columns)).unwrap();
+    let mut command = blocking::Command::new(PROGRAM)
+        .current_dir(sandbox.path("."))
+        .args(args.split_whitespace())
+        .env("TERM", "xterm-256color");
+    for name in SETTINGS.iter().filter(|name| **name != "TERM") {
+        command = command.env_remove(name);
+    }
+    let mut program = command.spawn(place).unwrap();
+    let (mut bytes, mut piece) = (Vec::new(), [0; 4096]);
+    // Reading from a closed terminal is an error.
+    while let Ok(count @ 1..) = (&pty).read(&mut piece) {
+        bytes.extend_from_slice(&piece[..count]);
+    }
+    let code = program.wait().unwrap().code();
+    let text = String::from_utf8(bytes).unwrap();
+    assert!(code.is_some_and(|code| code != 101), "{args}: {text}");
+    let mut parts = text.split("\x1b[");
+    let mut seen = parts.next().unwrap_or_default().to_string();
+    for part in parts {
+        let end = part.find(|c: char| c.is_ascii_alphabetic()).unwrap();
+        seen += &part[end + 1..];
+    }
+    seen.split(['\r', '\n']).map(|line| line.trim_end().to_string()).collect()
+}
+
+/// Checks that no line is wider than the terminal, but for a single word that is.
+#[track_caller]
+fn check_widths(args: &str, lines: &[String], columns: u16) {
+    for line in lines {
+        let is_word = !line.trim_start().trim_end_matches('\\').trim_end().contains(' ');
+        let fits = line.chars().count() <= usize::from(columns);
+        assert!(fits || is_word, "{args}: {columns} columns: {line:?} in:\n{}", lines.join("\n"));
+    }
+}
+
+/// Words that are no numbers: those depend on the clock.
+fn words(text: &str) -> BTreeSet<&str> {
+    let is_word = |word: &&str| word.contains(char::is_alphabetic);
+    text.split_whitespace().map(|word| word.trim_matches('`')).filter(is_word).collect()
+}
+
 #[test]
-fn a_table_that_is_wider_than_the_terminal_is_one_robot_below_the_other() {
+fn every_help_fits_a_terminal_and_its_words_are_whole() {
+    let sandbox = Sandbox::new();
+    let commands = "|demo|serve|evolve|response|train|eval|team|audit|capacity|sweep|reproduce|report|\
+                    replay|plot|simulate|data|data fetch|data info|data sheet|bench|gallery|config|schema|\
+                    completions|man";
+    for command in commands.split('|') {
+        let args = format!("{command} --help");
+        let whole = sandbox.run(&args).ended(0, &[]).out;
+        assert!(whole.lines().all(|line| line.chars().count() <= 80), "{command}: {whole}");
+        for columns in [80, 60] {
+            let lines = shown(&sandbox, &args, columns);
+            check_widths(&args, &lines, columns);
+            assert_eq!(words(&lines.join(" ")), words(&whole), "{command}");
+        }
+        // Narrower than any word, it is still there.
+        shown(&sandbox, &args, 20);
+    }
+}
+
+/// The indented lines below a line of help.
+fn example(help: &[String], title: &str) -> String {
+    let below = help.iter().skip_while(|line| *line != title).skip(1);
+    below
+        .filter(|line| !line.is_empty())
+        .take_while(|line| line.starts_with(' '))
+        .cloned()
+        .collect::<Vec<_>>()
+        .join("\n")
+}
+
+#[test]
+fn a_plan_and_a_scenario_are_copied_from_help_as_they_are() {
+    for columns in [80, 60] {
+        let sandbox = Sandbox::new();
+        sandbox.write("plan.toml", example(&shown(&sandbox, "sweep --help", columns), "plan.toml:"));
+        let status = sandbox.run("sweep plan.toml --status").ended(0, &[]).out;
+        assert!(status.contains("9 tasks"), "{status}");
+        sandbox
+            .write("scenario.json", example(&shown(&sandbox, "simulate --help", columns), "scenario.json:"));
+        let walk = sandbox.run("simulate scenario.json").ended(0, &[]).out;
+        assert!(walk.lines().count() > 500, "{walk}");
+    }
+}
+
+#[test]
+fn what_commands_find_fits_a_terminal_and_its_words_are_whole() {
     let sandbox = Sandbox::tiny();
     sandbox.run("evolve -q -c tiny.toml -o run").ended(0, &[]);
-    let mut table = Session::new(&sandbox, "eval -q -a run --images 4 --cycles 1 --robots best");
-    // The table of robots has ten columns, and 130 characters of them.
-    table.shows("\r\nfitness ");
-    table.shows("\r\nbalanced %");
-    table.shows("as before, code=0");
+    sandbox.write(
+        "plan.toml",
+        "config = \"tiny.toml\"\nseeds = [1, 2]\n[vary]\nmap_elites.parents = [4, 8]\n[eval]\nimages = 4\n",
+    );
+    sandbox.run("sweep plan.toml -q").ended(0, &[]);
+    for args in [
+        "evolve -q -c tiny.toml -o another --force",
+        "eval -q -a run --images 4 --cycles 1",
+        "audit -q -a run --robots top:2",
+        "response -q -a run --images 60",
+        "capacity -q --eval run/eval.json --set trainings=2 --set sizes=[1,3]",
+        "team -q -a run --classes 0,1 --images 20",
+        "report -q -a run --rollouts 0",
+        "replay -q -a run --format png",
+        "plot archive -q -a run",
+        "sweep plan.toml -q --status",
+        "sweep plan.toml -q --collect",
+        "reproduce -q --status",
+        "data info -q",
+        "data sheet -q -o sheet.png --samples 1",
+        "gallery -q",
+        "config -q",
+        "schema -q",
+        // What is wrong, and what to do.
+        "eval -a a_folder_with_a_long_name/in_another_with_a_longer_one/run.json",
+        "evolve -c tiny.toml -o run",
+        "evolve -c tiny.toml --set map_elites.parent=3",
+        "eval --robots worst:3",
+        "evolve",
+        "audit -a run --physical-only",
+        "eval -a run --physical-only",
+    ] {
+        let piped = sandbox.run(args);
+        let whole = piped.out.clone() + &piped.err;
+        for columns in [80, 60] {
+            let lines = shown(&sandbox, args, columns);
+            check_widths(args, &lines, columns);
+            let text = lines.join(" ");
+            assert_eq!(words(&text), words(&whole), "{args}: {columns} columns");
+        }
+        shown(&sandbox, args, 20);
+    }
+}
+
+#[test]
+fn progress_and_what_is_next_fit_a_terminal() {
+    let sandbox = Sandbox::tiny();
+    let out = "a_folder_with_a_long_name/in_another/with_a_name_that_is_longer";
+    for columns in [80, 60, 20] {
+        let args = format!("evolve -c tiny.toml --force -o {out}");
+        let lines = shown(&sandbox, &args, columns);
+        check_widths(&args, &lines, columns);
+        if columns > 20 {
+            assert!(lines.iter().any(|line| line.contains(" left")), "{lines:?}");
+        }
+        // A command goes on where the line above it says so.
+        let text = lines.join("\n").replace("\n\n", "\n");
+        let (_, next) = text.split_once("next:").unwrap();
+        let next: Vec<&str> = next.split_whitespace().filter(|word| *word != "\\").collect();
+        let command =
+            format!("morphcog replay --robot best --archive {out}/run.json morphcog eval --archive");
+        assert!(next.join(" ").starts_with(&command), "{text}");
+    }
 }
 
 #[test]

@@ -11,6 +11,7 @@ pub mod number;
 pub mod observer;
 pub mod random;
 pub mod ranks;
+pub mod shell;
 pub mod shipped;
 pub mod signals;
 pub mod statistics;

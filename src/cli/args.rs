@@ -37,7 +37,7 @@ use std::path::PathBuf;
 /// together by evolution so that the robot walks one way when it sees a zero and the other way when
 /// it sees a one: no neurons, no controller.
 #[derive(Debug, Parser)]
-#[command(name = "morphcog", version, after_help = EXAMPLES, max_term_width = 100)]
+#[command(name = "morphcog", version, after_help = EXAMPLES, max_term_width = 80)]
 pub struct Cli {
     #[command(subcommand)]
     pub(super) command: Command,
@@ -60,32 +60,48 @@ from 1); without a value, such as data.train_images=, it is reset to its default
 
 const EXAMPLES: &str = "\
 Examples:
-  morphcog demo                                about a minute, no download
-  morphcog serve                               draw a digit, and watch a body read it
-  morphcog evolve --config quickstart.toml     small robots from nothing
-  morphcog replay --robot best                 watch the fittest robot of the newest run
-  morphcog data fetch mnist                    then the paper's experiments:
+  # a first look, no download
+  morphcog demo
+  # draw a digit, and watch a body read it
+  morphcog serve
+  # small robots from nothing
+  morphcog evolve --config quickstart.toml
+  # watch the fittest robot of the newest run
+  morphcog replay --robot best
+  # the paper's experiments
+  morphcog data fetch mnist
   morphcog evolve --config zero_one.toml
-  morphcog eval --archive runs/zero_one-seed1/run.json --images 1000 --robots top:10
+  morphcog eval --archive runs/zero_one-seed1 --robots top:10
 
 Exit codes:
-  0 done   1 failed   2 wrong command line   3 wrong or missing input file   4 rollout unstable (simulate)
-  5 run folder taken   75 stopped by a signal, saved, can be resumed   130 stopped at once";
+  0    done
+  1    failed
+  2    wrong command line
+  3    wrong or missing input file
+  4    rollout unstable (simulate)
+  5    run folder taken
+  75   stopped by a signal, saved, can be resumed
+  130  stopped at once";
 
 #[derive(Debug, Subcommand)]
 pub(super) enum Command {
-    /// A first look: train a body for about a minute, and test it.
+    /// A first look: train a body, and test it.
     #[command(after_help = demo::EXAMPLES)]
     Demo(DemoArgs),
     /// Evolve bodies with MAP-Elites.
     #[command(after_help = "\
 Examples:
   morphcog evolve --config quickstart.toml
-  morphcog evolve --config zero_one.toml --seed 2 --generations 1000
-  morphcog evolve --config zero_one.toml --seed 2 --generations 30000 --resume   goes on with that run
-  morphcog evolve --config zero_one.toml --set map_elites.parents=40 --out runs/forty
+  morphcog evolve --config zero_one.toml --seed 2 \\
+    --generations 1000
+  # goes on with that run
+  morphcog evolve --config zero_one.toml --seed 2 \\
+    --generations 30000 --resume
+  morphcog evolve --config zero_one.toml \\
+    --set map_elites.parents=40 --out runs/forty
 
-Ctrl-C (or SIGTERM, SIGUSR1) drops the generation under way, saves and exits with 75; a second Ctrl-C ends at once.")]
+Ctrl-C (or SIGTERM, SIGUSR1) drops the generation under way, saves and exits with 75; a second \
+Ctrl-C ends at once.")]
     Evolve(EvolveArgs),
     /// Measure how far each soft voxel and sensor of a robot moves it, and what it could be taught.
     #[command(after_help = response::EXAMPLES)]
@@ -96,11 +112,15 @@ Ctrl-C (or SIGTERM, SIGUSR1) drops the generation under way, saves and exits wit
     /// Test robots on held-out images.
     #[command(after_help = "\
 Examples:
-  morphcog eval --archive runs/zero_one-seed1/run.json --images 1000
-  morphcog eval --archive runs/zero_one-seed1/run.json --robots top:10
-  morphcog eval --archive runs/zero_one-seed1/run.json --robots 3fa,b02 -o two.json
-  morphcog eval --archive runs/zero_one-seed*/run.json --robots random:10 --physical-only    the paper's test
-  morphcog eval --robots gallery                       the robots published with the paper")]
+  morphcog eval --archive runs/zero_one-seed1 --images 1000
+  morphcog eval --archive runs/zero_one-seed1 --robots top:10
+  morphcog eval --archive runs/zero_one-seed1 \\
+    --robots 3fa,b02 -o two.json
+  # the paper's test
+  morphcog eval --archive runs/zero_one-seed* \\
+    --robots random:10 --physical-only
+  # the robots published with the paper
+  morphcog eval --robots gallery")]
     Eval(EvalArgs),
     /// Let robots of several runs answer together which class an image is of.
     #[command(after_help = team::EXAMPLES)]
@@ -124,10 +144,14 @@ Examples:
     #[command(after_help = "\
 Examples:
   morphcog replay --robot best
-  morphcog replay --robot 3fa --archive runs/zero_one-seed1/run.json --images train:1,test:17
-  morphcog replay --robot XFJPI            a robot published with the paper (see morphcog gallery)
-  morphcog replay --robot best --format terminal           space pauses, . steps, q quits
-  morphcog replay --robot best-validation:1                the best on validation images
+  morphcog replay --robot 3fa --archive runs/zero_one-seed1 \\
+    --images train:1,test:17
+  # a robot published with the paper (see morphcog gallery)
+  morphcog replay --robot XFJPI
+  # in the terminal: space pauses, . steps, q quits
+  morphcog replay --robot best --format terminal
+  # the best on validation images
+  morphcog replay --robot best-validation:1
   morphcog replay --robot best -o walk.gif")]
     Replay(ReplayArgs),
     /// Make a figure: SVG and PNG for papers and pages.
@@ -137,15 +161,20 @@ Examples:
     #[command(after_help = "\
 Examples:
   morphcog simulate scenario.json --out traj.csv
-  jq '.control_steps = 50' scenario.json | morphcog simulate - --points > points.csv
+  jq '.control_steps = 50' scenario.json |
+    morphcog simulate - --points > points.csv
 
 scenario.json:
-  {\"body\": [[3, 3, 6], [4, 0, 5]],         rows from the top; 0 empty, 1 rigid, 2 soft, 3 and 4 muscle (in phase,
-                                           antiphase), 5 and 6 sensor (shrinks, expands)
-   \"stimulus\": [[0, 0.5, 1], [0, 0, 1]],   one pixel per voxel, 0 to 1; or \"stimuli\": [...], \"switch_every\": 500
-   \"control_steps\": 500, \"start_row\": 2, \"start_column\": 493, \"reset_between\": false}
+  {\"body\": [[3, 3, 6], [4, 0, 5]],
+   \"stimulus\": [[0, 0.5, 1], [0, 0, 1]],
+   \"control_steps\": 500, \"start_row\": 2,
+   \"start_column\": 493, \"reset_between\": false}
 
-Output: step,com_x,com_y in world units (a voxel is 0.1); with --points also x_0,y_0,… and pixel_0_0,….
+body: rows from the top; 0 empty, 1 rigid, 2 soft, 3 and 4 muscle (in phase, antiphase), 5 and 6 \
+sensor (shrinks, expands). stimulus: one pixel per voxel, 0 to 1; or \"stimuli\": [...] with \
+\"switch_every\": 500.
+
+Output: step,com_x,com_y in world units (a voxel is 0.1); with --points also x_0,y_0,… and pixel_0_0,…. \
 Exit code 4 if the rollout becomes unstable.")]
     Simulate(SimulateArgs),
     /// Draw a digit and watch robots walk, in the browser.
@@ -184,7 +213,7 @@ Examples:
     },
     /// Completions for a shell.
     #[command(
-        after_help = "Example:\n  morphcog completions bash > ~/.local/share/bash-completion/completions/morphcog"
+        after_help = "Example:\n  morphcog completions bash \\\n    > ~/.local/share/bash-completion/completions/morphcog"
     )]
     Completions {
         /// The shell.
@@ -427,6 +456,50 @@ impl Cli {
             (true, _) => Mode::Quiet,
             (_, true) => Mode::Json,
             _ => Mode::Human,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cli::values::with_negative_numbers;
+    use clap::{Command, CommandFactory};
+
+    /// The commands in the examples of a help, as a shell reads them.
+    fn examples(help: &str) -> Vec<Vec<String>> {
+        let help = help.replace(" \\\n", " ").replace(" |\n", " | ");
+        let lines = help.lines().filter(|line| line.starts_with("  ") && !line.trim_start().starts_with('#'));
+        let begin = |line: &str| line.find("morphcog ").map(|place| line[place..].to_string());
+        let ends = [" | ", " > ", " && "];
+        let command = |line: String| {
+            let end = ends.iter().filter_map(|end| line.find(end)).min().unwrap_or(line.len());
+            line[..end].replace('"', "").split_whitespace().map(str::to_string).collect()
+        };
+        lines.filter_map(begin).map(command).collect()
+    }
+
+    fn check(command: &mut Command, columns: usize, count: &mut usize) {
+        let mut narrow = command.clone().term_width(columns);
+        let help = narrow.render_help().to_string();
+        let (_, footer) = help.rsplit_once("Example").unwrap();
+        for words in examples(footer) {
+            let read = with_negative_numbers(Cli::command()).try_get_matches_from(&words);
+            assert!(read.is_ok(), "{columns} columns: {words:?}: {}", read.unwrap_err());
+            *count += 1;
+        }
+        for sub in command.get_subcommands_mut().filter(|sub| sub.get_name() != "help") {
+            check(sub, columns, count);
+        }
+    }
+
+    #[test]
+    fn every_example_of_every_help_is_a_command() {
+        for columns in [60, 80] {
+            let (mut command, mut count) = (Cli::command(), 0);
+            command.build();
+            check(&mut command, columns, &mut count);
+            assert!(count > 80, "{count}");
         }
     }
 }

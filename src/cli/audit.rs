@@ -25,14 +25,18 @@ use std::sync::atomic::AtomicBool;
 
 pub(super) const EXAMPLES: &str = "\
 Examples:
-  morphcog audit --archive runs/zero_one-seed1/run.json
-  morphcog audit --archive runs/zero_one-seed1/run.json --robots top:10
-  morphcog audit --archive runs/zero_one-seed1/run.json --robots best-validation:3
+  morphcog audit --archive runs/zero_one-seed1
+  morphcog audit --archive runs/zero_one-seed1 --robots top:10
+  morphcog audit --archive runs/zero_one-seed1 \\
+    --robots best-validation:3
   morphcog audit --archive runs/zero_one-seed*
-  morphcog audit --robots gallery                     the robots published with the paper
-  morphcog audit --set perturbations.time_step=[2,4,8] --set threshold=2
+  # the robots published with the paper
+  morphcog audit --robots gallery
+  morphcog audit --set perturbations.time_step=[2,4,8] \\
+    --set threshold=2
 then
-  morphcog eval --archive runs/zero_one-seed1/run.json --robots random:10 --physical-only";
+  morphcog eval --archive runs/zero_one-seed1 \\
+    --robots random:10 --physical-only";
 
 #[derive(Debug, Args)]
 pub(super) struct AuditArgs {

@@ -17,10 +17,15 @@ use std::path::PathBuf;
 
 pub(super) const EXAMPLES: &str = "\
 Examples:
-  morphcog eval --archive runs/zero_one-seed*/run.json --robots random:10 --physical-only -o runs/eval.json
-  morphcog capacity --eval runs/eval.json             networks of sizes 1 to 45, 50 trainings each
-  morphcog capacity --eval runs/eval.json --clean     early stopping waits on other images than the test's
-  morphcog capacity --eval runs/eval.json --set trainings=10 --set step=4 --set mlp.learning_rate=0.003";
+  morphcog eval --archive runs/zero_one-seed* \\
+    --robots random:10 --physical-only -o runs/eval.json
+  # networks of sizes 1 to 45, 50 trainings each
+  morphcog capacity --eval runs/eval.json
+  # early stopping waits on other images than the test's
+  morphcog capacity --eval runs/eval.json --clean
+  morphcog capacity --eval runs/eval.json \\
+    --set trainings=10 --set step=4 \\
+    --set mlp.learning_rate=0.003";
 
 #[derive(Debug, Args)]
 pub(super) struct CapacityArgs {

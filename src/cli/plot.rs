@@ -17,20 +17,26 @@ use std::path::PathBuf;
 
 pub(super) const EXAMPLES: &str = "\
 Kinds:
-  body         a robot's voxels by material
-  spacetime    its position over time, seen from above
-  snapshots    poses of its rollout laid over each other
-  archive      fitness over muscle, sensor and total voxels
-  progress     QD score, coverage and best fitness; several archives (seeds) make a band
-  accuracy     what morphcog eval found (eval.json beside run.json, or the file that --archive names)
-  capacity     what morphcog capacity found (capacity.json beside run.json, or the file that --archive names)
-With several robots or archives, every kind but progress makes one figure for each.
+  body       a robot's voxels by material
+  spacetime  its position over time, seen from above
+  snapshots  poses of its rollout laid over each other
+  archive    fitness over muscle, sensor and total voxels
+  progress   QD score, coverage and best fitness; several
+             archives (seeds) make a band
+  accuracy   what morphcog eval found
+  capacity   what morphcog capacity found
+
+With several robots or archives, every kind but progress makes one figure for each. accuracy and \
+capacity read eval.json and capacity.json beside run.json, or the file that --archive names.
 
 Examples:
-  morphcog plot archive --archive runs/zero_one-seed1/run.json
-  morphcog plot body --robot best --robot 3fa -a runs/zero_one-seed1/run.json
-  morphcog plot snapshots --robot YJTLA -o yjtla.svg         a robot published with the paper
-  morphcog plot spacetime --images train:1,test:17 -o walk.png --dpi 600
+  morphcog plot archive --archive runs/zero_one-seed1
+  morphcog plot body --robot best --robot 3fa \\
+    --archive runs/zero_one-seed1
+  # a robot published with the paper
+  morphcog plot snapshots --robot YJTLA -o yjtla.svg
+  morphcog plot spacetime --images train:1,test:17 \\
+    -o walk.png --dpi 600
   morphcog plot body --robot top:3
   morphcog plot progress --archive runs/zero_one-seed*";
 

@@ -89,6 +89,11 @@ fn say(help: &clap::Error, arguments: &[OsString]) -> u8 {
         Console::new(Mode::Human).error(&io::Error::other(text.trim_start_matches("error: ").trim()), None);
         return code;
     }
+    if help.use_stderr() {
+        let text = help.render();
+        Console::new(Mode::Human).usage(&text.to_string(), &text.ansi().to_string());
+        return code;
+    }
     match help.print() {
         Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
             Console::new(Mode::Human).error(&error, None);

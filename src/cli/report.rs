@@ -17,9 +17,10 @@ pub(super) const EXAMPLES: &str = "\
 Examples:
   morphcog report --archive runs/zero_one-seed1
   morphcog report --archive runs/zero_one-seed* -o seeds.html
-  morphcog report --archive runs/zero_one-seed1 --rollouts 20 --open
+  morphcog report --archive runs/zero_one-seed1 \\
+    --rollouts 20 --open
 
-What lies beside a run.json is part of its report: metrics.csv, eval.json, audit.json,
+What lies beside a run.json is part of its report: metrics.csv, eval.json, audit.json, \
 capacity.json. With several runs, their common results are looked for in the folder above them.";
 
 #[derive(Debug, Args)]

@@ -1,13 +1,13 @@
 //! `morphcog reproduce`: its words, and what it calls.
 
 use crate::base::error::Error;
+use crate::base::shell::quoted;
 use crate::base::signals;
 use crate::cli::tasks::{Command, What, Where, asked, ended};
 use crate::cli::values::decimal;
 use crate::commands::plan::{PAPER_TOML, Plan};
 use crate::commands::reproduce;
 use crate::commands::reproduce::Options;
-use crate::store::folder::in_shell;
 use crate::view::console::Console;
 use crate::view::networks;
 use crate::view::reporters::Reporter;
@@ -16,12 +16,14 @@ use std::path::{Path, PathBuf};
 
 pub(super) const EXAMPLES: &str = "\
 Examples:
-  morphcog reproduce paper.toml --scale 0.01      the same steps with a hundredth of the generations
-  morphcog reproduce paper.toml                   all of it
+  # the same steps with a hundredth of the generations
+  morphcog reproduce paper.toml --scale 0.01
+  # all of it
+  morphcog reproduce paper.toml
   morphcog reproduce mine.toml --set seeds=[1,2] --out mine
 
-Evolves every experiment from every seed, audits robots until enough are found physical, tests them
-on held-out images, finds the networks that are as accurate, and prints the paper's table. Ctrl-C
+Evolves every experiment from every seed, audits robots until enough are found physical, tests them \
+on held-out images, finds the networks that are as accurate, and prints the paper's table. Ctrl-C \
 stops it anywhere; the same command goes on.";
 
 #[derive(Debug, Args)]
@@ -89,8 +91,4 @@ fn absolute(path: &str) -> Result<String, Error> {
     let path = Path::new(path);
     let absolute = std::path::absolute(path).map_err(|error| Error::reading(path, &error))?;
     Ok(absolute.to_string_lossy().into_owned())
-}
-
-fn quoted(text: &str) -> String {
-    in_shell(Path::new(text))
 }

@@ -23,16 +23,21 @@ use std::path::{Path, PathBuf};
 pub(super) const EXAMPLES: &str = "\
 Examples:
   morphcog response --archive runs/gaits
-  morphcog response --archive runs/gaits --robots top:4 --task \"4|9\"   what they could be taught
-  morphcog response --robots YJTLA                                      a published robot
-  morphcog response --archive runs/gaits --error 0.1 --images 3000      a sharper map
+  # what they could be taught
+  morphcog response --archive runs/gaits --robots top:4 \\
+    --task \"4|9\"
+  # a published robot
+  morphcog response --robots YJTLA
+  # a sharper map
+  morphcog response --archive runs/gaits --error 0.1 \\
+    --images 3000
 then
   morphcog train --archive runs/gaits --task \"4|9\"
 
-All soft voxels and sensors of a robot are made wide, narrow or left at rest by random images, each
-independently of the others: by how much does each move the body? A measurement ends when the slopes
-are known well enough (--error), or after --images rollouts. Images of a dataset are only needed
-with --task. Earlier measurements in response.json are reused for any task, by this command and by
+All soft voxels and sensors of a robot are made wide, narrow or left at rest by random images, each \
+independently of the others: by how much does each move the body? A measurement ends when the slopes \
+are known well enough (--error), or after --images rollouts. Images of a dataset are only needed \
+with --task. Earlier measurements in response.json are reused for any task, by this command and by \
 `train`: if many trainings begin with the same gaits, measure these first. Ctrl-C stops it.";
 
 /// Two groups of classes.

@@ -13,11 +13,13 @@ use std::path::PathBuf;
 
 pub(super) const EXAMPLES: &str = "\
 Examples:
-  morphcog serve                                    trained and published robots, and the newest run if there is one
-  morphcog serve --archive runs/zero_one-seed1 runs/four_digit-seed1
-  morphcog serve --port 8080 --no-open              then open http://127.0.0.1:8080/
+  # trained and published robots, and the newest run, if any
+  morphcog serve
+  morphcog serve --archive runs/zero_one-seed1 runs/pairs/*/
+  # then open http://127.0.0.1:8080/
+  morphcog serve --port 8080 --no-open
 
-Runs under runs/ that begin or go on meanwhile appear by themselves. Only this machine can reach
+Runs under runs/ that begin or go on meanwhile appear by themselves. Only this machine can reach \
 the page. Ctrl-C ends it.";
 
 #[derive(Debug, Args)]

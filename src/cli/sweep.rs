@@ -1,13 +1,13 @@
 //! `morphcog sweep`: its words, and what it calls.
 
 use crate::base::error::Error;
+use crate::base::shell::{in_shell, quoted};
 use crate::base::signals;
 use crate::base::text::counted;
 use crate::cli::tasks::{Command, What, Where, asked, ended, refused};
 use crate::commands::sweep::SweepPlan;
 use crate::commands::{collect, tasks};
 use crate::store::folder;
-use crate::store::folder::in_shell;
 use crate::view::console::Console;
 use crate::view::reporters::Reporter;
 use crate::view::sweeps;
@@ -16,26 +16,32 @@ use std::path::{Path, PathBuf};
 
 pub(super) const EXAMPLES: &str = "\
 plan.toml:
-  config = \"zero_one.toml\"                  # or archive = \"runs/gaits-seed1\", to train
+  # or, to train: archive = \"runs/gaits-seed1\"
+  config = \"zero_one.toml\"
   seeds = [1, 2, 3]
   set = [\"generations=1000\"]
   [vary]
   map_elites.parents = [10, 20, 40]
-  [audit]                                   # after each run
+  # after each run
+  [audit]
   [eval]
   robots = \"random:10\"
   physical_only = true
 
 Examples:
-  morphcog sweep plan.toml                       all tasks here, one per core
+  # all tasks here, one per core
+  morphcog sweep plan.toml
   morphcog sweep plan.toml --status
-  morphcog sweep plan.toml --collect             one CSV, and figures
-  morphcog sweep plan.toml --list | parallel     elsewhere: GNU parallel,
-  morphcog sweep plan.toml --slurm | sbatch      Slurm,
-  hq submit --array 1-9 -- morphcog sweep $PWD/plan.toml --out $PWD/runs/plan --threads 1 --task    HyperQueue
+  # one CSV, and figures
+  morphcog sweep plan.toml --collect
+  # elsewhere: GNU parallel, Slurm, HyperQueue
+  morphcog sweep plan.toml --list | parallel
+  morphcog sweep plan.toml --slurm | sbatch
+  hq submit --array 1-9 -- morphcog sweep $PWD/plan.toml \\
+    --out $PWD/runs/plan --threads 1 --task
 
-Every combination of seeds, groups or pairs (of classes) and varied keys is a task with a run folder
-of its own. Ctrl-C stops anywhere; the same command goes on, here or elsewhere. Exit code 0: all
+Every combination of seeds, groups or pairs (of classes) and varied keys is a task with a run folder \
+of its own. Ctrl-C stops anywhere; the same command goes on, here or elsewhere. Exit code 0: all \
 tasks are done; 1: some failed; 75: stopped.";
 
 #[derive(Debug, Args)]
@@ -66,7 +72,7 @@ pub(super) fn run(args: SweepArgs, console: &Console) -> Result<(), Error> {
     let place = args.place.place(&out);
     let absolute = std::path::absolute(&args.plan).map_err(|error| Error::reading(&args.plan, &error))?;
     let mut words = vec!["sweep".to_string(), in_shell(&absolute)];
-    words.extend(args.set.iter().flat_map(|set| ["--set".to_string(), in_shell(Path::new(set))]));
+    words.extend(args.set.iter().flat_map(|set| ["--set".to_string(), quoted(set)]));
     if asked(&args.what, &tasks, &Command { words, name: &name, tasks: &tasks, place: &place }, console)? {
         return Ok(());
     }
@@ -82,6 +88,6 @@ pub(super) fn run(args: SweepArgs, console: &Console) -> Result<(), Error> {
     let summary = tasks::run_all(&tasks, &place, jobs, &stop, &Reporter::new(console))?;
     ended(&summary, tasks.len())?;
     console.line(&format!("{} done, in {}", counted(tasks.len(), "task is", "tasks are"), out.display()));
-    console.info(&format!("next: morphcog sweep {} --collect", in_shell(&args.plan)));
+    console.suggest("next:", &format!("morphcog sweep {} --collect", in_shell(&args.plan)));
     Ok(())
 }

@@ -1,12 +1,12 @@
 //! What `sweep` and `reproduce` have in common: one task, all of them, lists, how far they are.
 
 use crate::base::error::Error;
+use crate::base::shell::{in_shell, quoted};
 use crate::base::{atlas, signals};
 use crate::cli::process;
 use crate::cli::values::{MOST, threads, whole};
 use crate::commands::tasks;
 use crate::commands::tasks::{Place, Summary, Task};
-use crate::store::folder::in_shell;
 use crate::view::console::Console;
 use crate::view::reporters::Reporter;
 use crate::view::sweeps;
@@ -105,7 +105,8 @@ impl Command<'_> {
 
     fn list(&self, count: usize, console: &Console) -> Result<(), Error> {
         let (line, threads) = (self.line()?, self.place.threads.unwrap_or(1));
-        (1..=count).for_each(|number| console.line(&format!("{line} --threads {threads} --task {number}")));
+        (1..=count)
+            .for_each(|number| console.command(&format!("{line} --threads {threads} --task {number}")));
         Ok(())
     }
 
@@ -115,7 +116,7 @@ impl Command<'_> {
         std::fs::create_dir_all(out).map_err(|error| Error::writing(out, &error))?;
         let out = std::path::absolute(out).map_err(|error| Error::reading(out, &error))?;
         let (name, line, threads) = (self.name, self.line()?, self.place.threads.unwrap_or(1));
-        let (name, log) = (in_shell(Path::new(name)), out.join("slurm-%a.log"));
+        let (name, log) = (quoted(name), out.join("slurm-%a.log"));
         console.text(&format!(
             r#"#!/bin/bash
 #SBATCH --job-name={name}

@@ -19,14 +19,18 @@ use std::path::PathBuf;
 
 pub(super) const EXAMPLES: &str = "\
 Examples:
-  morphcog team --images 100                               the team that ships with the program
-  morphcog team --archive runs/pairs/*/                    a robot of each run
-  morphcog team --archive runs/0v1 runs/0v2 runs/1v2 --classes 0,1,2
-  morphcog team --archive runs/pairs/*/ --split validation --images 400
+  # the team that ships with the program
+  morphcog team --images 100
+  # a robot of each run
+  morphcog team --archive runs/pairs/*/
+  morphcog team --archive runs/0v1 runs/0v2 runs/1v2 \\
+    --classes 0,1,2
+  morphcog team --archive runs/pairs/*/ --split validation \\
+    --images 400
 
-A robot votes for the classes of the side it walks to, if it walks farther than 3 voxel lengths;
-most votes win; in a tie, the class with the largest sum of walks. A second answer is that sum of
-walks alone. No weight of the votes is trained. team.json keeps every walk: the same command goes on
+A robot votes for the classes of the side it walks to, if it walks farther than 3 voxel lengths; \
+most votes win; in a tie, the class with the largest sum of walks. A second answer is that sum of \
+walks alone. No weight of the votes is trained. team.json keeps every walk: the same command goes on \
 after Ctrl-C, and with more runs.";
 
 /// What is said of `--archive`: elsewhere the newest run is the default.

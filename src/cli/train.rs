@@ -3,6 +3,7 @@
 use crate::base::error::Error;
 use crate::base::named;
 use crate::base::ranks::Ranks;
+use crate::base::shell::in_shell;
 use crate::base::signals;
 use crate::cli::choice;
 use crate::cli::choice::{ROBOTS, run_json, selected};
@@ -28,15 +29,17 @@ pub(super) const EXAMPLES: &str = "\
 Examples:
   morphcog evolve --config gaits.toml
   morphcog train --archive runs/gaits-seed1 --task \"4|9\"
-  morphcog train --task \"0|123\" --robots top:10 --set train.rounds=10
-  morphcog train --task \"4|9\" --set train.windows=2000 --set stimulus.reduction=area    look for the
-                                                                    part of the images that helps most
+  morphcog train --task \"0|123\" --robots top:10 \\
+    --set train.rounds=10
+  # look for the part of the images that helps most
+  morphcog train --task \"4|9\" --set train.windows=2000 \\
+    --set stimulus.reduction=area
 then
   morphcog eval --archive runs/gaits-seed1-4v9 --robots best
 
-The response of each gait is measured with random images. The most promising gait is trained
-on many training images, and the body is refined: challengers that answer better replace
-it. The robot is validated on images that it was not trained on, and audited. Ctrl-C stops it;
+The response of each gait is measured with random images. The most promising gait is trained \
+on many training images, and the body is refined: challengers that answer better replace \
+it. The robot is validated on images that it was not trained on, and audited. Ctrl-C stops it; \
 --resume goes on, also after its end with more challengers (--set train.challengers=240).";
 
 /// Two groups of classes.
@@ -192,6 +195,6 @@ pub(super) fn trained(options: &Options, stop: &AtomicBool, console: &Console) -
     if audited.stopped {
         return Err(Error::stopped("stopped while auditing; the run is saved".to_string()).hint(goes_on()));
     }
-    console.info(&format!("next: morphcog eval --archive {}", folder::in_shell(&archive)));
+    console.suggest("next:", &format!("morphcog eval --archive {}", in_shell(&archive)));
     Ok(())
 }

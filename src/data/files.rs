@@ -2,6 +2,7 @@
 
 use crate::base::files::home_expanded;
 use crate::base::hash::{hex, sha256_hex};
+use crate::base::shell::in_shell;
 use crate::data::builtin::BuiltinDigits;
 use crate::data::dataset::BUILTIN;
 use crate::data::idx;
@@ -346,7 +347,7 @@ fn advice(name: &str, place: &Place, replace: bool) -> String {
     }
     let to = match place.path == default_folder(name) {
         true => String::new(),
-        false => format!(" --to {}", place.path.display()),
+        false => format!(" --to {}", in_shell(&place.path)),
     };
     let force = if replace { " --force" } else { "" };
     format!("`morphcog data fetch {name}{to}{force}` downloads it")

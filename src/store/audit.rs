@@ -139,7 +139,7 @@ impl AuditFile {
     /// As of [`of_run`](AuditFile::of_run).
     pub(crate) fn of_state(fingerprint: &str, run_json: &Path) -> Result<Self, Error> {
         let path = &AuditFile::path(run_json);
-        let make = format!("morphcog audit --archive {}", folder::archive(run_json));
+        let make = format!("`morphcog audit --archive {}`", folder::archive(run_json));
         if !exists(path) {
             let text =
                 format!("{}: there is no such file: these robots have not been audited", path.display());

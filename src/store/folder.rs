@@ -4,6 +4,7 @@ use crate::base::error::Error;
 use crate::base::files::{check_writable, read_text, remove_half_written, write_atomically};
 use crate::base::named;
 use crate::base::observer::Observer;
+use crate::base::shell::in_shell;
 use crate::config::Config;
 use crate::store::lock;
 use crate::store::lock::Lock;
@@ -166,16 +167,6 @@ pub fn name_of(config: &str) -> String {
         return name.map_or("run".to_string(), |name| name.to_string_lossy().into_owned());
     }
     path.file_stem().map_or("run".to_string(), |stem| stem.to_string_lossy().into_owned())
-}
-
-/// A path as a shell reads it, for commands that people copy.
-pub fn in_shell(path: &Path) -> String {
-    let text = path.display().to_string();
-    let is_plain = |c: char| c.is_alphanumeric() || "_-./:@%+,".contains(c);
-    match !text.is_empty() && text.chars().all(is_plain) {
-        true => text,
-        false => format!("'{}'", text.replace('\'', r"'\''")),
-    }
 }
 
 /// Whether results can be written to a file, with a CSV beside it, and overwrite neither each other

@@ -41,7 +41,7 @@ impl Source {
         }
         let text = format!("{}: these are gaits, which tell no images apart yet", self.path.display());
         let hint =
-            format!("morphcog train --archive {} --task \"4|9\" teaches one", folder::archive(&self.path));
+            format!("`morphcog train --archive {} --task \"4|9\"` teaches one", folder::archive(&self.path));
         Err(Error::input(text).hint(hint))
     }
 }
@@ -374,7 +374,7 @@ pub(crate) fn first_physical<'a>(
                 let text = format!(
                     "{name}: robot {id}, number {place} of {task} on validation images, has not been audited"
                 );
-                let hint = format!("morphcog audit --archive {archive} --robots best-validation:{place}");
+                let hint = format!("`morphcog audit --archive {archive} --robots best-validation:{place}`");
                 return Err(Error::input(text).hint(hint));
             };
             if found.is_physical() {
@@ -387,7 +387,7 @@ pub(crate) fn first_physical<'a>(
                 "{name}: none of the {} best of {task} on validation images is physical",
                 of_task.len()
             );
-            let hint = format!("morphcog audit --archive {archive} makes all its robots eligible");
+            let hint = format!("`morphcog audit --archive {archive}` makes all its robots eligible");
             return Err(Error::input(text).hint(hint));
         }
     }

@@ -4,7 +4,8 @@
 use crate::base::observer::Generation;
 use crate::base::text::one_line;
 use crate::view::console::{Console, Mode, lock};
-use crate::view::progress::{Pacer, Recent, count_line, generation_line};
+use crate::view::progress::{Pacer, Recent, Words, count_line, generation_line};
+use crate::view::wrapping::one_of;
 use indicatif::ProgressBar;
 use serde::Serialize;
 use std::sync::Mutex;
@@ -26,13 +27,18 @@ impl<'c> Line<'c> {
     }
 
     /// Shows the text, made from the seconds since the beginning.
-    fn show(&self, done: u64, text: impl FnOnce(f64) -> String) {
+    fn show(&self, done: u64, text: impl FnOnce(f64) -> Words) {
         let seconds = self.begin.elapsed().as_secs_f64();
+        let text = |columns: usize| {
+            let Words { label, parts } = text(seconds);
+            let parts: Vec<String> = parts.iter().map(|part| one_line(part)).collect();
+            one_of(&one_line(&label), &parts, columns)
+        };
         if let Some(line) = &self.moving {
             line.set_position(done);
-            line.set_message(one_line(&text(seconds)));
+            line.set_message(text(self.console.room()));
         } else if self.console.mode() == Mode::Human && self.is_due(done, seconds) {
-            self.console.err(&format!("{}\n", one_line(&text(seconds))));
+            self.console.err(&format!("{}\n", text(usize::MAX)));
         }
     }
 

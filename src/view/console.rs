@@ -6,6 +6,7 @@ pub use crate::view::bar::{Bar, Counter, Live};
 
 use crate::base::text::{is_unseen, one_line, shortened};
 use crate::view::table;
+use crate::view::wrapping::{wrapped, wrapped_command};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde::Serialize;
 use std::error::Error;
@@ -14,7 +15,11 @@ use std::path::Path;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// Most characters of a cell of a table.
-const CELL: usize = 120;
+const CELL: usize = 400;
+/// Columns of the moving line's bar, and of the blank behind it.
+const BAR: usize = 9;
+/// Columns of a terminal that does not tell its own.
+const USUAL: usize = 80;
 
 /// For whom the console writes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -35,8 +40,8 @@ pub struct Console {
     /// What is known of stdout and stderr: whether they are terminals that can move the cursor.
     terminals: [bool; 2],
     colour: bool,
-    /// Columns of stdout, if it is a terminal.
-    width: Option<usize>,
+    /// Whether stdout and stderr have so many columns and no more.
+    narrow: [bool; 2],
     streams: Mutex<Streams>,
     /// The progress line on the terminal, which must step aside for other lines.
     line: Mutex<Option<ProgressBar>>,
@@ -51,9 +56,10 @@ struct Streams {
     lost: bool,
 }
 
-/// Columns of the terminal, if it tells.
-fn columns() -> Option<usize> {
-    crossterm::terminal::size().ok().map(|(columns, _)| usize::from(columns)).filter(|columns| *columns > 0)
+/// Columns of the terminal.
+fn columns() -> usize {
+    let told = crossterm::terminal::size().ok().map(|(columns, _)| usize::from(columns));
+    told.filter(|columns| *columns > 0).unwrap_or(USUAL)
 }
 
 pub(super) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
@@ -67,11 +73,11 @@ impl Console {
     pub fn new(mode: Mode) -> Self {
         let set = |name| std::env::var_os(name).filter(|v| !v.is_empty());
         let smart = set("TERM").is_none_or(|term| term != "dumb");
-        let terminals = [io::stdout().is_terminal() && smart, io::stderr().is_terminal() && smart];
+        let narrow = [io::stdout().is_terminal(), io::stderr().is_terminal()];
         Console {
-            terminals,
+            terminals: narrow.map(|is_terminal| is_terminal && smart),
             colour: set("NO_COLOR").is_none(),
-            width: io::stdout().is_terminal().then(columns).flatten(),
+            narrow,
             ..Console::with_writers(mode, Box::new(io::stdout()), Box::new(io::stderr()))
         }
     }
@@ -79,7 +85,19 @@ impl Console {
     /// A console onto any two writers, taken for files: no colours, no moving lines.
     pub fn with_writers(mode: Mode, out: Box<dyn Write + Send>, err: Box<dyn Write + Send>) -> Self {
         let streams = Mutex::new(Streams { out, err, closed: false, lost: false });
-        Console { mode, terminals: [false; 2], colour: false, width: None, streams, line: Mutex::new(None) }
+        Console {
+            mode,
+            terminals: [false; 2],
+            colour: false,
+            narrow: [false; 2],
+            streams,
+            line: Mutex::new(None),
+        }
+    }
+
+    /// Columns of stdout (0) or stderr (1) at present; all that are needed if it is no terminal.
+    fn columns(&self, stream: usize) -> usize {
+        if self.narrow[stream] { columns() } else { usize::MAX }
     }
 
     /// For whom it writes.
@@ -104,12 +122,20 @@ impl Console {
 
     /// A line of results, to stdout; an empty one parts others for people. Like all that people are
     /// told, it shows control characters and line breaks, which can only come from a file or its
-    /// name, and obeys none.
+    /// name, and obeys none; and a terminal shows it in lines that break between words.
     pub fn line(&self, text: &str) {
         match self.mode {
             Mode::Json if text.is_empty() => {}
             Mode::Json => self.event("result", &Text { text, file: None }),
-            _ => self.out(&format!("{}\n", one_line(text))),
+            _ => self.out(&lines(wrapped(&one_line(text), self.columns(0)))),
+        }
+    }
+
+    /// A command line for a shell, to stdout: one line however long it is.
+    pub fn command(&self, text: &str) {
+        match self.mode {
+            Mode::Json => self.event("result", &Text { text, file: None }),
+            _ => self.out(&format!("{text}\n")),
         }
     }
 
@@ -126,8 +152,8 @@ impl Console {
         self.out(text);
     }
 
-    /// A table of results, to stdout; columns of numbers are aligned to the right. Where it is wider
-    /// than the terminal, its rows stand one below the other.
+    /// A table of results, to stdout; columns of numbers are aligned to the right. A terminal shows it
+    /// as [`table::fitted`] fits it.
     pub fn table(&self, headers: &[&str], rows: &[Vec<String>]) {
         #[derive(Serialize)]
         struct Table<'a> {
@@ -141,8 +167,7 @@ impl Console {
                 let headers: Vec<&str> = headers.iter().map(String::as_str).collect();
                 let cells = |row: &Vec<String>| row.iter().map(|text| shortened(text, CELL)).collect();
                 let rows: Vec<Vec<String>> = rows.iter().map(cells).collect();
-                let width = self.width.unwrap_or(usize::MAX);
-                self.out(&(table::fitted(&headers, &rows, width).join("\n") + "\n"));
+                self.out(&lines(table::fitted(&headers, &rows, self.columns(0))));
             }
         }
     }
@@ -173,41 +198,57 @@ impl Console {
     /// A note to people, to stderr (JSON: an event).
     pub fn info(&self, text: &str) {
         match self.mode {
-            Mode::Human => self.err(&format!("{}\n", one_line(text))),
+            Mode::Human => self.err(&lines(wrapped(&one_line(text), self.columns(1)))),
             Mode::Quiet => {}
             Mode::Json => self.event("info", &Text { text, file: None }),
         }
     }
 
+    /// A note with a command to copy: "next:", and what is next. Blanks instead of "next:" align it
+    /// with one above.
+    pub fn suggest(&self, about: &str, command: &str) {
+        match self.mode {
+            Mode::Human => self.err(&lines(wrapped_command(about, command, self.columns(1)))),
+            _ => self.info(&format!("{about} {command}")),
+        }
+    }
+
     /// A warning, to stderr, in every mode.
     pub fn warning(&self, text: &str) {
-        self.err(&format!("{} {}\n", self.paint("warning:", "1;33"), one_line(text)));
+        self.err(&self.painted("warning:", "1;33", text));
     }
 
     /// An error with its causes and perhaps what to do, to stderr, in every mode. A cause that the
     /// line above it already tells is left out.
     pub fn error(&self, error: &(dyn Error + 'static), hint: Option<&str>) {
         let mut told = error.to_string();
-        let mut text = format!("{} {}\n", self.paint("error:", "1;31"), one_line(&told));
+        let mut text = self.painted("error:", "1;31", &told);
         let mut causes = Vec::new();
         let mut source = error.source();
         while let Some(cause) = source {
             let words = cause.to_string();
             if !told.contains(&words) {
-                text += &format!("  caused by: {}\n", one_line(&words));
+                text += &lines(wrapped(&format!("  caused by: {}", one_line(&words)), self.columns(1)));
                 told = words.clone();
                 causes.push(words);
             }
             source = cause.source();
         }
         if let Some(hint) = hint {
-            text += &format!("{} {}\n", self.paint("hint:", "1"), one_line(hint));
+            text += &self.painted("hint:", "1", hint);
         }
         self.err(&text);
         self.event(
             "error",
             &serde_json::json!({ "message": error.to_string(), "causes": causes, "hint": hint }),
         );
+    }
+
+    /// Words on a wrong command line, plain and with colours, to stderr.
+    pub fn usage(&self, plain: &str, coloured: &str) {
+        let text = if self.terminals[1] && self.colour { coloured } else { plain };
+        let columns = self.columns(1);
+        self.err(&lines(text.lines().flat_map(|line| wrapped(line, columns)).collect()));
     }
 
     /// Progress of an evolution: call [`Bar::update`] after every generation.
@@ -227,8 +268,13 @@ impl Console {
         (self.mode == Mode::Human && self.terminals[0]).then(|| Live::new(self))
     }
 
-    fn paint(&self, text: &str, code: &str) -> String {
-        if self.terminals[1] && self.colour { format!("\x1b[{code}m{text}\x1b[0m") } else { text.to_string() }
+    /// The lines of a text behind a word in colour.
+    fn painted(&self, word: &str, code: &str, text: &str) -> String {
+        let text = lines(wrapped(&format!("{word} {}", one_line(text)), self.columns(1)));
+        match self.terminals[1] && self.colour {
+            true => text.replacen(word, &format!("\x1b[{code}m{word}\x1b[0m"), 1),
+            false => text,
+        }
     }
 
     pub(super) fn out(&self, text: &str) {
@@ -270,7 +316,7 @@ impl Console {
             return None;
         }
         let line = ProgressBar::with_draw_target(Some(total), ProgressDrawTarget::stderr_with_hz(10));
-        let bar = if self.colour { "{bar:10.cyan/dim}" } else { "{bar:10}" };
+        let bar = if self.colour { "{bar:8.cyan/dim}" } else { "{bar:8}" };
         // The template is fixed: if it were wrong, the default would show.
         if let Ok(style) = ProgressStyle::with_template(&format!("{bar} {{wide_msg}}")) {
             line.set_style(style.progress_chars("━━─"));
@@ -279,12 +325,22 @@ impl Console {
         Some(line)
     }
 
+    /// Columns of the moving line that are left for words.
+    pub(super) fn room(&self) -> usize {
+        self.columns(1).saturating_sub(BAR)
+    }
+
     /// Takes the moving line away.
     pub(super) fn clear_line(&self) {
         if let Some(line) = lock(&self.line).take() {
             line.finish_and_clear();
         }
     }
+}
+
+/// Lines with their ends.
+fn lines(lines: Vec<String>) -> String {
+    lines.join("\n") + "\n"
 }
 
 /// A character of a JSON text, as an escape if it is not to be seen.

@@ -50,6 +50,8 @@ pub mod terminal;
 #[cfg(feature = "cli")]
 pub mod verdicts;
 pub mod walk;
+#[cfg(feature = "cli")]
+pub mod wrapping;
 
 pub use stage::Stage;
 pub use walk::Walk;

@@ -1,4 +1,4 @@
-//! Progress in words: how far, how fast, how long still.
+//! Progress in words: how far, how long still, how fast.
 
 use crate::base::number;
 use crate::base::observer::Generation;
@@ -30,31 +30,43 @@ impl<T: Copy> Recent<T> {
     }
 }
 
-/// How far an evolution is, in one line, given where it was some seconds ago.
-pub fn generation_line(now: &Generation, before: &Generation, seconds: f64) -> String {
-    let best = now.best.map_or("none".into(), |best| number::fixed(best, 2));
-    let rate = rate(now.evaluations.saturating_sub(before.evaluations), seconds);
-    // The speed last: it is what a narrow terminal cuts off.
-    format!(
-        "generation {}/{} · best {best} · coverage {} %{} · {rate} evaluations/s",
-        now.done,
-        now.total,
-        number::percent(now.coverage),
-        left(before.done, now.done, now.total, seconds)
-    )
+/// How far something is: a label, and parts in the order in which they matter.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Words {
+    /// What is going on.
+    pub label: String,
+    /// How much is done; how long it still takes, and so on.
+    pub parts: Vec<String>,
 }
 
-/// How far some counted thing is, in one line: images, robots or, with the unit "bytes", megabytes.
-/// `before` of them were done some seconds ago.
-pub fn count_line(label: &str, [before, done, total]: [u64; 3], unit: &str, seconds: f64) -> String {
-    let end = left(before, done, total, seconds);
-    if unit == "bytes" {
+/// How far an evolution is, given where it was some seconds ago.
+pub fn generation_line(now: &Generation, before: &Generation, seconds: f64) -> Words {
+    let best = now.best.map_or("none".into(), |best| number::fixed(best, 2));
+    let rate = rate(now.evaluations.saturating_sub(before.evaluations), seconds);
+    let mut parts = vec![format!("{}/{}", now.done, now.total)];
+    parts.extend(left(before.done, now.done, now.total, seconds));
+    parts.push(format!("best {best}"));
+    parts.push(format!("coverage {} %", number::percent(now.coverage)));
+    parts.push(format!("{rate} evaluations/s"));
+    Words { label: "generation".to_string(), parts }
+}
+
+/// How far some counted thing is: images, robots or, with the unit "bytes", megabytes. `before` of
+/// them were done some seconds ago.
+pub fn count_line(label: &str, [before, done, total]: [u64; 3], unit: &str, seconds: f64) -> Words {
+    let did = done.saturating_sub(before);
+    let (counts, speed) = if unit == "bytes" {
         let mega = |bytes: f64| number::fixed(bytes / 1e6, 1);
-        let speed = if seconds > 0.0 { done.saturating_sub(before) as f64 / seconds } else { 0.0 };
+        let speed = if seconds > 0.0 { did as f64 / seconds } else { 0.0 };
         let [done, total, speed] = [done as f64, total as f64, speed].map(mega);
-        return format!("{label} {done}/{total} MB · {speed} MB/s{end}");
-    }
-    format!("{label} {done}/{total} {unit} · {} {unit}/s{end}", rate(done.saturating_sub(before), seconds))
+        (format!("{done}/{total} MB"), format!("{speed} MB/s"))
+    } else {
+        (format!("{done}/{total} {unit}"), format!("{} {unit}/s", rate(did, seconds)))
+    };
+    let mut parts = vec![counts];
+    parts.extend(left(before, done, total, seconds));
+    parts.push(speed);
+    Words { label: label.to_string(), parts }
 }
 
 fn rate(count: u64, seconds: f64) -> String {
@@ -62,12 +74,9 @@ fn rate(count: u64, seconds: f64) -> String {
     number::fixed(rate, if rate < 10.0 { 1 } else { 0 })
 }
 
-fn left(before: u64, done: u64, total: u64, seconds: f64) -> String {
+fn left(before: u64, done: u64, total: u64, seconds: f64) -> Option<String> {
     let (did, todo) = (done.saturating_sub(before), total.saturating_sub(done));
-    if did == 0 || todo == 0 {
-        return String::new();
-    }
-    format!(" · {} left", duration(seconds * todo as f64 / did as f64))
+    (did > 0 && todo > 0).then(|| format!("{} left", duration(seconds * todo as f64 / did as f64)))
 }
 
 /// A time span in its two largest units: "45 s", "12 min 3 s", "3 h 20 min", "2 d 4 h".
@@ -107,32 +116,32 @@ impl Pacer {
 mod tests {
     use super::*;
 
+    fn text(line: Words) -> String {
+        format!("{}: {}", line.label, line.parts.join(", "))
+    }
+
     #[test]
     fn a_resumed_run_counts_its_speed_from_where_it_resumed() {
         let begin = Generation { done: 100, total: 200, best: None, coverage: 0.0, evaluations: 2000 };
         let now = Generation { done: 150, best: Some(3.1449), coverage: 0.25, evaluations: 3000, ..begin };
-        let line = generation_line(&now, &begin, 10.0);
-        assert_eq!(line, "generation 150/200 · best 3.14 · coverage 25.0 % · 10 s left · 100 evaluations/s");
-        assert!(
-            generation_line(&begin, &begin, 0.0).ends_with("best none · coverage 0.0 % · 0.0 evaluations/s")
-        );
+        let line = text(generation_line(&now, &begin, 10.0));
+        assert_eq!(line, "generation: 150/200, 10 s left, best 3.14, coverage 25.0 %, 100 evaluations/s");
+        let line = text(generation_line(&begin, &begin, 0.0));
+        assert!(line.ends_with("100/200, best none, coverage 0.0 %, 0.0 evaluations/s"), "{line}");
     }
 
     #[test]
     fn counted_things_have_their_unit() {
-        assert_eq!(
-            count_line("eval", [0, 50, 100], "images", 5.0),
-            "eval 50/100 images · 10 images/s · 5 s left"
-        );
-        let line = count_line("train images", [0, 5_000_000, 10_000_000], "bytes", 2.0);
-        assert_eq!(line, "train images 5.0/10.0 MB · 2.5 MB/s · 2 s left");
-        assert!(count_line("x", [0, 3, 0], "images", 0.0).contains("3/0"));
+        let line = |label: &str, counts: [u64; 3], unit: &str, seconds: f64| {
+            text(count_line(label, counts, unit, seconds))
+        };
+        assert_eq!(line("eval", [0, 50, 100], "images", 5.0), "eval: 50/100 images, 5 s left, 10 images/s");
+        let bytes = line("train images", [0, 5_000_000, 10_000_000], "bytes", 2.0);
+        assert_eq!(bytes, "train images: 5.0/10.0 MB, 2 s left, 2.5 MB/s");
+        assert!(line("x", [0, 3, 0], "images", 0.0).contains("3/0"));
         // What was known before took no time.
-        assert_eq!(count_line("x", [40, 40, 50], "rollouts", 1e-9), "x 40/50 rollouts · 0.0 rollouts/s");
-        assert_eq!(
-            count_line("x", [40, 45, 50], "rollouts", 5.0),
-            "x 45/50 rollouts · 1.0 rollouts/s · 5 s left"
-        );
+        assert_eq!(line("x", [40, 40, 50], "rollouts", 1e-9), "x: 40/50 rollouts, 0.0 rollouts/s");
+        assert_eq!(line("x", [40, 45, 50], "rollouts", 5.0), "x: 45/50 rollouts, 5 s left, 1.0 rollouts/s");
     }
 
     #[test]

@@ -5,6 +5,7 @@ use crate::analysis::published;
 use crate::base::clock::CLOCK;
 use crate::base::number;
 use crate::base::number::percent;
+use crate::base::shell::in_shell;
 use crate::base::text::counted;
 use crate::commands::bench::Speed;
 use crate::commands::data::Found;
@@ -13,7 +14,6 @@ use crate::search::evolve::Finished;
 use crate::search::train;
 use crate::store::capacity::CapacityFile;
 use crate::store::eval::{EvalFile, RobotReport};
-use crate::store::folder::in_shell;
 use crate::store::images::{HeldOut, ImageRef};
 use crate::store::names::RUN_JSON;
 use crate::store::validation::Validated;
@@ -95,10 +95,10 @@ pub fn evolution(console: &Console, finished: &Finished, out: &Path, goes_on: bo
     let archive = in_shell(&out.join(RUN_JSON));
     // Gaits tell no images apart yet.
     if run.config.measures_response() {
-        return console.info(&format!("next: morphcog train --archive {archive} --task \"4|9\""));
+        return console.suggest("next:", &format!("morphcog train --archive {archive} --task \"4|9\""));
     }
-    console.info(&format!("next: morphcog replay --robot best --archive {archive}"));
-    console.info(&format!("      morphcog eval --archive {archive}"));
+    console.suggest("next:", &format!("morphcog replay --robot best --archive {archive}"));
+    console.suggest("     ", &format!("morphcog eval --archive {archive}"));
 }
 
 /// After a training: the robot.
@@ -224,7 +224,8 @@ pub fn evaluation(console: &Console, report: &EvalFile, capacity: Option<&Capaci
     let Some(out) = out else { return };
     console.line(&format!("wrote {} and {}", out.display(), out.with_extension("csv").display()));
     if capacity.is_none() && is_test {
-        console.info(&format!("which networks are as accurate? morphcog capacity --eval {}", in_shell(out)));
+        let command = format!("morphcog capacity --eval {}", in_shell(out));
+        console.suggest("which networks are as accurate?", &command);
     }
 }
 

@@ -1,9 +1,9 @@
 //! Robots as buttons: a click plays them.
 
 use crate::base::number;
+use crate::base::shell::{in_shell, quoted};
 use crate::body::{Body, Material};
 use crate::commands::report::Dossier;
-use crate::store::folder::in_shell;
 use crate::store::run::Robot;
 use crate::view::colour::{MARK_WIDTH, mark, mark_colour, placed};
 use crate::view::html::escape;
@@ -28,7 +28,8 @@ pub(super) fn button(
 ) -> String {
     let about = about(dossier, robot);
     let rollout = rollouts.id(run, &robot.id).unwrap_or_default();
-    let command = format!("morphcog replay --robot {} --archive {}", robot.id, in_shell(&dossier.path));
+    let command =
+        format!("morphcog replay --robot {} --archive {}", quoted(&robot.id), in_shell(&dossier.path));
     format!(
         "<button type=\"button\" style=\"{style}\" data-robot=\"{}\" data-rollout=\"{}\" data-about=\"{}\" \
          data-command=\"{}\" \

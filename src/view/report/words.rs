@@ -4,6 +4,7 @@ use crate::base::files::exists;
 use crate::base::hash::short;
 use crate::base::number;
 use crate::base::number::percent;
+use crate::base::shell::{in_shell, quoted};
 use crate::commands::report::Dossier;
 use crate::config::capacity::CapacityConfig;
 use crate::config::train::TrainConfig;
@@ -12,7 +13,6 @@ use crate::data::dataset::BUILTIN;
 use crate::search::showing;
 use crate::store::capacity::CapacityFile;
 use crate::store::eval::Mean;
-use crate::store::folder::in_shell;
 use crate::store::images::{HowMany, ImageRef};
 use crate::store::names::{CONFIG, EVAL_JSON};
 use crate::store::run::RunFile;
@@ -205,8 +205,11 @@ pub(super) fn commands(dossier: &Dossier) -> String {
     let found = &dossier.findings;
     if let Some(audit) = &found.audit {
         let ids: Vec<&str> = audit.robots.iter().map(|robot| robot.id.as_str()).collect();
-        let some =
-            if ids.len() < audit.elites { format!(" --robots {}", ids.join(",")) } else { String::new() };
+        let some = if ids.len() < audit.elites {
+            format!(" --robots {}", quoted(ids.join(",")))
+        } else {
+            String::new()
+        };
         lines.push(format!("morphcog audit --archive {again}{some}"));
     }
     if let Some(report) = &found.eval {
@@ -214,10 +217,10 @@ pub(super) fn commands(dossier: &Dossier) -> String {
         let (images, seed) = (how_many(&report.images), report.seed);
         let mut line = format!(
             "morphcog eval --archive {again} --images {images} --seed {seed} --robots {}",
-            ids.join(",")
+            quoted(ids.join(","))
         );
         if report.trained_on.is_some() {
-            line += &format!(" --dataset {}", report.dataset);
+            line += &format!(" --dataset {}", quoted(&report.dataset));
         }
         if report.threshold != direction::THRESHOLD {
             line += &format!(" --threshold {}", report.threshold);
@@ -251,7 +254,7 @@ fn made_by(dossier: &Dossier, again: &str) -> Vec<String> {
     let (run, config) = (&dossier.run, dossier.path.with_file_name(CONFIG));
     let Some(origin) = &run.origin else {
         let known = exists(&config);
-        let missing = format!("# CONFIG: the key \"config\" of {}", dossier.path.display());
+        let missing = format!("# CONFIG: the key \"config\" of {}", in_shell(&dossier.path));
         let config = if known { in_shell(&config) } else { "CONFIG".to_string() };
         let name = &run.dataset.name;
         let (images, data) = match name == BUILTIN {
@@ -264,13 +267,14 @@ fn made_by(dossier: &Dossier, again: &str) -> Vec<String> {
     let gaits = format!("# GAITS: run {}, SHA-256 of its content {}…", origin.name, short(&origin.sha256));
     let robot = run.elites.first().and_then(|robot| robot.parent.as_deref());
     let task = run.dimensions.tasks.join(" ");
-    let mut line = format!("morphcog train --archive GAITS --task '{task}' --seed {}", run.config.seed);
-    line += &robot.map_or(String::new(), |robot| format!(" --robots {robot}"));
+    let mut line =
+        format!("morphcog train --archive GAITS --task {} --seed {}", quoted(task), run.config.seed);
+    line += &robot.map_or(String::new(), |robot| format!(" --robots {}", quoted(robot)));
     // The gaits' run may have any of these otherwise.
-    line += &format!(" --set data.dataset={}", run.config.data.dataset);
+    line += &format!(" --set {}", quoted(format!("data.dataset={}", run.config.data.dataset)));
     for (key, value) in seeing_and_training(&run.config) {
         let value = value.as_str().map_or_else(|| value.to_string(), str::to_string);
-        line += &format!(" --set {}", in_shell(Path::new(&format!("{key}={value}"))));
+        line += &format!(" --set {}", quoted(format!("{key}={value}")));
     }
     vec![gaits, format!("{line} --out {again}")]
 }
@@ -314,7 +318,7 @@ fn settings(file: &CapacityFile) -> String {
         && !usual.sizes().eq(points.iter().map(|point| point.size))
     {
         let step = points.windows(2).next().map_or(1, |two| two[1].size.saturating_sub(two[0].size).max(1));
-        text += &format!(" --set 'sizes=[{least},{most}]' --set step={step}");
+        text += &format!(" --set {} --set step={step}", quoted(format!("sizes=[{least},{most}]")));
     }
     text
 }
