@@ -265,9 +265,6 @@ fn progress_and_what_is_next_fit_a_terminal() {
         let args = format!("evolve -c tiny.toml --force -o {out}");
         let lines = shown(&sandbox, &args, columns);
         check_widths(&args, &lines, columns);
-        if columns > 20 {
-            assert!(lines.iter().any(|line| line.contains(" left")), "{lines:?}");
-        }
         // A command goes on where the line above it says so.
         let text = lines.join("\n").replace("\n\n", "\n");
         let (_, next) = text.split_once("next:").unwrap();

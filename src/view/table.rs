@@ -126,11 +126,18 @@ fn drawn(columns: &[&Column], widths: &[usize]) -> Vec<String> {
     lines
 }
 
-/// Rows one below the other, a cell behind its header; an empty line between two rows. Empty cells are
-/// left out.
+/// Rows one below the other, a cell behind its header, or below it if there is no room; an empty line
+/// between two rows. Empty cells are left out.
 fn stacked(headers: &[&str], rows: &[Vec<String>], most: usize) -> Vec<String> {
     let widest = headers.iter().map(|header| width(header)).max().unwrap_or(0);
+    let longest = rows.iter().flatten().map(|cell| least_of_cell(cell)).max().unwrap_or(0);
+    let is_below = widest + GAP + longest > most;
     let cell = |(header, text): (&&str, &String)| -> Vec<String> {
+        if is_below {
+            let lines = wrapped_cell(text, most.saturating_sub(GAP));
+            let lines = lines.into_iter().map(|line| " ".repeat(GAP) + &line);
+            return std::iter::once(header.to_string()).chain(lines).collect();
+        }
         let lines = wrapped_cell(text, most.saturating_sub(widest + GAP));
         let begin = |place: usize| if place == 0 { *header } else { "" };
         let line = |(place, text): (usize, String)| {
@@ -241,7 +248,8 @@ mod tests {
             "robot     a",
             "task      x",
         ];
-        assert_eq!(fitted(&headers, &rows, 15), expected);
+        assert_eq!(fitted(&headers, &rows, 16), expected);
+        assert_eq!(fitted(&headers, &rows, 15)[..4], ["robot", "  XFJPI", "accuracy", "  76.5 %"]);
         assert_eq!(fitted(&headers, &[], 3), align(&headers, &[]));
     }
 

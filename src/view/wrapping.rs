@@ -94,7 +94,7 @@ fn shortened(text: &str, columns: usize) -> String {
     }
 }
 
-/// The words of a text. A per cent sign stays with its number.
+/// The words of a text. A per cent sign stays with its number, or what it is of.
 fn words(text: &str, kind: Kind) -> Vec<Word> {
     let least_gap = if kind == Kind::Cell && text.contains("  ") { 2 } else { 1 };
     let (mut is_command, mut quote) = (kind == Kind::Command, None);
@@ -105,7 +105,8 @@ fn words(text: &str, kind: Kind) -> Vec<Word> {
             gap += 1;
             continue;
         }
-        let is_glued = gap < least_gap || gap == 1 && c == '%' && !is_command;
+        let begins_with_sign = words.last().is_some_and(|word| word.text == "%");
+        let is_glued = gap < least_gap || gap == 1 && !is_command && (c == '%' || begins_with_sign);
         match words.last_mut().filter(|_| is_glued) {
             Some(word) => word.text.extend(std::iter::repeat_n(' ', gap).chain([c])),
             None => words.push(Word { gap, text: c.to_string(), continues: is_command }),
@@ -174,6 +175,7 @@ mod tests {
         assert_eq!(wrapped("", 10), [""]);
         assert_eq!(wrapped("雪雪 雪雪", 8), ["雪雪", "  雪雪"]);
         assert_eq!(wrapped_cell("some words of a cell", 10), ["some words", "of a cell"]);
+        assert_eq!(wrapped_cell("% of 0", 3), ["% of", "0"]);
         // Nothing fits, and nothing is lost.
         for columns in [0, 1, 2, 3] {
             assert_eq!(wrapped("ab `cd ef` g", columns).join("").replace([' ', '\\'], ""), "ab`cdef`g");
