@@ -71,7 +71,8 @@ Examples:
   # the paper's experiments
   morphcog data fetch mnist
   morphcog evolve --config zero_one.toml
-  morphcog eval --archive runs/zero_one-seed1 --robots top:10
+  morphcog eval --archive runs/zero_one-seed1 \\
+    --robots top:10
 
 Exit codes:
   0    done
@@ -113,7 +114,8 @@ Ctrl-C ends at once.")]
     #[command(after_help = "\
 Examples:
   morphcog eval --archive runs/zero_one-seed1 --images 1000
-  morphcog eval --archive runs/zero_one-seed1 --robots top:10
+  morphcog eval --archive runs/zero_one-seed1 \\
+    --robots top:10
   morphcog eval --archive runs/zero_one-seed1 \\
     --robots 3fa,b02 -o two.json
   # the paper's test
@@ -144,8 +146,8 @@ Examples:
     #[command(after_help = "\
 Examples:
   morphcog replay --robot best
-  morphcog replay --robot 3fa --archive runs/zero_one-seed1 \\
-    --images train:1,test:17
+  morphcog replay --robot 3fa \\
+    --archive runs/zero_one-seed1 --images train:1,test:17
   # a robot published with the paper (see morphcog gallery)
   morphcog replay --robot XFJPI
   # in the terminal: space pauses, . steps, q quits
@@ -483,6 +485,8 @@ mod tests {
         let mut narrow = command.clone().term_width(columns);
         let help = narrow.render_help().to_string();
         let (_, footer) = help.rsplit_once("Example").unwrap();
+        let whole = command.get_after_help().unwrap().to_string();
+        assert_eq!(examples(footer), examples(whole.rsplit_once("Example").unwrap().1));
         for words in examples(footer) {
             let read = with_negative_numbers(Cli::command()).try_get_matches_from(&words);
             assert!(read.is_ok(), "{columns} columns: {words:?}: {}", read.unwrap_err());

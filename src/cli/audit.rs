@@ -26,7 +26,8 @@ use std::sync::atomic::AtomicBool;
 pub(super) const EXAMPLES: &str = "\
 Examples:
   morphcog audit --archive runs/zero_one-seed1
-  morphcog audit --archive runs/zero_one-seed1 --robots top:10
+  morphcog audit --archive runs/zero_one-seed1 \\
+    --robots top:10
   morphcog audit --archive runs/zero_one-seed1 \\
     --robots best-validation:3
   morphcog audit --archive runs/zero_one-seed*

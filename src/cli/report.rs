@@ -16,7 +16,8 @@ use std::path::PathBuf;
 pub(super) const EXAMPLES: &str = "\
 Examples:
   morphcog report --archive runs/zero_one-seed1
-  morphcog report --archive runs/zero_one-seed* -o seeds.html
+  morphcog report --archive runs/zero_one-seed* \\
+    -o seeds.html
   morphcog report --archive runs/zero_one-seed1 \\
     --rollouts 20 --open
 

@@ -25,8 +25,8 @@ Examples:
   morphcog team --archive runs/pairs/*/
   morphcog team --archive runs/0v1 runs/0v2 runs/1v2 \\
     --classes 0,1,2
-  morphcog team --archive runs/pairs/*/ --split validation \\
-    --images 400
+  morphcog team --archive runs/pairs/*/ \\
+    --split validation --images 400
 
 A robot votes for the classes of the side it walks to, if it walks farther than 3 voxel lengths; \
 most votes win; in a tie, the class with the largest sum of walks. A second answer is that sum of \

@@ -99,7 +99,7 @@ fn words(text: &str, kind: Kind) -> Vec<Word> {
     let least_gap = if kind == Kind::Cell && text.contains("  ") { 2 } else { 1 };
     let (mut is_command, mut quote) = (kind == Kind::Command, None);
     let mut words: Vec<Word> = Vec::new();
-    let mut gap = 0;
+    let (mut gap, mut is_escaped) = (0, false);
     for c in text.chars() {
         if c == ' ' && quote.is_none() {
             gap += 1;
@@ -113,11 +113,14 @@ fn words(text: &str, kind: Kind) -> Vec<Word> {
         }
         gap = 0;
         match c {
+            _ if is_escaped => {}
             '`' if kind == Kind::Prose => (is_command, quote) = (!is_command, None),
             '\'' | '"' if is_command && quote.is_none() => quote = Some(c),
             _ if quote == Some(c) => quote = None,
             _ => {}
         }
+        // A backslash in single quotes is one.
+        is_escaped = c == '\\' && is_command && !is_escaped && quote != Some('\'');
     }
     words
 }
@@ -164,6 +167,7 @@ fn is_broken(unit: &[Word], place: usize, line: &str, columns: usize) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::base::shell::quoted;
 
     #[test]
     fn lines_break_between_words_only() {
@@ -208,5 +212,7 @@ mod tests {
         assert_eq!(next(31), ["next:", "  audit --archive 'a b' -n 3"]);
         assert_eq!(next(24), ["next: audit --archive \\", "  'a b' -n 3"]);
         assert_eq!(wrapped_command("     ", "audit -a run", 20), ["      audit -a run"]);
+        let quoted = quoted("it's here/a b");
+        assert_eq!(wrapped_command("next:", &format!("eval -a {quoted}"), 26)[1..], [format!("  {quoted}")]);
     }
 }

@@ -355,3 +355,32 @@ fn an_instruction_set_that_is_not_there_is_an_error_that_names_those_that_are() 
         said(command).ended(code, words);
     }
 }
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_shell_reads_the_commands_that_are_printed_whatever_the_path() {
+    use std::ffi::OsStr;
+    use std::os::unix::ffi::OsStrExt;
+    let sandbox = Sandbox::tiny();
+    for name in [b"it's \"a\" $HOME `run`".as_slice(), b"-run", b"a|b;*\n", b"\xff\xfe"] {
+        let folder = OsStr::from_bytes(name);
+        let out = [b"--out=", name].concat();
+        let mut evolve = sandbox.command(["evolve", "-c", "tiny.toml"]);
+        evolve.arg(OsStr::from_bytes(&out));
+        let next = said(evolve).ended(0, &["next: "]).err;
+        let test = next.lines().find_map(|line| line.trim().strip_prefix("morphcog eval ")).unwrap();
+        let mut unaudited = sandbox.command(["eval", "--physical-only"]);
+        unaudited.arg(OsStr::from_bytes(&[b"--archive=", name].concat()));
+        let hint = said(unaudited).ended(3, &["hint: `"]).err;
+        let audit = hint.split_once("hint: `morphcog audit ").unwrap().1.trim_end().trim_end_matches('`');
+        for command in [format!("eval -q -n 4 --cycles 1 {test}"), format!("audit -q {audit}")] {
+            let line = format!("{PROGRAM} {command}");
+            let mut bash = std::process::Command::new("bash");
+            let ended = bash.args(["-c", &line]).current_dir(sandbox.path("")).output().unwrap();
+            assert!(ended.status.success(), "{command}: {ended:?}");
+        }
+        for file in ["eval.json", "audit.json"] {
+            assert!(sandbox.path("").join(folder).join(file).exists(), "{file} of {folder:?}");
+        }
+    }
+}
