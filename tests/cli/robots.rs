@@ -264,7 +264,7 @@ fn runs_of_the_atlas_are_read_compressed_and_leave_their_results_here() {
         "atlas-tiny-1-audit.json",
         sandbox.read("atlas-tiny-1-audit.json").replace("sha256\":\"", "sha256\":\"0"),
     );
-    let stale = ["atlas-tiny-1-audit.json: stale", "morphcog audit --archive atlas:tiny-1 audits the run"];
+    let stale = ["atlas-tiny-1-audit.json: stale", "`morphcog audit --archive atlas:tiny-1` audits the run"];
     sandbox.run("eval -a atlas:tiny-1 --robots random:2 --images 4 --physical-only").ended(3, &stale);
 
     let elsewhere = |args: &str| {
