@@ -33,7 +33,7 @@ use crate::data::dataset::{BUILTIN, Dataset, DatasetError, Split};
 use crate::data::fetch::{FetchError, FetchOptions, fetch};
 use crate::data::files::{FilesError, places};
 use crate::search::evolve;
-use crate::sim::InstructionSet;
+use crate::sim::{FloatEnvironment, InstructionSet};
 use crate::store::capacity::CapacityFile;
 use crate::store::folder;
 use crate::store::folder::IfExists;
@@ -57,6 +57,7 @@ use std::sync::atomic::AtomicBool;
 /// # Errors
 /// What went wrong; its kind has the exit code.
 pub fn run(cli: Cli, console: &Console, ranks: Ranks) -> Result<(), Error> {
+    let _environment = FloatEnvironment::standard();
     InstructionSet::asked().map_err(|text| Error::usage(text).hint("or leave it unset".to_string()))?;
     threads::check_environment()?;
     if cli.quiet && cli.json {

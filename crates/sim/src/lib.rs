@@ -92,7 +92,7 @@ pub use body::{Body, Material};
 pub use energy::Energy;
 pub use grid::Grid;
 pub use physics::{Physics, PhysicsError};
-pub use simd::InstructionSet;
+pub use simd::{FloatEnvironment, InstructionSet};
 pub use state::State;
 pub use step::actuation::width;
 pub use system::System;

@@ -12,11 +12,13 @@ use std::ops::{Add, BitAnd, BitOr, Div, Mul, Sub};
 use std::sync::OnceLock;
 
 mod buffer;
+mod environment;
 mod portable;
 #[cfg(target_arch = "x86_64")]
 mod x86;
 
 pub use buffer::Buffer;
+pub use environment::FloatEnvironment;
 
 /// The number of lanes that the width of all lane types divides: loops over a multiple of it need
 /// no remainder.
