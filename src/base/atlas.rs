@@ -42,6 +42,10 @@ pub fn file(run: &str, file: &str) -> io::Result<PathBuf> {
 }
 
 fn found(run: &str, file: &str, variable: Option<&OsStr>) -> io::Result<PathBuf> {
+    if let Some(set) = variable.filter(|value| !value.is_empty()).filter(|value| !Path::new(value).is_dir()) {
+        let text = format!("{VARIABLE}={}: expected a folder", Path::new(set).display());
+        return Err(io::Error::new(io::ErrorKind::NotADirectory, text));
+    }
     let folders = folders(variable);
     let places = folders.iter().map(|folder| folder.join(run).join(format!("{file}{COMPRESSED}")));
     let places: Vec<PathBuf> = places.collect();
@@ -139,7 +143,12 @@ mod tests {
     fn without_an_atlas_the_error_says_how_to_get_it() {
         let folder = tempfile::tempdir().unwrap();
         let nowhere = folder.path().join("nowhere");
-        let error = found("x", "run.json", Some(nowhere.as_os_str())).unwrap_err().to_string();
+        let error = |folder: &Path| found("x", "run.json", Some(folder.as_os_str())).unwrap_err().to_string();
+        assert!(
+            error(&nowhere).starts_with("MORPHCOG_ATLAS=") && error(&nowhere).contains("expected a folder")
+        );
+        std::fs::create_dir(&nowhere).unwrap();
+        let error = error(&nowhere);
         assert!(error.contains("nowhere/x/run.json.gz and no data/atlas/x/run.json.gz"), "{error}");
         let error = found("x-7", "run.json", None).unwrap_err().to_string();
         assert!(error.contains("MORPHCOG_ATLAS is not set"), "{error}");

@@ -1,7 +1,7 @@
 //! Writing files so that nothing is ever half-written, and reading texts that end.
 
 use crate::base::named::{self, Place};
-use flate2::read::GzDecoder;
+use flate2::read::MultiGzDecoder;
 use std::ffi::{OsStr, OsString};
 use std::fs::File;
 use std::io::{self, Read, Write};
@@ -21,7 +21,7 @@ const MOST_TEXT: u64 = 256 << 20;
 pub fn read_text(path: &Path) -> io::Result<String> {
     let source: Box<dyn Read> = match named::place(path).transpose()? {
         Some(Place::Shipped(text)) => return Ok(text.to_string()),
-        Some(Place::Compressed(file)) => Box::new(GzDecoder::new(File::open(file)?)),
+        Some(Place::Compressed(file)) => Box::new(MultiGzDecoder::new(File::open(file)?)),
         None => Box::new(File::open(path)?),
     };
     read_limited(source)

@@ -281,6 +281,17 @@ fn runs_of_the_atlas_are_read_compressed_and_leave_their_results_here() {
         ["atlas:tiny-2/run.json: cannot be read", "MORPHCOG_ATLAS is not set", "expected one of tiny-1"];
     sandbox.run("eval -a atlas:tiny-2 --images 4").ended(3, &unset);
     Sandbox::new().run("replay -a atlas:tiny-2").ended(3, &["set MORPHCOG_ATLAS to its data/atlas"]);
+    let mut command = sandbox.command("eval -a atlas:tiny-1 --images 4".split_whitespace());
+    command.env("MORPHCOG_ATLAS", "nowhere");
+    said(command).ended(3, &["MORPHCOG_ATLAS=nowhere: expected a folder"]);
+    // A file of two members, as `cat a.gz b.gz` makes it, is what both hold.
+    let run = std::fs::read(sandbox.path("run/run.json")).unwrap();
+    for (part, name) in [(&run[..run.len() / 2], "first"), (&run[run.len() / 2..], "second")] {
+        sandbox.write(name, part);
+    }
+    let members = [compressed("first"), compressed("second")].concat();
+    sandbox.write("data/atlas/members-1/run.json.gz", members);
+    sandbox.run("plot archive -a atlas:members-1 -o members.svg").ended(0, &[]);
     sandbox.write("data/atlas/broken-1/run.json.gz", &compressed("run/run.json")[..200]);
     sandbox.run("eval -a atlas:broken --images 4").ended(3, &["atlas:broken-1/run.json: cannot be read"]);
 }

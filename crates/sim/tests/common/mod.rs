@@ -1,7 +1,7 @@
 //! Trajectories of EvoGym's own (see `tests/golden/README.md`).
 #![allow(dead_code, reason = "every test program uses its own part")]
 
-use flate2::read::GzDecoder;
+use flate2::read::MultiGzDecoder;
 use morphcog_sim::{Body, Grid, Material, Physics, Start, System, World};
 use serde::de::{DeserializeOwned, Error};
 use serde::{Deserialize, Deserializer};
@@ -66,7 +66,7 @@ impl Reference {
 /// A file of `tests/golden`.
 pub fn golden<T: DeserializeOwned>(name: &str) -> T {
     let path = folder().join(format!("{name}.json.gz"));
-    serde_json::from_reader(GzDecoder::new(std::fs::File::open(path).unwrap())).unwrap()
+    serde_json::from_reader(MultiGzDecoder::new(std::fs::File::open(path).unwrap())).unwrap()
 }
 
 /// `tests/golden`, for the program's tests as well.
