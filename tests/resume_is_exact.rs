@@ -181,8 +181,19 @@ fn when_both_checkpoints_are_broken_it_says_so_and_destroys_nothing() {
         sandbox.write(&format!("run/{name}"), &half_way()[name][..200]);
     }
     let before = files(&sandbox.path("run"));
-    sandbox.run(&resume_to_12()).ended(3, &["checkpoint", "checksum", "hint:", "--force"]);
+    let said = sandbox.run(&resume_to_12()).ended(3, &["checkpoint", "checksum", "hint: move", "run.json"]);
+    // It would cost what can still be gone on with.
+    assert!(!said.err.contains("--force"), "{}", said.err);
     assert_eq!(files(&sandbox.path("run")), before);
+    // Without a whole run.json there is nothing to go on from.
+    let run = sandbox.read("run/run.json");
+    sandbox.write("run/run.json", &run[..200]);
+    sandbox.run(&resume_to_12()).ended(3, &["checkpoint", "checksum", "hint:", "--force"]);
+    sandbox.write("run/run.json", run);
+    // What the hint says is what helps.
+    remove_checkpoints(&sandbox);
+    sandbox.run(&resume_to_12()).ended(0, &["no checkpoint", "run.json"]);
+    assert_eq!(sandbox.run_file("run").generations, 12);
 }
 
 /// A folder with six generations of twelve and without checkpoints.

@@ -134,10 +134,14 @@ impl Error {
         Error { key: Some(key.to_string()), ..self }
     }
 
-    /// The same with where it is.
+    /// The same with where it is, unless it says that already.
     #[must_use]
     pub fn within(mut self, place: &str) -> Self {
-        self.message = one_line(&format!("{place}: {}", self.message));
+        let place = one_line(place);
+        let is_said = self.message.strip_prefix(&place).is_some_and(|rest| rest.starts_with(':'));
+        if !is_said {
+            self.message = one_line(&format!("{place}: {}", self.message));
+        }
         self
     }
 }

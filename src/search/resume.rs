@@ -32,16 +32,21 @@ pub(crate) fn saved(
         is_newest_broken = true;
         warn(text);
     };
-    let checkpoint = checkpoint::read(folder.path(), tell)?;
+    let run_json = folder.path().join(RUN_JSON);
+    let checkpoint = checkpoint::read(folder.path(), tell).map_err(|error| {
+        error.hint(match without_checkpoint(&run_json) {
+            Ok(_) => format!("move checkpoint*.json away: the run then goes on from its {RUN_JSON}"),
+            Err(_) => ANEW.to_string(),
+        })
+    })?;
     let has_checkpoint = checkpoint.is_some();
     let saved = match checkpoint {
         Some(saved) => saved,
         None => {
-            let path = folder.path().join(RUN_JSON);
-            if !path.exists() {
+            if !run_json.exists() {
                 return Ok(None);
             }
-            without_checkpoint(&path)?
+            without_checkpoint(&run_json)?
         }
     };
     compatible(&saved, config, training).map_err(|error| error.within(&place))?;

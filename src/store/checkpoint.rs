@@ -7,6 +7,7 @@ use crate::base::hash::sha256_hex;
 use crate::config::reading;
 use crate::store::metrics::Totals;
 use crate::store::names::CHECKPOINTS;
+use crate::store::results::Stored;
 use crate::store::run::{Robot, RunFile};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
@@ -114,9 +115,7 @@ pub fn read(folder: &Path, mut warn: impl FnMut(String)) -> Result<Option<Checkp
             Ok(Some(checkpoint))
         }
         (Ok(found), None) => Ok(found),
-        (Ok(None), Some(error)) | (Err(error), _) => {
-            Err(error.hint("start the run anew with --force".to_string()))
-        }
+        (Ok(None), Some(error)) | (Err(error), _) => Err(error),
     }
 }
 
@@ -262,15 +261,13 @@ mod tests {
     }
 
     #[test]
-    fn two_broken_ones_are_an_error_that_says_what_to_do() {
+    fn two_broken_ones_are_an_error() {
         let folder = tempfile::tempdir().unwrap();
         let folder = folder.path();
         CHECKPOINTS.iter().for_each(|name| std::fs::write(folder.join(name), "x").unwrap());
         let error = read(folder, |_| ()).unwrap_err();
         assert_eq!(error.kind, crate::base::error::ErrorKind::Input);
-        assert!(
-            error.message.contains("checksum") && error.hint.is_some_and(|hint| hint.contains("--force"))
-        );
+        assert!(error.message.contains("checksum"));
     }
 
     #[test]
