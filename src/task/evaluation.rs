@@ -148,21 +148,45 @@ pub fn fresh_rollouts(
     told: &(dyn Fn(u64) + Sync),
     stop: &AtomicBool,
 ) -> Result<(Vec<Result<f64, Unstable>>, usize), Stopped> {
+    let (found, simulated, ended) = fresh_rollouts_so_far(body, images, conditions, setting, told, stop);
+    ended.map(|()| (found, simulated))
+}
+
+/// Fresh rollouts as of [`fresh_rollouts`], as far as they are when `stop` is set: those of the first
+/// images, the number simulated, and whether it was stopped. Those of the other images, simulated
+/// later, complete them with the same bits.
+pub fn fresh_rollouts_so_far(
+    body: &Body,
+    images: &[Grid<f64>],
+    conditions: &[Condition],
+    setting: (&Physics, &Protocol),
+    told: &(dyn Fn(u64) + Sync),
+    stop: &AtomicBool,
+) -> (Vec<Result<f64, Unstable>>, usize, Result<(), Stopped>) {
     let setup = Setup::new(images, conditions, setting, stop);
     let systems = setup.systems(body);
     let same_as = setup.same_as(body);
     let mut shared = BTreeMap::<usize, u64>::new();
     same_as.iter().for_each(|&first| *shared.entry(first).or_default() += 1);
-    let roll = |&(number, ref images): &(usize, Vec<usize>)| {
-        let rolled = setup.side_by_side(body, &systems[number], images)?;
-        images.iter().for_each(|image| told(shared[image]));
-        Ok(images.iter().copied().zip(rolled).collect())
+    let mut parts = setup.parts(&systems, shared.keys().copied());
+    // In the images' order, one after another: what is stopped has then done the first of them.
+    parts.sort_by_key(|(_, images)| images.first().copied());
+    let next = AtomicUsize::new(0);
+    let worker = |_| {
+        let mut own = Vec::new();
+        while let Some((number, images)) = parts.get(next.fetch_add(1, Ordering::Relaxed)) {
+            let Ok(rolled) = setup.side_by_side(body, &systems[*number], images) else { break };
+            images.iter().for_each(|image| told(shared[image]));
+            own.extend(images.iter().copied().zip(rolled));
+        }
+        own
     };
-    let parts = setup.parts(&systems, shared.keys().copied());
-    let rolled: Vec<Vec<(usize, Result<f64, Unstable>)>> =
-        parts.par_iter().with_max_len(1).map(roll).collect::<Result<_, Stopped>>()?;
+    let workers = (0..rayon::current_num_threads().min(parts.len())).into_par_iter().with_max_len(1);
+    let rolled: Vec<Vec<(usize, Result<f64, Unstable>)>> = workers.map(worker).collect();
     let rolled: BTreeMap<usize, Result<f64, Unstable>> = rolled.into_iter().flatten().collect();
-    Ok((same_as.iter().map(|first| rolled[first]).collect(), rolled.len()))
+    let found: Vec<_> = same_as.iter().map_while(|first| rolled.get(first).copied()).collect();
+    let ended = if found.len() == images.len() { Ok(()) } else { Err(Stopped) };
+    (found, rolled.len(), ended)
 }
 
 /// A finished rollout: of one image if fresh; of all images if sequential, up to where the robot
@@ -759,6 +783,36 @@ mod tests {
         };
         run(&CALM, RolloutMode::Sequential, Savings::default(), &[3, 4], Box::new(may_win));
         assert_eq!(*asked.lock().unwrap(), BTreeSet::from([1, 2, 3, 4]));
+    }
+
+    #[test]
+    fn rollouts_that_were_stopped_are_the_first_ones_and_the_others_complete_them() {
+        let (physics, protocol) = (Physics::default(), Protocol { control_steps: 20, ..Protocol::default() });
+        let body: Body = "336/446/333".parse().unwrap();
+        let images: Vec<Grid<f64>> = (0..60)
+            .map(|number| {
+                Grid::from_fn(3, 3, |row, column| {
+                    f64::from((number * (row + 2) * (column + 1)) as u32 % 61) / 61.0
+                })
+            })
+            .collect();
+        let conditions: Vec<Condition> = crate::task::perturbation::of_response();
+        let conditions: Vec<Condition> = conditions.into_iter().cycle().take(60).collect();
+        let setting = (&physics, &protocol);
+        let (whole, _) = fresh_rollouts(&body, &images, &conditions, setting, &|_| (), &NEVER).unwrap();
+        for most in [1, 20, 59] {
+            let (stop, done) = (AtomicBool::new(false), AtomicUsize::new(0));
+            let told = |count: u64| {
+                let done = done.fetch_add(count as usize, Ordering::Relaxed) + count as usize;
+                stop.fetch_or(done >= most, Ordering::Relaxed);
+            };
+            let (found, _, ended) = fresh_rollouts_so_far(&body, &images, &conditions, setting, &told, &stop);
+            let known = found.len();
+            assert_eq!(ended.is_ok(), known == 60, "{known} of {most}");
+            let (images, conditions) = (&images[known..], &conditions[known..]);
+            let (rest, _) = fresh_rollouts(&body, images, conditions, setting, &|_| (), &NEVER).unwrap();
+            assert_eq!([found, rest].concat(), whole, "{known}");
+        }
     }
 
     #[test]
