@@ -3,7 +3,7 @@
 
 mod common;
 
-use common::program::{Sandbox, TINY, files};
+use common::program::{Sandbox, TINY, files, terminate};
 use morphcog::base::stop::{NEVER, Stopped};
 use morphcog::body::Body;
 use morphcog::genome::Genome;
@@ -45,6 +45,7 @@ fn run_of(bodies: &[&str]) -> Sandbox {
         robot
     };
     run.elites = bodies.iter().enumerate().map(robot).collect();
+    run.stats = run.archive().unwrap().stats(run.dimensions.possible_cells, run.config.archive.qd_offset);
     sandbox.write("run/run.json", run.to_json());
     sandbox.run_file("run");
     sandbox
@@ -116,13 +117,45 @@ fn robots_that_were_measured_before_are_kept_with_what_they_could_be_taught() {
     }
     let file = responses(&sandbox, "run/response.json");
     assert_eq!(file.robots.iter().filter(|robot| robot.taught.is_some()).count(), 2);
-    // A file that names places which the body does not have is said, and measured again.
+    // A file that names places which the body does not have is refused, and stays.
     let text = sandbox.read("run/response.json");
     let broken = text.replacen("{\"row\":0,", "{\"row\":99,", 1);
     assert_ne!(text, broken);
-    sandbox.write("run/response.json", broken);
+    sandbox.write("run/response.json", &broken);
     let line = format!("response -q -a run --robots {} -n 60 --error 0", ids[0]);
-    sandbox.run(&line).ended(0, &["run/response.json: robots.1.places", "measured again"]);
+    sandbox.run(&line).ended(3, &["run/response.json: robots[0].places", "written over", "--out"]);
+    assert_eq!(sandbox.read("run/response.json"), broken);
+}
+
+#[test]
+fn a_measurement_that_was_stopped_goes_on_and_ends_with_the_same_bytes() {
+    let sandbox = run_of(&[WALKER]);
+    let line = "response -q -a run -n 150 --error 0 -o";
+    sandbox.run(&format!("{line} whole.json")).ended(0, &[]);
+    let whole: serde_json::Value = serde_json::from_str(&sandbox.read("whole.json")).unwrap();
+    // In its first batch, between two batches, in a later one, after the last.
+    for known in [1, 17, 60, 77, 149, 150] {
+        let mut part = whole.clone();
+        let mut robot = part["robots"].as_array_mut().unwrap().pop().unwrap();
+        robot["displacements"].as_array_mut().unwrap().truncate(known);
+        part["unfinished"] = serde_json::json!([
+            { "id": robot["id"], "body": robot["body"], "displacements": robot["displacements"] }
+        ]);
+        sandbox.write("part.json", part.to_string());
+        sandbox.run(&format!("{line} part.json")).ended(0, &[]);
+        assert!(sandbox.read("part.json") == sandbox.read("whole.json"), "{known}");
+    }
+    // And what a signal leaves is such a file.
+    let mut child = sandbox.start("response -q -a run -n 6000 --error 0 -o stopped.json");
+    std::thread::sleep(std::time::Duration::from_millis(1500));
+    terminate(&child);
+    assert_eq!(child.wait().unwrap().code(), Some(75));
+    let stopped = ResponseFile::read(&sandbox.path("stopped.json")).unwrap();
+    let [begun] = &stopped.unfinished[..] else { panic!("{} unfinished", stopped.unfinished.len()) };
+    let measured = &responses(&sandbox, "whole.json").robots[0].displacements;
+    let common = begun.displacements.len().min(measured.len());
+    assert!(stopped.robots.is_empty() && common > 0);
+    assert_eq!(begun.displacements[..common], measured[..common]);
 }
 
 #[test]

@@ -29,7 +29,14 @@ fn run_once() -> &'static BTreeMap<String, Vec<u8>> {
         let sandbox = Sandbox::tiny();
         sandbox.run("evolve -q -c tiny.toml -o run").ended(0, &[]);
         sandbox.run("eval -q -a run/run.json -n 10 -r top:3 --cycles 1").ended(0, &[]);
-        sandbox.write("run/capacity.json", CAPACITY);
+        // Of the robots that were evaluated.
+        let read = |text: &str| serde_json::from_str::<serde_json::Value>(text).unwrap();
+        let (mut capacity, eval) = (read(CAPACITY), read(&sandbox.read("run/eval.json")));
+        capacity["selected"] = eval["selected"].clone();
+        for key in ["robots", "accuracy"] {
+            capacity["tasks"][0][key] = eval["means"]["0|1"][key].clone();
+        }
+        sandbox.write("run/capacity.json", capacity.to_string());
         files(&sandbox.path("run"))
     })
 }
@@ -221,6 +228,43 @@ fn what_cannot_be_shown_is_refused_in_a_line() {
     refused("progress -a run/run.json", 3, &["metrics.csv"]);
     std::fs::remove_file(sandbox.path("run/metrics.csv")).unwrap();
     refused("progress -a run/run.json", 3, &["metrics.csv"]);
+}
+
+#[test]
+fn metrics_and_capacity_of_another_run_are_not_taken_for_this_ones() {
+    let sandbox = with_run();
+    sandbox.run("evolve -q -c tiny.toml --seed 4 -o other").ended(0, &[]);
+    let own = sandbox.read("run/metrics.csv");
+    let (header, lines) = own.split_once('\n').unwrap();
+    let reversed: Vec<&str> = lines.lines().rev().collect();
+    let metrics = [
+        (sandbox.read("other/metrics.csv"), "another run"),
+        (format!("{header}\n{}\n", reversed.join("\n")), "in order"),
+        (format!("{own}{lines}"), "in order"),
+        (own[..own.trim_end().rfind('\n').unwrap() + 1].to_string(), "another state"),
+        (format!("{header}\n0,1,7.5{}", &lines[lines.match_indices(',').nth(2).unwrap().0..]), "from 0 to 1"),
+    ];
+    for (content, word) in metrics {
+        sandbox.write("run/metrics.csv", content);
+        sandbox.run("plot progress -a run").ended(3, &["run/metrics.csv", word]);
+        let said = sandbox.run("report -q -a run --rollouts 0").ended(0, &[]);
+        assert!(said.err.is_empty() || said.err.contains("metrics.csv"), "{said:?}");
+        let said = sandbox.run("report -a run --rollouts 0").ended(0, &["run/metrics.csv", "left out"]);
+        assert_eq!(said.err.matches("run/metrics.csv").count(), 1, "{said:?}");
+    }
+    sandbox.write("run/metrics.csv", own);
+    sandbox.run("plot progress -a run").ended(0, &[]);
+    // The capacity beside a run must be that of the evaluation beside it; without one, of the run.
+    let capacity: serde_json::Value = serde_json::from_str(&sandbox.read("run/capacity.json")).unwrap();
+    let mut other = capacity.clone();
+    other["tasks"][0]["accuracy"] = 0.125.into();
+    other["run"] = "other".into();
+    sandbox.write("run/capacity.json", other.to_string());
+    sandbox.run("plot capacity -a run").ended(3, &["run/capacity.json", "another run"]);
+    std::fs::remove_file(sandbox.path("run/eval.json")).unwrap();
+    sandbox.run("plot capacity -a run").ended(3, &["run/capacity.json", "another run"]);
+    sandbox.write("run/capacity.json", capacity.to_string());
+    sandbox.run("plot capacity -a run").ended(0, &[]);
 }
 
 #[test]

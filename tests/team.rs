@@ -224,6 +224,17 @@ fn a_test_that_was_stopped_goes_on_and_ends_with_the_same_bytes_on_any_threads()
 }
 
 #[test]
+fn a_file_that_cannot_be_read_is_not_written_over() {
+    let sandbox = pairs();
+    for content in ["{", "{\"format\": \"morphcog-team\", \"format_version\": 99}", "my notes"] {
+        sandbox.write("pairs/team.json", content);
+        let said = sandbox.run(&format!("{TEAM} -q --images 30"));
+        said.ended(3, &["pairs/team.json", "hint:", "move it away, or write elsewhere with --out"]);
+        assert_eq!(sandbox.read("pairs/team.json"), content);
+    }
+}
+
+#[test]
 fn validation_images_are_none_that_a_run_was_trained_on() {
     let sandbox = pairs();
     sandbox.run(&format!("{TEAM} -q --split validation --images 30")).ended(0, &[]);

@@ -86,7 +86,7 @@ fn a_training_ends_with_the_same_bytes_on_any_threads_and_after_any_stop() {
     let count = whole["rollouts"].as_array().unwrap().len();
     assert!(count >= 4, "{count}");
     for (kept, of_last) in [(0, 0), (1, 17), (1, 40), (count / 2, 3), (count - 1, 1000)] {
-        let mut cut = whole.clone();
+        let mut cut = unsummed(&whole);
         let batches = cut["rollouts"].as_array_mut().unwrap();
         batches.truncate(kept);
         if let Some(last) = batches.last_mut() {
@@ -116,6 +116,37 @@ fn a_training_ends_with_the_same_bytes_on_any_threads_and_after_any_stop() {
     // Another training is not mixed with it.
     let other = train("two", "--resume --seed 9");
     sandbox.run(&other).ended(2, &["training.json", "--force"]);
+}
+
+/// A `training.json` as earlier versions wrote it: any of its rollouts may be left out.
+fn unsummed(file: &serde_json::Value) -> serde_json::Value {
+    let mut file = file.clone();
+    file["format_version"] = 1.into();
+    file.as_object_mut().unwrap().remove("checksum");
+    file
+}
+
+#[test]
+fn a_training_goes_on_from_no_batch_that_was_changed_left_out_or_repeated() {
+    let sandbox = sandbox();
+    let train = format!("train -q -a walkers --task 0|1 --robots top:2 {LITTLE} -o taught");
+    sandbox.run(&train).ended(0, &[]);
+    let whole: serde_json::Value = serde_json::from_str(&sandbox.read("taught/training.json")).unwrap();
+    type Damage = fn(&mut Vec<serde_json::Value>);
+    let damages: [Damage; 4] = [
+        |batches| batches[0][3] = 0.25.into(),
+        |batches| drop(batches.remove(0)),
+        |batches| batches.swap(0, 1),
+        |batches| batches.push(batches[0].clone()),
+    ];
+    for damage in damages {
+        let mut damaged = whole.clone();
+        damage(damaged["rollouts"].as_array_mut().unwrap());
+        sandbox.write("taught/training.json", damaged.to_string());
+        let before = files(&sandbox.path("taught"));
+        sandbox.run(&format!("{train} --resume")).ended(3, &["taught/training.json: checksum", "--force"]);
+        assert!(files(&sandbox.path("taught")) == before);
+    }
 }
 
 #[test]
@@ -273,6 +304,7 @@ fn what_cannot_be_trained_is_one_clear_error_and_writes_nothing() {
     (blind.id, blind.voxels) = (blind.genome.id(), blind.body.counts());
     blind.cell = blind.bins();
     run.elites = vec![blind];
+    run.stats = run.archive().unwrap().stats(run.dimensions.possible_cells, run.config.archive.qd_offset);
     sandbox.write("blind/run.json", run.to_json());
     let said = sandbox.run("train -q -a blind --task 0|1 -o refused");
     let said = said.ended(3, &["blind/run.json", "soft voxel or a sensor", "--robots"]);

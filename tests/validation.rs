@@ -63,10 +63,13 @@ fn the_best_on_validation_images_are_found_the_same_every_time_and_kept() {
     assert!(first.robots.iter().all(|robot| robot.validation.as_ref().unwrap().images == 60));
     let kept = sandbox.read("run/validation.json");
     assert_eq!(eval(&sandbox, "--robots best-validation:3 --validation 60 --threads 3"), first);
-    // A broken or another run's file is not believed.
+    // One that cannot be read stays.
     sandbox.write("run/validation.json", "{");
-    assert_eq!(eval(&sandbox, "--robots best-validation:3 --validation 60"), first);
-    assert_eq!(sandbox.read("run/validation.json"), kept);
+    sandbox
+        .run("eval -q -a run/run.json --images 40 --robots best-validation:3 --validation 60")
+        .ended(3, &["run/validation.json", "delete it"]);
+    assert_eq!(sandbox.read("run/validation.json"), "{");
+    // Another run's is not believed.
     sandbox.write("run/validation.json", kept.replace("\"key\":\"", "\"key\":\"0"));
     assert_eq!(eval(&sandbox, "--robots best-validation:3 --validation 60"), first);
     // Selected otherwise, a robot has no such figure.

@@ -22,13 +22,15 @@ use crate::store::folder::{check_out, writable};
 use crate::store::images::{DatasetRef, ImageRef};
 use crate::store::names::RESPONSE_JSON;
 use crate::store::response::{
-    EndedBy, FORMAT, FORMAT_VERSION, PICTURES, ResponseFile, RobotResponse, Setting, Taught, pictures,
+    EndedBy, FORMAT, FORMAT_VERSION, PICTURES, ResponseFile, RobotResponse, Setting, Taught, Unfinished,
+    pictures,
 };
+use crate::store::results::replaced;
 use crate::store::robots::{Selection, Source};
 use crate::store::unwritten::Unwritten;
 use crate::store::whereabouts::{Whereabouts, load_dataset_of, say_transposed, seen};
 use crate::task::direction;
-use crate::task::evaluation::fresh_rollouts;
+use crate::task::evaluation::fresh_rollouts_so_far;
 use crate::task::gait::Gait;
 use crate::task::grouping::{Grouping, balanced};
 use crate::task::lesson::Example;
@@ -143,13 +145,14 @@ pub fn measure(options: &Options, stop: &AtomicBool, observer: &dyn Observer) ->
         run_seed,
         run_sha256: provenance.sha256.clone(),
         setting: setting(options, seed, config, &probing, task.as_ref())?,
+        unfinished: Vec::new(),
         robots: Vec::new(),
     };
     if !subjects.is_empty() {
         let label = format!("measuring {}:", counted(subjects.len(), "robot", "robots"));
         observer.begins(&Work::new(label, (subjects.len() * options.images) as u64, "rollouts"));
     }
-    let earlier = earlier(options, observer);
+    let earlier = earlier(options, observer)?;
     if let Some((path, before)) = earlier.iter().find(|(path, _)| *path == options.out)
         && before.run_sha256 == provenance.sha256
         && before.setting.seed != seed
@@ -169,8 +172,9 @@ pub fn measure(options: &Options, stop: &AtomicBool, observer: &dyn Observer) ->
     let mut unwritten = Unwritten::default();
     let mut stopped = false;
     for (number, subject) in subjects.iter().enumerate() {
+        let mut displacements = Vec::new();
         let found = pool.install(|| {
-            measuring.robot(subject, &mut |rollouts| {
+            measuring.robot(subject, &mut displacements, &mut |rollouts| {
                 observer.progress((number * options.images + rollouts) as u64)
             })
         });
@@ -182,15 +186,22 @@ pub fn measure(options: &Options, stop: &AtomicBool, observer: &dyn Observer) ->
             ))),
             Err(error) if error.kind == ErrorKind::Stopped => {
                 stopped = true;
-                break;
+                if !displacements.is_empty() {
+                    let (id, body) = (subject.id.clone(), subject.gait.built(&subject.gait.design()));
+                    file.unfinished.push(Unfinished { id, body, displacements });
+                }
             }
             Err(error) => return Err(error),
         }
-        if !file.robots.is_empty() {
+        if !file.robots.is_empty() || !file.unfinished.is_empty() {
             // Another process may have measured robots of this run meanwhile.
-            let before = ResponseFile::read(&options.out).ok();
-            let whole = before.map_or_else(|| file.clone(), |before| file.with_others_of(&before));
-            unwritten.tried(whole.write(&options.out), |text| observer.warning(text));
+            let before = replaced::<ResponseFile>(&options.out);
+            let whole = before.map(|before| before.map_or_else(|| file.clone(), |b| file.with_others_of(&b)));
+            let written = whole.and_then(|whole| whole.write(&options.out));
+            unwritten.tried(written, |text| observer.warning(text));
+        }
+        if stopped {
+            break;
         }
     }
     if file.robots.is_empty() && !stopped {
@@ -425,54 +436,64 @@ struct Measuring<'a> {
 }
 
 /// What was measured before and might be measured again: in the results' file, and beside the run.
-fn earlier(options: &Options, observer: &dyn Observer) -> Vec<(PathBuf, ResponseFile)> {
+///
+/// # Errors
+/// If the results' file cannot be read.
+fn earlier(options: &Options, observer: &dyn Observer) -> Result<Vec<(PathBuf, ResponseFile)>, Error> {
+    let out = replaced(&options.out)?.map(|file| (options.out.clone(), file));
     let beside = options.archive.as_deref().map(|archive| archive.with_file_name(RESPONSE_JSON));
-    let mut paths: Vec<PathBuf> = beside.into_iter().chain([options.out.clone()]).collect();
-    paths.dedup();
-    let found = |path: PathBuf| ResponseFile::found(&path, observer).map(|file| (path, file));
-    paths.into_iter().filter_map(found).collect()
+    let beside = beside.filter(|beside| *beside != options.out);
+    let beside = beside.and_then(|path| ResponseFile::found(&path, observer).map(|file| (path, file)));
+    Ok(beside.into_iter().chain(out).collect())
 }
 
 impl Measuring<'_> {
-    /// What is known of a gait: its displacements under the first random images.
-    fn known(&self, gait: &Gait) -> &[Option<f64>] {
+    /// What is known of a gait: its displacements under the first random images, and how many of
+    /// them are of a measurement that ended.
+    fn known(&self, gait: &Gait) -> (&[Option<f64>], usize) {
         let conditions = self.probing.conditions();
-        let of =
+        let of_files =
             self.earlier.iter().map(|(_, file)| file.known(self.run_sha256, self.seed, conditions, gait));
-        of.max_by_key(|known| known.len()).unwrap_or_default()
+        // All begin with the same images.
+        of_files.fold((&[], 0), |(known, ended), (other, other_ended)| {
+            (if other.len() > known.len() { other } else { known }, ended.max(other_ended))
+        })
     }
 
-    /// A robot's response; `None` if most of its rollouts are unstable. `progress` is told how many
-    /// rollouts are done.
+    /// A robot's response; `None` if most of its rollouts are unstable. `displacements` are those
+    /// under the random images so far, also if it is stopped; `progress` is told how many rollouts
+    /// are done.
     fn robot(
         &self,
         Subject { id, gait }: &Subject,
+        displacements: &mut Vec<Option<f64>>,
         progress: &mut dyn FnMut(usize),
     ) -> Result<Option<RobotResponse>, Error> {
         let Measuring { options, config, probing, stop, .. } = self;
-        let known = self.known(gait);
+        let (known, ended) = self.known(gait);
         let mut shown: Vec<Shown> = Vec::new();
-        let mut displacements: Vec<Option<f64>> = Vec::new();
-        // What is known costs nothing: it is taken whole, and first.
-        let most = options.images.max(known.len());
+        // What an earlier measurement ended with costs nothing: it is taken whole, and first. One
+        // that was stopped is gone through batch by batch, as if it had not been.
+        let most = options.images.max(ended);
         let mut rollouts = 0;
         loop {
-            let numbers = rollouts..most.min(known.len().max(rollouts + BATCH));
+            let numbers = rollouts..most.min(ended.max(rollouts + BATCH));
             rollouts = numbers.end;
-            let known = if numbers.start == 0 { known } else { &[] };
+            let known = &known[numbers.start.min(known.len())..numbers.end.min(known.len())];
             shown.extend(probing.shown(gait, &config.physics, numbers, |probe, stimuli, conditions| {
-                let (rolled, _) = fresh_rollouts(
+                let before = displacements.len();
+                displacements.extend(known);
+                let (rolled, _, ended) = fresh_rollouts_so_far(
                     probe,
                     &stimuli[known.len()..],
                     &conditions[known.len()..],
                     (&config.physics, &config.protocol),
                     &|_| (),
                     stop,
-                )?;
-                let rolled = known.iter().copied().chain(rolled.into_iter().map(Result::ok));
-                let rolled: Vec<Option<f64>> = rolled.collect();
-                displacements.extend(&rolled);
-                Ok::<_, Error>(rolled)
+                );
+                displacements.extend(rolled.into_iter().map(Result::ok));
+                ended?;
+                Ok::<_, Error>(displacements[before..].to_vec())
             })?);
             progress(rollouts.min(options.images));
             check(stop)?;
@@ -488,6 +509,7 @@ impl Measuring<'_> {
             let taught =
                 self.task.as_ref().map(|task| task.taught(gait, &response, &shown, stop)).transpose()?;
             let taught = taught.flatten();
+            let displacements = std::mem::take(displacements);
             return Ok(Some(RobotResponse::new(id, gait, &response, displacements, ended_by, taught)));
         }
     }

@@ -10,6 +10,7 @@ pub mod named;
 pub mod number;
 pub mod observer;
 pub mod random;
+pub(crate) mod ranges;
 pub mod ranks;
 pub mod shell;
 pub mod shipped;

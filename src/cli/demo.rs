@@ -144,7 +144,7 @@ mod tests {
         let conditions: Vec<_> = config.train.perturbations.conditions().collect();
         let probing = Probing::new(&conditions, run.config.seed);
         let gait = Gait::of(&run.best().unwrap().body).unwrap();
-        assert_eq!(file.known(&run.fingerprint(), run.config.seed, probing.conditions(), &gait).len(), 600);
+        assert_eq!(file.known(&run.fingerprint(), run.config.seed, probing.conditions(), &gait).0.len(), 600);
     }
 
     #[test]

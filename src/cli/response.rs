@@ -128,7 +128,10 @@ pub(super) fn run(args: ResponseArgs, console: &Console) -> Result<(), Error> {
     responses::pictures(console, &finished)?;
     if finished.stopped {
         let text = match finished.file.robots.len() {
-            0 => "stopped before the first robot was measured; nothing is written".to_string(),
+            0 if finished.file.unfinished.is_empty() => {
+                "stopped before anything was measured; nothing is written".to_string()
+            }
+            0 => "stopped within the first robot; what was measured is saved".to_string(),
             robots => {
                 format!("stopped after {}", counted(robots, "robot; it is saved", "robots; those are saved"))
             }

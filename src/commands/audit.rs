@@ -19,6 +19,7 @@ use crate::store::audit::{AuditFile, PerturbedRollout, RobotAudit};
 use crate::store::folder;
 use crate::store::folder::check_out;
 use crate::store::names::AUDIT_JSON;
+use crate::store::results::replaced;
 use crate::store::robots;
 use crate::store::robots::Selection;
 use crate::store::run::{Robot, RunFile};
@@ -111,13 +112,7 @@ pub fn audit(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> R
     let (config, fitness, training, subjects, order, mut file) = open(options)?;
     let grouping = config.grouping()?.with_fitness(fitness);
     let trial = Trial { grouping, training, criteria: options.criteria.clone(), config };
-    let earlier = match options.out.exists() {
-        true => Some(AuditFile::read(&options.out).map_err(|error| {
-            error.hint("it would be written over: move it away, or write elsewhere with --out".to_string())
-        })?),
-        false => None,
-    };
-    if let Some(earlier) = earlier
+    if let Some(earlier) = replaced::<AuditFile>(&options.out)?
         && earlier.run_sha256 == file.run_sha256
         && earlier.criteria != file.criteria
     {

@@ -16,7 +16,7 @@ use crate::store::eval::{EvalFile, RobotReport};
 use crate::store::folder::check_out;
 use crate::store::images::HeldOut;
 use crate::store::names::{CAPACITY_JSON, RUN_JSON};
-use crate::store::results::write_with_table;
+use crate::store::results::{replaced, write_with_table};
 use crate::store::run::RunFile;
 use crate::store::setting::{RunRef, Setting};
 use crate::store::trainings::Trainings;
@@ -70,6 +70,7 @@ pub fn capacity(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -
         let text = format!("--out {}: expected another ending", options.out.display());
         return Err(Error::usage(format!("{text}: the figure beside the results has that name")));
     }
+    replaced::<CapacityFile>(&options.out)?;
     let robots = robots(&report, options)?;
     let images = Images::of(&report, setting, options)?;
     let grouping = setting.task.grouping()?;

@@ -3,6 +3,7 @@
 use crate::analysis::gallery;
 use crate::base::error::Error;
 use crate::base::observer::{Observer, Work};
+use crate::base::ranges::MOST;
 use crate::base::ranks::Ranks;
 use crate::base::text::counted;
 use crate::base::threads::pool;
@@ -16,7 +17,7 @@ use crate::store::eval::{EvalFile, RobotReport, Trial};
 use crate::store::folder::check_out;
 use crate::store::images::{HeldOut, HowMany};
 use crate::store::names::{EVAL_JSON, EVAL_VALIDATION_JSON};
-use crate::store::results::write_with_table;
+use crate::store::results::{replaced, write_with_table};
 use crate::store::robots::{Chosen, Selection, Source};
 use crate::store::run::different;
 use crate::store::unwritten::Unwritten;
@@ -76,7 +77,7 @@ pub struct Finished {
 /// What is wrong with archive, data or selection.
 pub fn eval(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Result<Finished, Error> {
     let threshold = options.threshold;
-    if !(threshold >= 0.0 && threshold.is_finite()) {
+    if !(0.0..=MOST).contains(&threshold) {
         return Err(Error::usage(format!("--threshold {threshold}: expected 0 or more voxel lengths")));
     }
     let sources = sources(options)?;
@@ -235,6 +236,7 @@ fn sources(options: &Options) -> Result<Vec<Source>, Error> {
         same_setting(&sources[0], source)?;
     }
     different(sources.iter().map(|source| (source.path.as_path(), &source.run)))?;
+    replaced::<EvalFile>(&options.out)?;
     Ok(sources)
 }
 

@@ -2,7 +2,7 @@
 
 use crate::base::error::Error;
 use crate::config::{Settings, differing};
-use crate::store::metrics::{Moment, moments};
+use crate::store::metrics::{Moment, moments_of};
 use crate::store::run::RunFile;
 use crate::task::grouping::groups_text;
 use std::collections::BTreeSet;
@@ -81,7 +81,7 @@ impl Progress {
     /// # Errors
     /// What is missing or wrong, with its line.
     pub fn of(run: &RunFile, archive: &Path) -> Result<Self, Error> {
-        let moments = moments(archive)?;
+        let moments = moments_of(run, archive)?;
         let unit = run.fitness().unit();
         let mut settings = run.config.settings();
         settings.remove("seed");

@@ -17,6 +17,7 @@ use crate::store::eval::Trial;
 use crate::store::folder::check_out;
 use crate::store::images::{HeldOut, HowMany, ImageRef};
 use crate::store::names::{TEAM_JSON, TEAM_VALIDATION_JSON};
+use crate::store::results::replaced;
 use crate::store::robots::{BEST, Chosen, Selection, Source};
 use crate::store::run::different;
 use crate::store::team::{FORMAT, FORMAT_VERSION, Member, TeamBaselines, TeamFile};
@@ -122,7 +123,7 @@ pub fn team(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Re
     let images = file.images.clone();
     let hashes: Vec<String> = sources.iter().map(|source| source.run.fingerprint()).collect();
     // Those that are known stay in the file from the beginning, in the team's order.
-    let known = known(options, &file);
+    let known = known(options, &file)?;
     let mut members: Vec<Option<Member>> = robots
         .iter()
         .map(|chosen| {
@@ -268,13 +269,16 @@ fn validation_images(
 }
 
 /// Robots that an earlier test on the same images, stopped or with fewer of them, has shown these.
-fn known(options: &Options, now: &TeamFile) -> Vec<Member> {
+///
+/// # Errors
+/// If the file of an earlier test cannot be read.
+fn known(options: &Options, now: &TeamFile) -> Result<Vec<Member>, Error> {
     let about = |file: &TeamFile| {
         let TeamFile { program_version, test_sha256, images, cycles, split, .. } = file;
         (program_version.clone(), test_sha256.clone(), images.clone(), *cycles, *split)
     };
-    let earlier = TeamFile::read(&options.out).ok().filter(|file| about(file) == about(now));
-    earlier.map_or(Vec::new(), |file| file.members)
+    let earlier = replaced::<TeamFile>(&options.out)?.filter(|file| about(file) == about(now));
+    Ok(earlier.map_or(Vec::new(), |file| file.members))
 }
 
 /// What answers the same images without bodies: on the pixels that the robots see, all together; a

@@ -167,8 +167,7 @@ pub(crate) fn best<'a>(
     let shown = (dataset.fingerprint(Split::Train).expect("its images were drawn just now"), &images[..]);
     let key = key(run, &robots, searched, shown, walker.control_steps);
     let path = source.path.with_file_name(VALIDATION_JSON);
-    // One that is broken is made anew.
-    let known = ValidationFile::read(&path).ok().flatten();
+    let known = ValidationFile::read(&path)?;
     let by_id = |validated: &Validated| {
         let robot = robots.iter().find(|robot| robot.id == validated.id && robot.task == validated.task)?;
         Some((*robot, validated.clone()))

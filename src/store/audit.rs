@@ -1,15 +1,15 @@
 //! `audit.json` and `audit.csv`: the verdicts on a run's robots, beside its `run.json`.
 
 use crate::base::error::Error;
-use crate::base::files::{exists, read_text};
+use crate::base::files::exists;
 use crate::base::hash;
+use crate::base::ranges;
 use crate::base::table;
 use crate::config::audit::Criteria;
-use crate::config::reading;
 use crate::sim::Energy;
 use crate::store::folder;
 use crate::store::names::AUDIT_JSON;
-use crate::store::results::{by_lines, write_with_table};
+use crate::store::results::{self, Stored, by_lines, write_with_table};
 use crate::store::run::RunFile;
 use crate::task::perturbation::Kind;
 use schemars::JsonSchema;
@@ -58,13 +58,16 @@ pub struct RobotAudit {
     /// Why: for `exploits`, what it exploits.
     pub reason: String,
     /// Share of the perturbed rollouts in which its behaviour persists.
+    #[serde(deserialize_with = "ranges::share")]
     pub persisting: f64,
     /// Root mean square difference of displacements from the unchanged rollout's, voxel lengths.
+    #[serde(deserialize_with = "ranges::size")]
     pub spread: f64,
     /// Energies put in per actuation cycle in the unchanged rollout \[mass·wu²/s²\].
     pub energy_per_cycle: Energy,
     /// Displacement under each training image in the unchanged rollout, voxel lengths; none if
     /// unstable.
+    #[serde(default, deserialize_with = "ranges::number")]
     pub displacements: Option<Vec<f64>>,
     /// The perturbed rollouts; none for one that is not a walker.
     pub rollouts: Vec<PerturbedRollout>,
@@ -82,6 +85,37 @@ impl RobotAudit {
             Verdict::Physical => self.verdict.name().to_string(),
             verdict => format!("{}: {}", verdict.name(), self.reason),
         }
+    }
+}
+
+impl Stored for AuditFile {
+    const FORMAT: (&'static str, u32) = (FORMAT, FORMAT_VERSION);
+
+    fn check(&self) -> Result<(), Error> {
+        self.criteria.check()?;
+        for (number, robot) in self.robots.iter().enumerate() {
+            let at = |key: &str| format!("robots[{number}].{key}");
+            if self.robots[..number].iter().any(|other| other.id == robot.id) {
+                return Err(Error::at(&at("id"), format!("{} is there twice", robot.id)));
+            }
+            let Energy { drive, limits } = robot.energy_per_cycle;
+            ranges::check(&at("energy_per_cycle.drive"), drive)?;
+            ranges::check(&at("energy_per_cycle.limits"), limits)?;
+            let images = robot.displacements.as_ref().map(Vec::len);
+            let walked = robot.rollouts.iter().map(|rollout| rollout.displacements.as_ref().map(Vec::len));
+            if let Some(place) = walked.clone().position(|found| found.is_some() && found != images) {
+                let text = "expected as many as of the unchanged rollout";
+                return Err(Error::at(&at(&format!("rollouts[{place}].displacements")), text));
+            }
+        }
+        if self.robots.len() > self.elites {
+            let (found, most) = (self.robots.len(), self.elites);
+            return Err(Error::at(
+                "robots",
+                format!("expected at most {most}, as elites says, found {found}"),
+            ));
+        }
+        Ok(())
     }
 }
 
@@ -105,9 +139,7 @@ impl AuditFile {
     /// # Errors
     /// What is wrong with the file, with its line and key.
     pub fn read(path: &Path) -> Result<Self, Error> {
-        let text =
-            read_text(path).map_err(|error| Error::reading_or(path, &error, "morphcog audit makes one"))?;
-        AuditFile::parse(&text, &path.display().to_string())
+        results::read(path, "morphcog audit makes one")
     }
 
     /// Reads its text; `name` stands in messages.
@@ -115,7 +147,7 @@ impl AuditFile {
     /// # Errors
     /// If it is no verdicts.
     pub fn parse(text: &str, name: &str) -> Result<Self, Error> {
-        reading::read_versioned(text, name, FORMAT, FORMAT_VERSION)
+        results::parse(text, name)
     }
 
     /// Where the verdicts on a run are: beside its `run.json`; of a named run in the present folder,
@@ -305,11 +337,14 @@ pub struct PerturbedRollout {
     pub kind: Kind,
     /// Displacement under each training image, voxel lengths (a mirrored rollout's mirrored back);
     /// none if unstable.
+    #[serde(default, deserialize_with = "ranges::number")]
     pub displacements: Option<Vec<f64>>,
     /// Share of the images answered correctly in the unchanged rollout for which it still walks the
     /// correct way.
+    #[serde(deserialize_with = "ranges::share")]
     pub kept: f64,
     /// Walks under them, in the correct direction, as a share of the unchanged rollout's.
+    #[serde(deserialize_with = "ranges::number")]
     pub distance: f64,
     /// Whether the behaviour persists.
     pub persists: bool,

@@ -1,12 +1,12 @@
 //! `capacity.json`: what networks the robots are worth (paper, "Morphological cognition capacity").
 
 use crate::base::error::Error;
-use crate::base::files::read_text;
+use crate::base::ranges;
 use crate::base::table;
 use crate::baseline::curve::Crossing;
-use crate::config::reading;
 use crate::store::eval::EvalFile;
 use crate::store::names::{CAPACITY_JSON, EVAL_JSON};
+use crate::store::results::{self, Stored};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -64,6 +64,7 @@ pub struct TaskCapacity {
     /// Robots evaluated.
     pub robots: usize,
     /// Their mean accuracy on test images, 0 to 1.
+    #[serde(deserialize_with = "ranges::share")]
     pub accuracy: f64,
     /// A curve per kind of network.
     pub curves: Vec<Curve>,
@@ -78,6 +79,7 @@ pub struct Curve {
     /// The points, by size.
     pub points: Vec<Point>,
     /// c0, c1, c2 of accuracy ≈ c0 + c1·size + c2·size², least squares through the points.
+    #[serde(default, deserialize_with = "ranges::number")]
     pub fit: Option<[f64; 3]>,
     /// The smallest size at which the fit reaches the robots' accuracy, or that it is above it from
     /// the smallest network on; none if it never reaches it.
@@ -91,11 +93,46 @@ pub struct Point {
     /// Hidden neurons, or kernels.
     pub size: usize,
     /// Mean test accuracy over the trainings, 0 to 1.
+    #[serde(deserialize_with = "ranges::share")]
     pub mean: f64,
     /// Standard deviation over the trainings; none of one.
+    #[serde(default, deserialize_with = "ranges::share")]
     pub standard_deviation: Option<f64>,
     /// Trainable parameters.
     pub parameters: usize,
+}
+
+impl Stored for CapacityFile {
+    const FORMAT: (&'static str, u32) = (FORMAT, FORMAT_VERSION);
+
+    fn check(&self) -> Result<(), Error> {
+        for (number, task) in self.tasks.iter().enumerate() {
+            let at = |key: &str| format!("tasks[{number}].{key}");
+            if task.robots == 0 {
+                return Err(Error::at(&at("robots"), "expected one or more"));
+            }
+            if self.tasks[..number].iter().any(|other| other.task == task.task) {
+                return Err(Error::at(&at("task"), format!("{} is there twice", task.task)));
+            }
+            for (number, curve) in task.curves.iter().enumerate() {
+                let at = |key: &str| at(&format!("curves[{number}].{key}"));
+                let sizes = || curve.points.iter().map(|point| point.size);
+                if curve.points.is_empty() || !sizes().is_sorted_by(|a, b| a < b) {
+                    return Err(Error::at(&at("points"), "expected one or more, by size, each size once"));
+                }
+                let found = match curve.capacity {
+                    None => continue,
+                    Some(Crossing::At(size) | Crossing::Below { below: size }) => size,
+                };
+                let [least, most] = [sizes().min(), sizes().max()].map(|size| size.unwrap_or(0) as f64);
+                if !(least..=most).contains(&found) {
+                    let text = format!("expected a size from {least} to {most}, found {found:e}");
+                    return Err(Error::at(&at("capacity"), text));
+                }
+            }
+        }
+        Ok(())
+    }
 }
 
 impl CapacityFile {
@@ -104,9 +141,7 @@ impl CapacityFile {
     /// # Errors
     /// What is wrong with the file, with its line and key.
     pub fn read(path: &Path) -> Result<Self, Error> {
-        let text = read_text(path)
-            .map_err(|error| Error::reading_or(path, &error, "morphcog capacity makes one"))?;
-        reading::read_versioned(&text, &path.display().to_string(), FORMAT, FORMAT_VERSION)
+        results::read(path, "morphcog capacity makes one")
     }
 
     /// Where the analysis of an evaluation goes if nothing is said: `capacity.json` beside it, or

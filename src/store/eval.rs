@@ -1,24 +1,25 @@
 //! `eval.json` and `eval.csv`: what an evaluation found.
 
 use crate::base::error::Error;
-use crate::base::files::read_text;
 use crate::base::hash;
 use crate::base::hash::sha256_hex;
+use crate::base::ranges;
 use crate::base::statistics::{bootstrap, standard_deviation, wilson};
 use crate::base::table;
-use crate::config::{Config, reading};
+use crate::config::Config;
 use crate::data::dataset;
 use crate::data::dataset::Dataset;
 use crate::store::images::{DatasetRef, HeldOut, ImageRef};
+use crate::store::results::{self, Stored};
 use crate::store::robots::Source;
 use crate::store::run::{Robot, RunFile};
 use crate::store::setting::{RunRef, Setting};
 use crate::store::validation::Validated;
-use crate::task::direction::Assignment;
+use crate::task::direction::{Assignment, Direction};
 use crate::task::grouping::{Group, Split};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::mem::replace;
 use std::path::Path;
 
@@ -26,6 +27,9 @@ use std::path::Path;
 pub const FORMAT: &str = "morphcog-eval";
 /// Version of its schema.
 pub const FORMAT_VERSION: u32 = 1;
+
+/// How far a share may be from its quotient: programs of others round it.
+const ROUNDING: f64 = 1e-6;
 
 /// The content of `eval.json`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -66,6 +70,7 @@ pub struct EvalFile {
     /// Control steps per image, each a fresh rollout.
     pub control_steps: u32,
     /// Displacements up to this counted as wrong \[voxel lengths\].
+    #[serde(deserialize_with = "ranges::size")]
     pub threshold: f64,
     /// Whether it ended before the last robot, by a signal or otherwise.
     pub stopped: bool,
@@ -83,13 +88,15 @@ pub struct EvalFile {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Baselines {
     /// Always answering the larger group.
+    #[serde(deserialize_with = "ranges::share")]
     pub larger_group: f64,
     /// One pixel and a threshold, chosen on training images.
+    #[serde(deserialize_with = "ranges::share")]
     pub best_single_pixel: f64,
     /// That pixel: row, column.
     pub pixel: [usize; 2],
     /// The group of the nearest of the run's training images; none if those are of another dataset.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "ranges::share")]
     pub nearest_training_image: Option<f64>,
 }
 
@@ -99,15 +106,17 @@ pub struct Mean {
     /// Robots.
     pub robots: usize,
     /// Mean accuracy.
+    #[serde(deserialize_with = "ranges::share")]
     pub accuracy: f64,
     /// Mean balanced accuracy.
+    #[serde(deserialize_with = "ranges::share")]
     pub balanced_accuracy: f64,
     /// Standard deviation of the accuracy over the robots; none of a single one.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "ranges::share")]
     pub standard_deviation: Option<f64>,
     /// 95 % bootstrap interval of the mean accuracy (percentiles of 10,000 resamples; of
     /// several runs, of the runs and then of the robots of each).
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "ranges::interval")]
     pub interval: Option<[f64; 2]>,
 }
 
@@ -122,6 +131,7 @@ pub struct RobotReport {
     /// Its task.
     pub task: String,
     /// Its fitness on the training images, voxel lengths.
+    #[serde(deserialize_with = "ranges::number")]
     pub objective: f64,
     /// Which way the classes before the task's bar are to walk: "left" or "right", as on the
     /// training images.
@@ -131,16 +141,22 @@ pub struct RobotReport {
     /// Images in all.
     pub images: usize,
     /// Share answered correctly.
+    #[serde(deserialize_with = "ranges::share")]
     pub accuracy: f64,
     /// Its 95 % Wilson interval.
+    #[serde(deserialize_with = "ranges::interval")]
     pub interval: [f64; 2],
     /// Mean over the two groups of the share answered correctly.
+    #[serde(deserialize_with = "ranges::share")]
     pub balanced_accuracy: f64,
     /// Share answered correctly, by class.
+    #[serde(deserialize_with = "ranges::share")]
     pub per_class: BTreeMap<u8, f64>,
     /// Mean |displacement|, voxel lengths, of the stable rollouts.
+    #[serde(deserialize_with = "ranges::size")]
     pub mean_distance: f64,
     /// Share of images under which it moved no farther than the threshold.
+    #[serde(deserialize_with = "ranges::share")]
     pub not_moved: f64,
     /// Images under which its rollout became unstable (counted as wrong).
     pub unstable: usize,
@@ -150,6 +166,7 @@ pub struct RobotReport {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub validation: Option<Validated>,
     /// Displacement under each image, voxel lengths; none if unstable.
+    #[serde(deserialize_with = "ranges::number")]
     pub displacements: Vec<Option<f64>>,
 }
 
@@ -209,6 +226,58 @@ impl RobotReport {
     /// The report in short: its figures.
     pub fn without_displacements(&self) -> Self {
         RobotReport { displacements: Vec::new(), ..self.clone() }
+    }
+}
+
+impl Stored for EvalFile {
+    const FORMAT: (&'static str, u32) = (FORMAT, FORMAT_VERSION);
+
+    fn check(&self) -> Result<(), Error> {
+        self.setting.as_ref().map_or(Ok(()), Setting::check)?;
+        if self.images.is_empty() {
+            return Err(Error::at("images", "expected one or more"));
+        }
+        // Earlier versions evaluated one run, and did not list it.
+        let runs = self.runs.len().max(1);
+        for (number, robot) in self.robots.iter().enumerate() {
+            let refuse = |key: &str, expected: String| {
+                Err(Error::at(&format!("robots[{number}].{key}"), format!("expected {expected}")))
+            };
+            if robot.run >= runs {
+                return refuse("run", format!("a place among {runs} runs, from 0, found {}", robot.run));
+            }
+            if Direction::named(&robot.first_group_walks).is_none() {
+                return refuse("first_group_walks", "left or right".to_string());
+            }
+            let images = self.images.len();
+            if robot.images != images || robot.displacements.len() != images {
+                return refuse("displacements", format!("one for each of {images} images"));
+            }
+            if robot.right > images {
+                return refuse("right", format!("at most {images}, the images, found {}", robot.right));
+            }
+            if (robot.accuracy - robot.right as f64 / images as f64).abs() > ROUNDING {
+                return refuse("accuracy", format!("right / images, {}/{images}", robot.right));
+            }
+            if robot.unstable != robot.displacements.iter().filter(|walk| walk.is_none()).count() {
+                return refuse("unstable", "as many as displacements that are null".to_string());
+            }
+            let labels: BTreeSet<u8> = self.images.iter().map(|image| image.label).collect();
+            if !robot.per_class.keys().eq(&labels) {
+                return refuse("per_class", "the classes of the images".to_string());
+            }
+            if let Some(validated) = &robot.validation {
+                validated.check().map_err(|error| error.within(&format!("robots[{number}].validation")))?;
+            }
+        }
+        for (task, mean) in &self.means {
+            let robots = self.robots.iter().filter(|robot| robot.task == *task).count();
+            if mean.robots != robots || robots == 0 {
+                let text = format!("expected the {robots} of the task, found {}", mean.robots);
+                return Err(Error::at(&format!("means.{task}.robots"), text));
+            }
+        }
+        Ok(())
     }
 }
 
@@ -331,12 +400,7 @@ impl EvalFile {
     /// # Errors
     /// What is wrong with the file, with its line and key.
     pub fn read(path: &Path) -> Result<Self, Error> {
-        let text =
-            read_text(path).map_err(|error| Error::reading_or(path, &error, "morphcog eval makes one"))?;
-        let name = path.display().to_string();
-        let file: EvalFile = reading::read_versioned(&text, &name, FORMAT, FORMAT_VERSION)?;
-        let checked = file.setting.as_ref().map_or(Ok(()), Setting::check);
-        checked.map(|()| file).map_err(|error| error.within(&name))
+        results::read(path, "morphcog eval makes one")
     }
 
     /// Its text, one line.

@@ -2,8 +2,10 @@
 
 use crate::base::error::Error;
 use crate::base::files::{read_text, write_atomically};
+use crate::base::ranges;
 use crate::qd::ArchiveStats;
 use crate::store::names::METRICS;
+use crate::store::run::RunFile;
 use crate::task::evaluation::Evaluation;
 use serde::{Deserialize, Serialize};
 use std::fs::File;
@@ -28,6 +30,7 @@ pub struct Totals {
     /// Offspring found unstable.
     pub unstable: u64,
     /// Wall-clock time, all sessions of the run together \[s\].
+    #[serde(deserialize_with = "ranges::size")]
     pub seconds: f64,
 }
 
@@ -116,20 +119,26 @@ impl Metrics {
 /// A line of `metrics.csv`, as far as figures show it.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
 pub struct Moment {
+    /// The generation, from 0.
+    pub generation: u64,
     /// Offspring made so far.
+    #[serde(deserialize_with = "ranges::size")]
     pub evaluations: f64,
     /// Elites per possible cell.
+    #[serde(deserialize_with = "ranges::share")]
     pub coverage: f64,
     /// Sum of the objectives, each less the offset.
+    #[serde(deserialize_with = "ranges::number")]
     pub qd_score: f64,
     /// Largest objective; none without elites.
+    #[serde(default, deserialize_with = "ranges::number")]
     pub obj_max: Option<f64>,
     /// Wall-clock time so far \[s\].
-    #[serde(default)]
+    #[serde(default, deserialize_with = "ranges::size")]
     pub seconds: f64,
 }
 
-/// The lines of the metrics.csv beside a run.json.
+/// Reads the metrics.csv beside a run.json, of which nothing else is known yet.
 ///
 /// # Errors
 /// What is missing or wrong, with its line.
@@ -141,11 +150,43 @@ pub fn moments(archive: &Path) -> Result<Vec<Moment>, Error> {
     parsed(whole).map_err(|error| error.within(&path.display().to_string()))
 }
 
+/// Reads the metrics.csv of a run: the line of the generation that its run.json holds has the
+/// figures that stand there. A run under way may have more lines.
+///
+/// # Errors
+/// As [`moments`]; if it is of another run, or of another state of it.
+pub fn moments_of(run: &RunFile, archive: &Path) -> Result<Vec<Moment>, Error> {
+    let moments = moments(archive)?;
+    let Some(last) = run.generations.checked_sub(1) else { return Ok(moments) };
+    let ArchiveStats { coverage, qd_score, obj_max, .. } = run.stats;
+    let is_it = |moment: &&Moment| {
+        (moment.coverage, moment.qd_score, moment.obj_max) == (coverage, qd_score, obj_max)
+    };
+    match moments.iter().find(|moment| moment.generation == last).filter(is_it) {
+        Some(_) => Ok(moments),
+        None => {
+            let (metrics, archive) = (archive.with_file_name(METRICS), archive.display());
+            let text = format!(
+                "{}: generation {last}: expected the figures of {archive}: it is of another run, or another \
+                 state of it",
+                metrics.display()
+            );
+            Err(Error::input(text))
+        }
+    }
+}
+
 fn parsed(text: &str) -> Result<Vec<Moment>, Error> {
     let hint = || "morphcog evolve writes this file beside run.json".to_string();
     let mut moments = Vec::new();
     for line in csv::Reader::from_reader(text.as_bytes()).deserialize() {
         let moment: Moment = line.map_err(|error| Error::input(error.to_string()).hint(hint()))?;
+        if let Some(before) = moments.last().filter(|before: &&Moment| before.generation >= moment.generation)
+        {
+            let (before, found) = (before.generation, moment.generation);
+            let text = format!("generation {found} after {before}: expected a line per generation, in order");
+            return Err(Error::input(text).hint(hint()));
+        }
         moments.push(moment);
     }
     match moments.is_empty() {
@@ -247,7 +288,13 @@ mod tests {
     fn broken_metrics_are_refused_with_their_line() {
         let broken = |text: &str| parsed(text).unwrap_err().message;
         assert!(broken("generation,coverage\n").contains("found none"));
-        assert!(broken("a,b\n1,2\n").contains("evaluations"));
-        assert!(broken("coverage,qd_score,obj_max,evaluations\n1,2,3,4\n1,x,3,4\n").contains("line: 3"));
+        assert!(broken("a,b\n1,2\n").contains("generation"));
+        let columns = "generation,coverage,qd_score,obj_max,evaluations";
+        assert!(broken(&format!("{columns}\n0,1,2,3,4\n1,1,x,3,4\n")).contains("line: 3"));
+        assert!(broken(&format!("{columns}\n0,7.5,2,3,4\n")).contains("from 0 to 1, found 7.5"));
+        assert!(broken(&format!("{columns}\n0,1,NaN,3,4\n")).contains("found NaN"));
+        for reversed_or_doubled in ["1,1,2,3,4\n0,1,2,3,4\n", "0,1,2,3,4\n0,1,2,3,4\n"] {
+            assert!(broken(&format!("{columns}\n{reversed_or_doubled}")).contains("in order"));
+        }
     }
 }

@@ -1,14 +1,14 @@
 //! `response.json` and `response.csv`: the responses of robots' gaits, beside the run's `run.json`.
 
 use crate::base::error::Error;
-use crate::base::files::{exists, read_text};
+use crate::base::files::exists;
 use crate::base::number::is_zero;
 use crate::base::observer::Observer;
+use crate::base::ranges;
 use crate::base::table;
 use crate::body::Body;
-use crate::config::reading;
 use crate::store::images::DatasetRef;
-use crate::store::results::{by_lines, write_with_table};
+use crate::store::results::{self, Stored, by_lines, write_with_table};
 use crate::task::gait::Gait;
 use crate::task::margins::Margins;
 use crate::task::perturbation::Condition;
@@ -47,6 +47,9 @@ pub struct ResponseFile {
     pub run_sha256: String,
     /// How responses were measured.
     pub setting: Setting,
+    /// Robots whose measurement was stopped: the same command goes on with them.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub unfinished: Vec<Unfinished>,
     /// The robots, in the order in which they were chosen.
     pub robots: Vec<RobotResponse>,
 }
@@ -60,6 +63,7 @@ pub struct Setting {
     /// Most rollouts of a robot, those left aside that were known before.
     pub images: usize,
     /// The relative error of the slopes at which a measurement ends.
+    #[serde(deserialize_with = "ranges::share")]
     pub error: f64,
     /// The dataset that the task's images are of.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -114,28 +118,50 @@ pub struct RobotResponse {
     /// Why there were no more.
     pub ended_by: EndedBy,
     /// How far off the slopes are, as a share of what they are: 0 to 1.
+    #[serde(deserialize_with = "ranges::share")]
     pub relative_error: f64,
     /// Share of the displacements' variance that slopes fitted to other rollouts explain.
+    #[serde(deserialize_with = "ranges::at_most_one")]
     pub r_squared: f64,
     /// What these leave unexplained of a displacement: standard deviation \[voxel lengths\].
+    #[serde(deserialize_with = "ranges::size")]
     pub noise: f64,
     /// What the true slopes would leave unexplained \[voxel lengths\].
+    #[serde(deserialize_with = "ranges::size")]
     pub scatter: f64,
     /// The penalty of the ridge regression.
+    #[serde(deserialize_with = "ranges::size")]
     pub ridge: f64,
     /// Displacement of a body whose places all had no width, the mean over conditions \[voxel
     /// lengths\].
+    #[serde(deserialize_with = "ranges::number")]
     pub intercept: f64,
     /// The same under each condition; none of one without stable rollouts.
+    #[serde(deserialize_with = "ranges::number")]
     pub intercepts: Vec<Option<f64>>,
     /// Displacement of the gait under each random image, in the order in which they are drawn \[voxel
     /// lengths\]; `null` where unstable. `train` begins with them.
+    #[serde(deserialize_with = "ranges::number")]
     pub displacements: Vec<Option<f64>>,
     /// The soft voxels and sensors, row-major.
     pub places: Vec<Place>,
     /// What the gait could be taught, if that was asked for.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub taught: Option<Taught>,
+}
+
+/// A robot whose measurement was stopped.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Unfinished {
+    /// Its id, or the name of a published robot.
+    pub id: String,
+    /// Its body.
+    pub body: Body,
+    /// Displacement of the gait under each random image so far, as of a measured robot \[voxel
+    /// lengths\].
+    #[serde(deserialize_with = "ranges::number")]
+    pub displacements: Vec<Option<f64>>,
 }
 
 /// A soft voxel or a sensor.
@@ -148,8 +174,10 @@ pub struct Place {
     pub column: usize,
     /// By how much it moves the body to the right when it is wider by one rest width \[voxel
     /// lengths\].
+    #[serde(deserialize_with = "ranges::number")]
     pub slope: f64,
     /// The standard error of that \[voxel lengths\].
+    #[serde(deserialize_with = "ranges::size")]
     pub error: f64,
 }
 
@@ -165,12 +193,16 @@ impl Place {
 #[serde(deny_unknown_fields)]
 pub struct Taught {
     /// Mean clipped margin of its answers, `mean_clipped`: from −1 to 1.
+    #[serde(deserialize_with = "ranges::number")]
     pub fitness: f64,
     /// Its 95 % interval.
+    #[serde(deserialize_with = "ranges::fitness_interval")]
     pub fitness_interval: [f64; 2],
     /// Share of correct answers, both groups weighing the same.
+    #[serde(deserialize_with = "ranges::share")]
     pub accuracy: f64,
     /// Its 95 % interval.
+    #[serde(deserialize_with = "ranges::interval")]
     pub accuracy_interval: [f64; 2],
     /// The best window of those that were tried, by `stimulus.margin`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -228,25 +260,46 @@ impl RobotResponse {
     }
 }
 
+impl Stored for ResponseFile {
+    const FORMAT: (&'static str, u32) = (FORMAT, FORMAT_VERSION);
+
+    fn check(&self) -> Result<(), Error> {
+        if self.setting.conditions.is_empty() {
+            return Err(Error::at("setting.conditions", "expected one or more"));
+        }
+        for (number, robot) in self.robots.iter().enumerate() {
+            let refuse = |key: &str, expected: &str| {
+                Err(Error::at(&format!("robots[{number}].{key}"), format!("expected {expected}")))
+            };
+            if self.robots[..number].iter().any(|other| other.id == robot.id) {
+                return refuse("id", "each robot once");
+            }
+            let places = robot.places.iter().map(|place| (place.row, place.column));
+            let gait = Gait::of(&robot.body);
+            if !gait.is_some_and(|gait| gait.places().iter().copied().eq(places)) {
+                return refuse("places", "the soft voxels and sensors of its body, row-major");
+            }
+            if robot.rollouts != robot.displacements.len() {
+                return refuse("displacements", "one for each of the rollouts");
+            }
+            if robot.unstable != robot.displacements.iter().filter(|walk| walk.is_none()).count() {
+                return refuse("unstable", "as many as displacements that are null");
+            }
+            if robot.intercepts.len() > self.setting.conditions.len() {
+                return refuse("intercepts", "at most one for each of the conditions");
+            }
+        }
+        Ok(())
+    }
+}
+
 impl ResponseFile {
     /// Reads a file.
     ///
     /// # Errors
     /// What is wrong with the file, with its line and key.
     pub fn read(path: &Path) -> Result<Self, Error> {
-        let text = read_text(path)
-            .map_err(|error| Error::reading_or(path, &error, "morphcog response makes one"))?;
-        let name = path.display().to_string();
-        let file: ResponseFile = reading::read_versioned(&text, &name, FORMAT, FORMAT_VERSION)?;
-        for (number, robot) in file.robots.iter().enumerate() {
-            let places = robot.places.iter().map(|place| (place.row, place.column));
-            let gait = Gait::of(&robot.body);
-            if !gait.is_some_and(|gait| gait.places().iter().copied().eq(places)) {
-                let text = "expected the soft voxels and sensors of its body, row-major";
-                return Err(Error::at(&format!("robots.{}.places", number + 1), text).within(&name));
-            }
-        }
-        Ok(file)
+        results::read(path, "morphcog response makes one")
     }
 
     /// The file at a path, if there is one. One that cannot be read is told, and left aside.
@@ -259,20 +312,24 @@ impl ResponseFile {
     }
 
     /// The displacements of a gait under the first random images of a seed, if they were measured for
-    /// the run with this SHA-256, by this version, under these conditions.
+    /// the run with this SHA-256, by this version, under these conditions; also those of a
+    /// measurement that was stopped. And how many of them are of one that ended.
     pub(crate) fn known(
         &self,
         run_sha256: &str,
         seed: u64,
         conditions: &[Condition],
         gait: &Gait,
-    ) -> &[Option<f64>] {
-        let has_gait =
-            |robot: &&RobotResponse| Gait::of(&robot.body).is_some_and(|own| own.probe() == gait.probe());
-        match self.is_of(run_sha256, seed, conditions) {
-            true => self.robots.iter().find(has_gait).map_or(&[], |robot| &robot.displacements),
-            false => &[],
+    ) -> (&[Option<f64>], usize) {
+        if !self.is_of(run_sha256, seed, conditions) {
+            return (&[], 0);
         }
+        let has_gait = |body: &Body| Gait::of(body).is_some_and(|own| own.probe() == gait.probe());
+        let ended = self.robots.iter().find(|robot| has_gait(&robot.body));
+        let begun = self.unfinished.iter().find(|robot| has_gait(&robot.body));
+        let ended: &[Option<f64>] = ended.map_or(&[], |robot| &robot.displacements);
+        let begun: &[Option<f64>] = begun.map_or(&[], |robot| &robot.displacements);
+        (if begun.len() > ended.len() { begun } else { ended }, ended.len())
     }
 
     /// Whether it was measured for the run with this SHA-256, by this version, under these
@@ -293,6 +350,11 @@ impl ResponseFile {
                 let taught = robot.taught.filter(|_| earlier.setting.asks_as(&self.setting));
                 all.robots.push(RobotResponse { taught, ..robot.clone() });
             }
+            let is_open = |robot: &&Unfinished| {
+                let ended = self.robots.iter().map(|own| &own.id);
+                ended.chain(self.unfinished.iter().map(|own| &own.id)).all(|id| *id != robot.id)
+            };
+            all.unfinished.extend(earlier.unfinished.iter().filter(is_open).cloned());
         }
         all
     }

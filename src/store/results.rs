@@ -1,12 +1,58 @@
-//! How files of results are written: a table beside each, and long lists line by line.
+//! Reads and writes JSON files of ours: one reader for all of them; a table beside results, and
+//! long lists line by line.
 
 use crate::base::error::Error;
-use crate::base::files::write_atomically;
+use crate::base::files::{read_text, write_atomically};
+use crate::config::reading;
 use serde::Serialize;
+use serde::de::DeserializeOwned;
 use std::path::Path;
 
 /// Why results are always JSON.
 const JSON: &str = "numbers are finite and keys are text: JSON has all of it";
+
+/// A JSON file of ours. Its fields name the [ranges](crate::base::ranges) of their numbers.
+pub(crate) trait Stored: DeserializeOwned {
+    /// What the file calls itself, and the newest version of its schema that can be read.
+    const FORMAT: (&'static str, u32);
+
+    /// Checks what types cannot: that counts go together.
+    ///
+    /// # Errors
+    /// What is wrong with it; the error names the key.
+    fn check(&self) -> Result<(), Error>;
+}
+
+/// Reads a file; `maker` says what makes one if there is none.
+///
+/// # Errors
+/// What is wrong with the file, with its line or key.
+pub(crate) fn read<T: Stored>(path: &Path, maker: &str) -> Result<T, Error> {
+    let text = read_text(path).map_err(|error| Error::reading_or(path, &error, maker))?;
+    parse(&text, &path.display().to_string())
+}
+
+/// Reads the text of a file; `name` stands in messages.
+///
+/// # Errors
+/// As of [`read`].
+pub(crate) fn parse<T: Stored>(text: &str, name: &str) -> Result<T, Error> {
+    let file: T = reading::read_versioned(text, name, T::FORMAT.0, T::FORMAT.1)?;
+    file.check().map(|()| file).map_err(|error| error.within(name))
+}
+
+/// Reads what results are about to replace, if it is there.
+///
+/// # Errors
+/// If it cannot be read: nobody knows what would be lost.
+pub(crate) fn replaced<T: Stored>(path: &Path) -> Result<Option<T>, Error> {
+    // A device or a pipe takes whatever is written to it.
+    if !path.is_file() {
+        return Ok(None);
+    }
+    let hint = "it would be written over: move it away, or write elsewhere with --out";
+    read(path, "").map(Some).map_err(|error| error.hint(hint.to_string()))
+}
 
 /// The text of an object whose last key is a list: the head on one line, with an empty list there,
 /// then a line for each of the list.
@@ -25,4 +71,177 @@ pub(crate) fn write_with_table(path: &Path, json: &str, table: &[u8]) -> Result<
     [(path, json.as_bytes()), (&path.with_extension("csv"), table)].into_iter().try_for_each(
         |(path, content)| write_atomically(path, content).map_err(|error| Error::writing(path, &error)),
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::store::audit::AuditFile;
+    use crate::store::capacity::CapacityFile;
+    use crate::store::eval::EvalFile;
+    use crate::store::names::{
+        AUDIT_JSON, CAPACITY_JSON, EVAL_JSON, RESPONSE_JSON, RUN_JSON, TEAM_JSON, VALIDATION_JSON,
+    };
+    use crate::store::response::ResponseFile;
+    use crate::store::run::RunFile;
+    use crate::store::team::TeamFile;
+    use crate::store::training::File;
+    use crate::store::validation::ValidationFile;
+    use serde_json::Value;
+    use std::path::PathBuf;
+
+    /// Reads the text of a file by its name; its error, if it is refused.
+    fn refusal(name: &str, text: &str) -> Option<Error> {
+        fn of<T: Stored>(text: &str, name: &str) -> Option<Error> {
+            parse::<T>(text, name).err()
+        }
+        match name {
+            AUDIT_JSON => of::<AuditFile>(text, name),
+            CAPACITY_JSON => of::<CapacityFile>(text, name),
+            EVAL_JSON => of::<EvalFile>(text, name),
+            RESPONSE_JSON => of::<ResponseFile>(text, name),
+            RUN_JSON => of::<RunFile>(text, name),
+            TEAM_JSON => of::<TeamFile>(text, name),
+            VALIDATION_JSON => of::<ValidationFile>(text, name),
+            "training.json" => of::<File>(text, name),
+            other => panic!("{other}: no such file ships"),
+        }
+    }
+
+    /// The path of every JSON file that ships with the program or lies in the repository.
+    fn shipped() -> Vec<PathBuf> {
+        let mut folders = vec![Path::new(env!("CARGO_MANIFEST_DIR")).join("data")];
+        let mut found = Vec::new();
+        while let Some(folder) = folders.pop() {
+            for entry in std::fs::read_dir(&folder).unwrap() {
+                let path = entry.unwrap().path();
+                let name = path.file_name().unwrap().to_str().unwrap().to_string();
+                match name.strip_suffix(".gz") {
+                    _ if path.is_dir() => folders.push(path),
+                    Some(name) => {
+                        let run = folder.file_name().unwrap().to_str().unwrap();
+                        found.push(PathBuf::from(format!("atlas:{run}/{name}")));
+                    }
+                    None if name.ends_with(".json") && name != "gallery.json" => found.push(path),
+                    None => {}
+                }
+            }
+        }
+        found.sort();
+        found
+    }
+
+    #[test]
+    fn every_file_that_ships_is_read() {
+        let all = shipped();
+        assert!(all.len() > 150, "{}", all.len());
+        for path in all.iter().filter(|path| path.extension().is_some_and(|ending| ending == "json")) {
+            let name = path.file_name().unwrap().to_str().unwrap();
+            let text = read_text(path).unwrap();
+            assert_eq!(refusal(name, &text).map(|error| error.message), None, "{}", path.display());
+        }
+    }
+
+    /// The smallest file of each kind that ships, and one of a training.
+    fn samples() -> Vec<(String, Value)> {
+        let mut smallest = std::collections::BTreeMap::<String, String>::new();
+        for path in shipped().iter().filter(|path| path.extension().is_some_and(|ending| ending == "json")) {
+            let name = path.file_name().unwrap().to_str().unwrap().to_string();
+            let text = read_text(path).unwrap();
+            let known = smallest.entry(name).or_insert_with(|| text.clone());
+            if text.len() < known.len() {
+                *known = text;
+            }
+        }
+        let training = File::new("key".to_string(), vec![vec![Some(1.5), None], vec![Some(-2.5)]]);
+        smallest.insert("training.json".to_string(), serde_json::to_string(&training).unwrap());
+        smallest.into_iter().map(|(name, text)| (name, serde_json::from_str(&text).unwrap())).collect()
+    }
+
+    /// The place of a number of every kind in a value: of lists, those of the first item.
+    fn numbers(value: &Value, at: &str, found: &mut Vec<String>) {
+        match value {
+            Value::Number(_) => found.push(at.to_string()),
+            Value::Array(items) => {
+                items.iter().take(1).for_each(|item| numbers(item, &format!("{at}/0"), found));
+            }
+            Value::Object(keys) => {
+                keys.iter().for_each(|(key, value)| numbers(value, &format!("{at}/{key}"), found));
+            }
+            _ => {}
+        }
+    }
+
+    #[test]
+    fn no_number_of_any_file_may_be_endless_and_errors_name_file_and_key() {
+        for (name, sample) in samples() {
+            assert_eq!(refusal(&name, &sample.to_string()).map(|error| error.message), None, "{name}");
+            let mut places = Vec::new();
+            numbers(&sample, "", &mut places);
+            assert!(places.len() >= 2, "{name}: {places:?}");
+            for place in places {
+                for number in [1e308, -1e308] {
+                    let mut changed = sample.clone();
+                    *changed.pointer_mut(&place).unwrap() = Value::from(number);
+                    let error = refusal(&name, &changed.to_string());
+                    let error = error.unwrap_or_else(|| panic!("{name}: {place} = {number} is taken"));
+                    assert!(error.message.starts_with(&format!("{name}:")), "{place}: {error}");
+                    // The key, or the section that it is in.
+                    let mut keys =
+                        place.split('/').filter(|key| !key.is_empty() && key.parse::<u8>().is_err());
+                    assert!(keys.any(|key| error.message.contains(key)), "{place}: {error}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn counts_that_do_not_go_together_are_refused_with_their_key() {
+        let samples: std::collections::BTreeMap<String, Value> = samples().into_iter().collect();
+        let number = |text: &str| serde_json::from_str::<Value>(text).unwrap();
+        for (name, place, value) in [
+            (EVAL_JSON, "/robots/0/accuracy", "7.5"),
+            (EVAL_JSON, "/robots/0/accuracy", "0.123"),
+            (EVAL_JSON, "/robots/0/interval", "[5, -3]"),
+            (EVAL_JSON, "/robots/0/interval", "[0.5, 0.25]"),
+            (EVAL_JSON, "/robots/0/right", "1000000"),
+            (EVAL_JSON, "/robots/0/unstable", "1000000"),
+            (EVAL_JSON, "/robots/0/run", "99"),
+            (EVAL_JSON, "/robots/0/displacements", "[1.5]"),
+            (EVAL_JSON, "/robots/0/first_group_walks", "\"up\""),
+            (EVAL_JSON, "/images", "[]"),
+            (AUDIT_JSON, "/elites", "0"),
+            (AUDIT_JSON, "/robots/0/persisting", "1.5"),
+            (CAPACITY_JSON, "/tasks/0/curves/0/points", "[]"),
+            (CAPACITY_JSON, "/tasks/0/curves/0/points/0/mean", "-0.5"),
+            (CAPACITY_JSON, "/tasks/0/robots", "0"),
+            (RESPONSE_JSON, "/robots/0/rollouts", "1"),
+            (RESPONSE_JSON, "/robots/0/unstable", "599"),
+            (RESPONSE_JSON, "/robots/0/places", "[]"),
+            (TEAM_JSON, "/size", "1"),
+            (TEAM_JSON, "/images", "[]"),
+            (TEAM_JSON, "/answers/votes/accuracy/right", "1000000"),
+            (TEAM_JSON, "/answers/votes/confusion/0/0", "1000000"),
+            (VALIDATION_JSON, "/robots/0/right", "1000000"),
+            (RUN_JSON, "/stats/num_elites", "0"),
+            (RUN_JSON, "/stats/coverage", "0.125"),
+            (RUN_JSON, "/stats/obj_max", "null"),
+            ("training.json", "/checksum", "null"),
+            ("training.json", "/rollouts/0", "[1.5]"),
+            ("training.json", "/rollouts", "[[-2.5], [1.5, null]]"),
+            ("training.json", "/rollouts", "[[1.5, null], [-2.5], [-2.5]]"),
+            ("training.json", "/rollouts/0/0", "1.5000000000000002"),
+        ] {
+            let mut changed = samples[name].clone();
+            *changed.pointer_mut(place).unwrap_or_else(|| panic!("{name}: {place}")) = number(value);
+            let error = refusal(name, &changed.to_string());
+            let error = error.unwrap_or_else(|| panic!("{name}: {place} = {value} is taken"));
+            assert!(error.message.starts_with(&format!("{name}:")), "{place} = {value}: {error}");
+        }
+        // An earlier version wrote no checksum.
+        let mut old = samples["training.json"].clone();
+        old["format_version"] = Value::from(1);
+        old.as_object_mut().unwrap().remove("checksum");
+        assert!(refusal("training.json", &old.to_string()).is_none());
+    }
 }

@@ -5,6 +5,7 @@ use crate::base::error::Error;
 use crate::base::files::read_text;
 use crate::base::hash::sha256_hex;
 use crate::base::number;
+use crate::base::ranges;
 use crate::base::table;
 use crate::body::{Body, VoxelCounts};
 use crate::config::Config;
@@ -12,7 +13,7 @@ use crate::genome::Genome;
 use crate::qd::descriptor::{count_bin, possible_cells};
 use crate::qd::{Archive, ArchiveStats, DescriptorSpace, Elite};
 use crate::store::images::{DatasetRef, ImageRef, answers};
-use crate::store::results::by_lines;
+use crate::store::results::{self, Stored, by_lines};
 use crate::store::training::Origin;
 use crate::task::direction::Assignment;
 use crate::task::fitness::Fitness;
@@ -42,9 +43,11 @@ pub struct Robot {
     /// The task it performs, as "0|123": classes before the bar walk one way, the others the other.
     pub task: String,
     /// Its fitness, in the fitness's [unit](crate::task::fitness::Fitness::unit).
+    #[serde(deserialize_with = "ranges::number")]
     pub objective: f64,
     /// Displacement under each training image, voxel lengths, right positive; with `response` those
     /// of its probe under as many random images.
+    #[serde(deserialize_with = "ranges::number")]
     pub displacements: Vec<f64>,
     /// Its voxels by kind.
     pub voxels: VoxelCounts,
@@ -134,46 +137,10 @@ pub struct RunFile {
     pub read_sha256: Option<String>,
 }
 
-impl RunFile {
-    /// Reads `run.json`.
-    ///
-    /// # Errors
-    /// What is wrong with the file, with its line and key.
-    pub fn read(path: &Path) -> Result<Self, Error> {
-        let text = read_text(path).map_err(|error| Error::reading_or(path, &error, WHAT_RUNS))?;
-        RunFile::parse(&text, &path.display().to_string())
-    }
+impl Stored for RunFile {
+    const FORMAT: (&'static str, u32) = (FORMAT, FORMAT_VERSION);
 
-    /// Generations done and asked for, if the file says them; nothing else of it is read.
-    pub fn progress(path: &Path) -> Option<(u64, u64)> {
-        #[derive(Deserialize)]
-        struct Whole {
-            generations: u64,
-            config: Asked,
-        }
-        #[derive(Deserialize)]
-        struct Asked {
-            generations: u64,
-        }
-        let run: Whole = serde_json::from_str(&read_text(path).ok()?).ok()?;
-        Some((run.generations, run.config.generations))
-    }
-
-    /// Reads its text; `name` stands in messages.
-    ///
-    /// # Errors
-    /// As [`RunFile::read`].
-    pub fn parse(text: &str, name: &str) -> Result<Self, Error> {
-        let run: RunFile = crate::config::reading::read_versioned(text, name, FORMAT, FORMAT_VERSION)?;
-        run.check().map_err(|error| error.within(name))?;
-        Ok(RunFile { read_sha256: Some(sha256_hex(text.as_bytes())), ..run })
-    }
-
-    /// Whether it is a run that this program can have made, wherever it was read.
-    ///
-    /// # Errors
-    /// What is wrong with it; without the name of the file.
-    pub(crate) fn check(&self) -> Result<(), Error> {
+    fn check(&self) -> Result<(), Error> {
         if self.format != FORMAT || self.format_version > FORMAT_VERSION {
             let text = format!("format: expected {FORMAT}, format_version up to {FORMAT_VERSION}");
             return Err(Error::input(text));
@@ -218,7 +185,46 @@ impl RunFile {
                 return refuse("it has not one displacement per training image");
             }
         }
-        self.archive().map(|_| ())
+        let stats = self.archive()?.stats(self.dimensions.possible_cells, self.config.archive.qd_offset);
+        match stats == self.stats {
+            true => Ok(()),
+            false => Err(Error::at("stats", "expected the figures of the elites")),
+        }
+    }
+}
+
+impl RunFile {
+    /// Reads `run.json`.
+    ///
+    /// # Errors
+    /// What is wrong with the file, with its line and key.
+    pub fn read(path: &Path) -> Result<Self, Error> {
+        let text = read_text(path).map_err(|error| Error::reading_or(path, &error, WHAT_RUNS))?;
+        RunFile::parse(&text, &path.display().to_string())
+    }
+
+    /// Generations done and asked for, if the file says them; nothing else of it is read.
+    pub fn progress(path: &Path) -> Option<(u64, u64)> {
+        #[derive(Deserialize)]
+        struct Whole {
+            generations: u64,
+            config: Asked,
+        }
+        #[derive(Deserialize)]
+        struct Asked {
+            generations: u64,
+        }
+        let run: Whole = serde_json::from_str(&read_text(path).ok()?).ok()?;
+        Some((run.generations, run.config.generations))
+    }
+
+    /// Reads its text; `name` stands in messages.
+    ///
+    /// # Errors
+    /// As [`RunFile::read`].
+    pub fn parse(text: &str, name: &str) -> Result<Self, Error> {
+        let run: RunFile = results::parse(text, name)?;
+        Ok(RunFile { read_sha256: Some(sha256_hex(text.as_bytes())), ..run })
     }
 
     fn space(&self) -> DescriptorSpace {

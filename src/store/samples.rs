@@ -28,7 +28,7 @@ pub fn run(robots: &[(&str, f64)]) -> RunFile {
             genome,
         }
     };
-    RunFile {
+    let run = RunFile {
         format: FORMAT.to_string(),
         format_version: FORMAT_VERSION,
         program_version: "0".to_string(),
@@ -42,5 +42,10 @@ pub fn run(robots: &[(&str, f64)]) -> RunFile {
         elites: robots.iter().enumerate().map(robot).collect(),
         config,
         read_sha256: None,
-    }
+    };
+    let stats =
+        |archive: Archive<Robot>| archive.stats(run.dimensions.possible_cells, run.config.archive.qd_offset);
+    // Robots that no archive can hold are for tests of what refuses them.
+    let stats = run.archive().map_or(run.stats, stats);
+    RunFile { stats, ..run }
 }

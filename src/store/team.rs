@@ -1,13 +1,12 @@
 //! `team.json` and `team.csv`: what robots of several runs answer together.
 
 use crate::base::error::Error;
-use crate::base::files::read_text;
+use crate::base::ranges;
 use crate::base::table;
 use crate::body::Body;
-use crate::config::reading;
 use crate::store::eval::Trial;
 use crate::store::images::{HeldOut, ImageRef};
-use crate::store::results::write_with_table;
+use crate::store::results::{self, Stored, write_with_table};
 use crate::task::direction::{Assignment, Direction};
 use crate::task::grouping::Group;
 use crate::task::judge::Judge;
@@ -49,8 +48,10 @@ pub struct TeamFile {
     /// Seed by which they were drawn.
     pub seed: u64,
     /// Walks up to this give no vote \[voxel lengths\].
+    #[serde(deserialize_with = "ranges::size")]
     pub threshold: f64,
     /// Walks count up to this in sums \[voxel lengths\].
+    #[serde(deserialize_with = "ranges::size")]
     pub clip: f64,
     /// Actuation cycles per image, each image a fresh rollout.
     pub cycles: u32,
@@ -89,8 +90,10 @@ pub struct Member {
     /// How it answers the images of its own classes.
     pub own: Accuracy,
     /// Share of all images under which it moved no farther than the threshold, or was unstable.
+    #[serde(deserialize_with = "ranges::share")]
     pub not_moved: f64,
     /// Displacement under each image \[voxel lengths\]; none if unstable.
+    #[serde(deserialize_with = "ranges::number")]
     pub displacements: Vec<Option<f64>>,
 }
 
@@ -103,10 +106,13 @@ pub struct Answers {
     /// The largest sum of walks.
     pub walks: Decoded,
     /// Share of images for which several classes had most votes.
+    #[serde(deserialize_with = "ranges::share")]
     pub ties: f64,
     /// Mean over images: of the robots that know the answered class, the share that voted for it.
+    #[serde(deserialize_with = "ranges::share")]
     pub agreement: f64,
     /// Mean number of robots that moved no farther than the threshold, or were unstable.
+    #[serde(deserialize_with = "ranges::size")]
     pub not_moved: f64,
 }
 
@@ -117,6 +123,7 @@ pub struct Decoded {
     /// How many are correct.
     pub accuracy: Accuracy,
     /// Share answered correctly, by class.
+    #[serde(deserialize_with = "ranges::share")]
     pub per_class: BTreeMap<u8, f64>,
     /// Images by their class (rows) and by the answer (columns), both in the order of `classes`.
     pub confusion: Vec<Vec<usize>>,
@@ -142,6 +149,85 @@ pub struct TeamBaselines {
     pub best_body: Accuracy,
     /// Its id.
     pub best_body_id: String,
+}
+
+impl Stored for TeamFile {
+    const FORMAT: (&'static str, u32) = (FORMAT, FORMAT_VERSION);
+
+    fn check(&self) -> Result<(), Error> {
+        let (classes, images) = (self.classes.len(), self.images.len());
+        let refuse = |key: &str, expected: String| Err(Error::at(key, format!("expected {expected}")));
+        let mut different = self.classes.clone();
+        different.sort_unstable();
+        different.dedup();
+        if classes < 2 || different != self.classes {
+            return refuse("classes", "two or more, each once, in order".to_string());
+        }
+        if let Some(image) = self.images.iter().find(|image| !self.classes.contains(&image.label)) {
+            return refuse("images", format!("labels among the classes, found {}", image.label));
+        }
+        if !(1..=MOST_CYCLES).contains(&self.cycles) {
+            return refuse("cycles", format!("1 to {MOST_CYCLES}"));
+        }
+        if images == 0 {
+            return refuse("images", "one or more".to_string());
+        }
+        if self.members.len() > self.size {
+            return refuse("members", format!("at most {}, as size says", self.size));
+        }
+        for (place, member) in self.members.iter().enumerate() {
+            let of = |key: &str| format!("members[{place}].{key}");
+            let mut known: Vec<u8> = member.groups.concat();
+            known.sort_unstable();
+            known.dedup();
+            let all = member.groups.concat();
+            if known.len() != all.len() || all.iter().any(|class| !self.classes.contains(class)) {
+                return refuse(&of("groups"), "two groups of the classes, each class once".to_string());
+            }
+            if member.groups.iter().any(Vec::is_empty) {
+                return refuse(&of("groups"), "a class in each group".to_string());
+            }
+            if Direction::named(&member.first_group_walks).is_none() {
+                return refuse(&of("first_group_walks"), "left or right".to_string());
+            }
+            if member.displacements.len() != images {
+                return refuse(&of("displacements"), format!("one for each of {images} images"));
+            }
+            member.own.check(images).map_err(|error| error.within(&of("own")))?;
+        }
+        for decoded in self.answers.iter().flat_map(|answers| [&answers.votes, &answers.walks]) {
+            decoded.accuracy.check(images).map_err(|error| error.within("accuracy"))?;
+            if decoded.answers.len() != images {
+                return refuse("answers", format!("one for each of {images} images"));
+            }
+            if decoded.answers.iter().any(|answer| !self.classes.contains(answer)) {
+                return refuse("answers", "classes of the team".to_string());
+            }
+            if !decoded.per_class.keys().eq(&self.classes) {
+                return refuse("per_class", "the classes of the team".to_string());
+            }
+            let rows = &decoded.confusion;
+            if rows.len() != classes || rows.iter().any(|row| row.len() != classes) {
+                return refuse("confusion", format!("{classes} rows of {classes} numbers"));
+            }
+            if rows.iter().flatten().fold(0, |sum: usize, count| sum.saturating_add(*count)) != images {
+                return refuse("confusion", format!("{images} images in all"));
+            }
+        }
+        if let Some(baselines) = &self.baselines {
+            let TeamBaselines { linear_one_against_rest, linear_pairs, nearest_neighbour, best_body, .. } =
+                baselines;
+            for (key, accuracy) in [
+                ("linear_one_against_rest", linear_one_against_rest),
+                ("linear_pairs", linear_pairs),
+                ("nearest_neighbour", nearest_neighbour),
+                ("best_body", best_body),
+            ] {
+                accuracy.check(images).map_err(|error| error.within(&format!("baselines.{key}")))?;
+            }
+        }
+        Ok(())
+    }
 }
 
 impl Member {
@@ -259,62 +345,7 @@ impl TeamFile {
     /// # Errors
     /// What is wrong with it.
     pub fn read(path: &Path) -> Result<Self, Error> {
-        let text =
-            read_text(path).map_err(|error| Error::reading_or(path, &error, "morphcog team makes one"))?;
-        let name = path.display().to_string();
-        let file: TeamFile = reading::read_versioned(&text, &name, FORMAT, FORMAT_VERSION)?;
-        file.check().map_err(|error| error.within(&name))?;
-        Ok(file)
-    }
-
-    /// Checks what types cannot: that all is about the same classes and images.
-    fn check(&self) -> Result<(), Error> {
-        let (classes, images) = (self.classes.len(), self.images.len());
-        let refuse = |key: &str, expected: String| Err(Error::at(key, format!("expected {expected}")));
-        let mut different = self.classes.clone();
-        different.sort_unstable();
-        different.dedup();
-        if classes < 2 || different != self.classes {
-            return refuse("classes", "two or more, each once, in order".to_string());
-        }
-        if let Some(image) = self.images.iter().find(|image| !self.classes.contains(&image.label)) {
-            return refuse("images", format!("labels among the classes, found {}", image.label));
-        }
-        if !(1..=MOST_CYCLES).contains(&self.cycles) {
-            return refuse("cycles", format!("1 to {MOST_CYCLES}"));
-        }
-        for (place, member) in self.members.iter().enumerate() {
-            let of = |key: &str| format!("members[{place}].{key}");
-            let mut known: Vec<u8> = member.groups.concat();
-            known.sort_unstable();
-            known.dedup();
-            let all = member.groups.concat();
-            if known.len() != all.len() || all.iter().any(|class| !self.classes.contains(class)) {
-                return refuse(&of("groups"), "two groups of the classes, each class once".to_string());
-            }
-            if member.groups.iter().any(Vec::is_empty) {
-                return refuse(&of("groups"), "a class in each group".to_string());
-            }
-            if member.displacements.len() != images {
-                return refuse(&of("displacements"), format!("one for each of {images} images"));
-            }
-        }
-        for decoded in self.answers.iter().flat_map(|answers| [&answers.votes, &answers.walks]) {
-            if decoded.answers.len() != images {
-                return refuse("answers", format!("one for each of {images} images"));
-            }
-            if decoded.answers.iter().any(|answer| !self.classes.contains(answer)) {
-                return refuse("answers", "classes of the team".to_string());
-            }
-            if !decoded.per_class.keys().eq(&self.classes) {
-                return refuse("per_class", "the classes of the team".to_string());
-            }
-            let rows = &decoded.confusion;
-            if rows.len() != classes || rows.iter().any(|row| row.len() != classes) {
-                return refuse("confusion", format!("{classes} rows of {classes} numbers"));
-            }
-        }
-        Ok(())
+        results::read(path, "morphcog team makes one")
     }
 
     /// Writes it, and its table beside it.

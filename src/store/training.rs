@@ -1,13 +1,17 @@
 //! `training.json`: every rollout of a training, so that it goes on where it was stopped; and which
 //! run its gaits are from.
 
+use crate::base::error::Error;
+use crate::base::hash::sha256_hex;
 use crate::base::number::is_zero;
+use crate::base::ranges;
+use crate::store::results::Stored;
 use crate::store::run::RunFile;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// What the file calls itself, and the version of its schema.
-pub(crate) const FILE: (&str, u32) = ("morphcog-training", 1);
+pub(crate) const FILE: (&str, u32) = ("morphcog-training", 2);
 
 /// The run whose gaits a robot was trained from, wherever that lay.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -85,6 +89,40 @@ pub struct File {
     pub format_version: u32,
     /// SHA-256 of all that the rollouts depend on.
     pub key: String,
+    /// SHA-256 of `key` and `rollouts`, so that no damage changes what is trained. Files of version
+    /// 1 have none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub checksum: Option<String>,
     /// Rollouts in the order in which they were asked for.
+    #[serde(deserialize_with = "ranges::number")]
     pub rollouts: Vec<Batch>,
+}
+
+impl File {
+    /// The file of these rollouts, with its checksum.
+    pub(crate) fn new(key: String, rollouts: Vec<Batch>) -> Self {
+        let (format, format_version) = (FILE.0.to_string(), FILE.1);
+        let file = File { format, format_version, key, checksum: None, rollouts };
+        File { checksum: Some(file.sum()), ..file }
+    }
+
+    fn sum(&self) -> String {
+        let content = (&self.key, &self.rollouts);
+        sha256_hex(serde_json::to_string(&content).expect("texts, numbers and lists are JSON").as_bytes())
+    }
+}
+
+impl Stored for File {
+    const FORMAT: (&'static str, u32) = FILE;
+
+    fn check(&self) -> Result<(), Error> {
+        match &self.checksum {
+            None if self.format_version == 1 => Ok(()),
+            Some(checksum) if *checksum == self.sum() => Ok(()),
+            _ => Err(Error::at(
+                "checksum",
+                "it is not that of the rollouts: the file is damaged or was edited",
+            )),
+        }
+    }
 }

@@ -1,9 +1,9 @@
 //! Trainings of networks, kept beside the results so that none is done twice.
 
 use crate::base::error::Error;
-use crate::base::files::{read_text, write_atomically};
+use crate::base::files::{exists, write_atomically};
 use crate::baseline::Trained;
-use crate::config::reading;
+use crate::store::results::{self, Stored};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -28,6 +28,22 @@ struct Content {
     trainings: BTreeMap<String, BTreeMap<usize, Vec<(f64, usize)>>>,
 }
 
+impl Stored for Content {
+    const FORMAT: (&'static str, u32) = FORMAT;
+
+    fn check(&self) -> Result<(), Error> {
+        for (key, sizes) in &self.trainings {
+            for (size, trained) in sizes {
+                if !trained.iter().all(|(accuracy, _)| (0.0..=1.0).contains(accuracy)) {
+                    let text = "expected accuracies from 0 to 1";
+                    return Err(Error::at(&format!("trainings.{key}.{size}"), text));
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
 impl Trainings {
     /// Those beside a result file: `capacity.trainings.json` beside `capacity.json`; none if there is
     /// no such file.
@@ -38,14 +54,10 @@ impl Trainings {
         let path = results.with_extension("trainings.json");
         let empty =
             || Content { format: FORMAT.0.to_string(), format_version: FORMAT.1, ..Content::default() };
-        let content = match read_text(&path) {
-            Ok(text) => {
-                let anew = || "move it away, and networks are trained anew".to_string();
-                reading::read_versioned(&text, &path.display().to_string(), FORMAT.0, FORMAT.1)
-                    .map_err(|error| error.hint(anew()))?
-            }
-            Err(error) if error.kind() == std::io::ErrorKind::NotFound => empty(),
-            Err(error) => return Err(Error::reading(&path, &error)),
+        let anew = "move it away, and networks are trained anew";
+        let content = match exists(&path) {
+            true => results::read(&path, "").map_err(|error| error.hint(anew.to_string()))?,
+            false => empty(),
         };
         Ok(Trainings { path, content })
     }

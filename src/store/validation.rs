@@ -1,9 +1,10 @@
 //! `validation.json`: the robots of a run that were chosen on validation images.
 
 use crate::base::error::Error;
-use crate::base::files::{exists, read_text};
-use crate::config::reading;
+use crate::base::files::exists;
+use crate::base::ranges;
 use crate::store::names::VALIDATION_JSON;
+use crate::store::results::{self, Stored};
 use crate::store::robots::Source;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -25,6 +26,7 @@ pub struct Validated {
     /// Images answered correctly.
     pub right: usize,
     /// Mean over the two groups of the share answered correctly.
+    #[serde(deserialize_with = "ranges::share")]
     pub balanced_accuracy: f64,
 }
 
@@ -42,6 +44,32 @@ pub(crate) struct ValidationFile {
     pub robots: Vec<Validated>,
 }
 
+impl Validated {
+    /// Checks that its counts go together; errors name the key.
+    pub(crate) fn check(&self) -> Result<(), Error> {
+        match self.right <= self.images && self.images > 0 {
+            true => Ok(()),
+            false => Err(Error::at("right", format!("expected at most images, {}", self.images))),
+        }
+    }
+}
+
+impl Stored for ValidationFile {
+    const FORMAT: (&'static str, u32) = FORMAT;
+
+    fn check(&self) -> Result<(), Error> {
+        for (number, robot) in self.robots.iter().enumerate() {
+            robot.check().map_err(|error| error.within(&format!("robots[{number}]")))?;
+            let is_it = |other: &Validated| (&other.id, &other.task) == (&robot.id, &robot.task);
+            if self.robots[..number].iter().any(is_it) {
+                let text = format!("{} is there twice for {}", robot.id, robot.task);
+                return Err(Error::at(&format!("robots[{number}].id"), text));
+            }
+        }
+        Ok(())
+    }
+}
+
 impl ValidationFile {
     /// What is in a file, if there is one.
     ///
@@ -51,11 +79,8 @@ impl ValidationFile {
         if !exists(path) {
             return Ok(None);
         }
-        let text = read_text(path).map_err(|error| Error::reading(path, &error))?;
-        let hint = || "delete it: morphcog eval --robots best-validation:1 chooses robots anew".to_string();
-        reading::read_versioned(&text, &path.display().to_string(), FORMAT.0, FORMAT.1)
-            .map(Some)
-            .map_err(|error| error.hint(hint()))
+        let hint = "delete it: morphcog eval --robots best-validation:1 chooses robots anew";
+        results::read(path, "").map(Some).map_err(|error| error.hint(hint.to_string()))
     }
 }
 

@@ -32,6 +32,11 @@ impl Direction {
             Direction::Right => "right",
         }
     }
+
+    /// The direction that has a name.
+    pub(crate) fn named(name: &str) -> Option<Self> {
+        [Direction::Left, Direction::Right].into_iter().find(|direction| direction.name() == name)
+    }
 }
 
 /// Which way group A is to walk; group B is to walk the other. Fixed by the training answers before

@@ -796,7 +796,7 @@ mod tests {
                 })
             })
             .collect();
-        let conditions: Vec<Condition> = crate::task::perturbation::of_response();
+        let conditions = crate::task::perturbation::of_response();
         let conditions: Vec<Condition> = conditions.into_iter().cycle().take(60).collect();
         let setting = (&physics, &protocol);
         let (whole, _) = fresh_rollouts(&body, &images, &conditions, setting, &|_| (), &NEVER).unwrap();

@@ -1,6 +1,8 @@
 //! How robots that tell two groups of classes apart answer together which class an image is of,
 //! without any trained weight.
 
+use crate::base::error::Error;
+use crate::base::ranges;
 use crate::base::statistics::wilson;
 use crate::task::judge::Judge;
 use schemars::JsonSchema;
@@ -107,12 +109,25 @@ pub struct Accuracy {
     /// Images answered correctly.
     pub right: usize,
     /// Share answered correctly.
+    #[serde(deserialize_with = "ranges::share")]
     pub accuracy: f64,
     /// Its 95 % Wilson interval.
+    #[serde(deserialize_with = "ranges::interval")]
     pub interval: [f64; 2],
 }
 
 impl Accuracy {
+    /// Checks that it is about at most so many images.
+    ///
+    /// # Errors
+    /// If more are right; the error names the key.
+    pub(crate) fn check(&self, images: usize) -> Result<(), Error> {
+        match self.right <= images {
+            true => Ok(()),
+            false => Err(Error::at("right", format!("expected at most {images}, found {}", self.right))),
+        }
+    }
+
     /// Of answers, each with what would be correct.
     pub fn of<T: PartialEq>(answers: impl IntoIterator<Item = (T, T)>) -> Self {
         let (mut right, mut all) = (0, 0);

@@ -281,9 +281,19 @@ fn of_run(kind: Kind, path: &Path) -> Result<Figure, Error> {
         Kind::Capacity => {
             let (beside, eval) = (result(path, CAPACITY_JSON), folder::beside(path, EVAL_JSON));
             let file = CapacityFile::read(&beside).map_err(hint)?;
-            if beside != *path && exists(&eval) {
-                // Where its robots come from.
-                EvalFile::of_runs(&eval, &[&RunFile::read(path)?])?;
+            if beside != *path {
+                let run = RunFile::read(path)?;
+                let is_of_it = match exists(&eval) {
+                    // Where its robots come from.
+                    true => file.is_of(&EvalFile::of_runs(&eval, &[&run])?),
+                    false => file.run == run.name,
+                };
+                if !is_of_it {
+                    let text = format!("{}: it is about the robots of another run", beside.display());
+                    return Err(
+                        Error::input(text).hint("morphcog capacity makes that of this run".to_string())
+                    );
+                }
             }
             Ok(plot::capacity(&file))
         }

@@ -1,9 +1,10 @@
 //! Where the words go: `--json`, `--quiet`, terminals, pipes and full disks.
 
-use crate::common::program::{PROGRAM, Sandbox, said};
+use crate::common::program::{PROGRAM, Sandbox, files, said};
 use crate::simulate::scenario;
 use crate::with_run;
 use morphcog::store::eval::EvalFile;
+use morphcog::store::run::RunFile;
 use std::collections::BTreeSet;
 use std::path::Path;
 
@@ -15,7 +16,9 @@ fn no_table_shows_a_minus_nothing() {
         elite["objective"] = (-0.001).into();
         elite["displacements"] = serde_json::json!([-0.001, 0.001]);
     }
-    sandbox.write("run/run.json", run.to_string());
+    let mut run: RunFile = serde_json::from_value(run).unwrap();
+    run.stats = run.archive().unwrap().stats(run.dimensions.possible_cells, run.config.archive.qd_offset);
+    sandbox.write("run/run.json", run.to_json());
     let mut said = sandbox.run("eval -a run -n 4 --cycles 1 --robots top:2").ended(0, &[]).out;
     said += &sandbox.run("replay -a run --format html").ended(0, &[]).out;
     sandbox.run("report -q --archive run --rollouts 1").ended(0, &[]);
@@ -41,6 +44,107 @@ fn speed_is_measured_in_processor_time_and_says_so() {
     let expected = if cfg!(any(target_os = "linux", target_os = "macos")) { "processor" } else { "wall" };
     assert!(clocks.len() >= 5 && clocks.iter().all(|clock| clock == expected), "{clocks:?}");
     assert!(sandbox.run("bench --help").ended(0, &[]).out.contains("processor time"));
+}
+
+#[test]
+fn an_error_about_a_file_names_it_once_whatever_is_wrong_with_it() {
+    let sandbox = with_run();
+    for command in [
+        "eval -q -a run -n 4 --cycles 1 --robots best",
+        "audit -q -a run --robots best",
+        "response -q -a run -n 60 --robots all",
+    ] {
+        sandbox.run(command).ended(0, &[]);
+    }
+    let good = files(&sandbox.path("run"));
+    // What reads which file.
+    let readers: [(&str, &[&str]); 6] = [
+        (
+            "run.json",
+            &[
+                "eval -a run -n 4",
+                "audit -a run",
+                "response -a run",
+                "train -a run --task 0|1 -o taught",
+                "team -a run --classes 0,1",
+                "replay -a run",
+                "report -a run",
+                "plot archive -a run",
+                "plot body -a run",
+                "plot progress -a run",
+                "serve -a run",
+                "eval -a run --robots best-validation:1",
+            ],
+        ),
+        ("eval.json", &["plot accuracy -a run", "capacity --eval run/eval.json", "eval -a run -n 4"]),
+        (
+            "audit.json",
+            &["audit -a run", "eval -a run -n 4 --physical-only", "replay -a run --physical-only"],
+        ),
+        ("response.json", &["response -a run --robots all"]),
+        ("metrics.csv", &["plot progress -a run"]),
+        ("config.toml", &["evolve -c run/config.toml -o other", "config run/config.toml"]),
+    ];
+    for (name, commands) in readers {
+        let text = String::from_utf8(good[name].clone()).unwrap();
+        let half = text[..text.len() / 2].to_string();
+        let wounds: [Vec<u8>; 7] = [
+            Vec::new(),
+            half.into(),
+            b"\xff\xfe\x00".to_vec(),
+            b"[]".to_vec(),
+            text.replacen("morphcog-", "other-", 1).replacen("seed = ", "sed = ", 1).into(),
+            text.replacen("\"format_version\":1", "\"format_version\":99", 1)
+                .replacen("= 5", "= -5", 1)
+                .into(),
+            text.replacen(":0.", ":1e308,\"x\":0.", 1).replacen("generation,", "", 1).into(),
+        ];
+        let path = format!("run/{name}");
+        for wound in wounds.iter().filter(|wound| **wound != good[name]) {
+            sandbox.write(&path, wound);
+            for command in commands {
+                let said = sandbox.run(command);
+                let line = said.err.lines().find(|line| line.starts_with("error:"));
+                let line = line.unwrap_or_else(|| panic!("{command}: {name}: {said:?}"));
+                assert_eq!(line.matches(&path).count(), 1, "{command}: {line}");
+            }
+        }
+        // Nor is it read where there is no file, but a folder.
+        std::fs::remove_file(sandbox.path(&path)).unwrap();
+        std::fs::create_dir(sandbox.path(&path)).unwrap();
+        for command in commands.iter().filter(|command| !command.contains("plot accuracy")) {
+            let said = sandbox.run(command);
+            let line = said.err.lines().find(|line| line.starts_with("error:")).unwrap_or_default();
+            assert_eq!(line.matches(&path).count(), 1, "{command}: {name}: {said:?}");
+        }
+        std::fs::remove_dir(sandbox.path(&path)).unwrap();
+        sandbox.write(&path, &good[name]);
+    }
+}
+
+#[test]
+fn no_command_writes_over_results_that_it_cannot_read() {
+    let sandbox = with_run();
+    sandbox.run("eval -q -a run -n 4 --cycles 1 --robots best").ended(0, &[]);
+    for (name, command) in [
+        ("run/eval.json", "eval -a run -n 4 --cycles 1"),
+        ("run/eval-validation.json", "eval -a run --split validation -n 4 --cycles 1"),
+        ("run/audit.json", "audit -a run"),
+        ("run/response.json", "response -a run"),
+        ("capacity.json", "capacity --eval run/eval.json -o capacity.json"),
+        ("capacity.trainings.json", "capacity --eval run/eval.json -o capacity.json"),
+        ("run/validation.json", "eval -a run --robots best-validation:1"),
+    ] {
+        let whole = std::fs::read(sandbox.path(name)).ok();
+        sandbox.write(name, "{\"format\": \"morphcog-later\", \"format_version\": 7}");
+        let said = sandbox.run(command).ended(3, &[name, "hint:"]);
+        assert!(said.err.contains("move") || said.err.contains("delete it"), "{said:?}");
+        assert!(sandbox.read(name).contains("later"), "{command}");
+        match whole {
+            Some(whole) => drop(sandbox.write(name, whole)),
+            None => std::fs::remove_file(sandbox.path(name)).unwrap(),
+        }
+    }
 }
 
 #[test]

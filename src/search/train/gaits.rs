@@ -99,7 +99,7 @@ pub(super) fn measured(
     }
     let Some(file) = ResponseFile::found(&path, observer) else { return nothing() };
     let (run, seed, conditions) = (source.run.fingerprint(), of_run.seed, probing.conditions());
-    walkers.iter().map(|walker| file.known(&run, seed, conditions, &walker.gait).to_vec()).collect()
+    walkers.iter().map(|walker| file.known(&run, seed, conditions, &walker.gait).0.to_vec()).collect()
 }
 
 /// Of all that rollouts depend on; more challengers come after those that there were.

@@ -2,12 +2,13 @@
 
 use crate::base::Grid;
 use crate::base::error::Error;
-use crate::base::files::{read_text, write_atomically};
+use crate::base::files::write_atomically;
 use crate::base::observer::{Observer, Work};
 use crate::body::Body;
-use crate::config::{Config, reading};
-use crate::store::training::{Batch, FILE, File};
-use crate::task::evaluation::fresh_rollouts;
+use crate::config::Config;
+use crate::store::results;
+use crate::store::training::{Batch, File};
+use crate::task::evaluation::fresh_rollouts_so_far;
 use crate::task::perturbation::Condition;
 use crate::task::teach::{Plan, Rollouts};
 use std::path::PathBuf;
@@ -47,11 +48,9 @@ impl<'a> Log<'a> {
     ) -> Result<Self, Error> {
         let mut batches = Vec::new();
         if path.exists() {
-            let text = read_text(&path).map_err(|error| Error::reading(&path, &error))?;
             let name = path.display().to_string();
             let anew = || "train anew with --force".to_string();
-            let file: File =
-                reading::read_versioned(&text, &name, FILE.0, FILE.1).map_err(|e| e.hint(anew()))?;
+            let file: File = results::read(&path, "").map_err(|error| error.hint(anew()))?;
             if file.key != key {
                 let text = format!(
                     "{name}: expected the training that began here: other robots, images or settings"
@@ -59,6 +58,9 @@ impl<'a> Log<'a> {
                 return Err(Error::usage(text).hint(
                     "go on with those, write elsewhere with --out, or train anew with --force".to_string(),
                 ));
+            }
+            if file.checksum.is_none() {
+                observer.warning(&format!("{name}: it has no checksum, so damage to it would go unnoticed"));
             }
             batches = file.rollouts;
         }
@@ -129,9 +131,10 @@ impl<'a> Log<'a> {
             let end = stimuli.len().min(begin + part);
             let (stimuli, conditions) = (&stimuli[begin..end], &conditions[begin..end]);
             let told = |count| self.rolled(count);
-            let found = fresh_rollouts(body, stimuli, conditions, setting, &told, self.stop);
-            let (found, _) = found.map_err(|_| stopped())?;
+            let (found, _, ended) =
+                fresh_rollouts_so_far(body, stimuli, conditions, setting, &told, self.stop);
             self.batches[number].extend(found.into_iter().map(Result::ok));
+            ended.map_err(|_| stopped())?;
             if self.saved.1.elapsed() >= SAVE_EVERY {
                 self.save()?;
             }
@@ -144,12 +147,7 @@ impl<'a> Log<'a> {
         if self.saved.0 == rollouts && self.path.exists() {
             return Ok(());
         }
-        let file = File {
-            format: FILE.0.to_string(),
-            format_version: FILE.1,
-            key: self.key.clone(),
-            rollouts: self.batches.clone(),
-        };
+        let file = File::new(self.key.clone(), self.batches.clone());
         let text = serde_json::to_string(&file).expect("numbers are finite and keys are text") + "\n";
         write_atomically(&self.path, text.as_bytes()).map_err(|error| Error::writing(&self.path, &error))?;
         self.saved = (rollouts, Instant::now());

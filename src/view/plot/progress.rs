@@ -184,6 +184,7 @@ mod tests {
 
     fn run(seed: u64, best: &[Option<f64>]) -> Progress {
         let moment = |(k, best): (usize, &Option<f64>)| Moment {
+            generation: k as u64,
             evaluations: 20.0 * (k + 1) as f64,
             coverage: 0.1,
             qd_score: 3.0,
