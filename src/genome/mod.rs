@@ -121,11 +121,26 @@ impl Genome {
         Ok(Genome { cppn: self.cppn.clone(), edits })
     }
 
-    /// A short id, the same for the same genome: the first ten hexadecimal digits of its content's
-    /// hash.
+    /// A short id, the same for the same genome: the first ten hexadecimal digits of its
+    /// [digest](Genome::digest). The first is a letter: `g` to `p` stand for 0 to 9, since tools
+    /// take `0636890406` and `18e2354970` for numbers.
     pub fn id(&self) -> String {
-        let content = [self.cppn.canonical_bytes(), self.edits.canonical_bytes()].concat();
-        hash::sha256_hex(&content)[..10].to_string()
+        let mut id = self.digest()[..10].to_string();
+        if let Some(digit) = id[..1].parse::<u8>().ok() {
+            id.replace_range(..1, char::from(b'g' + digit).encode_utf8(&mut [0; 4]));
+        }
+        id
+    }
+
+    /// Tells whether an id is this genome's: as it is now, or as it is in older files, where some
+    /// begin with a digit.
+    pub fn has_id(&self, id: &str) -> bool {
+        id == self.id() || id == &self.digest()[..10]
+    }
+
+    /// SHA-256 of its content, in hexadecimal digits.
+    pub fn digest(&self) -> String {
+        hash::sha256_hex(&[self.cppn.canonical_bytes(), self.edits.canonical_bytes()].concat())
     }
 
     /// A copy with one mutation, and more of them until its body is valid; with that body. Of some,
@@ -262,6 +277,21 @@ mod tests {
         assert!(text.starts_with(r#"{"cppn":{"version":1,"#));
         let read: Genome = serde_json::from_str(&text).unwrap();
         assert_eq!((read.id(), read.id().len()), (genome.id(), 10));
+    }
+
+    #[test]
+    fn ids_begin_with_a_letter_and_those_of_old_files_are_still_known() {
+        let mut ids = std::collections::BTreeSet::new();
+        let mut digits = 0;
+        for seed in 0..40 {
+            let (genome, _) = Genome::random(PAPER, &MutationParams::default(), &mut rng(seed)).unwrap();
+            let (id, old) = (genome.id(), genome.digest()[..10].to_string());
+            assert!(id.starts_with(|c: char| c.is_ascii_lowercase()) && id[1..] == old[1..], "{id} {old}");
+            assert!(genome.has_id(&id) && genome.has_id(&old) && !genome.has_id(&id[1..]));
+            digits += usize::from(id != old);
+            ids.insert(id);
+        }
+        assert!(digits > 10 && ids.len() == 40, "{digits}");
     }
 
     #[test]

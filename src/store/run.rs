@@ -36,7 +36,7 @@ const WHAT_RUNS: &str = "expected a run.json, its folder, or runs that ship, suc
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Robot {
-    /// Content hash of the genome (ten hexadecimal digits).
+    /// Content hash of the genome: a letter and nine hexadecimal digits (ten in older files).
     pub id: String,
     /// Its cell, one bin per dimension of the archive.
     pub cell: Vec<usize>,
@@ -166,7 +166,7 @@ impl Stored for RunFile {
             if (robot.body.height(), robot.body.width()) != (height, width) {
                 return refuse(&format!("its body is not {height} × {width} voxels, as the config says"));
             }
-            if robot.genome.id() != robot.id {
+            if !robot.genome.has_id(&robot.id) {
                 return refuse("its id is not its genome's");
             }
             if robot.genome.body(height, width).as_ref() != Ok(&robot.body) {
