@@ -20,6 +20,12 @@ pub fn percent(share: f64) -> String {
     fixed(100.0 * share, 1)
 }
 
+/// The share of a variance that a model explains, by its R², in percent without decimals. A model
+/// whose cross-validated R² is negative predicts worse than the mean, and explains nothing.
+pub fn explained(r_squared: f64) -> String {
+    fixed(100.0 * r_squared.max(0.0), 0)
+}
+
 fn unsigned_zero(text: String) -> String {
     let is_zero = text.chars().all(|c| matches!(c, '+' | '-' | '0' | '.'));
     if is_zero { text.trim_start_matches(['+', '-']).to_string() } else { text }
@@ -28,6 +34,11 @@ fn unsigned_zero(text: String) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn nothing_explains_less_than_nothing() {
+        assert_eq!([-1.03, -0.0, 0.874, 1.0].map(explained), ["0", "0", "87", "100"]);
+    }
 
     #[test]
     fn what_rounds_to_nothing_has_no_sign() {

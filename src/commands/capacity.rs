@@ -6,6 +6,7 @@ use crate::base::error::{Error, ErrorKind};
 use crate::base::hash::sha256_hex;
 use crate::base::observer::{Observer, Work};
 use crate::base::statistics::standard_deviation;
+use crate::base::text::counted;
 use crate::base::threads::pool;
 use crate::baseline::{Kind, Pooling, Trained, curve};
 use crate::commands::capacity_images::{Images, Task};
@@ -210,7 +211,7 @@ impl Networks<'_> {
         let per_task = config.networks.len() * config.sizes().count() * config.trainings;
         let total = (splits.len() * per_task) as u64;
         let kept = if before > 0 { format!(" ({before} known from before)") } else { String::new() };
-        let label = format!("training {total} networks{kept}:");
+        let label = format!("training {}{kept}:", counted(total, "network", "networks"));
         self.observer.begins(&Work { label, total, known: before, unit: "trainings" });
         self.done.store(before, Ordering::Relaxed);
     }
@@ -321,7 +322,10 @@ fn robots<'a>(report: &'a EvalFile, options: &Options) -> Result<Vec<&'a RobotRe
         }
     }
     if physical.is_empty() {
-        return Err(Error::input(format!("{name}: none of {} robots is physical", report.robots.len())));
+        return Err(Error::input(format!(
+            "{name}: none of {} is physical",
+            counted(report.robots.len(), "robot", "robots")
+        )));
     }
     Ok(physical)
 }

@@ -99,7 +99,11 @@ fn waiting(
             let found = free.len();
             let text =
                 format!("capacity: waiting_images: expected {per_class} of class {label}, found {found}");
-            return Err(Error::input(text).hint(format!("ask for at most {}", found * classes.len())));
+            let hint = match found * classes.len() {
+                0 => "clean = false needs none".to_string(),
+                most => format!("ask for at most {most}"),
+            };
+            return Err(Error::input(text).hint(hint));
         }
         let rng = &mut stream(options.config.seed, Purpose::Waiting, 0, u64::from(label));
         all.extend(rng.sample(free.len(), per_class).into_iter().map(|i| ImageRef { index: free[i], label }));

@@ -3,6 +3,7 @@
 use crate::analysis::gallery;
 use crate::base::error::Error;
 use crate::base::number;
+use crate::base::text::counted;
 use crate::body::Body;
 use crate::config::{Config, DataConfig};
 use crate::data::dataset::Split;
@@ -184,7 +185,8 @@ pub(crate) fn check_length(config: &Config, images: usize) -> Result<(), Error> 
     let steps = config.protocol.control_steps;
     match steps as usize > most {
         true => Err(Error::input(format!(
-            "protocol.control_steps = {steps}: expected at most {most} to record a rollout under {images} images"
+            "protocol.control_steps = {steps}: expected at most {most} to record a rollout under {}",
+            counted(images, "image", "images")
         ))
         .hint("show fewer images".to_string())),
         false => Ok(()),

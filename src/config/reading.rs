@@ -179,10 +179,23 @@ fn spoken(message: &str) -> String {
     }
     for (kind, words) in words {
         if let Some(start) = message.strip_suffix(&format!("expected {kind}")) {
-            return format!("{start}expected {words}");
+            let meant =
+                meant(start, kind == "f64").map_or(String::new(), |number| format!("; write {number}"));
+            return format!("{start}expected {words}{meant}");
         }
     }
     message.to_string()
+}
+
+/// The number that a text stands for that is none in TOML, such as `.5`, `5.` or `05`; `start`
+/// begins a message of serde's about it.
+fn meant(start: &str, is_decimal: bool) -> Option<String> {
+    let text = start.strip_prefix("invalid type: string \"")?.strip_suffix("\", ")?;
+    let number = text.parse::<f64>().ok().filter(|number| number.is_finite())?;
+    match is_decimal {
+        true => Some(format!("{number:?}")),
+        false => (number.fract() == 0.0 && number.abs() < 1e15).then(|| format!("{number:.0}")),
+    }
 }
 
 fn line_at(text: &str, span: Option<std::ops::Range<usize>>) -> Option<usize> {
@@ -571,6 +584,29 @@ mod tests {
             assert!(error.message.starts_with(&format!("--set {wrong}: ")), "{}", error.message);
         }
     }
+
+    #[test]
+    fn a_text_that_is_nearly_a_number_is_said_with_the_number_to_write() {
+        let outer = Outer { name: "a".to_string(), inner: Inner::default() };
+        let said = |assignment: &str| {
+            changed(outer.clone(), &[assignment.to_string()], |_| Ok(()), |error| error).unwrap_err().message
+        };
+        for (assignment, number) in [
+            ("inner.list=['.5']", "0.5"),
+            ("inner.list.1=-.5", "-0.5"),
+            ("inner.list.1=5.", "5.0"),
+            ("inner.count=05", "5"),
+            ("inner.count=+05.", "5"),
+        ] {
+            let outer = Outer { inner: Inner { list: vec![1.0], ..Inner::default() }, ..outer.clone() };
+            let error = changed(outer, &[assignment.to_string()], |_| Ok(()), |error| error).unwrap_err();
+            assert!(error.message.ends_with(&format!("; write {number}")), "{}", error.message);
+        }
+        for assignment in ["inner.count=.5", "inner.count=x", "inner.list=['inf.']"] {
+            assert!(!said(assignment).contains("write"), "{}", said(assignment));
+        }
+    }
+
     #[test]
     fn an_item_of_a_list_is_set_by_its_number_and_a_key_unset_by_no_value() {
         let inner = Inner { count: 3, list: vec![1.0, 2.0], maybe: Some(4) };

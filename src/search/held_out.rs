@@ -117,8 +117,10 @@ pub(crate) fn images_besides(
         seen.extend(trained_on(run, dataset)?);
     }
     let left = left(classes, &seen, dataset);
-    let per_class = per_class(classes, &left, asked, how_many)
-        .map_err(|(error, most)| error.hint(format!("ask for at most {most}")))?;
+    let per_class = per_class(classes, &left, asked, how_many).map_err(|(error, most)| match most {
+        0 => error.hint("every image of that class was trained on; show test images".to_string()),
+        _ => error.hint(format!("ask for at most {most}")),
+    })?;
     let HowMany::Evenly(count) = how_many else { return Ok(left.concat()) };
     let draw = |(&label, free): (&u8, Vec<ImageRef>)| -> Vec<ImageRef> {
         let mut random = stream(config.seed, Purpose::Validation, 0, u64::from(label));
@@ -141,25 +143,24 @@ pub(crate) fn test_images(
     how_many: HowMany,
     seed: u64,
 ) -> Result<Vec<ImageRef>, Error> {
+    let count_of = |class: &&u8| dataset.indices_of(Split::Test, **class).len();
+    if let Some(label) = classes.iter().find(|class| count_of(class) == 0) {
+        let text = format!("{}: there is no test image of class {label}", dataset.name());
+        let there = dataset.classes(Split::Test);
+        return Err(Error::input(text).hint(format!("there are of the classes {there:?}")));
+    }
     let HowMany::Evenly(count) = how_many else {
-        let mut all = Vec::new();
-        for &label in classes {
-            let of_class = dataset.indices_of(Split::Test, label);
-            if of_class.is_empty() {
-                let text = format!("{}: there is no test image of class {label}", dataset.name());
-                let there = dataset.classes(Split::Test);
-                return Err(Error::input(text).hint(format!("there are of the classes {there:?}")));
-            }
-            all.extend(of_class.iter().map(|&index| ImageRef { index, label }));
-        }
-        return Ok(all);
+        let of_class = |&label: &u8| {
+            dataset.indices_of(Split::Test, label).iter().map(move |&index| ImageRef { index, label })
+        };
+        return Ok(classes.iter().flat_map(of_class).collect());
     };
     let mut images = Vec::new();
     for (place, &label) in classes.iter().enumerate() {
         let share = count / classes.len() + usize::from(place < count % classes.len());
         let drawn = dataset.draw(Split::Test, &[label], share, seed);
         let drawn = drawn.map_err(|error| {
-            let most = classes.iter().map(|&c| dataset.indices_of(Split::Test, c).len()).min().unwrap_or(0);
+            let most = classes.iter().map(|class| count_of(&class)).min().unwrap_or(0);
             let hint = format!("ask for at most {} images, or for all", most * classes.len());
             Error::input(error.to_string()).hint(hint)
         })?;

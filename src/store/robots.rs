@@ -125,8 +125,12 @@ impl Selection {
     pub fn describe(&self) -> String {
         match self {
             Selection::All => "all elites".to_string(),
+            Selection::Top(1) => "the fittest of each task on the training images".to_string(),
             Selection::Top(count) => format!("the {count} fittest of each task on the training images"),
-            Selection::Random(count) => format!("{count} elites of each task, drawn at random"),
+            Selection::Random(count) => {
+                format!("{} of each task, drawn at random", counted(*count, "elite", "elites"))
+            }
+            Selection::Validated(1) => "the best of each run and task on validation images".to_string(),
             Selection::Validated(count) => {
                 format!("the {count} best of each run and task on validation images")
             }
@@ -340,9 +344,9 @@ pub(crate) fn physical<'a>(
     if physical.is_empty() {
         let names: Vec<String> = sources.iter().map(|source| path(source).display().to_string()).collect();
         return Err(Error::input(format!(
-            "{}: none of {} robots is physical",
+            "{}: none of {} is physical",
             names.join(", "),
-            fittest.len()
+            counted(fittest.len(), "robot", "robots")
         )));
     }
     Ok(physical)
@@ -383,10 +387,8 @@ pub(crate) fn first_physical<'a>(
             }
         }
         if physical == 0 && !of_task.is_empty() {
-            let text = format!(
-                "{name}: none of the {} best of {task} on validation images is physical",
-                of_task.len()
-            );
+            let best = counted(of_task.len(), "robot", "robots");
+            let text = format!("{name}: of {best} that validation images chose for {task}, none is physical");
             let hint = format!("`morphcog audit --archive {archive}` makes all its robots eligible");
             return Err(Error::input(text).hint(hint));
         }

@@ -57,7 +57,7 @@ fn row(robot: &RobotResponse, is_taught: bool, has_window: bool) -> Vec<String> 
         robot.id.clone(),
         robot.places.len().to_string(),
         certain.to_string(),
-        percent(robot.r_squared),
+        percent(robot.r_squared.max(0.0)),
         number::fixed(robot.scatter, 1),
         number::fixed(robot.relative_error, 2),
         format!("{} ({} to {})", signed(robot.intercept), signed(low), signed(high)),

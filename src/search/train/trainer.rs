@@ -3,6 +3,7 @@
 use crate::base::error::Error;
 use crate::base::number;
 use crate::base::observer::{Observer, Work};
+use crate::base::text::counted;
 use crate::config::Config;
 use crate::config::train::TrainConfig;
 use crate::data::dataset::{Dataset, Split};
@@ -157,10 +158,11 @@ impl Trainer<'_> {
 }
 
 fn told_response(observer: &dyn Observer, robot: &str, gait: &Gait, response: &Response) {
-    let (places, share) = (gait.places().len(), number::fixed(100.0 * response.r_squared, 0));
+    let places = counted(gait.places().len(), "soft voxel or sensor", "soft voxels and sensors");
+    let share = number::explained(response.r_squared);
     let noise = number::fixed(response.noise, 1);
     observer.note(&format!(
-        "{robot}: {places} soft voxels and sensors explain {share} % of its response; the rest is {noise} voxel lengths"
+        "{robot}: {share} % of its response is explained by {places}; the rest is {noise} voxel lengths"
     ));
 }
 
