@@ -209,7 +209,7 @@ fn run_eval(args: EvalArgs, console: &Console, ranks: Ranks) -> Result<(), Error
         false => archives,
     };
     if !of_gallery {
-        choice::say_unfinished(&archives, console);
+        choice::say_simulated(&archives, console);
     }
     let name = eval::own_name(args.split);
     let beside = || match of_gallery {

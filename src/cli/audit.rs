@@ -79,7 +79,7 @@ pub(super) fn run(args: AuditArgs, console: &Console, ranks: Ranks) -> Result<()
     });
     let of_archives: Vec<&PathBuf> = of_archives.collect();
     if !of_archives.is_empty() {
-        choice::say_unfinished(of_archives, console);
+        choice::say_simulated(of_archives, console);
     }
     // Which robots to audit is known for all runs before the first rollout.
     let asked = match archives.is_empty() {

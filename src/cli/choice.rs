@@ -6,6 +6,7 @@ use crate::base::error::Error;
 use crate::base::named;
 use crate::base::signals;
 use crate::base::stop::NEVER;
+use crate::base::text::counted;
 use crate::commands::one_by_one;
 use crate::commands::one_by_one::Named;
 use crate::store::folder;
@@ -15,6 +16,7 @@ use crate::view::console::Console;
 use crate::view::reporters::Reporter;
 use clap::Args;
 use clap::builder::{PathBufValueParser, TypedValueParser};
+use std::collections::BTreeSet;
 use std::path::PathBuf;
 
 /// Archives, of a command that takes several.
@@ -64,7 +66,7 @@ pub(super) fn selected(mut given: Vec<Selection>) -> Result<Option<Selection>, E
 /// The robots of a selection, for a command that looks at them one by one.
 pub(super) fn one_by_one(search: &one_by_one::Options, console: &Console) -> Result<Vec<Named>, Error> {
     if !(search.archives.is_empty() && gallery::is_meant(&search.robots)?) {
-        say_unfinished(&search.archives, console);
+        say_simulated(&search.archives, console);
     }
     // Only a search on validation images is stopped in an orderly way: signals end all else at
     // once.
@@ -75,15 +77,47 @@ pub(super) fn one_by_one(search: &one_by_one::Options, console: &Console) -> Res
     }
 }
 
-/// Says of which archives a command reads the robots that there are so far: those whose runs have not
-/// reached their end. Without archives it is the newest run that is meant.
-pub(super) fn say_unfinished<'a>(archives: impl IntoIterator<Item = &'a PathBuf>, console: &Console) {
+/// Says what is to be known of archives whose robots are simulated again: as [`say_unfinished`] and
+/// [`warn_of_versions`].
+pub(super) fn say_simulated<'a>(archives: impl IntoIterator<Item = &'a PathBuf> + Clone, console: &Console) {
+    say_unfinished(archives.clone(), console);
+    warn_of_versions(archives, console);
+}
+
+/// Warns of archives that another version of the program made: here their robots may walk otherwise.
+/// Runs that have names came with this version, whose tests simulate them.
+pub(super) fn warn_of_versions<'a>(archives: impl IntoIterator<Item = &'a PathBuf>, console: &Console) {
+    let of_others: Vec<(PathBuf, String)> = meant(archives)
+        .filter_map(|path| RunFile::other_version(&path).map(|version| (path, version)))
+        .collect();
+    let Some(((path, _), others)) = of_others.split_first() else { return };
+    let more = match others.len() {
+        0 => String::new(),
+        more => format!(" and {}", counted(more, "other run", "other runs")),
+    };
+    let versions: BTreeSet<&str> = of_others.iter().map(|(_, version)| version.as_str()).collect();
+    console.warning(&format!(
+        "{}{more}: made by morphcog {}; this is {}, whose numbers may be others",
+        path.display(),
+        versions.into_iter().collect::<Vec<_>>().join(" and "),
+        env!("CARGO_PKG_VERSION")
+    ));
+}
+
+/// The paths of these archives, without those that have names; of none, that of the newest run.
+fn meant<'a>(archives: impl IntoIterator<Item = &'a PathBuf>) -> impl Iterator<Item = PathBuf> {
     let mut archives: Vec<PathBuf> = archives.into_iter().cloned().collect();
     if archives.is_empty() {
         archives.extend(folder::newest_run());
     }
+    archives.into_iter().filter(|path| !named::is_named(path))
+}
+
+/// Says of which archives a command reads the robots that there are so far: those whose runs have not
+/// reached their end. Without archives it is the newest run that is meant.
+pub(super) fn say_unfinished<'a>(archives: impl IntoIterator<Item = &'a PathBuf>, console: &Console) {
     // Those that have names do not go on.
-    for path in archives.into_iter().filter(|path| !named::is_named(path)) {
+    for path in meant(archives) {
         if let Some((done, asked)) = RunFile::progress(&path).filter(|(done, asked)| done < asked) {
             console.info(&format!(
                 "{}: generation {done} of {asked}: the run is not at its end",

@@ -52,7 +52,10 @@ pub(super) fn run(args: ReportArgs, console: &Console) -> Result<(), Error> {
     if archives.is_empty() {
         archives.push(folder::newest_run()?);
     }
-    choice::say_unfinished(&archives, console);
+    match args.rollouts {
+        0 => choice::say_unfinished(&archives, console),
+        _ => choice::say_simulated(&archives, console),
+    }
     let out = args.out.unwrap_or_else(|| folder::beside_all(&archives, "report.html"));
     folder::writable(&out)?;
     let gathered =

@@ -2,6 +2,7 @@
 
 use crate::base::error::Error;
 use crate::base::signals;
+use crate::cli::choice;
 use crate::cli::choice::Archives;
 use crate::cli::values::whole;
 use crate::serve::server::Server;
@@ -42,9 +43,11 @@ pub(super) fn run(args: ServeArgs, console: &Console) -> Result<(), Error> {
     // A page without a run is of use, too: the published robots are there.
     let newest = if archives.is_empty() { folder::newest_run().ok() } else { None };
     let stop = signals::stop_flag()?;
+    let shown: Vec<_> = archives.iter().chain(&newest).cloned().collect();
     let options = Options { archives, newest, data: args.data, runs: folder::RUNS.into() };
     let (service, notes) = Service::open(&options)?;
     let server = Server::bind(service, args.port)?;
+    choice::warn_of_versions(&shown, console);
     for note in notes {
         console.info(&format!("note: {note}"));
     }

@@ -4,7 +4,7 @@ use crate::base::error::Error;
 use crate::base::shell::{in_shell, quoted};
 use crate::base::signals;
 use crate::base::text::counted;
-use crate::cli::tasks::{Command, What, Where, asked, ended, refused};
+use crate::cli::tasks::{Command, What, Where, asked, ended, refused, warn_of_gaits};
 use crate::commands::sweep::SweepPlan;
 use crate::commands::{collect, tasks};
 use crate::store::folder;
@@ -83,6 +83,7 @@ pub(super) fn run(args: SweepArgs, console: &Console) -> Result<(), Error> {
         let collected = collect::collect(&tasks, &status, &place, &warn)?;
         return sweeps::collected(console, &name, &collected, &status, &out);
     }
+    warn_of_gaits(&tasks, console);
     let stop = signals::stop_flag()?;
     let jobs = args.place.jobs.map(usize::from);
     let summary = tasks::run_all(&tasks, &place, jobs, &stop, &Reporter::new(console))?;

@@ -3,10 +3,10 @@
 use crate::base::error::Error;
 use crate::base::shell::{in_shell, quoted};
 use crate::base::{atlas, signals};
-use crate::cli::process;
 use crate::cli::values::{MOST, threads, whole};
+use crate::cli::{choice, process};
 use crate::commands::tasks;
-use crate::commands::tasks::{Place, Summary, Task};
+use crate::commands::tasks::{Place, Run, Summary, Task};
 use crate::view::console::Console;
 use crate::view::reporters::Reporter;
 use crate::view::sweeps;
@@ -158,6 +158,14 @@ pub(super) fn refused(mut errors: Vec<Error>, console: &Console) -> Error {
     last
 }
 
+/// Warns of gaits that another version of the program made.
+pub(super) fn warn_of_gaits(tasks: &[Task], console: &Console) {
+    // All tasks train the gaits of one archive.
+    if let Some(Run::Train(training)) = tasks.first().map(|task| &task.run) {
+        choice::warn_of_versions([&training.archive], console);
+    }
+}
+
 /// What is asked for but to do all tasks; whether that is all.
 pub(super) fn asked(
     what: &What,
@@ -174,6 +182,7 @@ pub(super) fn asked(
         };
         tasks::check_folders(std::slice::from_ref(task), place).map_err(|errors| refused(errors, console))?;
         tasks::check_data(std::iter::once((number, task)), place)?;
+        warn_of_gaits(std::slice::from_ref(task), console);
         let stop = signals::stop_flag()?;
         tasks::run(task, place, &stop, &Reporter::new(console)).map_err(goes_on)?;
         console.line(&format!("task {number} ({}): done", task.name));

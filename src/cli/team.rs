@@ -78,7 +78,7 @@ pub(super) fn run(args: TeamArgs, console: &Console) -> Result<(), Error> {
         archives = folder::run_json(PathBuf::from(shipped::TEAM)).map_err(Error::other)?;
         console.line(&format!("no --archive: the {} robots of {}", archives.len(), shipped::TEAM));
     }
-    choice::say_unfinished(&archives, console);
+    choice::say_simulated(&archives, console);
     let options = Options {
         robots: selected(args.robots)?.unwrap_or(Selection::Ids(vec![BEST.to_string()])),
         classes: (!args.classes.is_empty()).then_some(args.classes),

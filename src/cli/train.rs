@@ -164,7 +164,7 @@ pub(super) fn after_evolution(evolution: &evolve::Options) -> Result<Options, Er
 
 /// Trains, validates and audits, and says how it went.
 pub(super) fn trained(options: &Options, stop: &AtomicBool, console: &Console) -> Result<(), Error> {
-    choice::say_unfinished([&options.archive], console);
+    choice::say_simulated([&options.archive], console);
     let finished = train::train(options, stop, &Reporter::new(console))?;
     let Finished { validated, .. } = &finished;
     summary::training(console, &finished, &options.out);

@@ -218,6 +218,17 @@ impl RunFile {
         Some((run.generations, run.config.generations))
     }
 
+    /// The version of morphcog that made a run, if it is another than this and the file says it;
+    /// nothing else of it is read.
+    pub fn other_version(path: &Path) -> Option<String> {
+        #[derive(Deserialize)]
+        struct Made {
+            program_version: String,
+        }
+        let run: Made = serde_json::from_str(&read_text(path).ok()?).ok()?;
+        Some(run.program_version).filter(|version| version != env!("CARGO_PKG_VERSION"))
+    }
+
     /// Reads its text; `name` stands in messages.
     ///
     /// # Errors

@@ -6,6 +6,46 @@ use morphcog::store::eval::EvalFile;
 use std::collections::BTreeMap;
 
 #[test]
+fn whoever_simulates_a_run_of_another_version_says_so_once() {
+    let sandbox = with_run();
+    let run = sandbox.read("run/run.json");
+    let version = format!("\"program_version\":\"{}\"", env!("CARGO_PKG_VERSION"));
+    assert!(run.contains(&version));
+    let old = run.replace(&version, "\"program_version\":\"0.0.9\"");
+    for (folder, text) in [("own", &run), ("old", &old)] {
+        sandbox.write(&format!("{folder}/run.json"), text);
+    }
+    let train = "--task 0|1 --set train.images=4 --set train.random_images=20 --set train.rounds=1 \
+                 --set train.final_images=4 --set train.challengers=0 --set validation.best=0";
+    for command in [
+        "eval -a FOLDER --images 4 --cycles 1".to_string(),
+        "audit -a FOLDER --robots best".to_string(),
+        "response -a FOLDER -n 60".to_string(),
+        "replay -a FOLDER --robots best -o replay.svg".to_string(),
+        "team -a FOLDER --robots best --images 4 --classes 0,1".to_string(),
+        format!("train -a FOLDER --robots top:1 {train} --out FOLDER-taught"),
+        "report -a FOLDER -o FOLDER.html".to_string(),
+    ] {
+        let said = |folder: &str| {
+            let said = sandbox.run(&command.replace("FOLDER", folder)).ended(0, &[]);
+            said.err.matches("made by morphcog").count()
+        };
+        assert_eq!((said("own"), said("old")), (0, 1), "{command}");
+    }
+    let now = env!("CARGO_PKG_VERSION");
+    let words = format!("old/run.json: made by morphcog 0.0.9; this is {now}, whose numbers may be others");
+    sandbox.run("eval -a old --images 4 --cycles 1").ended(0, &[&words]);
+    // What is only read is not simulated, and runs that ship are simulated by the tests of every
+    // version.
+    for command in ["plot archive -a old -o archive.svg", "report -a old --rollouts 0 -o old.html"] {
+        let said = sandbox.run(command).ended(0, &[]);
+        assert!(!said.err.contains("made by morphcog"), "{said:?}");
+    }
+    let said = sandbox.run("response -a gallery:gaits -n 60 -o gaits.json").ended(0, &[]);
+    assert!(!said.err.contains("made by morphcog"), "{said:?}");
+}
+
+#[test]
 fn an_evaluation_adds_up() {
     let sandbox = with_run();
     let said = sandbox
