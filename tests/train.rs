@@ -4,12 +4,22 @@
 mod common;
 
 use common::program::{Sandbox, TINY, files, gaits, write_images};
+use morphcog::base::ranks::Ranks;
+use morphcog::base::stop::NEVER;
 use morphcog::config::Config;
 use morphcog::data::dataset::Split;
 use morphcog::search::training::Training;
-use morphcog::store::run::Robot;
+use morphcog::search::{evolve, train};
+use morphcog::store::folder::IfExists;
+use morphcog::store::images::ImageRef;
+use morphcog::store::robots::Selection;
+use morphcog::store::run::{Robot, RunFile};
 use morphcog::store::whereabouts::load_dataset;
 use morphcog::task::gait::Gait;
+use proptest::prelude::*;
+use proptest::test_runner::{RngAlgorithm, TestRng, TestRunner};
+use std::collections::BTreeSet;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// A little of everything: seconds in place of minutes.
 const LITTLE: &str = "--set train.random_images=40 --set train.rounds=2 --set train.images=24 \
@@ -270,6 +280,8 @@ fn what_cannot_be_trained_is_one_clear_error_and_writes_nothing() {
     refused("--task a|b", 2, &["a|b"]);
     refused("--task 3|10,11", 3, &["class 10", "found 0"]);
     refused("--task 0|1 --set train.images=1", 3, &["train.images = 1", "--set"]);
+    let few = "--set train.final_images=3";
+    refused(&format!("--task 3|14 {few}"), 3, &[few, "expected 4 or more, for an image of every class"]);
     refused("--task 0|1 --set train.random_images=5", 3, &["train.random_images = 5"]);
     refused(
         "--task 0|1 --set train.random_images=1000000000000000000",
@@ -325,6 +337,216 @@ fn what_cannot_be_trained_is_one_clear_error_and_writes_nothing() {
     assert_eq!(files(&sandbox.path("walkers")), before);
     std::fs::write(sandbox.path("walkers").join("training.json"), "{}").unwrap();
     sandbox.run("evolve -q -c run.toml -o walkers --resume").ended(5, &["is a training", "train --resume"]);
+}
+
+/// An IDX dataset of noise in `letters`, with classes as EMNIST's letters have them, from 1.
+fn write_letters(sandbox: &Sandbox) {
+    const SIDE: usize = 5;
+    let header = |sizes: &[u32]| {
+        let magic = [0, 0, 8, sizes.len() as u8];
+        [&magic[..], &sizes.iter().flat_map(|size| size.to_be_bytes()).collect::<Vec<_>>()].concat()
+    };
+    for (split, count) in [("train", 26 * 8_u32), ("t10k", 26 * 4)] {
+        let pixels =
+            (0..count * (SIDE * SIDE) as u32).map(|place| place.wrapping_mul(2_654_435_761).to_be_bytes()[0]);
+        let images = [header(&[count, SIDE as u32, SIDE as u32]), pixels.collect()].concat();
+        let labels = [header(&[count]), (0..count).map(|image| (1 + image % 26) as u8).collect()].concat();
+        sandbox.write(&format!("letters/{split}-images-idx3-ubyte"), images);
+        sandbox.write(&format!("letters/{split}-labels-idx1-ubyte"), labels);
+    }
+}
+
+#[test]
+fn a_class_above_nine_is_never_taken_for_its_digits() {
+    let sandbox = sandbox();
+    write_letters(&sandbox);
+    let letters = "--data letters --set data.dataset=letters";
+    let quick =
+        format!("--robots top:1 {LITTLE} --set validation.best=0 --set train.challengers=0 {letters}");
+    let said = ["groups 1|26: the data have a class 26", "\"1|26,\" for it, or \"1|2,6\" for its digits"];
+    sandbox.run(&format!("train -q -a walkers --task 1|26 {quick}")).ended(2, &said);
+    sandbox.run(&format!("response -q -a walkers --task 1|26 {letters}")).ended(2, &said);
+    let plan = |task: &str| {
+        let plan = format!(
+            "archive = \"walkers\"\nrobots = \"top:1\"\nseeds = [1]\ngroups = [\"{task}\"]\n\
+             set = [\"data.dataset=letters\", \"validation.best=0\", \"train.rounds=1\", \
+             \"train.random_images=40\", \"train.challengers=0\", \"train.final_images=4\", \"train.images=4\"]\n"
+        );
+        sandbox.write("plan.toml", plan);
+        sandbox.run("sweep plan.toml --out swept --data letters --jobs 1")
+    };
+    plan("1|26").ended(2, &said);
+    assert!(!sandbox.path("swept").exists() && !sandbox.path("walkers-1v26").exists());
+
+    // Both have a spelling, a name and a folder of their own.
+    for (task, name, groups) in
+        [("1|26,", "1|26,", [vec![1], vec![26]]), ("1|2,6", "1|26", [vec![1], vec![2, 6]])]
+    {
+        plan(task).ended(0, &[]);
+        let folder = format!("walkers-{}", name.replace('|', "v"));
+        sandbox.run(&format!("train -q -a walkers --task {task} {quick}")).ended(0, &[]);
+        for folder in [folder.clone(), format!("swept/{folder}-seed1")] {
+            let run = sandbox.run_file(&folder);
+            assert_eq!(
+                (run.config.task.groups, run.dimensions.tasks),
+                (Some(groups.clone()), vec![name.to_string()])
+            );
+            sandbox.run(&format!("eval -q -a {folder} --images 6 --cycles 1")).ended(0, &[]);
+        }
+        let response = format!("response -q -a walkers --task {task} {letters} -n 60 -o response.json");
+        sandbox.run(&response).ended(0, &[]);
+        assert!(sandbox.read("response.json").contains(&format!("\"task\":\"{name}\"")));
+    }
+
+    // What an older version called 1|26 is what its groups say.
+    let older = sandbox.read("walkers-1v26,/run.json").replace("1|26,", "1|26");
+    sandbox.write("older/run.json", older);
+    sandbox.run("eval -q -a older --data letters --images 6 --cycles 1").ended(0, &[]);
+    sandbox.run("audit -q -a older --data letters").ended(0, &[]);
+    sandbox.run("report -q -a older --data letters -o older.html").ended(0, &[]);
+    let eval: serde_json::Value = serde_json::from_str(&sandbox.read("older/eval.json")).unwrap();
+    assert!(eval["means"]["1|26"].is_object() && eval["baselines"]["1|26"].is_object(), "{eval}");
+    assert_eq!(eval["robots"][0]["per_class"].as_object().unwrap().keys().collect::<Vec<_>>(), ["1", "26"]);
+}
+
+#[test]
+fn a_training_that_compared_designs_without_a_class_can_still_be_read() {
+    let sandbox = sandbox();
+    let few =
+        format!("{LITTLE} --set validation.best=0 --set train.challengers=0 --set train.final_images=4");
+    sandbox.run(&format!("train -q -a walkers --task 3|14 --robots top:1 {few} -o taught")).ended(0, &[]);
+    let mut run = sandbox.run_file("taught");
+    let shown: BTreeSet<u8> = run.training_images.iter().map(|image| image.label).collect();
+    assert_eq!(shown, BTreeSet::from([1, 3, 4]), "four images show every class");
+    // As older versions ended.
+    let place = run.training_images.iter().position(|image| image.label == 4).unwrap();
+    run.training_images[place].label = 1;
+    let rest = |image: &ImageRef| image.label != 3;
+    run.read_sha256 = None;
+    sandbox.write("older/run.json", run.to_json());
+    RunFile::read(&sandbox.path("older/run.json")).unwrap();
+    // But not without one of its groups.
+    run.training_images.retain(rest);
+    run.elites.iter_mut().for_each(|robot| robot.displacements.truncate(run.training_images.len()));
+    sandbox.write("older/run.json", run.to_json());
+    let error = RunFile::read(&sandbox.path("older/run.json")).unwrap_err();
+    assert!(error.message.contains("training_images"), "{error}");
+}
+
+/// A config of a tiny run, as different from others as those that are valid can be.
+fn any_config() -> impl Strategy<Value = String> {
+    let task = (proptest::sample::subsequence((0..10).collect::<Vec<u8>>(), 2..6), 1_usize..6, 0..4)
+        .prop_map(|(classes, cut, kind)| match kind {
+            0 if classes.len() < 5 => format!("splits = {classes:?}\nsame_way_bin = true"),
+            1 if classes.len() < 5 => format!("splits = {classes:?}"),
+            _ => {
+                let (a, b) = classes.split_at(cut.min(classes.len() - 1));
+                format!("groups = [{a:?}, {b:?}]")
+            }
+        });
+    let body = (1_usize..6, 1_usize..6, 0_usize..3);
+    let task_and_data = (task, 1_usize..4, any::<bool>());
+    let fitness = proptest::sample::select(vec!["min", "mean-clipped", "response"]);
+    let sizes = (0_u64..3, 1_u64..5, 0_u64..3, proptest::option::of(1_usize..4));
+    let showing = (1_u32..8, 2_u32..5, -3_i32..4, any::<bool>(), 0.0..1.0_f64);
+    let measured = (-1e9..1e9_f64, 0_usize..3, 1_u64..4, any::<u32>());
+    let train = (20_usize..24, 0_usize..3, 2_usize..8, 2_usize..12, 0_usize..3, 0_u32..3);
+    (body, task_and_data, fitness, sizes, showing, measured, train).prop_map(
+        |(body, (task, per_class, is_drawn), fitness, sizes, showing, measured, train)| {
+            let (height, width, min_muscles) = body;
+            let (initial, parents, immigrants, keep) = sizes;
+            let (steps, row, column, is_fresh, voxel_mutations) = showing;
+            let (offset, best, generations, seed) = measured;
+            let (random_images, rounds, images, final_images, challengers, start) = train;
+            let keep = keep.map_or(String::new(), |keep| format!("keep = {keep}"));
+            let rollout = if is_fresh { "fresh" } else { "sequential" };
+            let encoding = if is_drawn { "intensity" } else { "saturated" };
+            format!(
+                "seed = {seed}\ngenerations = {generations}\n\
+                 [body]\nheight = {height}\nwidth = {width}\nmin_muscles = {min_muscles}\n\
+                 [task]\n{task}\n[data]\ndataset = \"builtin\"\nimages_per_class = {per_class}\n\
+                 [stimulus]\nreduction = \"area\"\nencoding = \"{encoding}\"\n\
+                 [protocol]\nrollout = \"{rollout}\"\ncontrol_steps = {steps}\nstart_row = {row}\n\
+                 start_column = {column}\n[genome]\nvoxel_mutations = {voxel_mutations}\n\
+                 [map_elites]\ninitial = {initial}\nparents = {parents}\nrandom_immigrants = {immigrants}\n\
+                 [archive]\nqd_offset = {offset}\n{keep}\n[evaluation]\nfitness = \"{fitness}\"\n\
+                 [validation]\nimages = 20\nbest = {best}\n\
+                 [train]\nimages_per_class = 10\nrandom_images = {random_images}\nrounds = {rounds}\n\
+                 images = {images}\nfinal_images = {final_images}\nchallengers = {challengers}\n\
+                 perturbations.start = {start}\n"
+            )
+        },
+    )
+}
+
+/// Evolves and trains what a config says; how many runs that made. Whatever ended without an error
+/// is read again, and what ended with one has written nothing that cannot be.
+fn made_by(config: &str, groups: &str) -> usize {
+    let sandbox = Sandbox::new();
+    let read = |folder: &str| {
+        let run = RunFile::read(&sandbox.path(folder).join("run.json"));
+        run.unwrap_or_else(|error| panic!("{error}\n{groups}\n{config}"))
+    };
+    let Ok(config) = Config::parse(config, "any.toml", &[]) else { return 0 };
+    let (threads, if_exists) = (Some(1), IfExists::Refuse);
+    let options = evolve::Options {
+        config: config.clone(),
+        name: "any".to_string(),
+        out: sandbox.path("any"),
+        if_exists,
+        data: None,
+        threads,
+        ranks: Ranks::ALONE,
+    };
+    if evolve::evolve(&options, &NEVER, &()).is_err() {
+        assert!(!sandbox.path("any/run.json").exists());
+        return 0;
+    }
+    assert_eq!(Config::load(&sandbox.path("any/config.toml").to_string_lossy(), &[]).unwrap(), config);
+    if read("any").elites.is_empty() {
+        return 1;
+    }
+    let options = train::Options {
+        archive: sandbox.path("any/run.json"),
+        robots: Selection::Top(1),
+        groups: groups.parse().unwrap(),
+        seed: None,
+        set: Vec::new(),
+        name: "taught".to_string(),
+        out: sandbox.path("taught"),
+        if_exists,
+        data: None,
+        threads,
+    };
+    match train::train(&options, &NEVER, &()) {
+        Ok(_) => {
+            let taught = read("taught");
+            Config::load(&sandbox.path("taught/config.toml").to_string_lossy(), &[]).unwrap();
+            assert_eq!(taught.elites.len(), 1);
+            2
+        }
+        Err(_) => {
+            assert!(!sandbox.path("taught/run.json").exists());
+            1
+        }
+    }
+}
+
+#[test]
+fn whatever_is_valid_evolves_and_trains_to_runs_that_can_be_read() {
+    let groups = proptest::sample::select(vec!["0|1", "3|14", "02468|13579", "7|0123"]);
+    let mut runner = TestRunner::new_with_rng(
+        proptest::test_runner::Config { cases: 60, failure_persistence: None, ..Default::default() },
+        TestRng::deterministic_rng(RngAlgorithm::ChaCha),
+    );
+    let made = [const { AtomicUsize::new(0) }; 3];
+    let ran = runner.run(&(any_config(), groups), |(config, groups)| {
+        made[made_by(&config, groups)].fetch_add(1, Ordering::Relaxed);
+        Ok(())
+    });
+    ran.unwrap();
+    let [none, one, both] = made.map(|count| count.into_inner());
+    assert!(one > 5 && both > 10, "{none} {one} {both}");
 }
 
 #[test]

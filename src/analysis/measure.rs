@@ -32,7 +32,7 @@ use crate::store::whereabouts::{Whereabouts, load_dataset_of, say_transposed, se
 use crate::task::direction;
 use crate::task::evaluation::fresh_rollouts_so_far;
 use crate::task::gait::Gait;
-use crate::task::grouping::{Grouping, balanced};
+use crate::task::grouping::{Groups, balanced};
 use crate::task::lesson::Example;
 use crate::task::perturbation::Condition;
 use crate::task::protocol::{Protocol, RolloutMode};
@@ -65,7 +65,7 @@ pub struct Options {
     /// Whether only robots will do that an audit found physical.
     pub physical_only: bool,
     /// Two groups of classes, to tell what robots could be taught.
-    pub task: Option<[Vec<u8>; 2]>,
+    pub task: Option<Groups>,
     /// Keys of the config that a training would have otherwise than the run, as
     /// `stimulus.margin=5`; only with a task.
     pub set: Vec<String>,
@@ -290,7 +290,7 @@ fn conditions(config: &Config, rollouts: usize) -> Vec<Condition> {
 
 /// A task that robots could be taught.
 struct Task {
-    groups: [Vec<u8>; 2],
+    groups: Groups,
     /// The config that its training would have.
     config: Config,
     dataset: Dataset,
@@ -306,7 +306,7 @@ fn task(
     observer: &dyn Observer,
 ) -> Result<Option<Task>, Error> {
     let Some(groups) = &options.task else { return Ok(None) };
-    let config = train::config_of(&provenance.config, groups, Some(seed), &options.set)?;
+    let config = train::config_of(&provenance.config, groups.classes(), Some(seed), &options.set)?;
     let mut whereabouts = Whereabouts::given(options.data.as_deref());
     if let Some(path) = &options.archive {
         whereabouts = whereabouts.and_of(path);
@@ -318,6 +318,7 @@ fn task(
     };
     let of_run = provenance.dataset.as_ref().filter(|_| data(&config) == data(&provenance.config));
     let dataset = load_dataset_of(of_run, &config, &whereabouts, &[Split::Train])?;
+    train::check_groups(groups, &dataset)?;
     say_transposed(&dataset, &config.data, observer);
     let config = train::sized(
         config,
@@ -327,7 +328,7 @@ fn task(
         &options.set,
         observer,
     );
-    let classes = groups.concat();
+    let classes = groups.classes().concat();
     let per_class = IMAGES_PER_CLASS.min(scarcest(&dataset, &classes, LEAST_PER_CLASS)?);
     let failed = |error: DatasetError| Error::input(error.to_string());
     let drawn = dataset.draw(Split::Train, &classes, per_class, seed).map_err(failed)?;
@@ -376,20 +377,13 @@ fn setting(
         dataset: task.map(|task| reference(&task.dataset)),
         conditions: probing.conditions().to_vec(),
         control_steps: config.protocol.control_steps,
-        task: task.map(Task::name).transpose()?,
+        task: task.map(|task| task.groups.to_string()),
         stimulus: task.map(|task| task.config.stimulus),
         windows: task.map_or(0, |task| task.config.train.windows),
     })
 }
 
 impl Task {
-    fn name(&self) -> Result<String, Error> {
-        let [a, b] = &self.groups;
-        let grouping =
-            Grouping::two_groups(a, b).map_err(|error| Error::usage(format!("--task: {error}")))?;
-        Ok(grouping.tasks()[0].name())
-    }
-
     fn seen(&self, stimulus: &StimulusParams, image: &ImageRef) -> Result<Grid<f64>, Error> {
         seen(&self.config.body, stimulus, &self.dataset, Split::Train, image.index)
     }
@@ -405,12 +399,12 @@ impl Task {
         let config = &self.config;
         let (mut stimulus, mut margin) = (config.stimulus, None);
         if config.train.windows > 0 {
-            let windows = Windows::of(config, &self.dataset, &self.images, &self.groups)?;
+            let windows = Windows::of(config, &self.dataset, &self.images, self.groups.classes())?;
             let found = windows.best(gait, response, stop, &|_| ())?;
             stimulus.margin = found.margins;
             margin = Some(found.margins);
         }
-        let [first, _] = &self.groups;
+        let [first, _] = self.groups.classes();
         let ways = balanced(self.images.iter().map(|image| image.label), first);
         let example = |(image, (right, weight)): (&ImageRef, (f64, f64))| {
             let seen = self.seen(&stimulus, image)?;

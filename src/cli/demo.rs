@@ -76,7 +76,7 @@ pub(super) fn run(args: DemoArgs, console: &Console) -> Result<(), Error> {
     let options = train::Options {
         archive: folder::first_run(PathBuf::from(shipped::GAITS)).map_err(Error::other)?,
         robots: Selection::Ids(vec![BEST.to_string()]),
-        groups: [vec![0], vec![1]],
+        groups: [vec![0], vec![1]].into(),
         seed: Some(args.seed),
         set: LITTLE.map(str::to_string).to_vec(),
         name: "demo".to_string(),

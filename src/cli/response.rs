@@ -10,10 +10,10 @@ use crate::cli::choice::{ROBOTS, run_json, selected};
 use crate::cli::values::{MOST, decimal, seed, threads, whole};
 use crate::commands::one_by_one;
 use crate::commands::one_by_one::Named;
-use crate::search::train::groups;
 use crate::store::folder;
 use crate::store::names::RESPONSE_JSON;
 use crate::store::robots::{BEST, Selection};
+use crate::task::grouping::Groups;
 use crate::view::console::Console;
 use crate::view::reporters::Reporter;
 use crate::view::responses;
@@ -40,9 +40,6 @@ are known well enough (--error), or after --images rollouts. Images of a dataset
 with --task. Earlier measurements in response.json are reused for any task, by this command and by \
 `train`: if many trainings begin with the same gaits, measure these first. Ctrl-C stops it.";
 
-/// Two groups of classes.
-type Groups = [Vec<u8>; 2];
-
 #[derive(Debug, Args)]
 pub(super) struct ResponseArgs {
     /// The run.json, or its folder (default: the newest under runs/).
@@ -53,8 +50,9 @@ pub(super) struct ResponseArgs {
     /// Only robots that morphcog audit found physical: "best" is the best of them.
     #[arg(long)]
     physical_only: bool,
-    /// Two groups of classes, such as 4|9, 0|123 or 10,11|3: says what robots could be taught, too.
-    #[arg(short, long, value_name = "A|B", value_parser = groups)]
+    /// Two groups of classes, such as 4|9, 0|123 or 10,11|3 (as in train): says what robots could be
+    /// taught, too.
+    #[arg(short, long, value_name = "A|B")]
     task: Option<Groups>,
     /// Change a key of the config that a training of the task would have, such as stimulus.margin=5
     /// or train.windows=2000; may be given several times.

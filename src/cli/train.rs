@@ -10,14 +10,14 @@ use crate::cli::choice::{ROBOTS, run_json, selected};
 use crate::cli::values::{seed, threads};
 use crate::commands::audit;
 use crate::config::audit::Criteria;
-use crate::search::train::{Finished, Options, groups};
+use crate::search::train::{Finished, Options};
 use crate::search::{evolve, train};
 use crate::store::folder;
 use crate::store::folder::IfExists;
 use crate::store::names::{AUDIT_JSON, RUN_JSON};
 use crate::store::robots::Selection;
 use crate::store::whereabouts::Whereabouts;
-use crate::task::grouping::groups_text;
+use crate::task::grouping::{Groups, groups_text};
 use crate::view::console::Console;
 use crate::view::reporters::Reporter;
 use crate::view::{summary, verdicts};
@@ -42,16 +42,14 @@ on many training images, and the body is refined: challengers that answer better
 it. The robot is validated on images that it was not trained on, and audited. Ctrl-C stops it; \
 --resume goes on, also after its end with more challengers (--set train.challengers=240).";
 
-/// Two groups of classes.
-type Groups = [Vec<u8>; 2];
-
 #[derive(Debug, Args)]
 pub(super) struct TrainArgs {
     /// The run.json of the gaits, or its folder (default: the newest under runs/).
     #[arg(short, long, value_name = "FILE", value_parser = run_json())]
     archive: Option<PathBuf>,
-    /// Two groups of classes, such as 4|9, 0|123 or 10,11|3.
-    #[arg(short, long, value_name = "A|B", value_parser = groups)]
+    /// Two groups of classes, such as 4|9 or 0|123. With classes above 9 commas separate them: 10,11|3,
+    /// or "1|26," for 1 against 26.
+    #[arg(short, long, value_name = "A|B")]
     task: Groups,
     #[arg(short, long, visible_aliases = ["robot", "select"], default_value = "top:4", help = ROBOTS)]
     robots: Vec<Selection>,
@@ -82,7 +80,7 @@ pub(super) struct TrainArgs {
 pub(super) fn run(args: TrainArgs, console: &Console) -> Result<(), Error> {
     let archive = args.archive.map_or_else(folder::newest_run, Ok)?;
     let robots = selected(args.robots)?.unwrap_or(Selection::Top(GAITS));
-    let name = name(&archive, &args.task, args.seed);
+    let name = name(&archive, args.task.classes(), args.seed);
     let beside = match named::is_named(&archive) {
         true => Some(Path::new(folder::RUNS)),
         false => archive.parent().and_then(|folder| folder.parent()),
@@ -113,8 +111,7 @@ pub(super) fn run(args: TrainArgs, console: &Console) -> Result<(), Error> {
 const GAITS: usize = 4;
 
 /// How a training of an archive's gaits is called: after the archive's folder and the task.
-fn name(archive: &Path, task: &Groups, seed: Option<u64>) -> String {
-    let [a, b] = task;
+fn name(archive: &Path, [a, b]: &[Vec<u8>; 2], seed: Option<u64>) -> String {
     let folder = archive.parent().and_then(Path::file_name).map(|name| name.to_string_lossy());
     let of = match named::name(archive) {
         Some((_, name)) => name,
@@ -152,7 +149,7 @@ pub(super) fn after_evolution(evolution: &evolve::Options) -> Result<Options, Er
         out: of_training,
         archive,
         robots: Selection::Top(GAITS),
-        groups: groups.clone(),
+        groups: groups.clone().into(),
         seed: None,
         set: Vec::new(),
         name,

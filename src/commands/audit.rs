@@ -280,7 +280,7 @@ impl Trial {
         let (displacements, energy) = plain.map_or((None, Energy::default()), |(d, e)| (Some(d), e));
         let classes: Vec<u8> = self.training.images.iter().map(|image| image.label).collect();
         let still = vec![0.0; classes.len()];
-        let split = self.grouping.tasks().iter().find(|split| split.name() == subject.task);
+        let split = self.grouping.tasks().iter().find(|split| split.is_called(&subject.task));
         // A run's robots are checked to have tasks of the run.
         let split = split.unwrap_or(&self.grouping.tasks()[0]);
         let behaviour = Behaviour::new(

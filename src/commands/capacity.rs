@@ -75,11 +75,11 @@ pub fn capacity(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -
     let robots = robots(&report, options)?;
     let images = Images::of(&report, setting, options)?;
     let grouping = setting.task.grouping()?;
-    let accuracies = |split: &grouping::Split| -> Vec<f64> {
-        robots.iter().filter(|robot| robot.task == split.name()).map(|robot| robot.accuracy).collect()
+    let of_split = |split: &grouping::Split| -> Vec<&RobotReport> {
+        robots.iter().copied().filter(|robot| split.is_called(&robot.task)).collect()
     };
     let splits: Vec<&grouping::Split> =
-        grouping.tasks().iter().filter(|split| !accuracies(split).is_empty()).collect();
+        grouping.tasks().iter().filter(|split| !of_split(split).is_empty()).collect();
     let known = Trainings::read(&options.out)?;
     let mut networks = Networks {
         config,
@@ -108,13 +108,18 @@ pub fn capacity(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -
     };
     let mut unwritten = Unwritten::default();
     for split in splits {
-        let of_task = accuracies(split);
-        let accuracy = of_task.iter().sum::<f64>() / of_task.len() as f64;
+        let of_task = of_split(split);
+        let accuracy = of_task.iter().map(|robot| robot.accuracy).sum::<f64>() / of_task.len() as f64;
         let Some(curves) = networks.curves(split, accuracy)? else {
             file.stopped = true;
             break;
         };
-        file.tasks.push(TaskCapacity { task: split.name(), robots: of_task.len(), accuracy, curves });
+        file.tasks.push(TaskCapacity {
+            task: of_task[0].task.clone(),
+            robots: of_task.len(),
+            accuracy,
+            curves,
+        });
         unwritten.tried(write(options, &file), |text| observer.warning(text));
     }
     // What was found before it was stopped is better than nothing.

@@ -116,10 +116,11 @@ pub fn collect(
             continue;
         }
         let found = Found::of(&source, &folder, task.steps.eval.as_ref().map(|step| step.split), warn);
+        // As the run's own files call them.
         let grouping = run.config.grouping()?;
-        let names = grouping.tasks().iter().filter(|split| !split.is_same_way()).map(|split| split.name());
-        for recognises in names {
-            all.rows.push(row(Some(found.of_task(run, recognises, status.seconds.unwrap_or(0.0)))));
+        let tasks = grouping.tasks().iter().zip(&run.dimensions.tasks);
+        for (_, recognises) in tasks.filter(|(split, _)| !split.is_same_way()) {
+            all.rows.push(row(Some(found.of_task(run, recognises.clone(), status.seconds.unwrap_or(0.0)))));
         }
         if run.generations > 1 && folder.join(METRICS).exists() {
             all.progress.push(Progress::of(run, &archive)?);

@@ -128,8 +128,10 @@ pub fn eval(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Re
     if let Some(name) = other {
         report.transfer(name, &dataset);
     }
-    let splits = robots.iter().filter_map(|chosen| task_of(&grouping, chosen.robot));
-    report.baselines = shown.baselines(&sources, splits)?;
+    let tasks = robots
+        .iter()
+        .filter_map(|Chosen { robot, .. }| Some((robot.task.as_str(), task_of(&grouping, robot)?)));
+    report.baselines = shown.baselines(&sources, tasks)?;
     let pool = pool(options.threads)?;
     let walker =
         || Walker { config, control_steps: steps, pool: &pool, stop, observer, done: AtomicU64::new(0) };

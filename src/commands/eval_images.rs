@@ -86,14 +86,14 @@ impl<'a> HeldOutImages<'a> {
         }
     }
 
-    /// The baselines of each of these tasks.
+    /// The baselines of each of these tasks, by the names that their robots' runs have for them.
     ///
     /// # Errors
     /// If an image cannot be drawn or seen.
     pub fn baselines<'t>(
         &self,
         sources: &[Source],
-        tasks: impl Iterator<Item = &'t grouping::Split>,
+        tasks: impl Iterator<Item = (&'t str, &'t grouping::Split)>,
     ) -> Result<BTreeMap<String, Baselines>, Error> {
         let seen = |images: &[ImageRef]| -> Result<Vec<(Grid<f64>, u8)>, Error> {
             let stimulus = |index| see(self.config, self.dataset, Split::Train, index);
@@ -113,8 +113,8 @@ impl<'a> HeldOutImages<'a> {
         let shown: Vec<Labelled> =
             shown.map(|(stimulus, image)| Labelled { stimulus, class: image.label }).collect();
         let mut all = BTreeMap::new();
-        for task in tasks {
-            if all.contains_key(&task.name()) {
+        for (name, task) in tasks {
+            if all.contains_key(name) {
                 continue;
             }
             let rule = best_pixel(task, &labelled(&choice));
@@ -131,7 +131,7 @@ impl<'a> HeldOutImages<'a> {
                 pixel: rule.map_or([0, 0], |rule| [rule.row, rule.column]),
                 nearest_training_image: nearest_of_all,
             };
-            all.insert(task.name(), baselines);
+            all.insert(name.to_string(), baselines);
         }
         Ok(all)
     }

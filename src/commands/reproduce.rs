@@ -73,7 +73,7 @@ pub fn tasks(plan: &Plan, scale: f64) -> Result<Vec<Task>, Error> {
                 vec![("experiment".to_string(), name.clone()), ("seed".to_string(), seed.to_string())];
             tasks.push(Task {
                 name: format!("{name}-seed{seed}"),
-                run: Run::Evolve(Box::new(config), name.clone()),
+                run: Run::Evolve(Box::new(config), name.clone(), None),
                 steps: Steps::default(),
                 varied,
             });

@@ -11,10 +11,10 @@ use crate::config::{Config, Settings, flatten, reading};
 use crate::search::train;
 use crate::store::folder::{self, first_run};
 use crate::store::robots::Source;
-use crate::task::grouping::groups_text;
+use crate::task::grouping::{Groups, groups_text};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 /// Most tasks of a sweep: a slip in a list makes millions quickly.
@@ -128,17 +128,17 @@ impl SweepPlan {
     }
 
     /// The two groups of each task, if the plan names any.
-    fn groups(&self) -> Result<Vec<[Vec<u8>; 2]>, Error> {
-        let mut all = Vec::new();
+    fn groups(&self) -> Result<Vec<Groups>, Error> {
+        let mut all: Vec<Groups> = Vec::new();
         for (number, text) in (1..).zip(&self.groups) {
-            all.push(train::groups(text).map_err(|error| Error::at(&format!("groups.{number}"), error))?);
+            all.push(text.parse().map_err(|error: String| Error::at(&format!("groups.{number}"), error))?);
         }
         for (k, &a) in self.pairs.iter().enumerate() {
-            all.extend(self.pairs[k + 1..].iter().map(|&b| [vec![a.min(b)], vec![a.max(b)]]));
+            all.extend(self.pairs[k + 1..].iter().map(|&b| [vec![a.min(b)], vec![a.max(b)]].into()));
         }
         // Which group walks which way is up to the robots: 1|0 is 0|1.
-        let same = |groups: &[Vec<u8>; 2]| -> BTreeSet<BTreeSet<u8>> {
-            groups.iter().map(|group| group.iter().copied().collect()).collect()
+        let same = |groups: &Groups| -> BTreeSet<BTreeSet<u8>> {
+            groups.classes().iter().map(|group| group.iter().copied().collect()).collect()
         };
         if all.iter().map(same).collect::<BTreeSet<_>>().len() < all.len() {
             return Err(Error::at("groups", "expected different ones, also of pairs"));
@@ -212,7 +212,7 @@ impl SweepPlan {
             let text = format!("{} tasks: expected at most {MOST}", sizes.join(" × "));
             return Err(one(Error::at("vary", text)));
         }
-        let groups: Vec<Option<&[Vec<u8>; 2]>> =
+        let groups: Vec<Option<&Groups>> =
             if groups.is_empty() { vec![None] } else { groups.iter().map(Some).collect() };
         let mut combinations: Vec<Vec<&Setting>> = vec![Vec::new()];
         for settings in &varied {
@@ -238,10 +238,19 @@ impl SweepPlan {
             return Err(refused.errors().into_iter().flat_map(one).collect());
         }
         let mut names = BTreeSet::new();
-        match tasks.iter().find(|task| !names.insert(task.name.to_lowercase())) {
-            Some(task) => Err(one(Error::at("vary", format!("two tasks would be called {}", task.name)))),
-            None => Ok(tasks),
+        if let Some(task) = tasks.iter().find(|task| !names.insert(task.name.to_lowercase())) {
+            return Err(one(Error::at("vary", format!("two tasks would be called {}", task.name))));
         }
+        // Two values may be one, such as 1 and 1.0.
+        let mut experiments: BTreeMap<String, &str> = BTreeMap::new();
+        for task in &tasks {
+            let config = sha256_hex(format!("{:?}", task.run.config()).as_bytes());
+            if let Some(other) = experiments.insert(config, &task.name) {
+                let text = format!("{other} and {} are the same: expected different values", task.name);
+                return Err(one(Error::at("vary", text)));
+            }
+        }
+        Ok(tasks)
     }
 
     fn base(&self, path: &Path) -> Result<Base, Error> {
@@ -269,32 +278,32 @@ impl SweepPlan {
         base: &Base,
         name: &str,
         combination: &[&Setting],
-        groups: Option<&[Vec<u8>; 2]>,
+        groups: Option<&Groups>,
         seed: u64,
     ) -> Result<Task, Error> {
         let settings = combination.iter().map(|setting| format!("{}={}", setting.key, setting.value));
         let mut set: Vec<String> = self.set.iter().cloned().chain(settings).collect();
         let run = match base {
             Base::Evolve(config_name, config) => {
-                set.extend(groups.map(|groups| format!("task.groups={groups:?}")));
+                set.extend(groups.map(|groups| format!("task.groups={:?}", groups.classes())));
                 set.push(format!("seed={seed}"));
                 // Of a config with splits, the groups are in their place.
                 let mut config = (**config).clone();
                 if groups.is_some() {
                     let classes = config.classes();
                     (config.task.splits, config.task.same_way_bin) = (None, false);
-                    config.task.groups = groups.cloned();
+                    config.task.groups = groups.map(|groups| groups.classes().clone());
                     // Images that a config names are of the classes of its own task.
                     if config.classes() != classes {
                         config.data.train_images = None;
                     }
                 }
                 let config = reading::changed(config, &set, Config::validate, |error| error)?;
-                Run::Evolve(Box::new(config), config_name.clone())
+                Run::Evolve(Box::new(config), config_name.clone(), groups.cloned())
             }
             Base::Train(archive, source) => {
                 let groups = groups.cloned().expect("a plan with an archive has groups");
-                let config = train::config_of(&source.run.config, &groups, Some(seed), &set)?;
+                let config = train::config_of(&source.run.config, groups.classes(), Some(seed), &set)?;
                 Run::Train(Box::new(Training {
                     archive: archive.clone(),
                     sha256: source.run.fingerprint(),
@@ -306,10 +315,7 @@ impl SweepPlan {
                 }))
             }
         };
-        let classes = match &run {
-            Run::Evolve(config, _) => config.classes().len(),
-            Run::Train(training) => training.config.classes().len(),
-        };
+        let classes = run.config().classes().len();
         let too_few = |step: &&EvalStep| !step.images.has_each(classes);
         if let Some(EvalStep { images, .. }) = self.eval.as_ref().filter(too_few) {
             return Err(Error::value(
@@ -320,7 +326,7 @@ impl SweepPlan {
         }
         let mut varied: Vec<(String, String)> =
             combination.iter().map(|setting| (setting.key.clone(), text(&setting.value))).collect();
-        varied.extend(groups.map(|[a, b]| ("groups".to_string(), groups_text([a, b], "|"))));
+        varied.extend(groups.map(|groups| ("groups".to_string(), groups.to_string())));
         varied.push(("seed".to_string(), seed.to_string()));
         Ok(Task { name: name.to_string(), run, steps: self.steps(), varied })
     }
@@ -328,7 +334,7 @@ impl SweepPlan {
 
 impl Base {
     /// The name of a task.
-    fn name(&self, combination: &[&Setting], groups: Option<&[Vec<u8>; 2]>, seed: u64) -> String {
+    fn name(&self, combination: &[&Setting], groups: Option<&Groups>, seed: u64) -> String {
         let base = match self {
             Base::Evolve(name, _) => name.clone(),
             Base::Train(archive, source) => match named::name(archive) {
@@ -340,7 +346,7 @@ impl Base {
             },
         };
         let words = combination.iter().map(|setting| setting.word.clone());
-        let groups = groups.map(|[a, b]| groups_text([a, b], "v"));
+        let groups = groups.map(Groups::classes).map(|[a, b]| groups_text([a, b], "v"));
         let parts = std::iter::once(base).chain(words).chain(groups).chain([format!("seed{seed}")]);
         parts.collect::<Vec<_>>().join("-")
     }
@@ -421,7 +427,7 @@ mod tests {
         let text = "config = \"four_digit.toml\"\nseeds = [7]\ngroups = [\"0|123\"]\nset = [\"generations=9\"]\n\
                     [vary]\narchive.keep = [3]";
         let tasks = plan(text).tasks(Path::new("plan.toml")).unwrap();
-        let Run::Evolve(config, _) = &tasks[0].run else { panic!("it evolves") };
+        let Run::Evolve(config, ..) = &tasks[0].run else { panic!("it evolves") };
         assert_eq!((config.seed, config.generations), (7, 9));
         assert_eq!(config.task.groups, Some([vec![0], vec![1, 2, 3]]));
     }
@@ -469,6 +475,24 @@ mod tests {
             let plan: SweepPlan = toml::from_str(text).unwrap();
             assert_eq!(plan.check().unwrap_err().key.as_deref(), Some(key), "{text}");
         }
+    }
+
+    #[test]
+    fn values_that_are_one_and_the_same_are_refused() {
+        for vary in ["archive.qd_offset = [1, 1.0]", "stimulus.margin = [0, [0, 0, 0, 0]]"] {
+            let text = format!("config = \"quickstart.toml\"\n[vary]\n{vary}\ngenerations = [5, 6]");
+            let errors = plan(&text).tasks(Path::new("plan.toml")).unwrap_err();
+            let said = errors[0].to_string();
+            assert!(said.contains("are the same: expected different values"), "{said}");
+        }
+        let text = "config = \"quickstart.toml\"\n[vary]\narchive.qd_offset = [1, 1.5]";
+        assert_eq!(names(text).len(), 2);
+    }
+
+    #[test]
+    fn a_lone_class_above_nine_has_a_task_of_its_own() {
+        let names = names("config = \"quickstart.toml\"\ngroups = [\"1|26\", \"1|26,\"]\npairs = [3, 12]");
+        assert_eq!(names, ["quickstart-1v26-seed1", "quickstart-1v26,-seed1", "quickstart-3v12,-seed1"]);
     }
 
     #[test]

@@ -177,6 +177,10 @@ fn spoken(message: &str) -> String {
     if let Some((start, _)) = message.split_once("expected struct ") {
         return format!("{start}expected a table");
     }
+    // TOML has no numbers such as `.5` and `5.`
+    if message.starts_with("invalid mantissa") || message.starts_with("invalid fraction") {
+        return "expected digits before and after the point of a number, as in 0.5".to_string();
+    }
     for (kind, words) in words {
         if let Some(start) = message.strip_suffix(&format!("expected {kind}")) {
             let meant =
@@ -602,6 +606,10 @@ mod tests {
             let error = changed(outer, &[assignment.to_string()], |_| Ok(()), |error| error).unwrap_err();
             assert!(error.message.ends_with(&format!("; write {number}")), "{}", error.message);
         }
+        assert_eq!(
+            toml_error("name = 'a'\ninner.list = [.5]"),
+            "own.toml:2: expected digits before and after the point of a number, as in 0.5"
+        );
         for assignment in ["inner.count=.5", "inner.count=x", "inner.list=['inf.']"] {
             assert!(!said(assignment).contains("write"), "{}", said(assignment));
         }

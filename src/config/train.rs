@@ -29,8 +29,8 @@ pub struct TrainConfig {
     /// Training images that a round shows. Default 120: with fewer, slopes are noisier, and the
     /// constant is off.
     pub images: usize,
-    /// Training images on which designs and challengers are compared. Default 400: with fewer,
-    /// small gains cannot be told from chance.
+    /// Training images on which designs and challengers are compared: at least one of every class,
+    /// of both groups by turns. Default 400: with fewer, small gains cannot be told from chance.
     pub final_images: usize,
     /// Bodies that challenge the best design, in sensors or in a few voxels of any material.
     /// Default 30; later ones win more seldom.

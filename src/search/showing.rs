@@ -20,7 +20,7 @@ pub(crate) fn control_steps(config: &Config, cycles: u32) -> u32 {
 
 /// The recognition task a robot performs; none if it always walks the same way.
 pub(crate) fn task_of<'a>(grouping: &'a Grouping, robot: &Robot) -> Option<&'a grouping::Split> {
-    grouping.tasks().iter().find(|split| split.name() == robot.task && !split.is_same_way())
+    grouping.tasks().iter().find(|split| split.is_called(&robot.task) && !split.is_same_way())
 }
 
 /// Shows images to robots.

@@ -241,7 +241,7 @@ fn screened(
     let config: &Config = &run.config;
     let stimuli = see_all(config, dataset, Split::Train, images)?;
     let split_of = |robot: &Robot| -> Option<&grouping::Split> {
-        grouping.tasks().iter().find(|split| split.name() == robot.task)
+        grouping.tasks().iter().find(|split| split.is_called(&robot.task))
     };
     let mut tasks = BTreeMap::<&str, Vec<&Robot>>::new();
     robots.iter().for_each(|robot| tasks.entry(&robot.task).or_default().push(robot));

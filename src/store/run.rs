@@ -151,11 +151,24 @@ impl Stored for RunFile {
             let text = format!("generations = {done}: expected at most config.generations, {all}");
             return Err(Error::input(text));
         }
-        if self.dimensions != Dimensions::of(&self.config)? {
+        let (grouping, names) = (self.config.grouping()?, &self.dimensions.tasks);
+        let are_called = grouping.tasks().len() == names.len()
+            && grouping.tasks().iter().zip(names).all(|(split, name)| split.is_called(name));
+        let of_config = Dimensions { tasks: names.clone(), ..Dimensions::of(&self.config)? };
+        if !are_called || self.dimensions != of_config {
             return Err(Error::input("dimensions: they are not those of the config".to_string()));
         }
         let shown: BTreeSet<u8> = self.training_images.iter().map(|image| image.label).collect();
-        if shown != self.config.classes().into_iter().collect() {
+        let classes: BTreeSet<u8> = self.config.classes().into_iter().collect();
+        // Older trainings may end without an image of every class, but have some of both groups.
+        let are_enough = match (&self.origin, &self.config.task.groups) {
+            (Some(_), Some(groups)) => {
+                shown.is_subset(&classes)
+                    && groups.iter().all(|group| group.iter().any(|class| shown.contains(class)))
+            }
+            _ => shown == classes,
+        };
+        if !are_enough {
             let text = "training_images: their labels are not the classes of the config's task";
             return Err(Error::input(text.to_string()));
         }
@@ -280,7 +293,7 @@ impl RunFile {
             return None;
         }
         let grouping = self.config.grouping().ok()?;
-        let split = grouping.tasks().iter().find(|split| split.name() == robot.task)?;
+        let split = grouping.tasks().iter().find(|split| split.is_called(&robot.task))?;
         Judge::of(split, Assignment::from_training(split, self.fitness(), &self.answers(robot)))
     }
 

@@ -1,7 +1,15 @@
 //! [`Grouping`]: which tasks there are: how classes are divided into a group that walks one way and
 //! one that walks the other.
+//!
+//! A task's name and its [`Groups`] have one grammar. If all classes are below 10, every digit is a
+//! class: `0|123`. Otherwise the name has a comma, and every number between commas is a class:
+//! `10,11|3`, `1,3|26`. Where no group has two classes to separate, the comma comes last: `1|26,` is
+//! 1 against 26, and `1|26` is 1 against 2 and 6. So a name means one task, whatever the data, and
+//! a task has one name.
 
 use crate::task::fitness::Fitness;
+use std::fmt;
+use std::str::FromStr;
 
 /// One of the two groups of a [`Split`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -46,13 +54,117 @@ impl Split {
         }
         groups_text([&self.a, &self.b], "|")
     }
+
+    /// Tells whether a name from a file is its name. In older files the comma at the end is missing:
+    /// there, a task is the one of its run's groups that has the name.
+    pub fn is_called(&self, name: &str) -> bool {
+        let own = self.name();
+        own == name || own.strip_suffix(',') == Some(name)
+    }
 }
 
-/// Two groups of classes with a text between them: `0|123`, or `0v123` in names of files. All classes
-/// are separated by commas if one has several digits.
+/// The name of two groups of classes with a text between them: `0|123`, or `0v123` in names of
+/// files.
 pub fn groups_text(groups: [&[u8]; 2], between: &str) -> String {
-    let separator = if groups.iter().copied().flatten().all(|class| *class < 10) { "" } else { "," };
+    let are_digits = groups.iter().copied().flatten().all(|class| *class < 10);
+    let mut text = joined(groups, between, if are_digits { "" } else { "," });
+    if !are_digits && !text.contains(',') {
+        text.push(',');
+    }
+    text
+}
+
+fn joined(groups: [&[u8]; 2], between: &str, separator: &str) -> String {
     groups.map(|group| group.iter().map(u8::to_string).collect::<Vec<_>>().join(separator)).join(between)
+}
+
+/// Two groups of classes that somebody named, as by `4|9`, `0|123` or `10,11|3`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Groups {
+    classes: [Vec<u8>; 2],
+    /// Whether every digit was a class, and there was no comma.
+    are_digits: bool,
+}
+
+impl Groups {
+    /// The classes of both groups.
+    pub fn classes(&self) -> &[Vec<u8>; 2] {
+        &self.classes
+    }
+
+    /// Checks that their text means nothing else with these classes: `1|26` without a comma may be
+    /// meant for a class 26 where there is one.
+    ///
+    /// # Errors
+    /// [`Ambiguous`] if it may.
+    pub fn check_among(&self, there: &[u8]) -> Result<(), Ambiguous> {
+        let number = |group: &Vec<u8>| -> Option<u8> {
+            let digits: String = group.iter().map(u8::to_string).collect();
+            let number = digits.parse().ok().filter(|number| there.contains(number));
+            number.filter(|_| self.are_digits && group.len() > 1)
+        };
+        let numbers = self.classes.each_ref().map(number);
+        let Some(class) = numbers.into_iter().flatten().next() else { return Ok(()) };
+        let [a, b] = &self.classes;
+        let lone = |place: usize| numbers[place].map_or(self.classes[place].clone(), |number| vec![number]);
+        Err(Ambiguous {
+            text: self.to_string(),
+            class,
+            lone: groups_text([&lone(0), &lone(1)], "|"),
+            separate: joined([a, b], "|", ","),
+        })
+    }
+}
+
+/// A text may name two tasks.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "groups {text}: the data have a class {class}; expected \"{lone}\" for it, or \"{separate}\" for its digits"
+)]
+pub struct Ambiguous {
+    text: String,
+    class: u8,
+    lone: String,
+    separate: String,
+}
+
+impl From<[Vec<u8>; 2]> for Groups {
+    fn from(classes: [Vec<u8>; 2]) -> Self {
+        Groups { classes, are_digits: false }
+    }
+}
+
+impl fmt::Display for Groups {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let [a, b] = &self.classes;
+        f.write_str(&groups_text([a, b], "|"))
+    }
+}
+
+impl FromStr for Groups {
+    type Err = String;
+    fn from_str(text: &str) -> Result<Self, String> {
+        let expected = || format!("{text}: expected two groups of classes, as in 4|9, 0|123 or 10,11|3");
+        let are_digits = !text.contains(',');
+        let group = |part: &str| -> Option<Vec<u8>> {
+            let part = part.trim();
+            match are_digits {
+                true => part.chars().map(|c| u8::try_from(c.to_digit(10)?).ok()).collect(),
+                false => {
+                    let part = part.strip_suffix(',').unwrap_or(part);
+                    let number = |class: &str| class.trim().parse().ok();
+                    part.split(',').map(number).collect()
+                }
+            }
+        };
+        let (a, b) = text.split_once('|').ok_or_else(expected)?;
+        let classes = [group(a).ok_or_else(expected)?, group(b).ok_or_else(expected)?];
+        if classes.iter().any(Vec::is_empty) {
+            return Err(expected());
+        }
+        Grouping::two_groups(&classes[0], &classes[1]).map_err(|error| format!("{text}: {error}"))?;
+        Ok(Groups { classes, are_digits })
+    }
 }
 
 /// Which way is right for images with these labels, and what each weighs: 1, right, for the first
@@ -175,6 +287,84 @@ fn check_unique(classes: &[u8]) -> Result<(), GroupingError> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn a_name_means_one_task_and_a_task_has_one_name(
+            classes in proptest::sample::subsequence((0..=255).collect::<Vec<u8>>(), 2..9)
+                .prop_flat_map(|classes| Just(classes).prop_shuffle()),
+            below in prop_oneof![Just(10_u8), Just(30), Just(255)],
+            cut in 1_usize..8,
+        ) {
+            let mut classes: Vec<u8> = classes.into_iter().map(|class| class % below).collect();
+            let mut seen = std::collections::BTreeSet::new();
+            classes.retain(|class| seen.insert(*class));
+            prop_assume!(classes.len() > 1);
+            let (a, b) = classes.split_at(cut.min(classes.len() - 1));
+            let split = Grouping::two_groups(a, b).unwrap().tasks()[0].clone();
+            let read: Groups = split.name().parse().unwrap();
+            prop_assert_eq!(read.classes(), &[a.to_vec(), b.to_vec()]);
+            prop_assert_eq!(read.to_string(), split.name());
+            let in_files = groups_text([a, b], "v");
+            prop_assert_eq!(&in_files.replace('v', "|").parse::<Groups>().unwrap(), &read);
+            prop_assert!(split.is_called(&split.name()));
+        }
+
+        #[test]
+        fn whatever_can_be_read_has_a_name_that_is_read_as_the_same(text in "[0-9]{1,3}[0-9, ]{0,6}\\|[0-9, ]{1,7}") {
+            if let Ok(read) = text.parse::<Groups>() {
+                let name = read.to_string();
+                let again: Groups = name.parse().unwrap();
+                prop_assert_eq!(again.classes(), read.classes());
+                prop_assert_eq!(again.to_string(), name);
+            }
+        }
+    }
+
+    #[test]
+    fn a_lone_class_above_nine_is_named_by_a_comma() {
+        let name = |a: &[u8], b: &[u8]| groups_text([a, b], "|");
+        assert_eq!(name(&[1], &[26]), "1|26,");
+        assert_eq!(name(&[10], &[2]), "10|2,");
+        assert_eq!(name(&[1], &[2, 6]), "1|26");
+        assert_eq!(name(&[1, 3], &[26]), "1,3|26");
+        let read = |text: &str| text.parse::<Groups>().map(|groups| groups.classes);
+        assert_eq!(read("1|26"), Ok([vec![1], vec![2, 6]]));
+        for text in ["1|26,", "1,|26", " 1 , | 26 , "] {
+            assert_eq!(read(text), Ok([vec![1], vec![26]]), "{text}");
+        }
+        assert_eq!(read("10,11|23"), Ok([vec![10, 11], vec![23]]), "a comma separates in both groups");
+        for text in ["", "1", "1|", "|1", ",|1", "1|,", "1,,2|3", "1|256,", "1|1", "1|-2,", "1|2|3", "a|b"] {
+            assert!(read(text).is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn digits_that_may_be_a_class_of_the_data_are_said_to_be_ambiguous() {
+        let said = |text: &str, there: &[u8]| {
+            let groups: Groups = text.parse().unwrap();
+            groups.check_among(there).err().map(|error| error.to_string())
+        };
+        let letters: Vec<u8> = (1..=26).collect();
+        assert_eq!(
+            said("1|26", &letters).unwrap(),
+            "groups 1|26: the data have a class 26; expected \"1|26,\" for it, or \"1|2,6\" for its digits"
+        );
+        let found = said("12|34", &letters).unwrap();
+        assert!(found.contains("expected \"12|3,4\" for it, or \"1,2|3,4\" for its digits"), "{found}");
+        for text in ["1|26,", "1|2,6", "4|9", "1|34"] {
+            assert_eq!(said(text, &letters), None, "{text}");
+        }
+        assert_eq!(said("0|123", &(0..10).collect::<Vec<u8>>()), None);
+    }
+
+    #[test]
+    fn the_name_of_an_older_file_is_that_of_its_groups() {
+        let split = |a: &[u8], b: &[u8]| Grouping::two_groups(a, b).unwrap().tasks()[0].clone();
+        assert!(split(&[1], &[26]).is_called("1|26") && split(&[1], &[2, 6]).is_called("1|26"));
+        assert!(!split(&[1], &[26]).is_called("1|2") && !split(&[1], &[2, 6]).is_called("1|26,"));
+    }
 
     #[test]
     fn both_groups_weigh_a_half_however_many_images_they_have() {

@@ -486,7 +486,7 @@ mod tests {
             let stimulus = Grid::from_fn(1, 2, |_, _| 1.0);
             let example =
                 Example { right, weight: 0.25, ..Example::new(&gait, &stimulus, &Physics::default()) };
-            Image { stimulus, example, condition: 0 }
+            Image { stimulus, class: 0, example, condition: 0 }
         };
         let images = [image(1.0), image(-1.0), image(-1.0), image(-1.0)];
         let shown = WeightedImage::all(&images.iter().collect::<Vec<_>>(), -1.0);

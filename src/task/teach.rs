@@ -15,6 +15,7 @@ use crate::task::gait::{Design, Gait, SENSORS};
 use crate::task::lesson::{Example, Lesson};
 use crate::task::refine::{Challenge, Refinement, WeightedImage};
 use crate::task::response::{Evidence, Moments, Response, dot};
+use std::collections::BTreeSet;
 
 /// What rollouts with random images count beside those around the latest design. They are farther
 /// from it, but more, and each tells more of the slopes.
@@ -58,6 +59,8 @@ pub struct Plan {
 pub struct Image {
     /// What the voxels see.
     pub stimulus: Grid<f64>,
+    /// Its class.
+    pub class: u8,
     /// Its widths, its correct side and its weight.
     pub example: Example,
     /// The condition under which it is shown: a number from 0.
@@ -340,9 +343,11 @@ impl<'a> Teacher<'a> {
     }
 
     /// Training images to compare bodies on, by their numbers, and as they are shown: of both
-    /// groups as many as far as they go.
+    /// groups as many as far as they go, and of every class one or more, if there is room.
     fn compared_on(&self, draw: usize) -> (Vec<usize>, Vec<WeightedImage>) {
-        let numbers = self.drawn(self.plan.final_images, &mut self.random(Use::Finish, draw as u64));
+        let mut random = self.random(Use::Finish, draw as u64);
+        let numbers = self.drawn(self.plan.final_images, &mut random);
+        let numbers = self.with_every_class(numbers, &mut random);
         let images: Vec<&Image> = numbers.iter().map(|number| &self.images[*number]).collect();
         let images = WeightedImage::all(&images, self.side);
         (numbers, images)
@@ -368,6 +373,29 @@ impl<'a> Teacher<'a> {
             turn += 1;
         }
         drawn
+    }
+
+    /// Images with every class among them: where one is missing, a random image of it replaces the
+    /// last of its group whose class has another.
+    fn with_every_class(&self, mut numbers: Vec<usize>, random: &mut Stream) -> Vec<usize> {
+        let classes: BTreeSet<u8> = self.images.iter().map(|image| image.class).collect();
+        for class in classes {
+            let count = |class: u8| numbers.iter().filter(|n| self.images[**n].class == class).count();
+            if count(class) > 0 {
+                continue;
+            }
+            let all: Vec<usize> =
+                (0..self.images.len()).filter(|number| self.images[*number].class == class).collect();
+            let right = self.images[all[0]].example.right;
+            let has_another = |number: &usize| {
+                let image = &self.images[*number];
+                image.example.right == right && count(image.class) > 1
+            };
+            if let Some(place) = numbers.iter().rposition(has_another) {
+                numbers[place] = all[random.below(all.len())];
+            }
+        }
+        numbers
     }
 
     fn conditions_of(&self, numbers: &[usize]) -> Vec<usize> {
@@ -460,7 +488,9 @@ mod tests {
                     f64::from(u8::from(random.unit() < bright(column)))
                 });
                 let example = Example { right, ..Example::new(&self.gait, &stimulus, &self.physics) };
-                Image { stimulus, example, condition: number / 2 % 2 }
+                // The second group has many classes, the last of them seldom.
+                let class = if right > 0.0 { 0 } else { 1 + (number / 2 % 49 / 8) as u8 };
+                Image { stimulus, class, example, condition: number / 2 % 2 }
             };
             (0..count).map(&mut image).collect()
         }
@@ -557,6 +587,26 @@ mod tests {
         let mean = |of: fn(&Round) -> f64| rounds.iter().map(of).sum::<f64>() / rounds.len() as f64;
         let (predicted, measured) = (mean(|round| round.predicted), mean(|round| round.measured));
         assert!((predicted - measured).abs() < 0.15, "{predicted} {measured}");
+    }
+
+    #[test]
+    fn designs_are_compared_on_an_image_of_every_class_if_there_is_room() {
+        let planted = Planted::new(4);
+        let (gait, response, images) = (planted.gait.clone(), planted.response(40), planted.images(600));
+        let classes = |final_images: usize, draw: usize| -> BTreeSet<u8> {
+            let plan = Plan { final_images, ..PLAN };
+            let teacher = Teacher::new(&gait, &response, images.clone(), plan, &planted.physics);
+            let (numbers, _) = teacher.compared_on(draw);
+            assert_eq!(numbers.iter().collect::<BTreeSet<_>>().len(), final_images, "each once");
+            let first = numbers.iter().filter(|number| images[**number].class == 0).count();
+            assert_eq!(first, final_images.div_ceil(2));
+            numbers.iter().map(|number| images[*number].class).collect()
+        };
+        for draw in 0..20 {
+            assert_eq!(classes(14, draw).len(), 8, "seven classes of one group in seven images");
+            assert_eq!(classes(40, draw).len(), 8);
+        }
+        assert_eq!(classes(2, 0).len(), 2);
     }
 
     #[test]

@@ -44,7 +44,7 @@ pub fn check_data<'a>(tasks: impl Iterator<Item = (usize, &'a Task)>, place: &Pl
     for (number, task) in tasks.filter(|(_, task)| !has_begun(task)) {
         let given = Whereabouts::given(place.data.as_deref());
         let (config, whereabouts) = match &task.run {
-            Run::Evolve(config, _) => (&**config, given),
+            Run::Evolve(config, ..) => (&**config, given),
             Run::Train(training) => (&training.config, given.and_of(&training.archive)),
         };
         let test = task.steps.eval.as_ref().filter(|step| step.split == HeldOut::Test);
@@ -56,8 +56,11 @@ pub fn check_data<'a>(tasks: impl Iterator<Item = (usize, &'a Task)>, place: &Pl
             Entry::Vacant(place_of) => place_of.insert(whereabouts.load(&config.data, splits)?),
         };
         let named = |error: Error| error.within(&format!("task {number} ({})", task.name));
+        if let Some(groups) = task.run.groups() {
+            train::check_groups(groups, dataset).map_err(named)?;
+        }
         match &task.run {
-            Run::Evolve(config, _) => {
+            Run::Evolve(config, ..) => {
                 training::Training::images(config, dataset).map_err(named)?;
                 held_out::check(config, &[], "data.images_per_class", dataset).map_err(named)?;
             }

@@ -64,7 +64,7 @@ fn status_of(number: usize, task: &Task, folder: &Path) -> Result<Status, Error>
         (Some(_), _) => (State::Stopped, None),
     };
     let (generations, of_run) = match &task.run {
-        Run::Evolve(config, _) => {
+        Run::Evolve(config, ..) => {
             let (done, seconds) = last_generation(&folder.join(METRICS)).unwrap_or((0, 0.0));
             (Some([done, config.generations]), Some((done, seconds)).filter(|_| state != State::Waiting))
         }

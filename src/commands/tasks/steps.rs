@@ -67,7 +67,7 @@ fn steps(task: &Task, place: &Place, stop: &AtomicBool, observer: &dyn Observer)
     let folder = place.folder(task);
     let stopped = || Error::stopped("stopped; what is done so far is kept".to_string());
     match &task.run {
-        Run::Evolve(config, name) => {
+        Run::Evolve(config, name, _) => {
             let options = evolve::Options {
                 config: (**config).clone(),
                 name: name.clone(),

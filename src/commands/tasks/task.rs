@@ -10,6 +10,7 @@ use crate::store::robots::{BEST, Selection};
 use crate::store::run::RunFile;
 use crate::store::task::TaskFile;
 use crate::store::whereabouts::Whereabouts;
+use crate::task::grouping::Groups;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -31,10 +32,28 @@ pub struct Task {
 /// What makes a run.
 #[derive(Clone, Debug)]
 pub enum Run {
-    /// `evolve`, with the name of the run.
-    Evolve(Box<Config>, String),
+    /// `evolve`, with the name of the run, and the groups of classes if the plan names them.
+    Evolve(Box<Config>, String, Option<Groups>),
     /// `train`.
     Train(Box<Training>),
+}
+
+impl Run {
+    /// The config that the run has.
+    pub(crate) fn config(&self) -> &Config {
+        match self {
+            Run::Evolve(config, ..) => config,
+            Run::Train(training) => &training.config,
+        }
+    }
+
+    /// The groups of classes that the plan names.
+    pub(super) fn groups(&self) -> Option<&Groups> {
+        match self {
+            Run::Evolve(.., groups) => groups.as_ref(),
+            Run::Train(training) => Some(&training.groups),
+        }
+    }
 }
 
 /// A training.
@@ -47,7 +66,7 @@ pub struct Training {
     /// Which of its robots.
     pub robots: String,
     /// The two groups of classes.
-    pub groups: [Vec<u8>; 2],
+    pub groups: Groups,
     /// Seed of all chance.
     pub seed: u64,
     /// Keys that differ from those of the run.
@@ -165,7 +184,7 @@ impl Task {
     /// Everything that its run depends on.
     pub(super) fn settings(&self) -> Settings {
         let (config, more) = match &self.run {
-            Run::Evolve(config, _) => (config.settings(), Vec::new()),
+            Run::Evolve(config, ..) => (config.settings(), Vec::new()),
             Run::Train(training) => (
                 training.config.settings(),
                 vec![("archive", training.sha256.clone()), ("robots", training.robots.clone())],
@@ -177,18 +196,15 @@ impl Task {
 
     /// What is asked for beyond that: it may grow or change, and the task goes on.
     pub(super) fn asked(&self) -> Value {
-        let config = match &self.run {
-            Run::Evolve(config, _) => config,
-            Run::Train(training) => &training.config,
-        };
-        serde_json::json!({ "amount": self.amount(), "validation": config.validation, "steps": self.steps })
+        let validation = &self.run.config().validation;
+        serde_json::json!({ "amount": self.amount(), "validation": validation, "steps": self.steps })
     }
 
     /// In which keys a run in its folder is another than this task makes: the key, its value there,
     /// and in the plan.
     pub(crate) fn differing(&self, run: &RunFile) -> Vec<(String, String, String)> {
         match &self.run {
-            Run::Evolve(config, _) => differing(&run.config.settings(), &config.settings()),
+            Run::Evolve(config, ..) => differing(&run.config.settings(), &config.settings()),
             // Of a training's config windows and numbers of images are found on the way.
             Run::Train(training) => {
                 let of = |config: &Config, archive: String| -> Settings {
@@ -206,7 +222,7 @@ impl Task {
     /// depends on the present folder.
     pub fn data_here(&self) -> Option<PathBuf> {
         let (data, whereabouts) = match &self.run {
-            Run::Evolve(config, _) => (&config.data, Whereabouts::given(None)),
+            Run::Evolve(config, ..) => (&config.data, Whereabouts::given(None)),
             Run::Train(training) => {
                 (&training.config.data, Whereabouts::given(None).and_of(&training.archive))
             }
@@ -223,7 +239,7 @@ impl Task {
     /// How much of it there is to show on a bar: generations, or challengers.
     pub(super) fn amount(&self) -> u64 {
         match &self.run {
-            Run::Evolve(config, _) => config.generations,
+            Run::Evolve(config, ..) => config.generations,
             Run::Train(training) => training.config.train.challengers as u64,
         }
     }

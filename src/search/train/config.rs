@@ -12,6 +12,7 @@ use crate::search::training::{Training, scarcest};
 use crate::store::images::DatasetRef;
 use crate::store::whereabouts::{Whereabouts, part_of_others, size_of};
 use crate::task::fitness::Fitness;
+use crate::task::grouping::Groups;
 use crate::task::margins::Margins;
 use crate::task::protocol::{Protocol, RolloutMode};
 use crate::task::stimulus::StimulusParams;
@@ -42,7 +43,9 @@ pub(crate) fn config_of(
         ..of_walkers.clone()
     };
     let asked = base.clone();
-    let check = |config: &Config| fixed(config, &asked).and_then(|()| config.validate());
+    let check = |config: &Config| {
+        fixed(config, &asked).and_then(|()| config.validate()).and_then(|()| enough(config, groups))
+    };
     let config = reading::changed(base, set, check, |error| error)?;
     let BodyConfig { height, width, .. } = of_walkers.body;
     if (config.body.height, config.body.width) != (height, width) {
@@ -59,6 +62,19 @@ pub(crate) fn config_of(
         return Err(Error::value("seed", config.seed, &format!("{}, as said elsewhere", asked.seed)));
     }
     Ok(config)
+}
+
+/// Checks that designs are compared on an image of every class: both groups take turns, of which the
+/// first begins.
+fn enough(config: &Config, [a, b]: &[Vec<u8>; 2]) -> Result<(), Error> {
+    let (found, least) = (config.train.final_images, (2 * a.len()).saturating_sub(1).max(2 * b.len()));
+    match found < least {
+        true => {
+            let expected = format!("{least} or more, for an image of every class");
+            Err(Error::value("train.final_images", found, &expected))
+        }
+        false => Ok(()),
+    }
 }
 
 /// Whether a config has what trainings have, and nothing in its place.
@@ -148,6 +164,15 @@ pub(crate) fn with_images(
     config.validate()?;
     held_out::check(&config, before, "train.images_per_class", dataset)?;
     Ok(config)
+}
+
+/// Checks that the text of two groups means nothing else with the classes of a dataset.
+///
+/// # Errors
+/// If it does; what to write.
+pub(crate) fn check_groups(groups: &Groups, dataset: &Dataset) -> Result<(), Error> {
+    let there = dataset.classes(Split::Train);
+    groups.check_among(&there).map_err(|error| Error::usage(error.to_string()))
 }
 
 /// Whether a run's gaits, when they have evolved, can be trained to tell these groups apart: to be

@@ -10,7 +10,7 @@ mod log;
 mod trainer;
 
 pub use config::check;
-pub(crate) use config::{config_of, sized, with_images};
+pub(crate) use config::{check_groups, config_of, sized, with_images};
 
 use crate::base::error::Error;
 use crate::base::files::write_atomically;
@@ -33,6 +33,7 @@ use crate::store::training::Origin;
 use crate::store::validation::Validated;
 use crate::store::whereabouts;
 use crate::store::whereabouts::Whereabouts;
+use crate::task::grouping::Groups;
 use crate::task::teach::Taught;
 use gaits::{Walker, key, measured, origin, walkers};
 use log::Log;
@@ -49,7 +50,7 @@ pub struct Options {
     /// Which of them are tried; the one that can be taught most is taught.
     pub robots: Selection,
     /// The two groups of classes.
-    pub groups: [Vec<u8>; 2],
+    pub groups: Groups,
     /// Seed of all chance; `None`: that of the run.
     pub seed: Option<u64>,
     /// Keys of the config that differ from those of the run, as `train.rounds=10`.
@@ -79,26 +80,6 @@ pub struct Finished {
     pub validated: Option<Vec<Validated>>,
 }
 
-/// Reads two groups of classes, as in "4|9", "0|123" or "10,11|3".
-///
-/// # Errors
-/// What was expected.
-pub fn groups(text: &str) -> Result<[Vec<u8>; 2], String> {
-    let expected = || format!("{text}: expected two groups of classes, as in 4|9, 0|123 or 10,11|3");
-    let group = |part: &str| -> Result<Vec<u8>, String> {
-        let classes: Option<Vec<u8>> = match part.contains(',') {
-            true => part.split(',').map(|class| class.trim().parse().ok()).collect(),
-            false => part.trim().chars().map(|c| c.to_digit(10).and_then(|d| u8::try_from(d).ok())).collect(),
-        };
-        classes.filter(|classes| !classes.is_empty()).ok_or_else(expected)
-    };
-    let (a, b) = text.split_once('|').ok_or_else(expected)?;
-    let groups = [group(a)?, group(b)?];
-    crate::task::grouping::Grouping::two_groups(&groups[0], &groups[1])
-        .map_err(|error| format!("{text}: {error}"))?;
-    Ok(groups)
-}
-
 /// Trains a robot, and validates it.
 ///
 /// # Errors
@@ -113,8 +94,9 @@ pub fn train(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> R
     let whereabouts = Whereabouts::given(options.data.as_deref())
         .and_of_resumed(options.if_exists, &options.out.join(RUN_JSON))
         .and_of(&options.archive);
-    let config = config_of(&source.run.config, &options.groups, options.seed, &options.set)?;
+    let config = config_of(&source.run.config, options.groups.classes(), options.seed, &options.set)?;
     let dataset = whereabouts.load(&config.data, &[Split::Train])?;
+    check_groups(&options.groups, &dataset)?;
     whereabouts::say_transposed(&dataset, &config.data, observer);
     let of_gaits = &source.run;
     let config = sized(config, Some(&of_gaits.dataset), &of_gaits.config, &dataset, &options.set, observer);

@@ -87,7 +87,7 @@ impl Trainer<'_> {
             let stimulus = see(config, self.dataset, Split::Train, image.index)?;
             let condition = all.iter().position(|other| other == condition).expect("it is one of all");
             let example = Example { right, weight, ..Example::new(gait, &stimulus, &config.physics) };
-            Ok(Image { stimulus, example, condition })
+            Ok(Image { stimulus, class: image.label, example, condition })
         };
         training.images.iter().zip(&training.conditions).zip(ways).map(image).collect()
     }
