@@ -362,13 +362,13 @@ fn a_class_above_nine_is_never_taken_for_its_digits() {
     write_letters(&sandbox);
     let letters = "--data letters --set data.dataset=letters";
     let quick =
-        format!("--robots top:1 {LITTLE} --set validation.best=0 --set train.challengers=0 {letters}");
+        format!("--robots top:3 {LITTLE} --set validation.best=0 --set train.challengers=0 {letters}");
     let said = ["groups 1|26: the data have a class 26", "\"1|26,\" for it, or \"1|2,6\" for its digits"];
     sandbox.run(&format!("train -q -a walkers --task 1|26 {quick}")).ended(2, &said);
     sandbox.run(&format!("response -q -a walkers --task 1|26 {letters}")).ended(2, &said);
     let plan = |task: &str| {
         let plan = format!(
-            "archive = \"walkers\"\nrobots = \"top:1\"\nseeds = [1]\ngroups = [\"{task}\"]\n\
+            "archive = \"walkers\"\nrobots = \"top:3\"\nseeds = [1]\ngroups = [\"{task}\"]\n\
              set = [\"data.dataset=letters\", \"validation.best=0\", \"train.rounds=1\", \
              \"train.random_images=40\", \"train.challengers=0\", \"train.final_images=4\", \"train.images=4\"]\n"
         );
@@ -414,7 +414,7 @@ fn a_training_that_compared_designs_without_a_class_can_still_be_read() {
     let sandbox = sandbox();
     let few =
         format!("{LITTLE} --set validation.best=0 --set train.challengers=0 --set train.final_images=4");
-    sandbox.run(&format!("train -q -a walkers --task 3|14 --robots top:1 {few} -o taught")).ended(0, &[]);
+    sandbox.run(&format!("train -q -a walkers --task 3|14 --robots top:3 {few} -o taught")).ended(0, &[]);
     let mut run = sandbox.run_file("taught");
     let shown: BTreeSet<u8> = run.training_images.iter().map(|image| image.label).collect();
     assert_eq!(shown, BTreeSet::from([1, 3, 4]), "four images show every class");
@@ -446,7 +446,7 @@ fn any_config() -> impl Strategy<Value = String> {
         });
     let body = (1_usize..6, 1_usize..6, 0_usize..3);
     let task_and_data = (task, 1_usize..4, any::<bool>());
-    let fitness = proptest::sample::select(vec!["min", "mean-clipped", "response"]);
+    let fitness = proptest::sample::select(vec!["min", "mean_clipped", "response"]);
     let sizes = (0_u64..3, 1_u64..5, 0_u64..3, proptest::option::of(1_usize..4));
     let showing = (1_u32..8, 2_u32..5, -3_i32..4, any::<bool>(), 0.0..1.0_f64);
     let measured = (-1e9..1e9_f64, 0_usize..3, 1_u64..4, any::<u32>());
@@ -470,7 +470,7 @@ fn any_config() -> impl Strategy<Value = String> {
                  start_column = {column}\n[genome]\nvoxel_mutations = {voxel_mutations}\n\
                  [map_elites]\ninitial = {initial}\nparents = {parents}\nrandom_immigrants = {immigrants}\n\
                  [archive]\nqd_offset = {offset}\n{keep}\n[evaluation]\nfitness = \"{fitness}\"\n\
-                 [validation]\nimages = 20\nbest = {best}\n\
+                 [validation]\nimages = 40\nbest = {best}\n\
                  [train]\nimages_per_class = 10\nrandom_images = {random_images}\nrounds = {rounds}\n\
                  images = {images}\nfinal_images = {final_images}\nchallengers = {challengers}\n\
                  perturbations.start = {start}\n"
@@ -508,7 +508,7 @@ fn made_by(config: &str, groups: &str) -> usize {
     }
     let options = train::Options {
         archive: sandbox.path("any/run.json"),
-        robots: Selection::Top(1),
+        robots: Selection::Top(3),
         groups: groups.parse().unwrap(),
         seed: None,
         set: Vec::new(),
@@ -686,7 +686,7 @@ fn what_was_made_for_images_of_one_size_is_never_applied_to_another_without_a_wo
     assert!(evolved.out.contains(part), "{}", evolved.out);
     let margins = |run: &str| sandbox.run_file(run).config.stimulus.margin.to_string();
     let train = format!(
-        "train -a walkers --task 0|1 --robots top:1 {LITTLE} --set train.challengers=0 --set data.dataset=own"
+        "train -a walkers --task 0|1 --robots top:3 {LITTLE} --set train.challengers=0 --set data.dataset=own"
     );
     for (size, height, width) in [("square", 14, 14), ("narrow", 17, 5)] {
         write_images(&sandbox, &format!("{size}/"), [height, width], 1);
@@ -703,7 +703,7 @@ fn what_was_made_for_images_of_one_size_is_never_applied_to_another_without_a_wo
     let nothing = format!("{train} --data narrow --set stimulus.margin=4 -o none");
     sandbox.run(&nothing).ended(3, &["stimulus.margin", "leaves nothing", "with 0 the whole image is seen"]);
     // Of the same size, what the gaits see is seen.
-    sandbox.run(&format!("train -q -a walkers --task 0|1 --robots top:1 {LITTLE} -o same")).ended(0, &[]);
+    sandbox.run(&format!("train -q -a walkers --task 0|1 --robots top:3 {LITTLE} -o same")).ended(0, &[]);
     assert_eq!(margins("same"), "4");
     let response = "response -a walkers --robots top:1 --images 60 --task 0|1 --set data.dataset=own \
                     --data square --out response.json";

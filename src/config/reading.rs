@@ -183,8 +183,11 @@ fn spoken(message: &str) -> String {
     }
     for (kind, words) in words {
         if let Some(start) = message.strip_suffix(&format!("expected {kind}")) {
-            let meant =
-                meant(start, kind == "f64").map_or(String::new(), |number| format!("; write {number}"));
+            let meant = match kind {
+                "a boolean" | "a sequence" => None,
+                kind => meant(start, kind == "f64"),
+            };
+            let meant = meant.map_or(String::new(), |number| format!("; write {number}"));
             return format!("{start}expected {words}{meant}");
         }
     }

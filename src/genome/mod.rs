@@ -126,7 +126,7 @@ impl Genome {
     /// take `0636890406` and `18e2354970` for numbers.
     pub fn id(&self) -> String {
         let mut id = self.digest()[..10].to_string();
-        if let Some(digit) = id[..1].parse::<u8>().ok() {
+        if let Ok(digit) = id[..1].parse::<u8>() {
             id.replace_range(..1, char::from(b'g' + digit).encode_utf8(&mut [0; 4]));
         }
         id

@@ -20,10 +20,10 @@ fn whoever_simulates_a_run_of_another_version_says_so_once() {
     for command in [
         "eval -a FOLDER --images 4 --cycles 1".to_string(),
         "audit -a FOLDER --robots best".to_string(),
-        "response -a FOLDER -n 60".to_string(),
-        "replay -a FOLDER --robots best -o replay.svg".to_string(),
+        "response -a FOLDER --robots top:3 -n 60".to_string(),
+        "replay -a FOLDER --robots best -o replay.png".to_string(),
         "team -a FOLDER --robots best --images 4 --classes 0,1".to_string(),
-        format!("train -a FOLDER --robots top:1 {train} --out FOLDER-taught"),
+        format!("train -a FOLDER --robots top:3 {train} --out FOLDER-taught"),
         "report -a FOLDER -o FOLDER.html".to_string(),
     ] {
         let said = |folder: &str| {
