@@ -296,9 +296,18 @@ fn run_replay(args: ReplayArgs, console: &Console) -> Result<(), Error> {
     let wanted = named.unwrap_or_else(|| pictures::Wanted::beside(&folder, &replay.name, &format));
     let made = pictures::make(console, &replay, &pictures::Wanted { width, every, fps, look, ..wanted })?;
     match made.last().filter(|_| open) {
-        Some(path) => open::that(path).map_err(|error| Error::other(format!("cannot open it: {error}"))),
+        Some(path) => show(path),
         None => Ok(()),
     }
+}
+
+/// Opens a file with the program that the system has for it.
+fn show(path: &Path) -> Result<(), Error> {
+    // Why not is the business of programs that nobody here has asked for.
+    open::that(path).map_err(|_| {
+        let text = format!("{}: no program could be started to show it", path.display());
+        Error::other(text).hint("the file is written: open it yourself".to_string())
+    })
 }
 
 /// The robot that is to be watched.

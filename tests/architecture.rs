@@ -23,6 +23,8 @@ const ROOMS: [(&str, u8); 15] = [
     ("serve", 10),
 ];
 const CLI_FLOOR: u8 = 11;
+/// From this floor on, work comes without a pool of threads; below, it is called in one.
+const DRAWS: u8 = 9;
 
 /// Source without comments and without what stands in quotes; lines stay lines.
 fn bare(source: &str) -> String {
@@ -160,6 +162,17 @@ fn violations(path: &str, source: &str) -> Vec<String> {
     }
     if path != "base/random.rs" && all.iter().any(|t| matches!(*t, "rand" | "rand_pcg" | "rand_core")) {
         refuse("random numbers come from base/random.rs only".to_string());
+    }
+    if path != "base/threads.rs" {
+        let is_made = |w: &[&str]| matches!(w, ["thread", ":", ":", "spawn" | "scope" | "Builder"]);
+        let code = tokens(bare.split("mod tests").next().unwrap_or_default());
+        if code.windows(4).any(is_made) || code.contains(&"ThreadPoolBuilder") {
+            refuse("threads are made in base/threads.rs only, where none left is an error".to_string());
+        }
+        let uses_pools = floor(room).is_some_and(|own| own >= DRAWS) && code.contains(&"rayon");
+        if uses_pools && !code.iter().any(|token| matches!(*token, "in_pool" | "install")) {
+            refuse("rayon's own pool, which panics where no threads are left: use in_pool".to_string());
+        }
     }
     if !(is_top || room == "cli") && all.iter().any(|t| *t == "clap" || t.starts_with("clap_")) {
         refuse("clap belongs to the command line".to_string());
@@ -339,5 +352,8 @@ fn what_is_against_the_plan_is_found() {
         1
     );
     assert_eq!(found("task/score.rs", "use rand::Rng;"), 1);
+    assert_eq!(found("task/score.rs", "fn f() { std::thread::spawn(f); } mod tests { thread::scope }"), 1);
+    assert_eq!(found("view/gif.rs", "use rayon::prelude::*; fn f() { a.par_iter(); }"), 1);
+    assert_eq!(found("view/gif.rs", "use rayon::prelude::*; fn f() { in_pool(|| a.par_iter()); }"), 0);
     assert_eq!(found("config/mod.rs", "#[derive(clap::Args)] struct A;"), 1);
 }

@@ -12,7 +12,7 @@ use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
 use std::process::{Child, Command, Stdio};
 use std::sync::OnceLock;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 const EVERY_GENERATION: &str = "--set checkpoint.generations=1";
 
@@ -405,6 +405,55 @@ fn two_programs_do_not_share_a_folder() {
     second.ended(5, &["another morphcog is using"]);
     third.ended(5, &["another morphcog is using"]);
     sandbox.run_file("run");
+}
+
+/// Waits until a run has saved a generation.
+fn wait_until_saved(sandbox: &Sandbox, folder: &str) {
+    let begin = Instant::now();
+    while RunFile::read(&sandbox.path(folder).join("run.json")).map_or(0, |run| run.generations) == 0 {
+        assert!(begin.elapsed() < Duration::from_secs(60), "{folder}: nothing is saved");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+}
+
+#[test]
+fn a_run_that_lost_its_folder_or_its_lock_ends_with_one_error_and_leaves_the_second_run_alone() {
+    let sandbox = Sandbox::tiny();
+    for (out, what, is_stopped) in [
+        ("folder", "folder", false),
+        ("lock", "folder/.lock", false),
+        ("folder-while-stopped", "folder", true),
+        ("lock-while-stopped", "folder/.lock", true),
+    ] {
+        let first = sandbox.endless(out);
+        wait_until_saved(&sandbox, out);
+        if is_stopped {
+            signal(&first, "STOP");
+        }
+        // A run that goes on makes new files meanwhile.
+        let gone = sandbox.path(&what.replace("folder", out));
+        while gone.exists() {
+            let _ = if gone.is_dir() { std::fs::remove_dir_all(&gone) } else { std::fs::remove_file(&gone) };
+        }
+        sandbox.run(&format!("evolve -q -c tiny.toml -o {out} --force")).ended(0, &[]);
+        let second = files(&sandbox.path(out));
+        if is_stopped {
+            // As if the second were still at work.
+            let holder = "{\"host\":\"another-machine\",\"process\":7,\"beats\":3}";
+            std::fs::write(sandbox.path(out).join(".lock"), holder).unwrap();
+            signal(&first, "CONT");
+        }
+        let ended = first.wait_with_output().unwrap();
+        let said = String::from_utf8_lossy(&ended.stderr);
+        assert_eq!(ended.status.code(), Some(5), "{out}: {said}");
+        let why = if is_stopped { "process 7 on another-machine has taken over" } else { "not written" };
+        let errors = said.lines().filter(|line| line.starts_with("error:")).count();
+        assert!(errors == 1 && said.contains(why) && said.contains("hint:"), "{out}: {said}");
+        let mut after = files(&sandbox.path(out));
+        after.insert(".lock".to_string(), second[".lock"].clone());
+        assert_eq!(after, second, "{out}");
+        assert_eq!(sandbox.run_file(out).generations, 12);
+    }
 }
 
 #[test]

@@ -4,12 +4,13 @@
 
 mod common;
 
-use common::program::{Sandbox, TINY, files, gaits, without_seconds};
+use common::program::{PROGRAM, Sandbox, TINY, files, gaits, without_seconds};
 use common::server::Server;
 use morphcog::base::error::ErrorKind;
 use morphcog::config::Config;
 use morphcog::search::evolve::{Options, evolve};
 use morphcog::store::folder::IfExists;
+use std::os::unix::process::ExitStatusExt;
 use std::process::{Child, Command, ExitStatus};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -108,7 +109,7 @@ fn commands_that_have_nothing_to_save_are_ended_by_the_signal_and_leave_no_file(
     sandbox.write("long.json", "{\"body\": [[3, 4, 3], [4, 0, 4]], \"control_steps\": 1000000}");
     let before = files(&sandbox.path("run"));
     let mut child = sandbox.start("simulate long.json --points -o long.csv");
-    assert_eq!(stopped(&mut child, "TERM").code(), Some(1));
+    assert_eq!(stopped(&mut child, "TERM").code(), Some(75));
     let left = std::fs::read_dir(sandbox.path("")).unwrap().map(|entry| entry.unwrap().file_name());
     assert!(left.into_iter().all(|name| !name.to_string_lossy().contains("long.csv")));
     for command in [
@@ -121,6 +122,99 @@ fn commands_that_have_nothing_to_save_are_ended_by_the_signal_and_leave_no_file(
         assert_eq!(stopped(&mut child, "TERM").code(), None, "{command}");
         assert_eq!(files(&sandbox.path("run")), before, "{command}");
     }
+}
+
+/// How a command ends that a signal meets at work.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum End {
+    /// It saves what it has, and says so with 75.
+    Stopped,
+    /// It has nothing to save: by the signal, as is usual.
+    BySignal,
+    /// To be ended so is what it is for.
+    Done,
+}
+
+#[test]
+fn every_command_ends_in_its_documented_way_at_every_signal_that_asks_it_to() {
+    // More could not be recorded.
+    let sandbox = patient_run(600_000);
+    sandbox.write("long.json", "{\"body\": [[3, 4, 3], [4, 0, 4]], \"control_steps\": 1000000}");
+    let patient = TINY.replace("control_steps = 20", "control_steps = 1000000");
+    sandbox.write("patient.toml", patient);
+    sandbox.write("sweep.toml", "config = \"patient.toml\"\nseeds = [1, 2]\n");
+    sandbox.write(
+        "paper.toml",
+        "seeds = [1]\nrobots = 3\nimages = 20\n[[experiment]]\nconfig = \"patient.toml\"\n",
+    );
+    sandbox.run("evolve -q -c tiny.toml -o short").ended(0, &[]);
+    sandbox.run("eval -q -a short --images 40 --cycles 1 --robots top:4").ended(0, &[]);
+    let endless = "--set mlp.epochs=1000000000 --set mlp.patience=1000000000 --set networks=[\"mlp\"]";
+    // A mirror that takes connections and says nothing.
+    let silent = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
+    let mirror = format!("http://{}", silent.local_addr().unwrap());
+    let commands = [
+        ("demo -q -o demo-N".to_string(), End::Stopped),
+        (format!("evolve -q -c tiny.toml {LONG} -o evolve-N"), End::Stopped),
+        (format!("train -q -a shipped:gaits -t 0|1 --dataset builtin -o train-N {LONG}"), End::Stopped),
+        ("eval -q -a run --images 40 --cycles 1 -o eval-N.json".to_string(), End::Stopped),
+        ("audit -q -a run -o audit-N.json".to_string(), End::Stopped),
+        ("response -q -a run --robots all -o response-N.json".to_string(), End::Stopped),
+        ("team -q -a run --classes 0,1 --images 40 -o team-N.json".to_string(), End::Stopped),
+        (format!("capacity -q --eval short/eval.json {endless} -o capacity-N.json"), End::Stopped),
+        ("sweep -q sweep.toml -o sweep-N".to_string(), End::Stopped),
+        ("sweep -q sweep.toml -o task-N --task 1".to_string(), End::Stopped),
+        ("reproduce -q paper.toml -o reproduce-N".to_string(), End::Stopped),
+        ("simulate long.json --points -o long-N.csv".to_string(), End::Stopped),
+        ("simulate long.json --points".to_string(), End::BySignal),
+        ("replay -q -a run --robot best --format gif -o walk-N.gif".to_string(), End::BySignal),
+        ("plot -q spacetime -a run -o spacetime-N.svg".to_string(), End::BySignal),
+        ("report -q run -o report-N.html".to_string(), End::BySignal),
+        ("bench".to_string(), End::BySignal),
+        (format!("data fetch mnist --to data-N --mirror {mirror}"), End::BySignal),
+        ("serve -q --no-open".to_string(), End::Done),
+    ];
+    for (signal, number) in [("HUP", 1), ("TERM", 15), ("INT", 2)] {
+        let mut started: Vec<(Child, &str, End)> = Vec::new();
+        for (command, end) in &commands {
+            started.push((sandbox.start(&command.replace("-N", signal)), command, *end));
+        }
+        // All of them together, for none is waited for alone.
+        std::thread::sleep(Duration::from_secs(4));
+        for (child, ..) in &started {
+            let sent = Command::new("kill").args(["-s", signal, &child.id().to_string()]).status().unwrap();
+            assert!(sent.success());
+        }
+        for (child, command, end) in started {
+            let ended = child.wait_with_output().unwrap();
+            let found = (ended.status.code(), ended.status.signal());
+            let expected = match end {
+                End::Stopped => (Some(75), None),
+                End::BySignal => (None, Some(number)),
+                End::Done => (Some(0), None),
+            };
+            let said = String::from_utf8_lossy(&ended.stderr);
+            assert_eq!(found, expected, "{command} and {signal}: {said}");
+            assert!(end != End::Stopped || said.contains("stopped"), "{command} and {signal}: {said}");
+        }
+    }
+    let left = std::fs::read_dir(sandbox.path("")).unwrap().map(|entry| entry.unwrap().file_name());
+    let half: Vec<_> = left.filter(|name| name.to_string_lossy().ends_with(".tmp")).collect();
+    assert!(half.is_empty(), "{half:?}");
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_hangup_that_is_ignored_at_the_start_as_by_nohup_stays_ignored() {
+    let sandbox = Sandbox::tiny();
+    let script = format!("trap '' HUP; exec {PROGRAM} evolve -q -c tiny.toml {LONG} -o run");
+    let mut command = Command::new("sh");
+    command.args(["-c", &script]).current_dir(sandbox.path("")).stderr(std::process::Stdio::piped());
+    let mut child = command.spawn().unwrap();
+    std::thread::sleep(Duration::from_millis(1500));
+    let sent = Command::new("kill").args(["-s", "HUP", &child.id().to_string()]).status().unwrap();
+    assert!(sent.success());
+    assert_eq!(stopped(&mut child, "TERM").code(), Some(75));
 }
 
 #[test]

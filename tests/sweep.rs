@@ -5,6 +5,7 @@ mod common;
 
 use common::program::{PROGRAM, SETTINGS, Sandbox, TINY, files, said};
 use std::collections::BTreeMap;
+use std::io::Read;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
@@ -272,6 +273,33 @@ fn a_task_is_one_process_s_and_a_stopped_one_says_so() {
     std::thread::sleep(Duration::from_millis(300));
     common::program::terminate(&child);
     assert_eq!(child.wait().unwrap().code(), Some(75));
+}
+
+#[test]
+fn a_task_whose_lock_is_lost_ends_with_an_error_and_leaves_the_folder_alone() {
+    let sandbox = sandbox();
+    sandbox.write("plan.toml", PLAN.replace("\nseeds", "\nset = [\"generations=1000000\"]\nseeds"));
+    let folder = sandbox.path("all").join(TASKS[0]);
+    for command in ["sweep plan.toml --out all --task 1", "sweep plan.toml --out all -q --jobs 1"] {
+        let mut child = sandbox.start(command);
+        wait_for(&folder.join("run.json"));
+        std::fs::remove_file(folder.join(".task.lock")).unwrap();
+        if command.ends_with("--jobs 1") {
+            // The other tasks go on.
+            let until = Instant::now() + Duration::from_secs(60);
+            while !sandbox.path("all").join(TASKS[1]).join("run.json").exists() {
+                assert!(Instant::now() < until, "the next task does not begin");
+            }
+            common::program::terminate(&child);
+        }
+        let before = files(&folder);
+        let mut said = String::new();
+        child.stderr.take().unwrap().read_to_string(&mut said).unwrap();
+        assert_eq!(child.wait().unwrap().code(), Some(if command.ends_with('1') { 5 } else { 75 }), "{said}");
+        assert_eq!(said.matches("not written").count(), 1, "{said}");
+        assert_eq!(files(&folder)["task.json"], before["task.json"]);
+        std::fs::remove_dir_all(&folder).unwrap();
+    }
 }
 
 #[test]

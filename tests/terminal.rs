@@ -32,9 +32,9 @@ impl Session {
     fn new(sandbox: &Sandbox, args: &str) -> Self {
         let (pty, place) = blocking::open().unwrap();
         pty.resize(Size::new(24, 80)).unwrap();
-        // Ctrl-C reaches the shell, too, which has more to say.
+        // Signals of the terminal reach the shell, too, which has more to say.
         let script = format!(
-            "trap : INT; before=$(stty -g); {PROGRAM} {args}; code=$?; \
+            "trap : INT HUP; before=$(stty -g); {PROGRAM} {args}; code=$?; \
              test \"$(stty -g)\" = \"$before\" && echo as before, code=$code"
         );
         let mut shell = blocking::Command::new("sh")
@@ -162,6 +162,40 @@ fn check_widths(args: &str, lines: &[String], columns: u16) {
 fn words(text: &str) -> BTreeSet<&str> {
     let is_word = |word: &&str| word.contains(char::is_alphabetic);
     text.split_whitespace().map(|word| word.trim_matches('`')).filter(is_word).collect()
+}
+
+#[test]
+fn a_hangup_ends_a_film_and_the_terminal_is_as_it_was() {
+    let sandbox = Sandbox::new();
+    let mut film = Session::new(&sandbox, FILM);
+    film.shows("space pauses");
+    // The shell leads the group of all that runs in its terminal.
+    let group = format!("-{}", film.shell.id());
+    let sent = std::process::Command::new("kill").args(["-s", "HUP", "--", &group]).status().unwrap();
+    assert!(sent.success());
+    film.shows("\x1b[?25h");
+    film.shows("as before, code=75");
+}
+
+#[test]
+fn a_run_whose_terminal_is_closed_is_saved() {
+    let sandbox = Sandbox::tiny();
+    let mut run = Session::new(&sandbox, "evolve -c tiny.toml --generations 99999 -o run");
+    run.shows("generation 0/99999");
+    run.shows(" left");
+    let Session { keyboard, screen, .. } = &mut run;
+    // The thread that reads the screen has the other one; it ends when nobody wants more.
+    drop((
+        std::mem::replace(keyboard, Arc::new(blocking::open().unwrap().0)),
+        std::mem::replace(screen, channel().1),
+    ));
+    let lock = sandbox.path("run/.lock");
+    let end = Instant::now() + LIMIT;
+    while !std::fs::read(&lock).unwrap().is_empty() {
+        assert!(Instant::now() < end, "it does not end");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    assert!(sandbox.run_file("run").generations > 0);
 }
 
 #[test]

@@ -169,6 +169,8 @@ pub fn measure(options: &Options, stop: &AtomicBool, observer: &dyn Observer) ->
     }
     let measuring =
         Measuring { options, config, probing, task, earlier, run_sha256: &provenance.sha256, seed, stop };
+    let asked: Vec<&str> = subjects.iter().map(|subject| subject.id.as_str()).collect();
+    let drawn = pictures(&options.out, &asked);
     let mut unwritten = Unwritten::default();
     let mut stopped = false;
     for (number, subject) in subjects.iter().enumerate() {
@@ -197,8 +199,8 @@ pub fn measure(options: &Options, stop: &AtomicBool, observer: &dyn Observer) ->
             // Another process may have measured robots of this run meanwhile.
             let before = replaced::<ResponseFile>(&options.out);
             let whole = before.map(|before| before.map_or_else(|| file.clone(), |b| file.with_others_of(&b)));
-            let written = whole.and_then(|whole| whole.write(&options.out));
-            unwritten.tried(written, |text| observer.warning(text));
+            let written = whole.and_then(|whole| whole.write(&options.out, &drawn));
+            unwritten.tried(written, |text| observer.warning(text))?;
         }
         if stopped {
             break;

@@ -1,5 +1,6 @@
 //! [`Error`]: what a command fails with, and the exit code it means.
 
+use crate::base::ownership::Lost;
 use crate::base::stop::Stopped;
 use crate::base::text::one_line;
 use std::fmt;
@@ -19,6 +20,8 @@ pub enum ErrorKind {
     Unstable,
     /// Something is in the way: a run folder that exists, or is in use.
     Occupied,
+    /// A folder that this process had locked is no longer its own: nothing more is written to it.
+    Lost,
     /// Stopped by a signal; the run was saved and can be resumed.
     Stopped,
 }
@@ -31,7 +34,7 @@ impl ErrorKind {
             ErrorKind::Usage => 2,
             ErrorKind::Input => 3,
             ErrorKind::Unstable => 4,
-            ErrorKind::Occupied => 5,
+            ErrorKind::Occupied | ErrorKind::Lost => 5,
             ErrorKind::Stopped => 75,
         }
     }
@@ -107,8 +110,22 @@ impl Error {
         if error.kind() == io::ErrorKind::NotFound { text.hint(hint.to_string()) } else { text }
     }
 
-    /// A file cannot be written; if there is no room for it, with what to do.
+    /// A file is not written any more: its folder is another process's, or anybody's.
+    fn lost(path: &Path, lost: &Lost) -> Self {
+        let hint = match lost {
+            Lost::Taken { .. } => "let that one end, or start this command again in another folder",
+            Lost::Removed { .. } => "start the command again, and leave the folder to it as long as it runs",
+        };
+        let text = format!("{}: not written: {lost}", path.display());
+        Error::new(ErrorKind::Lost, text).hint(hint.to_string())
+    }
+
+    /// A file cannot be written; if there is no room for it, or the lock of its folder is lost, with
+    /// what to do.
     pub fn writing(path: &Path, error: &io::Error) -> Self {
+        if let Some(lost) = Lost::of(error) {
+            return Error::lost(path, lost);
+        }
         let place = match path.parent() {
             Some(folder) if !folder.as_os_str().is_empty() => folder,
             _ => Path::new("."),

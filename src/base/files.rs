@@ -1,14 +1,19 @@
 //! Writing files so that nothing is ever half-written, and reading texts that end.
 
 use crate::base::named::{self, Place};
+use crate::base::ownership;
 use flate2::read::MultiGzDecoder;
 use std::ffi::{OsStr, OsString};
-use std::fs::File;
+use std::fs::{DirEntry, File};
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
+use std::time::{Duration, SystemTime};
 
 /// Beginning and end of the names of temporary files, around the name of the file to be written.
 const TEMPORARY: [&str; 2] = [".", ".tmp"];
+
+/// A writer has its temporary file locked after so long.
+const TO_LOCK: Duration = Duration::from_secs(10);
 
 /// Most bytes of a text: many times what any file of ours has.
 const MOST_TEXT: u64 = 256 << 20;
@@ -68,10 +73,11 @@ pub fn exists(path: &Path) -> bool {
 
 /// Writes a file as a whole or not at all: to a temporary name in the same folder, synced, then
 /// renamed. Of a symbolic link, the file it leads to; what is no ordinary file (`/dev/stdout`, a
-/// pipe) is written to as it is.
+/// pipe) is written to as it is. What a killed process left of the same file is removed.
 ///
 /// # Errors
-/// What the system says, as when the folder does not exist; the file is then as it was.
+/// What the system says, as when the folder does not exist; [`ownership::Lost`]. The file is then as
+/// it was.
 pub fn write_atomically(path: &Path, content: &[u8]) -> io::Result<()> {
     write_whole(path, |file| file.write_all(content))
 }
@@ -85,21 +91,66 @@ pub fn write_whole(path: &Path, write: impl FnOnce(&mut File) -> io::Result<()>)
     if std::fs::metadata(path).is_ok_and(|found| !found.is_file() && !found.is_dir()) {
         return write(&mut File::options().write(true).open(path)?);
     }
-    let path = &led_to(path);
+    ownership::check(path)?;
+    let asked = path;
+    let path = &led_to(asked);
     let folder = folder_of(path);
+    let mut file = temporary(path)?;
+    // Says to others that its writer lives; where the file system has no locks, nothing does.
+    let _ = file.as_file().try_lock();
+    write(file.as_file_mut())?;
+    file.as_file().sync_all()?;
+    // The lock may have been lost while a long file was written.
+    ownership::check(asked)?;
+    file.persist(path).map_err(|error| error.error)?;
+    remove_left_behind(path);
+    sync_folder(folder)
+}
+
+/// A temporary file beside a file.
+fn temporary(path: &Path) -> io::Result<tempfile::NamedTempFile<File>> {
     let mut prefix = OsString::from(TEMPORARY[0]);
-    // Names have at most 255 bytes.
-    let name = path.file_name().filter(|name| name.len() <= 200).unwrap_or_default();
-    prefix.extend([name, OsStr::new(".")]);
-    let mut builder = tempfile::Builder::new();
+    prefix.extend([inner_name(path), OsStr::new(".")]);
     // Opened here: with the permissions of any new file, not a temporary file's owner-only; and so
     // that what the system says does not name a file that the user did not ask for.
     let open = |name: &Path| File::options().write(true).create_new(true).open(name);
-    let mut file = builder.prefix(&prefix).suffix(TEMPORARY[1]).make_in(folder, open)?;
-    write(file.as_file_mut())?;
-    file.as_file().sync_all()?;
-    file.persist(path).map_err(|error| error.error)?;
-    sync_folder(folder)
+    tempfile::Builder::new().prefix(&prefix).suffix(TEMPORARY[1]).make_in(folder_of(path), open)
+}
+
+/// What temporary names have of a file's own name: names have at most 255 bytes.
+fn inner_name(path: &Path) -> &OsStr {
+    path.file_name().filter(|name| name.len() <= 200).unwrap_or_default()
+}
+
+/// Of which file a name is a temporary one.
+fn temporary_of(name: &str) -> Option<&str> {
+    let [begin, end] = TEMPORARY;
+    let inner = name.strip_prefix(begin)?.strip_suffix(end)?;
+    inner.rsplit_once('.').map(|(name, _)| name)
+}
+
+/// Removes the temporary files of a file whose writers were killed. What cannot be removed stays: the
+/// file itself is written.
+fn remove_left_behind(path: &Path) {
+    let own = inner_name(path).to_string_lossy();
+    let Ok(entries) = std::fs::read_dir(folder_of(path)) else { return };
+    for entry in entries.flatten() {
+        let is_own = temporary_of(&entry.file_name().to_string_lossy()).is_some_and(|name| name == own);
+        if is_own && is_left_behind(&entry).unwrap_or(false) {
+            let _ = std::fs::remove_file(entry.path());
+        }
+    }
+}
+
+/// Whether the writer of a temporary file has ended: it would have the file locked. One that has only
+/// just made the file may not have locked it yet.
+fn is_left_behind(entry: &DirEntry) -> io::Result<bool> {
+    let found = entry.metadata()?;
+    let age = SystemTime::now().duration_since(found.modified()?).unwrap_or_default();
+    // Other things than files are nobody's leftovers; and network file systems lock only what is
+    // open for writing.
+    let opened = || File::options().write(true).open(entry.path());
+    Ok(found.is_file() && age > TO_LOCK && opened()?.try_lock().is_ok())
 }
 
 /// Where a path leads; also of a symbolic link to a file that is not there yet.
@@ -116,14 +167,12 @@ pub fn check_writable(path: &Path) -> io::Result<()> {
     match std::fs::metadata(path) {
         Ok(found) if found.is_dir() => Err(io::ErrorKind::IsADirectory.into()),
         Ok(found) if !found.is_file() => Ok(()),
-        _ => {
-            let open = |name: &Path| File::options().write(true).create_new(true).open(name);
-            tempfile::Builder::new().make_in(folder_of(&led_to(path)), open).map(|_| ())
-        }
+        _ => temporary(&led_to(path)).map(|_| ()),
     }
 }
 
-fn folder_of(path: &Path) -> &Path {
+/// The folder that a file is in.
+pub(super) fn folder_of(path: &Path) -> &Path {
     path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
@@ -133,14 +182,9 @@ fn folder_of(path: &Path) -> &Path {
 /// # Errors
 /// What the system says.
 pub fn remove_half_written(folder: &Path, names: &[&str]) -> io::Result<()> {
-    let [begin, end] = TEMPORARY;
     for entry in std::fs::read_dir(folder)? {
         let entry = entry?;
-        let found = entry.file_name();
-        let found = found.to_string_lossy();
-        let inner = found.strip_prefix(begin).and_then(|rest| rest.strip_suffix(end));
-        let inner = inner.and_then(|inner| inner.rsplit_once('.'));
-        if inner.is_some_and(|(name, _)| names.contains(&name)) {
+        if temporary_of(&entry.file_name().to_string_lossy()).is_some_and(|name| names.contains(&name)) {
             std::fs::remove_file(entry.path())?;
         }
     }
@@ -242,6 +286,33 @@ mod tests {
         write_atomically(&pipe, b"content").unwrap();
         assert_eq!(reader.join().unwrap(), b"content");
         assert!(pipe.metadata().unwrap().file_type().is_fifo());
+    }
+
+    #[test]
+    fn what_a_killed_process_left_of_a_file_goes_when_it_is_written_and_what_is_being_written_stays() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("audit.json");
+        let long_ago = SystemTime::now() - Duration::from_secs(3600);
+        let made = |name: &str, is_old: bool| {
+            let file = File::create(folder.path().join(name)).unwrap();
+            if is_old {
+                file.set_modified(long_ago).unwrap();
+            }
+            file
+        };
+        drop(made(".audit.json.dead.tmp", true));
+        let alive = made(".audit.json.alive.tmp", true);
+        alive.lock().unwrap();
+        let others = [".audit.json.fresh.tmp", ".audit.csv.Xy1.tmp", "audit.json.tmp", ".audit.json"];
+        others.iter().for_each(|name| drop(made(name, name.contains("csv"))));
+        write_atomically(&path, b"{}").unwrap();
+        let is_there = |name: &str| folder.path().join(name).exists();
+        assert!(!is_there(".audit.json.dead.tmp"));
+        assert!(is_there(".audit.json.alive.tmp") && others.iter().all(|name| is_there(name)));
+        drop(alive);
+        write_atomically(&path, b"{}").unwrap();
+        assert!(!is_there(".audit.json.alive.tmp"));
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1 + others.len());
     }
 
     #[test]

@@ -9,6 +9,7 @@ pub mod hash;
 pub mod named;
 pub mod number;
 pub mod observer;
+pub mod ownership;
 pub mod random;
 pub(crate) mod ranges;
 pub mod ranks;

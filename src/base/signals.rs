@@ -14,7 +14,7 @@ const AT_ONCE: i32 = 130;
 /// Whether no flag watches signals; they then end the process.
 static UNUSED: OnceLock<Arc<AtomicBool>> = OnceLock::new();
 
-/// A flag that SIGINT, SIGTERM and SIGUSR1 set as long as this exists.
+/// A flag that SIGINT, SIGTERM, SIGUSR1 and SIGHUP set as long as this exists.
 #[derive(Debug)]
 pub struct StopFlag {
     stop: Arc<AtomicBool>,
@@ -44,16 +44,15 @@ pub fn heed_file_limit() {
     let _ = flag::register(signal_hook::consts::SIGXFSZ, Arc::default());
 }
 
-/// A flag that SIGINT, SIGTERM and SIGUSR1 set; a second SIGINT ends the process at once. When it
-/// goes, signals end the process again.
+/// A flag that SIGINT, SIGTERM, SIGUSR1 and SIGHUP set; a second SIGINT ends the process at once.
+/// When it goes, signals end the process again. A SIGHUP that is ignored stays ignored: so `nohup`
+/// keeps a process alive.
 ///
 /// # Errors
 /// If the system does not let signals be handled.
 pub fn stop_flag() -> Result<StopFlag, Error> {
     let failed = |error: std::io::Error| Error::other(format!("signals cannot be handled: {error}"));
-    let mut signals = vec![SIGINT, SIGTERM];
-    #[cfg(unix)]
-    signals.push(signal_hook::consts::SIGUSR1);
+    let signals = stopping();
     let unused = match UNUSED.get() {
         Some(unused) => unused,
         None => {
@@ -75,4 +74,25 @@ pub fn stop_flag() -> Result<StopFlag, Error> {
     }
     let were_unused = unused.swap(false, Ordering::Relaxed);
     Ok(StopFlag { stop, were_unused })
+}
+
+/// The signals that ask a command to stop.
+fn stopping() -> Vec<i32> {
+    let mut signals = vec![SIGINT, SIGTERM];
+    #[cfg(unix)]
+    {
+        use signal_hook::consts::{SIGHUP, SIGUSR1};
+        signals.push(SIGUSR1);
+        signals.extend(is_heeded(SIGHUP).then_some(SIGHUP));
+    }
+    signals
+}
+
+/// Whether a signal is known not to be ignored, which only Linux tells.
+#[cfg(unix)]
+fn is_heeded(signal: i32) -> bool {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let ignored = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
+    let ignored = ignored.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok());
+    ignored.is_some_and(|mask| mask >> (signal - 1) & 1 == 0)
 }

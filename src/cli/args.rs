@@ -101,8 +101,8 @@ Examples:
   morphcog evolve --config zero_one.toml \\
     --set map_elites.parents=40 --out runs/forty
 
-Ctrl-C (or SIGTERM, SIGUSR1) drops the generation under way, saves and exits with 75; a second \
-Ctrl-C ends at once.")]
+Ctrl-C (or SIGTERM, SIGUSR1, SIGHUP) drops the generation under way, saves and exits with 75; a \
+second Ctrl-C ends at once.")]
     Evolve(EvolveArgs),
     /// Measure how far each soft voxel and sensor of a robot moves it, and what it could be taught.
     #[command(after_help = response::EXAMPLES)]

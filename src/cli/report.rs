@@ -71,7 +71,7 @@ pub(super) fn run(args: ReportArgs, console: &Console) -> Result<(), Error> {
     let size = number::fixed(page.len() as f64 / 1e6, 1);
     console.line_about(&out, &format!("wrote {} ({size} MB)", out.display()));
     match args.open {
-        true => open::that(&out).map_err(|error| Error::other(format!("cannot open it: {error}"))),
+        true => super::show(&out),
         false => Ok(()),
     }
 }

@@ -160,14 +160,14 @@ pub fn audit(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> R
         file.add_known(&options.out);
         file.robots.sort_by_key(|robot| order.iter().position(|id| *id == robot.id));
         if ranks.leads() && !file.robots.is_empty() {
-            unwritten.tried(file.write(&options.out), |text| observer.warning(text));
+            unwritten.tried(file.write(&options.out), |text| observer.warning(text))?;
         }
         if stopped {
             return Ok(Finished { file, asked, stopped, unwritten: unwritten.error() });
         }
     }
     if ranks.leads() {
-        unwritten.tried(file.write(&options.out), |text| observer.warning(text));
+        unwritten.tried(file.write(&options.out), |text| observer.warning(text))?;
     }
     Ok(Finished { file, asked, stopped: false, unwritten: unwritten.error() })
 }

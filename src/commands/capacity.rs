@@ -120,11 +120,11 @@ pub fn capacity(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -
             accuracy,
             curves,
         });
-        unwritten.tried(write(options, &file), |text| observer.warning(text));
+        unwritten.tried(write(options, &file), |text| observer.warning(text))?;
     }
     // What was found before it was stopped is better than nothing.
     if file.stopped && !file.tasks.is_empty() {
-        unwritten.tried(write(options, &file), |text| observer.warning(text));
+        unwritten.tried(write(options, &file), |text| observer.warning(text))?;
     }
     Ok(Finished { file, unwritten: unwritten.error().or(networks.unkept.error()) })
 }
@@ -265,7 +265,7 @@ impl Networks<'_> {
         }
         if !finished.is_empty() {
             self.known.extend(key, size, &finished);
-            self.unkept.tried(self.known.write(), |text| self.observer.warning(text));
+            self.unkept.tried(self.known.write(), |text| self.observer.warning(text))?;
         }
         Ok(goes_on)
     }
@@ -291,7 +291,8 @@ fn curve_of(kind: Kind, points: Vec<Point>, accuracy: f64) -> Curve {
 }
 
 fn write(options: &Options, file: &CapacityFile) -> Result<(), Error> {
-    write_with_table(&options.out, &file.to_json(), &file.to_csv())
+    let figures = FIGURES.map(|ending| options.out.with_extension(ending));
+    write_with_table(&options.out, &file.to_json(), &file.to_csv(), figures)
 }
 
 /// The robots that count.

@@ -215,7 +215,7 @@ impl Testing<'_> {
                 report.conclude();
             }
             if ranks.leads() && report.robots.len() > before {
-                unwritten.tried(write(options, report), |text| walker.observer.warning(text));
+                unwritten.tried(write(options, report), |text| walker.observer.warning(text))?;
             }
             if is_stopped {
                 break;
@@ -314,7 +314,7 @@ fn same_setting(first: &Source, other: &Source) -> Result<(), Error> {
 }
 
 fn write(options: &Options, report: &EvalFile) -> Result<(), Error> {
-    write_with_table(&options.out, &report.to_json(), &report.to_csv())
+    write_with_table(&options.out, &report.to_json(), &report.to_csv(), [])
 }
 
 /// The same, if a robot can be shown an image for so long.

@@ -301,7 +301,7 @@ pub fn to_file(from: &Path, points: bool, path: &Path, stop: &AtomicBool) -> Res
         failed.map_or_else(|| file.flush(), Err)
     });
     if matches!(&outcome, Err(error) if error.kind == ErrorKind::Stopped) {
-        return Err(Error::other(format!("{}: not written: the simulation was stopped", path.display())));
+        return Err(Error::stopped(format!("stopped; {} is not written", path.display())));
     }
     written.map_err(|error| Error::writing(path, &error))?;
     outcome

@@ -159,12 +159,12 @@ pub fn team(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Re
             Trial { run, robot: chosen.robot, split: of_robot, images: &images, threshold: THRESHOLD };
         members[place] = Some(Member::new(&trial, &hashes[chosen.source], displacements));
         file.members = members.iter().flatten().cloned().collect();
-        unwritten.tried(file.write(&options.out), |text| observer.warning(text));
+        unwritten.tried(file.write(&options.out), |text| observer.warning(text))?;
     }
     file.members = members.into_iter().flatten().collect();
     file.baselines = pool.install(|| baselines(&file, (&sources, &robots, &splits), &dataset, split))?;
     file.answers = Some(file.decided());
-    unwritten.tried(file.write(&options.out), |text| observer.warning(text));
+    unwritten.tried(file.write(&options.out), |text| observer.warning(text))?;
     Ok(Finished { file, unwritten: unwritten.error() })
 }
 

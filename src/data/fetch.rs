@@ -213,7 +213,8 @@ fn found(folder: &Path, remote: &RemoteFile) -> Result<Option<PathBuf>, FetchErr
 fn agent() -> Agent {
     let seconds = |s| Some(Duration::from_secs(s));
     Agent::config_builder()
-        .timeout_resolve(seconds(15))
+        // None for names: they would be resolved in a thread that the client takes for granted. The
+        // system's resolver has limits of its own.
         .timeout_connect(seconds(15))
         .timeout_recv_response(seconds(30))
         .timeout_per_read(seconds(30))

@@ -4,7 +4,7 @@
 //! tenth of them, the better third of each task on three tenths, the better tenth on all. Results
 //! are kept beside the run.
 
-use crate::base::error::Error;
+use crate::base::error::{Error, ErrorKind};
 use crate::base::files::write_atomically;
 use crate::base::hash::sha256_hex;
 use crate::base::observer::Observer;
@@ -194,6 +194,9 @@ pub(crate) fn best<'a>(
     let text = serde_json::to_string(&file).map_err(|error| Error::other(error.to_string()))? + "\n";
     if let Err(error) = write_atomically(&path, text.as_bytes()) {
         let error = Error::writing(&path, &error);
+        if error.kind == ErrorKind::Lost {
+            return Err(error);
+        }
         walker.observer.warning(&format!("{error}; the next time robots are chosen anew"));
     }
     Ok(Some(first(&file.robots)))

@@ -16,6 +16,7 @@ pub mod stream;
 pub mod team;
 
 use crate::base::error::Error;
+use crate::base::threads;
 use crate::body::Body;
 use crate::commands::simulate::Scenario;
 use crate::sim::{Physics, Start};
@@ -49,6 +50,8 @@ pub struct Service {
     pub images: ImageSets,
     /// What runs at the moment.
     pub simulations: Simulations,
+    /// The threads that the robots of teams walk in.
+    pub pool: rayon::ThreadPool,
 }
 
 /// What `/api/status` says.
@@ -99,13 +102,14 @@ impl Service {
     /// for by name is told in the notes.
     ///
     /// # Errors
-    /// What is wrong with an archive.
+    /// What is wrong with an archive; if the system has no threads left.
     pub fn open(options: &Options) -> Result<(Self, Vec<String>), Error> {
         let Options { archives, newest, data, runs } = options;
         let (catalogue, mut notes) = Catalogue::open(archives, newest.as_deref(), runs)?;
         let (images, missing) = ImageSets::open(&catalogue, data.as_deref())?;
         notes.extend(missing);
-        Ok((Service { catalogue, images, simulations: Simulations::default() }, notes))
+        let pool = threads::pool(None)?;
+        Ok((Service { catalogue, images, simulations: Simulations::default(), pool }, notes))
     }
 
     /// How it is doing.

@@ -1,6 +1,7 @@
 //! `morphcog serve`: the page, and what it asks for, over HTTP on this machine only.
 
 use crate::base::error::Error;
+use crate::base::threads;
 use crate::serve::catalogue::Who;
 use crate::serve::http::Response;
 use crate::serve::routes::Reply;
@@ -51,11 +52,14 @@ impl Server {
     }
 
     /// Serves until `stop` is set; then ends all simulations.
-    pub fn run(self, stop: &AtomicBool) {
+    ///
+    /// # Errors
+    /// If the system has no thread left for it.
+    pub fn run(self, stop: &AtomicBool) -> Result<(), Error> {
         let Server { listener, address, service } = self;
         let ended = Arc::new(AtomicBool::new(false));
         let (own, over) = (Arc::clone(&service), Arc::clone(&ended));
-        std::thread::spawn(move || accept(&listener, address.port(), &own, &over));
+        threads::start("server", move || accept(&listener, address.port(), &own, &over))?;
         while !stop.load(Ordering::Relaxed) {
             std::thread::sleep(LOOK);
         }
@@ -67,6 +71,7 @@ impl Server {
         while service.simulations.running() > 0 && Instant::now() < until {
             std::thread::sleep(Duration::from_millis(5));
         }
+        Ok(())
     }
 }
 
@@ -90,7 +95,7 @@ fn accept(listener: &TcpListener, port: u16, service: &Arc<Service>, ended: &Ato
         let place = Place(Arc::clone(&connections));
         let service = Arc::clone(service);
         // If the system has no thread left, the connection is closed and its place is free again.
-        let _ = std::thread::Builder::new().name("connection".to_string()).spawn(move || {
+        let _ = threads::start("connection", move || {
             let _place = place;
             connection(&service, port, &mut stream);
         });
@@ -120,7 +125,7 @@ fn connection(service: &Service, port: u16, stream: &mut TcpStream) {
             }
             Reply::Team(plan) => {
                 let lives = |slot: &Slot, tell: &mut Tell| {
-                    team::live(slot, &plan, |event| tell(&stream::of_team(&event)))
+                    team::live(slot, &plan, &service.pool, |event| tell(&stream::of_team(&event)))
                 };
                 // A team takes one place.
                 let Some(refusal) = simulation(service, &plan.members[0].1, lives, stream) else { return };
@@ -149,7 +154,10 @@ fn simulation(
         Ok(slot) => slot,
         Err(refusal) => return Some(routes::refused(refusal)),
     };
-    let begun = http::begin_events(stream).and_then(|()| end_with(stream, &slot.control)).map_err(|_| Gone);
+    if let Err(error) = end_with(stream, &slot.control) {
+        return Some(Response::refusal(503, &error.to_string()));
+    }
+    let begun = http::begin_events(stream).map_err(|_| Gone);
     let told = begun
         .and_then(|()| lives(&slot, &mut |event: &str| stream.write_all(event.as_bytes()).map_err(|_| Gone)));
     // The thread that watches the connection has nothing left to do.
@@ -163,9 +171,13 @@ fn simulation(
 
 /// Ends a simulation when the other side closes its connection: a write would fail only after that,
 /// and in between the simulation would go on.
-fn end_with(stream: &TcpStream, control: &Arc<Control>) -> io::Result<()> {
-    let (stream, control) = (stream.try_clone()?, Arc::clone(control));
-    stream.set_read_timeout(Some(LOOK))?;
+///
+/// # Errors
+/// If the system has no file or no thread left for it.
+fn end_with(stream: &TcpStream, control: &Arc<Control>) -> Result<(), Error> {
+    let failed = |error: io::Error| Error::other(format!("the connection cannot be watched: {error}"));
+    let (stream, control) = (stream.try_clone().map_err(failed)?, Arc::clone(control));
+    stream.set_read_timeout(Some(LOOK)).map_err(failed)?;
     let watch = move || {
         while !control.is_over() {
             match stream.peek(&mut [0]) {
@@ -177,5 +189,5 @@ fn end_with(stream: &TcpStream, control: &Arc<Control>) -> io::Result<()> {
             }
         }
     };
-    std::thread::Builder::new().name("watch".to_string()).spawn(watch).map(|_| ())
+    threads::start("watch", watch).map(|_| ())
 }

@@ -170,13 +170,14 @@ struct Walker<'a> {
     is_unstable: bool,
 }
 
-/// Lets a team walk; `tell` gets what happens.
+/// Lets a team walk, its robots at once in a pool; `tell` gets what happens.
 ///
 /// # Errors
 /// [`Gone`] as soon as `tell` says so.
 pub fn live(
     slot: &Slot,
     plan: &TeamPlan,
+    pool: &rayon::ThreadPool,
     mut tell: impl FnMut(TeamEvent) -> Result<(), Gone>,
 ) -> Result<(), Gone> {
     let systems: Vec<Arc<System>> = plan
@@ -210,7 +211,7 @@ pub fn live(
         let due = due.min(plan.control_steps - step);
         if due > 0 {
             let over = &slot.control.over;
-            walkers.par_iter_mut().filter(|walker| !walker.is_unstable).for_each(|walker| {
+            let walks = |walker: &mut Walker| {
                 for _ in 0..due {
                     match walker.rollout.step_unless(over) {
                         Ok(Ok(())) => {}
@@ -221,6 +222,9 @@ pub fn live(
                         return;
                     }
                 }
+            };
+            pool.install(|| {
+                walkers.par_iter_mut().filter(|walker| !walker.is_unstable).for_each(walks);
             });
             if slot.control.is_over() {
                 continue;
@@ -244,6 +248,7 @@ fn tally(walkers: &[Walker], judges: &[&Judge], classes: &[u8]) -> Tally {
 mod tests {
     use super::*;
     use crate::base::Grid;
+    use crate::base::threads::pool;
     use crate::serve::simulations::Simulations;
     use crate::sim::Physics;
     use crate::task::protocol::Protocol;
@@ -276,7 +281,7 @@ mod tests {
         let simulations = Simulations::default();
         let slot = simulations.begin(plan.members[0].1.clone()).unwrap();
         let (mut moments, mut end) = (0, None);
-        live(&slot, &plan, |event| {
+        live(&slot, &plan, &pool(None).unwrap(), |event| {
             match event {
                 TeamEvent::Begin { classes, stands, .. } => {
                     assert_eq!((classes, stands.len()), (&[0, 1, 2][..], 2))
@@ -316,7 +321,7 @@ mod tests {
                 std::thread::sleep(std::time::Duration::from_millis(50));
                 simulations.close();
             });
-            live(&slot, &plan, |_| Ok(())).unwrap();
+            live(&slot, &plan, &pool(None).unwrap(), |_| Ok(())).unwrap();
         });
         assert!(begin.elapsed().as_secs() < 5, "{:?}", begin.elapsed());
     }

@@ -295,7 +295,7 @@ impl AuditFile {
     /// # Errors
     /// If they cannot be written.
     pub fn write(&self, path: &Path) -> Result<(), Error> {
-        write_with_table(path, &self.to_json(), &self.to_csv())
+        write_with_table(path, &self.to_json(), &self.to_csv(), [])
     }
 }
 

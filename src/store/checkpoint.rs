@@ -4,6 +4,7 @@
 use crate::base::error::Error;
 use crate::base::files::{sync_folder, write_atomically};
 use crate::base::hash::sha256_hex;
+use crate::base::ownership;
 use crate::config::reading;
 use crate::store::metrics::Totals;
 use crate::store::names::CHECKPOINTS;
@@ -91,6 +92,7 @@ pub fn write(folder: &Path, checkpoint: &Checkpoint) -> Result<(), Error> {
     // Only a good newest becomes the previous one: a broken one must not push the last good one
     // out.
     if let Ok(Some(_)) = content(&newest) {
+        ownership::check(&newest).map_err(failed(&newest))?;
         std::fs::rename(&newest, &previous).map_err(failed(&previous))?;
         sync_folder(folder).map_err(failed(folder))?;
     }
@@ -126,7 +128,9 @@ pub fn read(folder: &Path, mut warn: impl FnMut(String)) -> Result<Option<Checkp
 /// If it cannot be renamed.
 pub(crate) fn take_back(folder: &Path) -> Result<(), Error> {
     let [newest, previous] = CHECKPOINTS.map(|name| folder.join(name));
-    let renamed = std::fs::rename(&previous, &newest).and_then(|()| sync_folder(folder));
+    let renamed = ownership::check(&newest)
+        .and_then(|()| std::fs::rename(&previous, &newest))
+        .and_then(|()| sync_folder(folder));
     renamed.map_err(|error| Error::writing(&newest, &error))
 }
 

@@ -7,14 +7,16 @@
 
 use crate::base::error::Error;
 use crate::base::observer::Observer;
+use crate::base::ownership::{Lost, Ownership};
 use crate::base::stop::{Stopped, check};
+use crate::base::threads;
 use gethostname::gethostname;
 use serde::{Deserialize, Serialize};
 use std::fs::{File, TryLockError};
 use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
-use std::sync::{Arc, Condvar, Mutex, PoisonError};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant, SystemTime};
 
@@ -41,7 +43,8 @@ pub struct Holder {
     pub host: String,
     /// Number of the process.
     pub process: u32,
-    /// Heartbeats so far.
+    /// Heartbeats so far, counted from the time of its beginning \[ns\]: processes in containers may
+    /// have the same number on machines of the same name.
     pub beats: u64,
 }
 
@@ -71,6 +74,8 @@ pub enum Refusal {
     Stopped,
     /// The file cannot be made or written.
     Io(io::Error),
+    /// There is no thread for the heartbeat.
+    NoThread(Error),
 }
 
 impl From<io::Error> for Refusal {
@@ -95,6 +100,7 @@ impl Refusal {
             }
             Refusal::Stopped => Stopped.into(),
             Refusal::Io(error) => Error::writing(path, &error),
+            Refusal::NoThread(error) => error,
         }
     }
 }
@@ -112,14 +118,13 @@ struct Manner {
 
 const USUAL: Manner = Manner { by_system: true, is_contended: false, beat: BEAT, dead_after: DEAD_AFTER };
 
-/// A taken lock; let go when it is dropped.
+/// A taken lock; let go when it is dropped. As long as it is there, this process writes to the folder
+/// only what it may: see [`Ownership`].
 #[derive(Debug)]
 pub struct Lock {
-    path: PathBuf,
-    own: Holder,
-    /// Whether it is to end, and what wakes the heart for it.
-    end: Arc<(Mutex<bool>, Condvar)>,
+    own: Arc<Own>,
     heart: Option<JoinHandle<()>>,
+    _ownership: Ownership,
     /// With the system's lock on it.
     _file: File,
 }
@@ -165,37 +170,114 @@ impl Lock {
                 }
             }
         }
-        let own = Holder { host, process: std::process::id(), beats: 0 };
+        let own = Holder { host, process: std::process::id(), beats: now() };
         write(path, &own)?;
         if !is_locked || manner.is_contended {
             // Two that found it free at once: the one whose name stays has it.
             std::thread::sleep(LOOK);
-            if read(path)?.is_none_or(|now| !is_same(&now, &own)) {
+            if read(path)?.as_ref() != Some(&own) {
                 return Err(Refusal::Held(read(path)?));
             }
         }
-        let end = Arc::new((Mutex::new(false), Condvar::new()));
-        let (ends, place, name) = (Arc::clone(&end), path.to_path_buf(), own.clone());
-        let beat = move || beats(&ends, &place, name, manner.beat);
-        let heart = std::thread::Builder::new().name("heartbeat".to_string()).spawn(beat)?;
-        Ok(Lock { path: path.to_path_buf(), own, end, heart: Some(heart), _file: file })
+        let own = Arc::new(Own::new(path, own));
+        let ownership = Ownership::claim(path, {
+            let own = Arc::clone(&own);
+            move || own.check()
+        });
+        let mut lock = Lock { own: Arc::clone(&own), heart: None, _ownership: ownership, _file: file };
+        let heart = threads::start("heartbeat", move || own.beat(manner.beat));
+        lock.heart = Some(heart.map_err(Refusal::NoThread)?);
+        Ok(lock)
     }
 }
 
 impl Drop for Lock {
     fn drop(&mut self) {
-        let (ended, wake) = &*self.end;
-        *ended.lock().unwrap_or_else(PoisonError::into_inner) = true;
-        wake.notify_all();
+        self.own.state().is_over = true;
+        self.own.wake.notify_all();
         if let Some(heart) = self.heart.take() {
             // It does nothing that can panic; if it did, the lock goes all the same.
             let _ = heart.join();
         }
         // If this cannot be written, the lock is found stale.
-        if read(&self.path).ok().flatten().is_some_and(|now| is_same(&now, &self.own)) {
-            let _ = File::options().write(true).truncate(true).open(&self.path);
+        if self.own.check().is_ok() {
+            let _ = File::options().write(true).truncate(true).open(&self.own.path);
         }
     }
+}
+
+/// The name of this process in a lock file, and its heart.
+#[derive(Debug)]
+struct Own {
+    path: PathBuf,
+    host: String,
+    /// The first of its heartbeats.
+    first: u64,
+    state: Mutex<Heart>,
+    /// Wakes the heart at the end.
+    wake: Condvar,
+}
+
+#[derive(Debug)]
+struct Heart {
+    beats: u64,
+    is_over: bool,
+}
+
+impl Own {
+    fn new(path: &Path, Holder { host, beats, .. }: Holder) -> Self {
+        let state = Mutex::new(Heart { beats, is_over: false });
+        Own { path: path.to_path_buf(), host, first: beats, state, wake: Condvar::new() }
+    }
+
+    fn state(&self) -> MutexGuard<'_, Heart> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Whether the file still names this process.
+    ///
+    /// # Errors
+    /// [`Lost`]; what the system says if it cannot be read.
+    fn check(&self) -> io::Result<()> {
+        self.check_at(&self.state())
+    }
+
+    /// The same; no heartbeat is written meanwhile.
+    fn check_at(&self, heart: &Heart) -> io::Result<()> {
+        let removed = || Lost::Removed { lock: self.path.clone() };
+        let found = match read(&self.path) {
+            Err(error) if error.kind() == io::ErrorKind::NotFound => return Err(removed().into()),
+            found => found?.ok_or_else(removed)?,
+        };
+        // A beat that failed may have been written all the same.
+        let is_own = (&found.host, found.process) == (&self.host, std::process::id())
+            && (self.first..=heart.beats + 1).contains(&found.beats);
+        match is_own {
+            true => Ok(()),
+            false => Err(Lost::Taken { lock: self.path.clone(), holder: found.to_string() }.into()),
+        }
+    }
+
+    /// Beats until the end, as long as the file names the process.
+    fn beat(&self, pause: Duration) {
+        let mut heart = self.state();
+        while !heart.is_over {
+            let waited = self.wake.wait_timeout(heart, pause).unwrap_or_else(PoisonError::into_inner);
+            heart = waited.0;
+            // A heartbeat that cannot be written is tried again.
+            if !heart.is_over && waited.1.timed_out() && self.check_at(&heart).is_ok() {
+                let (host, process) = (self.host.clone(), std::process::id());
+                let beaten = write(&self.path, &Holder { host, process, beats: heart.beats + 1 });
+                heart.beats += u64::from(beaten.is_ok());
+            }
+        }
+    }
+}
+
+/// Nanoseconds since 1970.
+fn now() -> u64 {
+    let since = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
+    u64::try_from(since.as_nanos()).unwrap_or_default()
 }
 
 /// What a lock file says; it takes no time, and the system's lock for a moment only, to see whether
@@ -262,10 +344,6 @@ fn write(path: &Path, holder: &Holder) -> io::Result<()> {
     file.set_len(room as u64 + 1)
 }
 
-fn is_same(a: &Holder, b: &Holder) -> bool {
-    (&a.host, a.process) == (&b.host, b.process)
-}
-
 /// Whether a heart beats, or lets go and is taken by another, within some time.
 ///
 /// # Errors
@@ -283,25 +361,11 @@ fn is_alive(path: &Path, before: &Holder, dead_after: Duration, stop: &AtomicBoo
     Ok(false)
 }
 
-/// Beats until the end, as long as the file names the holder.
-fn beats(end: &(Mutex<bool>, Condvar), path: &Path, mut own: Holder, beat: Duration) {
-    let (ended, wake) = end;
-    let mut is_over = ended.lock().unwrap_or_else(PoisonError::into_inner);
-    while !*is_over {
-        let (over, waited) = wake.wait_timeout(is_over, beat).unwrap_or_else(PoisonError::into_inner);
-        is_over = over;
-        // A heartbeat that cannot be written is tried again.
-        let is_named = || read(path).is_ok_and(|now| now.is_some_and(|now| is_same(&now, &own)));
-        if !*is_over && waited.timed_out() && is_named() {
-            own.beats += 1;
-            let _ = write(path, &own);
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::base::error::ErrorKind;
+    use crate::base::files::write_atomically;
     use crate::base::stop::NEVER;
 
     /// No locks of the system, and a quick heart.
@@ -314,6 +378,12 @@ mod tests {
 
     fn path(folder: &tempfile::TempDir) -> PathBuf {
         folder.path().join("lock")
+    }
+
+    /// A name like that of this process.
+    fn own() -> Holder {
+        let host = gethostname().to_string_lossy().into_owned();
+        Holder { host, process: std::process::id(), beats: 0 }
     }
 
     fn elsewhere(path: &Path) {
@@ -418,6 +488,45 @@ mod tests {
         });
         std::fs::write(&path, "").unwrap();
         drop(Lock::take_contended(&path, &NEVER, &()).unwrap());
+    }
+
+    #[test]
+    fn a_process_that_lost_its_lock_writes_nothing_more_and_leaves_the_lock_to_the_other() {
+        let same_name: fn(&Path) = |path| write(path, &Holder { beats: now(), ..own() }).unwrap();
+        for others in [elsewhere as fn(&Path), same_name] {
+            let folder = tempfile::tempdir().unwrap();
+            let path = path(&folder);
+            let result = folder.path().join("run.json");
+            let lock = Lock::take_in(&path, WITHOUT, &NEVER, &()).unwrap();
+            std::thread::sleep(WITHOUT.beat * 3);
+            write_atomically(&result, b"ours").unwrap();
+            // The heart was silent for too long, and another process began.
+            others(&path);
+            std::thread::sleep(WITHOUT.beat * 3);
+            let before = std::fs::read(&path).unwrap();
+            let error = Error::writing(&result, &write_atomically(&result, b"more").unwrap_err());
+            assert_eq!((error.kind, error.kind.exit_code()), (ErrorKind::Lost, 5));
+            let holder = read(&path).unwrap().unwrap().to_string();
+            assert!(error.message.contains("run.json: not written") && error.message.contains(&holder));
+            assert!(error.hint.is_some());
+            drop(lock);
+            assert_eq!(std::fs::read(&path).unwrap(), before, "the other's name stays");
+            assert_eq!(std::fs::read(&result).unwrap(), b"ours");
+        }
+    }
+
+    #[test]
+    fn a_lock_that_was_removed_or_emptied_is_lost() {
+        let removed: fn(&Path) = |path| std::fs::remove_file(path).unwrap();
+        let emptied: fn(&Path) = |path| std::fs::write(path, "").unwrap();
+        for lose in [removed, emptied] {
+            let folder = tempfile::tempdir().unwrap();
+            let path = path(&folder);
+            let _lock = Lock::take(&path, &NEVER, &()).unwrap();
+            lose(&path);
+            let error = write_atomically(&folder.path().join("run.json"), b"{}").unwrap_err();
+            assert_eq!(Lost::of(&error), Some(&Lost::Removed { lock: path }));
+        }
     }
 
     #[test]

@@ -2,6 +2,7 @@
 
 use crate::base::error::Error;
 use crate::base::files::{read_text, write_atomically};
+use crate::base::ownership;
 use crate::base::ranges;
 use crate::qd::ArchiveStats;
 use crate::store::names::METRICS;
@@ -112,7 +113,8 @@ impl Metrics {
     /// # Errors
     /// If it cannot be written.
     pub fn flush(&mut self) -> Result<(), Error> {
-        self.file.flush().map_err(|error| Error::writing(&self.path, &error))
+        let written = ownership::check(&self.path).and_then(|()| self.file.flush());
+        written.map_err(|error| Error::writing(&self.path, &error))
     }
 }
 

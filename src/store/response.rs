@@ -376,12 +376,13 @@ impl ResponseFile {
         table::csv(["id", "row", "column", "material", "slope", "error"], rows)
     }
 
-    /// Writes it, and its CSV beside it.
+    /// Writes it, and its CSV beside it. Before it says anything new, `outdated` pictures go: they will
+    /// be drawn anew.
     ///
     /// # Errors
     /// If they cannot be written.
-    pub fn write(&self, path: &Path) -> Result<(), Error> {
-        write_with_table(path, &self.to_json(), &self.to_csv())
+    pub fn write(&self, path: &Path, outdated: &[[PathBuf; 2]]) -> Result<(), Error> {
+        write_with_table(path, &self.to_json(), &self.to_csv(), outdated.iter().flatten().cloned())
     }
 }
 

@@ -3,10 +3,12 @@
 
 use crate::base::error::Error;
 use crate::base::files::{read_text, write_atomically};
+use crate::base::ownership;
 use crate::config::reading;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
-use std::path::Path;
+use std::io;
+use std::path::{Path, PathBuf};
 
 /// Why results are always JSON.
 const JSON: &str = "numbers are finite and keys are text: JSON has all of it";
@@ -63,12 +65,28 @@ pub(crate) fn by_lines(head: &impl Serialize, list: &[impl Serialize]) -> String
     format!("{head}\n{}\n]}}\n", lines.join(",\n"))
 }
 
-/// Writes results, and their table beside them with the ending `csv`.
+/// Writes results, and their table beside them with the ending `csv`. The results are written last: if
+/// the process is killed in between, those of before are still there, and are made again. `figures` of
+/// the results of before go first: they will be drawn anew.
 ///
 /// # Errors
-/// If one of them cannot be written.
-pub(crate) fn write_with_table(path: &Path, json: &str, table: &[u8]) -> Result<(), Error> {
-    [(path, json.as_bytes()), (&path.with_extension("csv"), table)].into_iter().try_for_each(
+/// If one of them cannot be written or removed.
+pub(crate) fn write_with_table(
+    path: &Path,
+    json: &str,
+    table: &[u8],
+    figures: impl IntoIterator<Item = PathBuf>,
+) -> Result<(), Error> {
+    let is_known = std::fs::read(path).is_ok_and(|before| before == json.as_bytes());
+    for figure in figures.into_iter().filter(|_| !is_known) {
+        match ownership::check(&figure).and_then(|()| std::fs::remove_file(&figure)) {
+            Err(error) if error.kind() != io::ErrorKind::NotFound => {
+                return Err(Error::writing(&figure, &error));
+            }
+            _ => {}
+        }
+    }
+    [(&path.with_extension("csv"), table), (&path.to_path_buf(), json.as_bytes())].into_iter().try_for_each(
         |(path, content)| write_atomically(path, content).map_err(|error| Error::writing(path, &error)),
     )
 }
@@ -88,7 +106,6 @@ mod tests {
     use crate::store::training::File;
     use crate::store::validation::ValidationFile;
     use serde_json::Value;
-    use std::path::PathBuf;
 
     /// Reads the text of a file by its name; its error, if it is refused.
     fn refusal(name: &str, text: &str) -> Option<Error> {
@@ -243,5 +260,23 @@ mod tests {
         old["format_version"] = Value::from(1);
         old.as_object_mut().unwrap().remove("checksum");
         assert!(refusal("training.json", &old.to_string()).is_none());
+    }
+
+    #[test]
+    fn figures_of_other_results_go_before_the_results_are_written_and_those_of_the_same_stay() {
+        let folder = tempfile::tempdir().unwrap();
+        let [json, csv, figure] =
+            ["response.json", "response.csv", "response.svg"].map(|name| folder.path().join(name));
+        std::fs::write(&figure, "old").unwrap();
+        write_with_table(&json, "{}", b"a", [figure.clone()]).unwrap();
+        assert!(!figure.exists() && csv.exists());
+        std::fs::write(&figure, "drawn").unwrap();
+        write_with_table(&json, "{}", b"a", [figure.clone()]).unwrap();
+        assert!(figure.exists());
+        // Where the table cannot be written the results of before stay, so that it is made again.
+        std::fs::remove_file(&csv).unwrap();
+        std::fs::create_dir(&csv).unwrap();
+        assert!(write_with_table(&json, "{ }", b"b", []).is_err());
+        assert_eq!(std::fs::read(&json).unwrap(), b"{}");
     }
 }

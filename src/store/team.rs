@@ -15,12 +15,21 @@ use crate::task::voting::{Accuracy, Ballot};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// What `team.json` calls itself.
 pub const FORMAT: &str = "morphcog-team";
 /// Version of its schema.
 pub const FORMAT_VERSION: u32 = 1;
+
+/// Names of the figures beside it: the confusion matrix, and the poster of all bodies.
+pub const FIGURES: [&str; 2] = ["confusion", "bodies"];
+
+/// The files of a figure beside results in `out`, as SVG and as PNG.
+pub fn figure(out: &Path, name: &str) -> [PathBuf; 2] {
+    let stem = out.file_stem().unwrap_or_default().to_string_lossy();
+    ["svg", "png"].map(|ending| out.with_file_name(format!("{stem}-{name}.{ending}")))
+}
 
 /// Most cycles that an image is shown for: as many as the longest rollout has by default.
 const MOST_CYCLES: u32 = MAX_STEPS / 50;
@@ -354,7 +363,8 @@ impl TeamFile {
     /// If a file cannot be written.
     pub fn write(&self, path: &Path) -> Result<(), Error> {
         let json = serde_json::to_string(self).expect("keys are text and numbers are finite") + "\n";
-        write_with_table(path, &json, &self.to_csv())
+        let figures = FIGURES.iter().flat_map(|name| figure(path, name));
+        write_with_table(path, &json, &self.to_csv(), figures)
     }
 
     /// A row per image: its class, both answers, and how far each robot walked.

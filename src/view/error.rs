@@ -33,6 +33,9 @@ pub enum PictureError {
     /// The encoder refused.
     #[error("the picture could not be encoded: {0}")]
     Encode(String),
+    /// The system has no threads left.
+    #[error(transparent)]
+    Threads(#[from] Error),
     /// The file could not be written.
     #[error("could not write {}: {source}; check that the folder exists and is writable", path.display())]
     Write {
@@ -53,6 +56,7 @@ impl From<PictureError> for Error {
                     None => error.hint("check that the folder exists and is writable".to_string()),
                 }
             }
+            PictureError::Threads(error) => error,
             error => Error::other(error.to_string()),
         }
     }

@@ -1,5 +1,6 @@
 //! Animated GIFs of recordings: one palette, and per frame only what changed.
 
+use crate::base::threads::in_pool;
 use crate::task::recording::Recording;
 use crate::view::colour::Colour;
 use crate::view::error::{PictureError, write_whole};
@@ -71,6 +72,10 @@ pub fn shown(walk: &Walk, every: usize) -> Vec<usize> {
 /// # Errors
 /// As [`write()`], but for the file.
 pub fn encode(recording: &Recording, options: &GifOptions) -> Result<Vec<u8>, PictureError> {
+    in_pool(|| encoded(recording, options))?
+}
+
+fn encoded(recording: &Recording, options: &GifOptions) -> Result<Vec<u8>, PictureError> {
     let walk = Walk::new(recording)?;
     let stage = Stage::new(&walk, options.width)?.crisp().look(options.look);
     let frames = shown(&walk, options.every);

@@ -3,7 +3,7 @@
 use crate::base::error::Error;
 use crate::base::number;
 use crate::base::number::percent;
-use crate::store::team::{Decoded, Member, TeamFile};
+use crate::store::team::{Decoded, FIGURES, Member, TeamFile, figure};
 use crate::task::voting::Accuracy;
 use crate::view::console::{Console, Mode};
 use crate::view::error::write_whole;
@@ -126,12 +126,11 @@ fn figures(accuracy: &Accuracy) -> [String; 2] {
 
 /// Writes the confusion matrix and the poster of all bodies; their paths.
 fn pictures(file: &TeamFile, out: &Path) -> Result<Vec<String>, Error> {
-    let stem = out.file_stem().expect("its file has been written").to_string_lossy();
     let mut written = Vec::new();
-    for (name, figure) in [("confusion", plot::confusion(file)), ("bodies", plot::poster(file))] {
-        let Some(figure) = figure else { continue };
-        for (ending, bytes) in [("svg", figure.svg().into_bytes()), ("png", figure.png(PRINT)?)] {
-            let path = out.with_file_name(format!("{stem}-{name}.{ending}"));
+    for (name, drawn) in FIGURES.into_iter().zip([plot::confusion(file), plot::poster(file)]) {
+        let Some(drawn) = drawn else { continue };
+        for (path, bytes) in figure(out, name).into_iter().zip([drawn.svg().into_bytes(), drawn.png(PRINT)?])
+        {
             write_whole(&path, &bytes)?;
             written.push(path.display().to_string());
         }

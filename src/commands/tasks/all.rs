@@ -3,6 +3,7 @@
 use crate::base::error::{Error, ErrorKind};
 use crate::base::observer::{Generation, Observer, Work};
 use crate::base::text::counted;
+use crate::base::threads;
 use crate::commands::tasks::steps::{is_done, run};
 use crate::commands::tasks::task::{Place, Run, Task};
 use crate::config::{Config, DataConfig};
@@ -161,11 +162,7 @@ pub fn run_all(
             }
         }
     };
-    std::thread::scope(|scope| {
-        for _ in 0..jobs {
-            scope.spawn(worker);
-        }
-    });
+    threads::at_once(jobs, worker)?;
     let mut summary = summary.into_inner().unwrap_or_else(PoisonError::into_inner);
     summary.failed.sort_unstable();
     // Some of them may be done by now.

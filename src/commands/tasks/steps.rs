@@ -51,8 +51,9 @@ pub fn run(task: &Task, place: &Place, stop: &AtomicBool, observer: &dyn Observe
         Err(error) if error.kind == ErrorKind::Stopped => (State::Stopped, None),
         Err(error) => (State::Failed, Some(error.message.clone())),
     };
-    file.write(&path)?;
-    ended
+    // Why it ended says more than that this could not be written down.
+    let written = file.write(&path);
+    ended.and(written)
 }
 
 /// Whether all of a task is done. More generations, or other steps, are still to do.

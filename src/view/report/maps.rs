@@ -1,5 +1,6 @@
 //! The archive as buttons, and the rollouts they play.
 
+use crate::base::threads::in_pool;
 use crate::commands::report::{Dossier, Gathered};
 use crate::qd::descriptor::{COUNT_BINS, DescriptorSpace, possible_cells};
 use crate::store::run::Robot;
@@ -59,7 +60,7 @@ impl Rollouts {
             simulated();
             Ok(((number, robot.id.clone()), rollout))
         };
-        jobs.par_iter().map(one).collect::<Result<BTreeMap<_, _>, _>>().map(Rollouts)
+        in_pool(|| jobs.par_iter().map(one).collect::<Result<BTreeMap<_, _>, _>>())?.map(Rollouts)
     }
 
     /// Id of the element with a robot's rollout.

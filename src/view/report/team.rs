@@ -2,6 +2,7 @@
 //! stage.
 
 use crate::base::Grid;
+use crate::base::threads::in_pool;
 use crate::commands::report::{Dossier, Team};
 use crate::search::showing::control_steps;
 use crate::store::team::Member;
@@ -73,7 +74,7 @@ fn watched(team: &Team, runs: &[Dossier], simulated: &(dyn Fn() + Sync)) -> Resu
         simulated();
         walk
     };
-    let walks: Vec<PackedWalk> = jobs.par_iter().map(walk).collect();
+    let walks: Vec<PackedWalk> = in_pool(|| jobs.par_iter().map(walk).collect())?;
     // In a script element only "<" could end it or open another.
     let robots = robots(team, &walks, &shown).to_string().replace('<', "\\u003c");
     let mut elements = format!("<script type=\"application/json\" id=\"team-robots\">{robots}</script>\n");
