@@ -169,7 +169,8 @@ fn violations(path: &str, source: &str) -> Vec<String> {
         if code.windows(4).any(is_made) || code.contains(&"ThreadPoolBuilder") {
             refuse("threads are made in base/threads.rs only, where none left is an error".to_string());
         }
-        let uses_pools = floor(room).is_some_and(|own| own >= DRAWS) && code.contains(&"rayon");
+        let is_parallel = code.windows(4).any(|w| matches!(w, ["rayon", ":", ":", "prelude"]));
+        let uses_pools = is_parallel && floor(room).is_some_and(|own| own >= DRAWS);
         if uses_pools && !code.iter().any(|token| matches!(*token, "in_pool" | "install")) {
             refuse("rayon's own pool, which panics where no threads are left: use in_pool".to_string());
         }

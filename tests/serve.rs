@@ -8,7 +8,7 @@ mod common;
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD as BASE64;
-use common::program::Sandbox;
+use common::program::{PROGRAM, Sandbox, said};
 use common::server::{Answer, Server};
 use morphcog::analysis::gallery;
 use morphcog::base::Grid;
@@ -26,6 +26,7 @@ use morphcog::task::stimulus::{Encoding, Reduction, StimulusParams, stimulus};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::io::{BufRead, BufReader, Read};
+use std::process::Stdio;
 use std::time::{Duration, Instant};
 
 fn json_of(answer: &Answer) -> Value {
@@ -569,6 +570,28 @@ fn many_requests_at_once_are_all_answered() {
             scope.spawn(|| (0..10).for_each(|_| assert_eq!(server.get("/api/archives/0").status, 200)));
         }
     });
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn where_nothing_opens_the_page_or_a_report_it_is_said_in_plain_words() {
+    let sandbox = Sandbox::tiny();
+    sandbox.run("evolve -q -c tiny.toml -o run").ended(0, &[]);
+    // As xdg-open ends where it knows no browser.
+    let opener = sandbox.write("bin/xdg-open", "#!/bin/sh\nexit 3\n");
+    std::fs::set_permissions(&opener, std::os::unix::fs::PermissionsExt::from_mode(0o755)).unwrap();
+    let bin = sandbox.path("bin");
+    let mut report = sandbox.command("report run --rollouts 0 --open".split(' '));
+    report.env("PATH", &bin);
+    said(report).ended(1, &["run/report.html: no program could be started to show it", "open it yourself"]);
+    let mut serve = std::process::Command::new(PROGRAM);
+    serve.arg("serve").current_dir(sandbox.path("")).env("PATH", &bin);
+    let mut child = serve.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
+    let lines = BufReader::new(child.stderr.take().unwrap()).lines().map(Result::unwrap);
+    let warning = lines.into_iter().find(|line| line.contains("browser")).unwrap();
+    child.kill().unwrap();
+    child.wait().unwrap();
+    assert!(warning.contains("no browser could be opened; open http://127.0.0.1:"), "{warning}");
 }
 
 #[test]

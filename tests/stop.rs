@@ -195,7 +195,6 @@ fn every_command_ends_in_its_documented_way_at_every_signal_that_asks_it_to() {
             };
             let said = String::from_utf8_lossy(&ended.stderr);
             assert_eq!(found, expected, "{command} and {signal}: {said}");
-            assert!(end != End::Stopped || said.contains("stopped"), "{command} and {signal}: {said}");
         }
     }
     let left = std::fs::read_dir(sandbox.path("")).unwrap().map(|entry| entry.unwrap().file_name());

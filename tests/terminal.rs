@@ -180,21 +180,32 @@ fn a_hangup_ends_a_film_and_the_terminal_is_as_it_was() {
 #[test]
 fn a_run_whose_terminal_is_closed_is_saved() {
     let sandbox = Sandbox::tiny();
-    let mut run = Session::new(&sandbox, "evolve -c tiny.toml --generations 99999 -o run");
-    run.shows("generation 0/99999");
-    run.shows(" left");
-    let Session { keyboard, screen, .. } = &mut run;
-    // The thread that reads the screen has the other one; it ends when nobody wants more.
-    drop((
-        std::mem::replace(keyboard, Arc::new(blocking::open().unwrap().0)),
-        std::mem::replace(screen, channel().1),
-    ));
-    let lock = sandbox.path("run/.lock");
+    let (terminal, place) = blocking::open().unwrap();
+    terminal.resize(Size::new(24, 80)).unwrap();
+    let evolve = "evolve -c tiny.toml --generations 99999 -o run";
+    let mut command = blocking::Command::new(PROGRAM);
+    for name in SETTINGS.iter().filter(|name| **name != "TERM") {
+        command = command.env_remove(name);
+    }
+    let command =
+        command.current_dir(sandbox.path(".")).args(evolve.split(' ')).env("TERM", "xterm-256color");
+    let mut child = command.spawn(place).unwrap();
+    let mut shown = String::new();
+    while !shown.contains(" left") {
+        let mut piece = [0; 4096];
+        let count = (&terminal).read(&mut piece).unwrap();
+        shown += &String::from_utf8_lossy(&piece[..count]);
+    }
+    drop(terminal);
     let end = Instant::now() + LIMIT;
-    while !std::fs::read(&lock).unwrap().is_empty() {
+    let ended = loop {
+        if let Some(ended) = child.try_wait().unwrap() {
+            break ended;
+        }
         assert!(Instant::now() < end, "it does not end");
         std::thread::sleep(Duration::from_millis(20));
-    }
+    };
+    assert_eq!(ended.code(), Some(75));
     assert!(sandbox.run_file("run").generations > 0);
 }
 

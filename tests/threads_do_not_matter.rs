@@ -56,12 +56,13 @@ fn limited(sandbox: &Sandbox, limits: &str, args: &str) -> Said {
         std::fs::set_permissions(sandbox.path("."), PermissionsExt::from_mode(0o777)).unwrap();
     }
     let is_root = std::fs::metadata("/proc/self").unwrap().uid() == 0;
-    let nobody = 20_000 + std::process::id() % 40_000;
-    let other = format!("setpriv --reuid {nobody} --clear-groups ");
-    let limited = format!("{}prlimit {limits} ./morphcog {args}", if is_root { &other } else { "" });
-    let mut command = assert_cmd::Command::new("sh");
+    let nobody = format!("--reuid={}", 20_000 + std::process::id() % 40_000);
+    let as_another = ["setpriv", &nobody, "--clear-groups"];
+    let words = as_another.into_iter().filter(|_| is_root).chain(["prlimit"]).chain(limits.split(' '));
+    let words: Vec<&str> = words.chain(["./morphcog"]).chain(args.split(' ')).collect();
+    let mut command = assert_cmd::Command::new(words[0]);
     SETTINGS.iter().for_each(|name| _ = command.env_remove(name));
-    command.current_dir(sandbox.path(".")).args(["-c", &limited]).env("RAYON_NUM_THREADS", "2");
+    command.current_dir(sandbox.path(".")).args(&words[1..]).env("RAYON_NUM_THREADS", "2");
     said(command)
 }
 

@@ -1,6 +1,6 @@
 //! [`Error`]: what a command fails with, and the exit code it means.
 
-use crate::base::ownership::Lost;
+use crate::base::ownership::{self, Lost};
 use crate::base::stop::Stopped;
 use crate::base::text::one_line;
 use std::fmt;
@@ -123,7 +123,9 @@ impl Error {
     /// A file cannot be written; if there is no room for it, or the lock of its folder is lost, with
     /// what to do.
     pub fn writing(path: &Path, error: &io::Error) -> Self {
-        if let Some(lost) = Lost::of(error) {
+        // A folder that was removed a moment ago fails in other ways, too.
+        let now = ownership::check(path).err();
+        if let Some(lost) = [Some(error), now.as_ref()].into_iter().flatten().find_map(Lost::of) {
             return Error::lost(path, lost);
         }
         let place = match path.parent() {

@@ -1,7 +1,7 @@
 //! Writing files so that nothing is ever half-written, and reading texts that end.
 
 use crate::base::named::{self, Place};
-use crate::base::ownership;
+use crate::base::ownership::{self, folder_of};
 use flate2::read::MultiGzDecoder;
 use std::ffi::{OsStr, OsString};
 use std::fs::{DirEntry, File};
@@ -169,11 +169,6 @@ pub fn check_writable(path: &Path) -> io::Result<()> {
         Ok(found) if !found.is_file() => Ok(()),
         _ => temporary(&led_to(path)).map(|_| ()),
     }
-}
-
-/// The folder that a file is in.
-pub(super) fn folder_of(path: &Path) -> &Path {
-    path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
 /// Removes what writing the files of these names left half-written in a folder when the process was

@@ -1,7 +1,6 @@
 //! Folders that this process has locked. Nothing is written to one after its lock was lost: another
 //! process may be at work there.
 
-use crate::base::files::folder_of;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -89,6 +88,11 @@ pub fn check(file: &Path) -> io::Result<()> {
     let looks: Vec<Arc<Look>> =
         claims().iter().filter(is_there).map(|claim| Arc::clone(&claim.look)).collect();
     looks.iter().try_for_each(|look| look())
+}
+
+/// The folder that a file is in.
+pub(super) fn folder_of(path: &Path) -> &Path {
+    path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
 /// The names of a folder under which it is found again, also when it was removed.
