@@ -85,7 +85,7 @@ fn where_the_system_has_no_thread_left_every_command_says_so_and_none_panics() {
     let none_left = "a thread cannot be started";
     for (args, needs_threads) in [
         ("evolve -c tiny.toml -o new", true),
-        ("train -a shipped:gaits -t 0|1 --dataset builtin -o trained", true),
+        ("train -a gallery:gaits -t 0|1 --set data.dataset=builtin -o trained", true),
         ("demo -o demo", true),
         ("eval -a run --images 4 --cycles 1 --robots top:2", true),
         ("audit -a run --robots top:1", true),
