@@ -163,7 +163,6 @@ fn every_command_ends_in_its_documented_way_at_every_signal_that_asks_it_to() {
         ("eval -q -a run --images 40 --cycles 1 -o eval-N.json".to_string(), End::Stopped),
         ("audit -q -a run -o audit-N.json".to_string(), End::Stopped),
         ("response -q -a run --robots all -o response-N.json".to_string(), End::Stopped),
-        ("team -q -a run --classes 0,1 --images 1500 -o team-N.json".to_string(), End::Stopped),
         (format!("capacity -q --eval short/eval.json {endless} -o capacity-N.json"), End::Stopped),
         ("sweep -q sweep.toml -o sweep-N".to_string(), End::Stopped),
         ("sweep -q sweep.toml -o task-N --task 1".to_string(), End::Stopped),
