@@ -199,7 +199,10 @@ pub fn measure(options: &Options, stop: &AtomicBool, observer: &dyn Observer) ->
             // Another process may have measured robots of this run meanwhile.
             let before = replaced::<ResponseFile>(&options.out);
             let whole = before.map(|before| before.map_or_else(|| file.clone(), |b| file.with_others_of(&b)));
-            let written = whole.and_then(|whole| whole.write(&options.out, &drawn));
+            let is_new = |id: &str| file.robots.iter().any(|robot| robot.id == id);
+            let outdated = asked.iter().zip(&drawn).filter(|(id, _)| is_new(id));
+            let outdated: Vec<[PathBuf; 2]> = outdated.map(|(_, files)| files.clone()).collect();
+            let written = whole.and_then(|whole| whole.write(&options.out, &outdated));
             unwritten.tried(written, |text| observer.warning(text))?;
         }
         if stopped {
