@@ -292,3 +292,21 @@ fn a_tilde_in_a_path_is_the_home_folder() {
     );
     at_home("sweep plans/plan.toml --list --out all").ended(0, &[]);
 }
+
+#[test]
+fn test_images_of_any_size_are_shown_to_robots_on_the_page() {
+    let sandbox = Sandbox::new();
+    write_images(&sandbox, "there/", [150, 200], 1);
+    sandbox.write("shapes.toml", TINY.replace("\"builtin\"", "\"shapes\""));
+    sandbox.run("evolve -q -c shapes.toml -o runs/one --data there").ended(0, &[]);
+    let robot = &sandbox.run_file("runs/one").elites[0].id;
+    let server = Server::start(&sandbox, "--archive runs/one");
+    let shown = |archive: usize| {
+        let asked = serde_json::json!({
+            "subject": { "archive": archive, "robot": robot }, "shown": { "image": { "set": "shapes", "index": 3 } },
+        });
+        server.post("/api/stimulus", &asked)
+    };
+    let answer = (0..9).map(shown).find(|answer| !answer.body.contains("there is no robot")).unwrap();
+    assert!(answer.status == 200 && answer.body.contains("\"label\":1"), "{}", answer.body);
+}

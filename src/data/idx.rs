@@ -265,10 +265,19 @@ pub(crate) fn unpacked(file: &Path) -> Result<Vec<u8>, IdxError> {
     let stored = read_file(file)?;
     let mut content = Vec::new();
     let read = reader(&stored).take(MAX_BYTES + 1).read_to_end(&mut content);
-    let found = read.map_err(|source| IdxError::Gzip { file: file.to_path_buf(), source })? as u64;
+    let found = read.map_err(|error| unpacking(file, error))? as u64;
     match found > MAX_BYTES {
         true => Err(IdxError::Large { file: file.to_path_buf(), found }),
         false => Ok(content),
+    }
+}
+
+/// Why what is in a file was not got out of it.
+fn unpacking(file: &Path, source: io::Error) -> IdxError {
+    let file = file.to_path_buf();
+    match source.kind() {
+        io::ErrorKind::OutOfMemory => IdxError::Io { file, source },
+        _ => IdxError::Gzip { file, source },
     }
 }
 
@@ -288,7 +297,7 @@ fn decode<const N: usize>(
 ) -> Result<([usize; N], Vec<u8>), IdxError> {
     let mut content = reader(stored);
     let file = file.to_path_buf();
-    let broken = |source| IdxError::Gzip { file: file.clone(), source };
+    let broken = |error| unpacking(&file, error);
 
     let mut header = Vec::new();
     content.by_ref().take(4).read_to_end(&mut header).map_err(broken)?;

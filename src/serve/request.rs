@@ -14,7 +14,7 @@ use serde::Deserialize;
 /// Most control steps in a simulation, images changed on the way included: a hundred actuation
 /// cycles.
 pub const MAX_STEPS: u32 = 5000;
-/// Largest side of a picture \[pixels\].
+/// Largest side of a drawing \[pixels\].
 pub const MAX_PICTURE: usize = 128;
 /// Fastest pace that is not "as fast as possible".
 pub const MAX_SPEED: f64 = 16.0;
@@ -160,12 +160,6 @@ impl Shown {
     pub fn seen(self, who: &Who, images: &ImageSets) -> Result<Seen, Refusal> {
         let (height, width) = (who.body.height(), who.body.width());
         let reduce = |pixels: &Grid<u8>| {
-            let (rows, columns) = (pixels.height(), pixels.width());
-            if rows > MAX_PICTURE || columns > MAX_PICTURE {
-                return Err(Refusal::Wrong(format!(
-                    "shown.drawing: {rows} × {columns} pixels, expected at most {MAX_PICTURE} × {MAX_PICTURE}"
-                )));
-            }
             stimulus(pixels, height, width, &who.encoding)
                 .map_err(|error| Refusal::Wrong(format!("shown: {error}")))
         };
@@ -174,6 +168,12 @@ impl Shown {
                 Ok(Seen { stimulus: Grid::filled(height, width, 0.0), label: None })
             }
             Shown { drawing: Some(pixels), image: None, stimulus: None } => {
+                let (rows, columns) = (pixels.height(), pixels.width());
+                if rows > MAX_PICTURE || columns > MAX_PICTURE {
+                    return Err(Refusal::Wrong(format!(
+                        "shown.drawing: {rows} × {columns} pixels, expected at most {MAX_PICTURE} × {MAX_PICTURE}"
+                    )));
+                }
                 Ok(Seen { stimulus: reduce(&pixels)?, label: None })
             }
             Shown { drawing: None, image: Some(name), stimulus: None } => {

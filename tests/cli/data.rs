@@ -1,6 +1,6 @@
 //! Datasets: what is missing or broken.
 
-use crate::common::program::{Sandbox, said, write_images};
+use crate::common::program::{PROGRAM, Sandbox, said, write_images};
 
 #[test]
 fn missing_data_are_refused_naming_file_place_and_remedy() {
@@ -138,4 +138,29 @@ fn a_download_that_fails_says_what_does_without() {
     let said = sandbox.run("data fetch --mirror http://127.0.0.1:1").ended(1, &["--data", "builtin"]);
     assert_eq!(said.err.matches("127.0.0.1:1/train-images").count(), 1, "{}", said.err);
     assert!(!sandbox.path("data").exists());
+}
+
+#[test]
+#[cfg(target_os = "linux")]
+fn images_that_do_not_fit_into_memory_are_an_error_and_no_abort() {
+    let sandbox = Sandbox::new();
+    let write = |name: &str, header: &[u8], length: u64| {
+        let path = sandbox.write(name, header);
+        std::fs::File::options().write(true).open(path).unwrap().set_len(length).unwrap();
+    };
+    // 700 MB of black, which take no space on the disk.
+    write(
+        "own/train-images-idx3-ubyte",
+        &[0, 0, 8, 3, 0, 0, 0x2b, 0xc0, 0, 0, 1, 0, 0, 0, 0, 250],
+        16 + 716_800_000,
+    );
+    write("own/train-labels-idx1-ubyte", &[0, 0, 8, 1, 0, 0, 0x2b, 0xc0], 8 + 11_200);
+    for limit in [400_000, 1_100_000] {
+        let mut shell = std::process::Command::new("sh");
+        let line = format!("ulimit -v {limit}; exec {PROGRAM} data info own --data own");
+        let output = shell.args(["-c", &line]).current_dir(sandbox.path("")).output().unwrap();
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(3), "{said}");
+        assert!(said.contains("train-images-idx3-ubyte: cannot be read: out of memory"), "{said}");
+    }
 }
