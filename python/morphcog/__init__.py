@@ -16,21 +16,23 @@ of an actuation cycle.
 
 from __future__ import annotations
 
+import base64 as _base64
 import html as _html
 import io as _io
 import json as _json
 import operator as _operator
 import os as _os
-import subprocess as _subprocess
 import sys as _sys
 import threading as _threading
+import time as _time
+import warnings as _warnings
 from collections.abc import Mapping as _Mapping
 from dataclasses import dataclass as _dataclass
 
 import numpy as _np
 
 from . import _morphcog
-from ._morphcog import Config, Error, Unstable, __version__
+from ._morphcog import Error, Unstable, __version__
 
 __all__ = [
     "Config",
@@ -48,15 +50,19 @@ __all__ = [
 ]
 
 
-def _array(value, dtype, dimensions, what, expected):
-    """An array of a type and a number of dimensions; nothing is rounded or cut off on the way."""
+def _given(value, what, expected):
     try:
-        given = _np.asarray(value)
+        return _np.asarray(value)
     except ValueError:
         raise Error(f"{what}: expected {expected}, found rows of different lengths") from None
+
+
+def _array(value, dtype, dimensions, what, expected):
+    """An array of a type and a number of dimensions; nothing is rounded or cut off on the way."""
+    given = _given(value, what, expected)
     if given.ndim != dimensions:
         raise Error(f"{what}: expected {expected}, found shape {given.shape}")
-    kinds = {"u": "biu", "f": "biuf"}[_np.dtype(dtype).kind]
+    kinds = {"u": "iu", "f": "biuf"}[_np.dtype(dtype).kind]
     if given.dtype.kind not in kinds:
         raise Error(f"{what}: expected {expected}, found type {given.dtype}")
     converted = given.astype(dtype, copy=False)
@@ -90,8 +96,160 @@ def _stimuli(value):
     return _array(value, _np.float64, 3, "stimuli", "pixels from 0 to 1 of shape (images, rows, columns)")
 
 
+def _images(value):
+    """Images as bytes: bool is black and white; fractions are refused, since 1.0 may be full or 1 of 255."""
+    expected = "whole numbers from 0 to 255, or bool, of shape (images, rows, columns)"
+    given = _given(value, "images", expected)
+    if given.dtype.kind == "b":
+        given = _np.multiply(given, 255, dtype=_np.uint8)
+    elif given.dtype.kind == "f":
+        raise Error(f"images: expected {expected}, found type {given.dtype}; if 1 is full, (255 * images).astype('uint8')")
+    images = _array(given, _np.uint8, 3, "images", expected)
+    if images.size and images.max() == 1:
+        _warnings.warn("images: the largest pixel is 1 of 255, nearly black; pass bool if 1 is full", stacklevel=3)
+    return images
+
+
+def _path(value):
+    """A path as text, from text or any path-like object; ~ is the home folder. None stays."""
+    return None if value is None else _os.path.expanduser(_os.fsdecode(value))
+
+
+def _value(value):
+    """A value of a config's key as TOML; None is its default."""
+    if value is None:
+        return ""
+    if isinstance(value, str):
+        return value
+    if isinstance(value, _os.PathLike):
+        return _json.dumps(_path(value), ensure_ascii=False)
+    return _json.dumps(value, default=lambda other: _np.asarray(other).tolist())
+
+
+def _changes(set, before=""):
+    """Changes of keys, as key=value: from one text, several, or a dict, also of dicts."""
+    if isinstance(set, str):
+        return [set]
+    if not isinstance(set, _Mapping):
+        changes = list(set)
+        if not all(isinstance(change, str) for change in changes):
+            raise Error('set: expected a dict, or changes of keys as "map_elites.parents=10"')
+        return changes
+    changes = []
+    for key, value in set.items():
+        inner = isinstance(value, _Mapping)
+        changes += _changes(value, f"{before}{key}.") if inner else [f"{before}{key}={_value(value)}"]
+    return changes
+
+
+class Config:
+    """Everything that a run depends on.
+
+    config: a file, the name of a built-in config, or another Config. set: a change of a key, as
+    "map_elites.parents=10", several of them, or a dict. Configs are equal if all their keys are.
+    """
+
+    def __init__(self, config, set=()):
+        if isinstance(config, Config):
+            self._data = _morphcog.ConfigData.parsed(config.to_toml(), config._data.name, _changes(set))
+        else:
+            self._data = _morphcog.ConfigData(_path(config), _changes(set))
+
+    @classmethod
+    def _of(cls, data):
+        config = cls.__new__(cls)
+        config._data = data
+        return config
+
+    def to_toml(self):
+        """The config as TOML, every key with its value."""
+        return self._data.to_toml()
+
+    def to_json(self):
+        """The config as JSON."""
+        return self._data.to_json()
+
+    def __eq__(self, other):
+        return self.to_toml() == other.to_toml() if isinstance(other, Config) else NotImplemented
+
+    def __hash__(self):
+        return hash(self.to_toml())
+
+    def __reduce__(self):
+        return _restored_config, (self.to_toml(), self._data.name)
+
+    def __repr__(self):
+        return f"Config({self._data.name}, {self._data.about()})"
+
+
+def _restored_config(toml, name):
+    return Config._of(_morphcog.ConfigData.parsed(toml, name, []))
+
+
 def _config(config):
-    return config if config is None or isinstance(config, Config) else Config(_os.fspath(config))
+    """What the simulator takes, from whatever stands for a config; None stays."""
+    if config is None:
+        return None
+    return (config if isinstance(config, Config) else Config(config))._data
+
+
+class _Progress:
+    """Says on stderr how far a command is: in a terminal and in a notebook in one line that changes, elsewhere in
+    lines from time to time; warnings are Python's."""
+
+    def __init__(self, quiet):
+        self._stream = None if quiet else _sys.stderr
+        moves = getattr(self._stream, "isatty", bool)() or type(self._stream).__module__.startswith("ipykernel")
+        self._moves, self._least = moves, 0.5 if moves else 10.0
+        self._begun = self._said = _time.monotonic()
+        self._text, self._shown = "", ""
+
+    def __call__(self, kind, text):
+        if kind == "warning":
+            _warnings.warn(text, stacklevel=3)
+        elif kind == "note":
+            self._write(f"{self._over(text)}\n")
+            self._shown = ""
+        else:
+            self._text = text
+            # The longer it takes, the less often: a log of hours stays short.
+            now = _time.monotonic()
+            if now - self._said >= max(self._least, (now - self._begun) / 200):
+                self._said = now
+                self._show()
+
+    def _over(self, text):
+        """A text in the place of the line that is shown."""
+        return f"\r{text:<{len(self._shown)}}" if self._moves and self._shown else text
+
+    def _show(self):
+        end = "" if self._moves else "\n"
+        self._write(self._over(self._text) + end)
+        self._shown = self._text
+
+    def _write(self, text):
+        if self._stream is not None:
+            self._stream.write(text)
+            self._stream.flush()
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        if self._text != self._shown:
+            self._show()
+        if self._moves and self._text:
+            self._write("\n")
+
+
+def _main_is_interrupted():
+    """Whether Ctrl-C is ending the main thread. It would then wait for this one, which is told of no signal."""
+    main = _threading.main_thread()
+    if _threading.current_thread() is main:
+        return False
+    handled = getattr(_sys, "_current_exceptions", dict)().get(main.ident)
+    found = handled[1] if isinstance(handled, tuple) else handled
+    return isinstance(found if main.is_alive() else getattr(_sys, "last_value", None), KeyboardInterrupt)
 
 
 def images(dataset="builtin", split="train", data=None):
@@ -100,19 +258,18 @@ def images(dataset="builtin", split="train", data=None):
     dataset: "builtin" (digits that the program draws), "mnist", "fashion-mnist", or IDX files of your own.
     split: "train" or "test". data: folder with the files (default: MORPHCOG_DATA, then data/<dataset>).
     """
-    return _morphcog.images(dataset, split, None if data is None else _os.fspath(data))
+    return _morphcog.images(dataset, split, _path(data))
 
 
 def stimuli(images, config):
     """What the sensors of a config's robots see of images.
 
-    images: uint8 (images, rows, columns), as MNIST's (n, 28, 28). config: a Config, a file or the name
-    of a built-in config; its sections [body] and [stimulus] say how. Returns float64 (images, rows,
-    columns) from 0 to 1, on the body's grid. Raises Error for arrays of another shape or type, and for
-    sizes that do not go together.
+    images: (images, rows, columns), as MNIST's (n, 28, 28): whole numbers from 0 to 255 of any type, or
+    bool, whose True is 255. config: a Config, a file or the name of a built-in config; its sections
+    [body] and [stimulus] say how. Returns float64 (images, rows, columns) from 0 to 1, on the body's
+    grid. Raises Error for arrays of another shape or type, and for sizes that do not go together.
     """
-    expected = "whole numbers from 0 to 255 of shape (images, rows, columns)"
-    return _morphcog.stimuli(_array(images, _np.uint8, 3, "images", expected), _config(config))
+    return _morphcog.stimuli(_images(images), _config(config))
 
 
 def displacements(bodies, stimuli, *, control_steps=None, config=None, threads=None):
@@ -131,7 +288,8 @@ def displacements(bodies, stimuli, *, control_steps=None, config=None, threads=N
 
 
 class World:
-    """One simulation of a body on flat ground, step by step; threads that share it take turns.
+    """One simulation of a body on flat ground, step by step; threads that share it take turns. A copy
+    (copy.copy) goes on by itself from the same state.
 
     The stimulus may change at every control step. config: whose physics and start are used (default:
     the paper's). start_row: row of the body's bottom row at the start, 2 stands on the ground.
@@ -197,6 +355,19 @@ class World:
         with self._turn:
             return _np.array(self._world.centre)
 
+    def __copy__(self):
+        other = World.__new__(World)
+        with self._turn:
+            other._world, other._stimulus = self._world.copied(), self._stimulus
+        other._turn = _threading.RLock()
+        return other
+
+    def __deepcopy__(self, memo):
+        return self.__copy__()
+
+    def __reduce__(self):
+        raise TypeError("a World cannot be pickled: pickle its body and config, and make it anew")
+
     def __repr__(self):
         x, y = self.centre
         return f"World(control_step={self.control_step}, centre=({x:.2f}, {y:.2f}))"
@@ -218,26 +389,37 @@ class Robot:
 
     def page(self):
         """A page for a browser in which it walks under its training images, as HTML."""
-        return self.run._data.player(self.id)
+        return self.run._data.page(self.id)
 
     def _repr_html_(self):
-        return _framed(self.page())
+        try:
+            page, still = self.run._data.small_page(self.id)
+        except Error as error:
+            return f"<pre>{_html.escape(f'{self!r}: {error}')}</pre>"
+        return _framed(page, still, repr(self))
 
     def __repr__(self):
         rows, columns = self.body.shape
         return f"Robot({self.id}, task={self.task}, objective={self.objective:.3f}, body={rows}×{columns})"
 
 
-def _framed(page):
-    source = _html.escape(page, quote=True)
-    return f'<iframe srcdoc="{source}" style="width:100%;height:560px;border:0" title="a robot walks"></iframe>'
+def _framed(page, still, title):
+    """A page over a picture, which is left where a viewer takes away the page and its scripts."""
+    title, page = _html.escape(title), _html.escape(page)
+    picture = f'<img src="data:image/gif;base64,{_base64.b64encode(still).decode()}" alt="{title}">'
+    place = "position:absolute;top:0;left:0;width:100%;height:100%;border:0"
+    frame = f'<iframe srcdoc="{page}" style="{place}" title="{title}"></iframe>'
+    return f'<div style="position:relative;height:560px">{picture}{frame}</div>'
 
 
 class Run:
-    """A run folder: an archive of robots with its config."""
+    """A run folder: an archive of robots with its config. A pickled one is its path, and is read again."""
 
     def __init__(self, folder):
-        self._data = _morphcog.RunData(_os.fspath(folder))
+        self._data = _morphcog.RunData(_path(folder))
+
+    def __reduce__(self):
+        return _restored_run, (self._data.absolute(), self._data.settings())
 
     @property
     def path(self):
@@ -247,7 +429,7 @@ class Run:
     @property
     def config(self):
         """Its config."""
-        return self._data.config
+        return Config._of(self._data.config)
 
     @property
     def generations(self):
@@ -257,87 +439,85 @@ class Run:
     @property
     def elites(self):
         """Its robots, a row each, as a pandas DataFrame: index, objective, measures_…, solution_…, id, …"""
-        return _table(self._data.elites_csv())
+        return _table(_io.StringIO(self._data.elites_csv()))
 
     def __getitem__(self, robot):
         """A robot by its id, the beginning of that, or "best"."""
         identity, task, objective, body = self._data.robot(robot)
         return Robot(identity, task, objective, body, self)
 
-    def evaluate(self, robots="top:10", images=1000, split="test", data=None):
+    def evaluate(self, robots="top:10", images=1000, split="test", data=None, quiet=False):
         """Tests robots on held-out images, as `morphcog eval`: a DataFrame with a row for each robot.
 
-        images: how many, or "all".
+        images: how many, or "all". quiet: says nothing of how far it is.
         """
-        self._command("eval", "--robots", robots, "--images", images, "--split", split, data=data)
-        name = "eval.csv" if split == "test" else "eval-validation.csv"
-        return self._beside(name)
+        with _Progress(quiet) as progress:
+            return _table_in(self._data.evaluate(str(robots), str(images), str(split), _path(data), progress))
 
-    def audit(self, robots="all", data=None):
+    def audit(self, robots="all", data=None, quiet=False):
         """Whether robots walk or exploit the simulator, as `morphcog audit`: a DataFrame with a row for each
-        robot and change."""
-        self._command("audit", "--robots", robots, data=data)
-        return self._beside("audit.csv")
-
-    def _command(self, name, *options, data=None):
-        more = [] if data is None else ["--data", _os.fspath(data)]
-        words = [_sys.executable, "-m", "morphcog", name, "--json", "--archive", str(self.path), *options, *more]
-        done = _subprocess.run([str(word) for word in words], capture_output=True, text=True)
-        if done.returncode != 0:
-            said = [_json.loads(line) for line in done.stdout.splitlines()]
-            errors = [event for event in said if event["event"] == "error"]
-            texts = [text for event in errors for text in (event["message"], event["hint"]) if text]
-            raise Error("; ".join(texts) or done.stderr.strip())
-
-    def _beside(self, name):
-        with open(self._data.beside(name), encoding="utf-8") as file:
-            return _table(file.read())
+        robot and change. quiet: says nothing of how far it is."""
+        with _Progress(quiet) as progress:
+            return _table_in(self._data.audit(str(robots), _path(data), progress))
 
     def __repr__(self):
         return f"Run({str(self.path)!r}, generations={self.generations})"
 
 
-def _table(text):
+def _restored_run(path, settings):
+    run = Run(path)
+    if run._data.settings() != settings:
+        raise Error(f"{path}: another run is there now than the one that was pickled; load it anew")
+    return run
+
+
+def _table(file):
     try:
         import pandas
     except ImportError:
         raise ImportError("tables need pandas: pip install pandas") from None
-    return pandas.read_csv(_io.StringIO(text), dtype={"id": str})
+    return pandas.read_csv(file, dtype={"id": str})
+
+
+def _table_in(path):
+    with open(path, encoding="utf-8") as file:
+        return _table(file)
 
 
 def load_run(folder):
-    """A run by its folder or its run.json; or one that ships with morphcog, as "gallery:zero_one"."""
+    """A run by its folder or its run.json; or one that ships with morphcog, as "gallery:zero_one-1"."""
     return Run(folder)
 
 
-def _value(value):
-    """A value of a config's key as text; numpy's numbers and arrays too."""
-    return value if isinstance(value, str) else _json.dumps(value, default=lambda other: _np.asarray(other).tolist())
-
-
 def evolve(
-    config, *, generations=None, seed=None, set=(), out=None, resume=False, force=False, data=None, threads=None
+    config,
+    *,
+    generations=None,
+    seed=None,
+    set=(),
+    out=None,
+    resume=False,
+    force=False,
+    data=None,
+    threads=None,
+    quiet=False,
 ):
     """Evolves an archive of robots, as `morphcog evolve`, and returns its Run.
 
-    config: a file or the name of a built-in config. set: a change of a key, as "map_elites.parents=10", several
-    of them, or a dict. out: run folder (default: runs/<config>-seed<seed>). resume: goes on with the run in the
-    folder. force: replaces it. Ctrl-C saves the run, which resume goes on with. Raises Error with what is wrong.
+    config: a Config, a file or the name of a built-in config. set: a change of a key, as
+    "map_elites.parents=10", several of them, or a dict. out: run folder (default: runs/<config>-seed<seed>).
+    resume: goes on with the run in the folder. force: replaces it. quiet: says nothing of how far it is. Ctrl-C
+    saves the run, which resume goes on with. Raises Error with what is wrong.
     """
-    if isinstance(set, str):
-        changes = [set]
-    elif isinstance(set, _Mapping):
-        changes = [f"{key}={_value(value)}" for key, value in set.items()]
-    else:
-        changes = list(set)
     if resume and force:
         raise Error("resume=True, force=True: expected one of them: resume goes on with a run, force replaces it")
+    changes = _changes(set)
     changes += [] if seed is None else [f"seed={seed}"]
     changes += [] if generations is None else [f"generations={generations}"]
-    path = lambda value: None if value is None else _os.fspath(value)
-    return Run(
-        _morphcog.evolve_run(_os.fspath(config), changes, path(out), resume, force, path(data), _threads(threads))
-    )
+    config, threads = Config(config, changes)._data, _threads(threads)
+    with _Progress(quiet) as progress:
+        folder = _morphcog.evolve_run(config, _path(out), bool(resume), bool(force), _path(data), threads, progress)
+    return Run(folder)
 
 
 def from_evogym(structure, *, driven=False):

@@ -1,6 +1,6 @@
 import os
 import pathlib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from typing import Any, Literal
 
 import numpy as np
@@ -8,6 +8,7 @@ import numpy.typing as npt
 import pandas as pd
 
 _Path = str | os.PathLike[str]
+_Changes = str | Iterable[str] | Mapping[str, Any]
 _Body = npt.NDArray[np.uint8]
 _Floats = npt.NDArray[np.float64]
 
@@ -17,9 +18,11 @@ class Error(Exception): ...
 class Unstable(Error): ...
 
 class Config:
-    def __new__(cls, config: _Path, set: Sequence[str] = ...) -> Config: ...
+    def __init__(self, config: Config | _Path, set: _Changes = ()) -> None: ...
     def to_toml(self) -> str: ...
     def to_json(self) -> str: ...
+    def __eq__(self, other: object) -> bool: ...
+    def __hash__(self) -> int: ...
 
 class Robot:
     id: str
@@ -47,8 +50,9 @@ class Run:
         images: int | Literal["all"] = 1000,
         split: Literal["test", "validation"] = "test",
         data: _Path | None = None,
+        quiet: bool = False,
     ) -> pd.DataFrame: ...
-    def audit(self, robots: str = "all", data: _Path | None = None) -> pd.DataFrame: ...
+    def audit(self, robots: str = "all", data: _Path | None = None, quiet: bool = False) -> pd.DataFrame: ...
 
 class World:
     def __init__(
@@ -68,19 +72,22 @@ class World:
     def voxels(self) -> npt.NDArray[np.uintp]: ...
     @property
     def centre(self) -> _Floats: ...
+    def __copy__(self) -> World: ...
+    def __deepcopy__(self, memo: object) -> World: ...
 
 def load_run(folder: _Path) -> Run: ...
 def evolve(
-    config: _Path,
+    config: Config | _Path,
     *,
     generations: int | None = None,
     seed: int | None = None,
-    set: str | Iterable[str] | Mapping[str, Any] = (),
+    set: _Changes = (),
     out: _Path | None = None,
     resume: bool = False,
     force: bool = False,
     data: _Path | None = None,
     threads: int | None = None,
+    quiet: bool = False,
 ) -> Run: ...
 def images(
     dataset: str = "builtin", split: Literal["train", "test"] = "train", data: _Path | None = None

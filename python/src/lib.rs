@@ -1,32 +1,45 @@
 //! The Python module `morphcog._morphcog`; what users import stands in `morphcog/__init__.py`.
 
 use exceptions::{Error as MorphcogError, Unstable};
-use morphcog::base::Grid;
 use morphcog::base::error::{Error, ErrorKind};
+use morphcog::base::hash::sha256_hex;
+use morphcog::base::observer::{Generation, Observer, Work};
 use morphcog::base::ranks::Ranks;
 use morphcog::base::stop::Stopped;
 use morphcog::base::threads::{MOST_THREADS, pool};
+use morphcog::base::{Grid, named};
 use morphcog::body::{Body, Material};
-use morphcog::commands::replay;
+use morphcog::commands::{audit, eval, one_by_one, replay};
 use morphcog::config;
-use morphcog::data::dataset::{Dataset, Split};
+use morphcog::config::audit::Criteria;
+use morphcog::data::dataset::{Dataset, DatasetError, Split};
 use morphcog::data::files::places;
-use morphcog::search::evolve;
+use morphcog::search::{evolve, showing};
 use morphcog::sim::{Physics, Start, System};
 use morphcog::store::folder::{self, IfExists};
+use morphcog::store::images::HeldOut;
+use morphcog::store::names::AUDIT_JSON;
+use morphcog::store::robots::Selection;
 use morphcog::store::run::RunFile;
+use morphcog::task::direction;
 use morphcog::task::evaluation::fresh_rollouts;
 use morphcog::task::protocol::{MAX_ROW, MAX_STEPS, Protocol, RolloutMode};
 use morphcog::task::stimulus::stimulus;
-use morphcog::view::html;
+use morphcog::view::progress::{Recent, count_line, generation_line};
+use morphcog::view::walk::Walk;
+use morphcog::view::{gif, html};
 use numpy::{PyArray1, PyArray2, PyArray3, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
-use pyo3::exceptions::PyRuntimeError;
+use pyo3::exceptions::{PyKeyboardInterrupt, PyMemoryError, PyRuntimeError};
 use pyo3::prelude::*;
+use pyo3::sync::MutexExt;
+use pyo3::types::PyBytes;
 use rayon::prelude::*;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, channel};
-use std::time::Duration;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
 
 /// Exceptions, named as Python shows them.
 mod exceptions {
@@ -36,6 +49,9 @@ mod exceptions {
     create_exception!(morphcog, Error, PyException, "What morphcog refuses or fails with, in its own words.");
     create_exception!(morphcog, Unstable, Error, "A simulation became unstable and ended.");
 }
+
+/// Width of a robot's picture in a notebook, pixels.
+const WIDTH: u32 = 480;
 
 /// Images and labels.
 type Labelled<'py> = (Bound<'py, PyArray3<u8>>, Bound<'py, PyArray1<u8>>);
@@ -49,7 +65,7 @@ const STEPS: u64 = 20;
 /// An error with what to do about it.
 fn raised(error: &Error) -> PyErr {
     let hint = error.hint.as_ref().map_or(String::new(), |hint| format!("; {hint}"));
-    let text = format!("{error}{hint}");
+    let text = as_keywords(&format!("{error}{hint}"));
     match error.kind {
         ErrorKind::Unstable => Unstable::new_err(text),
         _ => MorphcogError::new_err(text),
@@ -60,37 +76,192 @@ fn refused(text: impl Into<String>) -> PyErr {
     MorphcogError::new_err(text.into())
 }
 
+/// Options of the command line in an error as this module calls them; commands for a shell stay as
+/// they are.
+fn as_keywords(text: &str) -> String {
+    const KEYWORDS: [&str; 9] =
+        ["out", "data", "robots", "images", "split", "seed", "threads", "generations", "config"];
+    let mut out = String::new();
+    let mut is_of_command = false;
+    for word in text.split_inclusive(' ') {
+        let bare = word.trim_end();
+        let lead = bare.len() - bare.trim_start_matches(['`', '(']).len();
+        let (lead, inner) = bare.split_at(lead);
+        is_of_command |= inner == "morphcog";
+        let option = inner.strip_prefix("--").filter(|_| !is_of_command);
+        is_of_command &= !bare.ends_with([',', ';', ':', '`']);
+        let end = |option: &str| option.find(|c: char| !c.is_ascii_lowercase()).unwrap_or(option.len());
+        let keyword = match option.map(|option| option.split_at(end(option))) {
+            // The changes themselves say what they set.
+            Some(("set", "")) => continue,
+            Some((flag @ ("resume" | "force"), rest)) => format!("{flag}=True{rest}"),
+            Some((keyword, rest)) if KEYWORDS.contains(&keyword) => match rest {
+                rest if rest.starts_with([':', ')']) => format!("{keyword}{rest}"),
+                // At the beginning its value follows.
+                "" if out.is_empty() => {
+                    out += &format!("{keyword}=");
+                    continue;
+                }
+                rest => format!("{keyword}={rest}"),
+            },
+            _ => inner.to_string(),
+        };
+        out += &format!("{lead}{keyword}{}", &word[bare.len()..]);
+    }
+    out
+}
+
+fn no_memory(what: &str) -> PyErr {
+    PyMemoryError::new_err(format!("there is no memory for {what}"))
+}
+
+/// An empty list with room for so many numbers.
+fn room<T>(count: Option<usize>, what: &str) -> PyResult<Vec<T>> {
+    let mut list = Vec::new();
+    count.and_then(|count| list.try_reserve_exact(count).ok()).ok_or_else(|| no_memory(what))?;
+    Ok(list)
+}
+
+/// Whether Ctrl-C ends this work: in the main thread as Python says, in others if it is ending the
+/// main thread, which would wait for them.
+fn check_interrupt(py: Python) -> PyResult<()> {
+    py.check_signals()?;
+    match py.import("morphcog")?.getattr("_main_is_interrupted")?.call0()?.is_truthy()? {
+        true => Err(PyKeyboardInterrupt::new_err(())),
+        false => Ok(()),
+    }
+}
+
 /// Does `work` on a thread of its own, without Python's lock; Ctrl-C sets its flag.
 fn watched<T: Send>(py: Python, work: impl FnOnce(&AtomicBool) -> T + Send) -> PyResult<T> {
+    watched_and(py, |_| Ok(()), work)
+}
+
+/// The same, with `look` called from time to time on this thread; an error of it ends the work, too.
+fn watched_and<T: Send>(
+    py: Python,
+    mut look: impl FnMut(Python) -> PyResult<()>,
+    work: impl FnOnce(&AtomicBool) -> T + Send,
+) -> PyResult<T> {
+    check_interrupt(py)?;
     let stop = AtomicBool::new(false);
     let stop = &stop;
     std::thread::scope(|scope| {
         let (ended, wait) = channel::<()>();
-        let worker = scope.spawn(move || {
+        let worker = std::thread::Builder::new().spawn_scoped(scope, move || {
             let found = work(stop);
             drop(ended);
             found
         });
+        let worker = worker.map_err(|error| refused(format!("no threads: {error}")))?;
         let mut interrupted = None;
-        let wait = std::sync::Mutex::new(wait);
+        let wait = Mutex::new(wait);
         while py.detach(|| {
             let wait = wait.lock().expect("only this thread waits");
             matches!(wait.recv_timeout(WATCH), Err(RecvTimeoutError::Timeout))
         }) {
             if interrupted.is_none()
-                && let Err(error) = py.check_signals()
+                && let Err(error) = check_interrupt(py).and_then(|()| look(py))
             {
                 stop.store(true, Ordering::Relaxed);
                 interrupted = Some(error);
             }
         }
         let found = py.detach(|| worker.join());
+        if interrupted.is_none() {
+            interrupted = look(py).err();
+        }
         match (interrupted, found) {
             (_, Err(_)) => Err(PyRuntimeError::new_err("a bug of morphcog; what it said stands above")),
             (Some(error), _) => Err(error),
             (None, Ok(found)) => Ok(found),
         }
     })
+}
+
+/// What a command says while it works, for the thread that called it to pass on.
+struct Heard {
+    began: Instant,
+    said: Mutex<Said>,
+}
+
+#[derive(Default)]
+struct Said {
+    /// What is not passed on yet: what kind of words, and the words.
+    lines: Vec<(&'static str, String)>,
+    work: Option<(Work, Recent<u64>)>,
+    evolution: Option<Recent<Generation>>,
+}
+
+impl Said {
+    /// How far it is now; of two, the later one counts.
+    fn moved(&mut self, line: String) {
+        match self.lines.last_mut() {
+            Some((PROGRESS, last)) => *last = line,
+            _ => self.lines.push((PROGRESS, line)),
+        }
+    }
+}
+
+/// Kinds of words, as `morphcog/__init__.py` knows them.
+const PROGRESS: &str = "progress";
+const NOTE: &str = "note";
+const WARNING: &str = "warning";
+
+impl Heard {
+    fn new() -> Self {
+        Heard { began: Instant::now(), said: Mutex::default() }
+    }
+
+    fn said(&self) -> MutexGuard<'_, Said> {
+        self.said.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn seconds(&self) -> f64 {
+        self.began.elapsed().as_secs_f64()
+    }
+
+    /// Passes on what was said to a function of Python's.
+    fn pass_on(&self, listener: &Bound<PyAny>) -> PyResult<()> {
+        let lines = std::mem::take(&mut self.said().lines);
+        lines.into_iter().try_for_each(|(kind, text)| listener.call1((kind, text)).map(drop))
+    }
+}
+
+impl Observer for Heard {
+    fn note(&self, text: &str) {
+        self.said().lines.push((NOTE, text.to_string()));
+    }
+
+    fn begins(&self, work: &Work) {
+        let recent = Recent::new(self.seconds(), work.known);
+        self.said().work = Some((work.clone(), recent));
+    }
+
+    fn progress(&self, done: u64) {
+        let mut said = self.said();
+        let Some((work, recent)) = &mut said.work else { return };
+        let (seconds, before) = recent.since(self.seconds(), done, |done| *done);
+        let line = count_line(&work.label, [before, done, work.total], work.unit, seconds);
+        said.moved(line);
+    }
+
+    fn generation(&self, now: &Generation) {
+        let mut said = self.said();
+        let recent = said.evolution.get_or_insert(Recent::new(self.seconds(), *now));
+        let (seconds, before) = recent.since(self.seconds(), *now, |now| now.done);
+        let line = generation_line(now, &before, seconds);
+        said.moved(line);
+    }
+
+    fn warning(&self, text: &str) {
+        self.said().lines.push((WARNING, text.to_string()));
+    }
+}
+
+/// A value that Python gives as text.
+fn parsed<T: FromStr<Err: std::fmt::Display>>(keyword: &str, text: &str) -> PyResult<T> {
+    text.parse().map_err(|error| refused(format!("{keyword}={text}: {error}")))
 }
 
 /// A body from an array of materials.
@@ -136,30 +307,55 @@ fn seen(pixels: numpy::ndarray::ArrayView2<f64>, body: &Body) -> PyResult<Grid<f
     Ok(Grid::from_fn(height, width, |row, column| pixels[(row, column)]))
 }
 
-/// A config of a run.
-#[pyclass(frozen, module = "morphcog")]
-struct Config {
+/// A config of a run, and what runs of it are called; see `morphcog.Config`.
+#[pyclass(frozen, module = "morphcog._morphcog")]
+struct ConfigData {
     inner: config::Config,
+    name: String,
 }
 
 #[pymethods]
-impl Config {
+impl ConfigData {
     /// Reads a config file, or a built-in one by its name; `set` changes keys.
     #[new]
-    #[pyo3(signature = (config, set = Vec::new()))]
     fn new(config: PathBuf, set: Vec<String>) -> PyResult<Self> {
-        let name = config.to_string_lossy();
-        config::Config::load(&name, &set).map(|inner| Config { inner }).map_err(|error| raised(&error))
+        let source = config.to_string_lossy();
+        let inner = config::Config::load(&source, &set).map_err(|error| raised(&error))?;
+        Ok(ConfigData { inner, name: folder::name_of(&source) })
     }
 
-    /// The config as TOML, every key with its value.
+    /// Reads a config's text, as `to_toml` has it.
+    #[staticmethod]
+    fn parsed(toml: &str, name: String, set: Vec<String>) -> PyResult<Self> {
+        let inner = config::Config::parse(toml, &name, &set).map_err(|error| raised(&error))?;
+        Ok(ConfigData { inner, name })
+    }
+
+    #[getter]
+    fn name(&self) -> &str {
+        &self.name
+    }
+
     fn to_toml(&self) -> String {
         self.inner.to_toml()
     }
 
-    /// The config as JSON.
     fn to_json(&self) -> String {
         serde_json::to_string(&self.inner).expect("every field is a number, text, list or table")
+    }
+
+    /// What it is of, in a few words.
+    fn about(&self) -> String {
+        let config::Config { seed, generations, body, data, .. } = &self.inner;
+        let tasks = self.inner.grouping().expect("a config's groups are checked when it is read");
+        let tasks: Vec<String> = tasks.tasks().iter().map(|task| task.name()).collect();
+        let task = match &tasks[..] {
+            [one] => one.clone(),
+            [first, ..] => format!("{first} and {} more", tasks.len() - 1),
+            [] => "none".to_string(),
+        };
+        let (size, data) = (format!("{}×{}", body.height, body.width), &data.dataset);
+        format!("task={task}, data={data}, body={size}, generations={generations}, seed={seed}")
     }
 }
 
@@ -174,14 +370,28 @@ struct RunData {
 impl RunData {
     #[new]
     fn new(path: PathBuf) -> PyResult<Self> {
-        let path = folder::first_run(path).map_err(|text| raised(&Error::input(text)))?;
-        let run = RunFile::read(&path).map_err(|error| raised(&error))?;
-        Ok(RunData { run, path })
+        let of_name = path.display().to_string();
+        let paths = folder::run_json(path).map_err(|text| raised(&Error::input(text)))?;
+        let [path] = &paths[..] else {
+            let names: Vec<String> = paths.iter().map(|path| folder::archive(path)).collect();
+            let text = format!("{of_name}: expected one run, these are {}", names.len());
+            return Err(refused(format!("{text}: {}", names.join(", "))));
+        };
+        let run = RunFile::read(path).map_err(|error| raised(&error))?;
+        Ok(RunData { run, path: path.clone() })
     }
 
-    /// Where results of a name go if nothing is said.
-    fn beside(&self, name: &str) -> PathBuf {
-        folder::beside(&self.path, name)
+    /// The path of its run.json from everywhere, or its name.
+    fn absolute(&self) -> PyResult<PathBuf> {
+        match named::is_named(&self.path) {
+            true => Ok(self.path.clone()),
+            false => Ok(std::path::absolute(&self.path)?),
+        }
+    }
+
+    /// A hash of all settings that its robots depend on.
+    fn settings(&self) -> String {
+        sha256_hex(format!("{:?}", self.run.config.settings()).as_bytes())
     }
 
     #[getter]
@@ -190,8 +400,8 @@ impl RunData {
     }
 
     #[getter]
-    fn config(&self) -> Config {
-        Config { inner: self.run.config.clone() }
+    fn config(&self) -> ConfigData {
+        ConfigData { inner: self.run.config.clone(), name: self.run.name.clone() }
     }
 
     #[getter]
@@ -220,43 +430,157 @@ impl RunData {
     }
 
     /// A page on which the robot walks under its training images.
-    fn player(&self, py: Python, robot: String) -> PyResult<String> {
-        let options =
-            replay::Options { robot, archive: Some(self.path.clone()), ..replay::Options::default() };
-        let page = watched(py, |_| -> Result<String, Error> {
-            let replay = replay::replay(&options)?;
-            let title = format!("morphcog: robot {}", replay.name);
-            Ok(html::page(&replay.recording, &title, &replay.about)?)
+    fn page(&self, py: Python, robot: String) -> PyResult<String> {
+        self.shown(py, robot, |replay, title| Ok(html::page(&replay.recording, title, &replay.about)?))
+    }
+
+    /// A small page, and a picture of the last moment, a GIF.
+    fn small_page<'py>(&self, py: Python<'py>, robot: String) -> PyResult<(String, Bound<'py, PyBytes>)> {
+        let (page, still) = self.shown(py, robot, |replay, title| {
+            let walk = Walk::new(&replay.recording)?;
+            let still = gif::still(&walk, walk.len() - 1, WIDTH)?;
+            Ok((html::small_page(&replay.recording, title, &replay.about)?, still))
         })?;
-        page.map_err(|error| raised(&error))
+        Ok((page, PyBytes::new(py, &still)))
+    }
+
+    /// Tests robots, as `morphcog eval`; where the table is.
+    #[allow(clippy::too_many_arguments)] // Python's keywords
+    fn evaluate(
+        &self,
+        py: Python,
+        robots: &str,
+        images: &str,
+        split: &str,
+        data: Option<PathBuf>,
+        listener: &Bound<PyAny>,
+    ) -> PyResult<PathBuf> {
+        let split: HeldOut = parsed("split", split)?;
+        let options = eval::Options {
+            archives: vec![self.path.clone()],
+            robots: parsed("robots", robots)?,
+            images: parsed("images", images)?,
+            split,
+            validation: None,
+            seed: 1,
+            threshold: direction::THRESHOLD,
+            cycles: showing::CYCLES,
+            data,
+            dataset: None,
+            out: folder::beside(&self.path, eval::own_name(split)),
+            threads: None,
+            ranks: Ranks::ALONE,
+        };
+        let unwritten = heard(py, listener, |stop, observer| {
+            eval::eval(&options, stop, observer).map(|finished| finished.unwritten)
+        })?;
+        written(unwritten, &options.out)
+    }
+
+    /// Audits robots, as `morphcog audit`; where the table is.
+    fn audit(
+        &self,
+        py: Python,
+        robots: &str,
+        data: Option<PathBuf>,
+        listener: &Bound<PyAny>,
+    ) -> PyResult<PathBuf> {
+        let robots: Selection = parsed("robots", robots)?;
+        let out = folder::beside(&self.path, AUDIT_JSON);
+        let unwritten = heard(py, listener, |stop, observer| {
+            let robots = match robots.validated() {
+                None => robots,
+                Some(_) => {
+                    let search = one_by_one::Options {
+                        robots,
+                        archives: vec![self.path.clone()],
+                        physical_only: false,
+                        seed: 1,
+                        data: data.clone(),
+                    };
+                    let found = one_by_one::named(&search, stop, observer)?;
+                    Selection::Ids(found.into_iter().map(|named| named.robot).collect())
+                }
+            };
+            let options = audit::Options {
+                source: audit::Source::Archive(self.path.clone()),
+                robots,
+                seed: 1,
+                criteria: Criteria::default(),
+                data,
+                out: out.clone(),
+                threads: None,
+                ranks: Ranks::ALONE,
+            };
+            audit::audit(&options, stop, observer).map(|finished| finished.unwritten)
+        })?;
+        written(unwritten, &out)
     }
 }
 
-fn setting(config: Option<&Config>) -> (Physics, Protocol) {
+impl RunData {
+    /// What is made of a recording of a robot, which has the title of its page.
+    fn shown<T: Send>(
+        &self,
+        py: Python,
+        robot: String,
+        make: impl Fn(&replay::Replay, &str) -> Result<T, Error> + Sync,
+    ) -> PyResult<T> {
+        let options =
+            replay::Options { robot, archive: Some(self.path.clone()), ..replay::Options::default() };
+        let pool = pool(None).map_err(|error| raised(&error))?;
+        let made = watched(py, |_| {
+            pool.install(|| {
+                let replay = replay::replay(&options)?;
+                make(&replay, &format!("morphcog: robot {}", replay.name))
+            })
+        })?;
+        made.map_err(|error| raised(&error))
+    }
+}
+
+/// Does what a command does; what it says goes to a function of Python's.
+fn heard<T: Send>(
+    py: Python,
+    listener: &Bound<PyAny>,
+    work: impl FnOnce(&AtomicBool, &dyn Observer) -> Result<T, Error> + Send,
+) -> PyResult<T> {
+    let heard = Heard::new();
+    let found = watched_and(py, |_| heard.pass_on(listener), |stop| work(stop, &heard))?;
+    found.map_err(|error| raised(&error))
+}
+
+/// Where the table beside results is, if they could be written.
+fn written(unwritten: Option<Error>, out: &Path) -> PyResult<PathBuf> {
+    match unwritten {
+        Some(error) => Err(raised(&error)),
+        None => Ok(out.with_extension("csv")),
+    }
+}
+
+fn setting(config: Option<&ConfigData>) -> (Physics, Protocol) {
     match config {
         Some(config) => (config.inner.physics.clone(), config.inner.protocol.clone()),
         None => (Physics::default(), Protocol::default()),
     }
 }
 
-/// Evolves; see `morphcog.evolve`.
+/// Evolves; see `morphcog.evolve`. The run's folder.
 #[pyfunction]
-#[pyo3(signature = (config, set, out, resume, force, data, threads))]
+#[pyo3(signature = (config, out, resume, force, data, threads, listener))]
 #[allow(clippy::too_many_arguments)] // Python's keywords
 fn evolve_run(
     py: Python,
-    config: PathBuf,
-    set: Vec<String>,
+    config: &ConfigData,
     out: Option<PathBuf>,
     resume: bool,
     force: bool,
     data: Option<PathBuf>,
     threads: Option<usize>,
+    listener: &Bound<PyAny>,
 ) -> PyResult<PathBuf> {
-    let source = config.to_string_lossy().into_owned();
-    let config = config::Config::load(&source, &set).map_err(|error| raised(&error))?;
-    let name = folder::name_of(&source);
-    let out = out.unwrap_or_else(|| PathBuf::from("runs").join(format!("{name}-seed{}", config.seed)));
+    let (config, name) = (config.inner.clone(), config.name.clone());
+    let out = out.unwrap_or_else(|| Path::new(folder::RUNS).join(format!("{name}-seed{}", config.seed)));
     let if_exists = match (resume, force) {
         (true, _) => IfExists::Resume,
         (_, true) => IfExists::Overwrite,
@@ -264,22 +588,13 @@ fn evolve_run(
     };
     let ranks = Ranks::ALONE;
     let options = evolve::Options { config, name, out: out.clone(), if_exists, data, threads, ranks };
-    let finished = watched(py, |stop| evolve::evolve(&options, stop, &()))?;
-    let finished = finished.map_err(|error| match error.hint.as_deref() {
-        Some(hint) if hint.contains("--") => raised(&Error { hint: Some(as_keywords(hint)), ..error }),
-        _ => raised(&error),
+    let unwritten = heard(py, listener, |stop, observer| {
+        evolve::evolve(&options, stop, observer).map(|finished| finished.unwritten)
     })?;
-    match finished.unwritten {
+    match unwritten {
         Some(error) => Err(raised(&error)),
         None => Ok(out),
     }
-}
-
-/// Options in a hint as this module calls them.
-fn as_keywords(hint: &str) -> String {
-    [("--force", "force=True"), ("--resume", "resume=True"), ("--out", "out="), ("--data", "data=")]
-        .into_iter()
-        .fold(hint.to_string(), |hint, (option, keyword)| hint.replace(option, keyword))
 }
 
 /// Images as sensors see them; see `morphcog.stimuli`.
@@ -287,18 +602,28 @@ fn as_keywords(hint: &str) -> String {
 fn stimuli<'py>(
     py: Python<'py>,
     images: PyReadonlyArray3<u8>,
-    config: &Config,
+    config: &ConfigData,
 ) -> PyResult<Bound<'py, PyArray3<f64>>> {
     let config::BodyConfig { height, width, .. } = config.inner.body;
     let view = images.as_array();
     let (count, tall, wide) = view.dim();
-    let mut all = Vec::with_capacity(count * height * width);
-    for image in view.outer_iter() {
+    let seen = |number: usize| {
+        let image = view.index_axis(numpy::ndarray::Axis(0), number);
         let image = Grid::from_fn(tall, wide, |row, column| image[(row, column)]);
-        let seen = stimulus(&image, height, width, &config.inner.stimulus)
-            .map_err(|error| refused(format!("{}: {error}", error.key())))?;
-        all.extend_from_slice(seen.cells());
-    }
+        stimulus(&image, height, width, &config.inner.stimulus)
+            .map_err(|error| refused(format!("{}: {error}", error.key())))
+    };
+    let all = watched(py, |stop| -> PyResult<Vec<f64>> {
+        // Images that cannot be seen are refused before there is room for all.
+        if count > 0 {
+            seen(0)?;
+        }
+        let mut all = room(count.checked_mul(height * width), "the stimuli")?;
+        for number in (0..count).take_while(|_| !stop.load(Ordering::Relaxed)) {
+            all.extend_from_slice(seen(number)?.cells());
+        }
+        Ok(all)
+    })??;
     let array = numpy::ndarray::Array3::from_shape_vec((count, height, width), all).expect("as many as said");
     Ok(PyArray3::from_owned_array(py, array))
 }
@@ -317,15 +642,23 @@ fn images<'py>(
         other => return Err(refused(format!("split={other:?}: expected \"train\" or \"test\""))),
     };
     let places = places(data.as_deref(), std::env::var_os("MORPHCOG_DATA"), None);
-    let loaded = Dataset::load(dataset, &places, &[split]).map_err(|error| refused(error.to_string()))?;
-    let (mut pixels, mut labels, mut size) = (Vec::new(), Vec::new(), (0, 0));
-    for index in 0..loaded.len(split) {
-        let image = loaded.image(split, index).map_err(|error| refused(error.to_string()))?;
-        size = (image.height(), image.width());
-        pixels.extend_from_slice(image.cells());
-        labels.push(loaded.label(split, index).map_err(|error| refused(error.to_string()))?);
-    }
-    let pixels = numpy::ndarray::Array3::from_shape_vec((labels.len(), size.0, size.1), pixels);
+    let failed = |error: DatasetError| raised(&Error::input(error.to_string()));
+    let (pixels, labels, [height, width]) = watched(py, |stop| -> PyResult<_> {
+        let loaded = Dataset::load(dataset, &places, &[split]).map_err(failed)?;
+        let count = loaded.len(split);
+        let (mut pixels, mut labels, mut size) = (Vec::new(), room(Some(count), "the labels")?, [0, 0]);
+        for index in (0..count).take_while(|_| !stop.load(Ordering::Relaxed)) {
+            let image = loaded.image(split, index).map_err(failed)?;
+            if index == 0 {
+                size = [image.height(), image.width()];
+                pixels = room(image.area().checked_mul(count), "the images")?;
+            }
+            pixels.extend_from_slice(image.cells());
+            labels.push(loaded.label(split, index).map_err(failed)?);
+        }
+        Ok((pixels, labels, size))
+    })??;
+    let pixels = numpy::ndarray::Array3::from_shape_vec((labels.len(), height, width), pixels);
     Ok((PyArray3::from_owned_array(py, pixels.expect("images of one size")), PyArray1::from_vec(py, labels)))
 }
 
@@ -337,7 +670,7 @@ fn displacements<'py>(
     bodies: Vec<PyReadonlyArray2<u8>>,
     stimuli: PyReadonlyArray3<f64>,
     control_steps: Option<u32>,
-    config: Option<&Config>,
+    config: Option<&ConfigData>,
     threads: Option<usize>,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
     let bodies = bodies.iter().map(body).collect::<PyResult<Vec<Body>>>()?;
@@ -360,6 +693,12 @@ fn displacements<'py>(
         seen_by(0, place)?;
     }
     let shown_to_any = if bodies.is_empty() { 0 } else { shown };
+    if shown_to_any > 0 {
+        seen_by(0, 0)?;
+    }
+    // Asked for as a whole: what the images take one by one could not be refused.
+    drop(room::<(Grid<f64>, f64)>(Some(shown_to_any), "the stimuli")?);
+    drop(room::<f64>(Some(stimuli.len()), "the stimuli")?);
     let images = (0..shown_to_any).map(|number| seen_by(number, 0)).collect::<PyResult<Vec<Grid<f64>>>>()?;
     let pool = pool(threads).map_err(|error| raised(&error))?;
     let walked = watched(py, |stop| {
@@ -375,11 +714,16 @@ fn displacements<'py>(
     Ok(PyArray2::from_owned_array(py, array))
 }
 
-/// One simulation; see `morphcog.World`.
-#[pyclass(module = "morphcog._morphcog")]
+/// One simulation; see `morphcog.World`. Between two looks for Ctrl-C others may read or change it.
+#[pyclass(frozen, module = "morphcog._morphcog")]
 struct WorldData {
-    world: morphcog::sim::World,
+    simulation: Mutex<Simulation>,
     body: Body,
+}
+
+#[derive(Clone)]
+struct Simulation {
+    world: morphcog::sim::World,
     unstable: Option<String>,
 }
 
@@ -387,7 +731,11 @@ struct WorldData {
 impl WorldData {
     #[new]
     #[pyo3(signature = (voxels, start_row, config))]
-    fn new(voxels: PyReadonlyArray2<u8>, start_row: Option<u32>, config: Option<&Config>) -> PyResult<Self> {
+    fn new(
+        voxels: PyReadonlyArray2<u8>,
+        start_row: Option<u32>,
+        config: Option<&ConfigData>,
+    ) -> PyResult<Self> {
         let body = body(&voxels)?;
         let (physics, protocol) = setting(config);
         let (lowest, row) = (physics.ground_row, start_row.unwrap_or(protocol.start_row));
@@ -396,54 +744,58 @@ impl WorldData {
         }
         let start = Start { column: protocol.start_column, row };
         let world = morphcog::sim::World::new(System::new(&body, physics), start);
-        Ok(WorldData { world, body, unstable: None })
+        Ok(WorldData { simulation: Mutex::new(Simulation { world, unstable: None }), body })
     }
 
-    fn set_stimulus(&mut self, pixels: PyReadonlyArray2<f64>) -> PyResult<()> {
-        self.world.set_stimulus(&seen(pixels.as_array(), &self.body)?);
+    /// Another one that is as this one is now.
+    fn copied(&self, py: Python) -> Self {
+        WorldData { simulation: Mutex::new(self.simulation(py).clone()), body: self.body.clone() }
+    }
+
+    fn set_stimulus(&self, py: Python, pixels: PyReadonlyArray2<f64>) -> PyResult<()> {
+        let pixels = seen(pixels.as_array(), &self.body)?;
+        self.simulation(py).world.set_stimulus(&pixels);
         Ok(())
     }
 
-    fn step(&mut self, py: Python, count: u64) -> PyResult<()> {
-        if let Some(text) = &self.unstable {
-            return Err(Unstable::new_err(format!("{text}; begin anew with reset()")));
-        }
+    fn step(&self, py: Python, count: u64) -> PyResult<()> {
         // A part at a time, so that Ctrl-C is seen; a control step takes milliseconds at most.
         let mut left = count;
-        while left > 0 {
+        loop {
             let steps = left.min(STEPS);
-            let world = &mut self.world;
-            let stepped = py.detach(|| (0..steps).try_for_each(|_| world.step()));
-            if let Err(unstable) = stepped {
-                self.unstable = Some(unstable.to_string());
-                return Err(Unstable::new_err(unstable.to_string()));
-            }
-            py.check_signals()?;
+            py.detach(|| self.locked().step(steps)).map_err(Unstable::new_err)?;
             left -= steps;
+            if left == 0 {
+                return Ok(());
+            }
+            check_interrupt(py)?;
         }
-        Ok(())
     }
 
-    fn reset(&mut self) {
-        self.world.reset();
-        self.unstable = None;
+    fn reset(&self, py: Python) {
+        let mut simulation = self.simulation(py);
+        simulation.world.reset();
+        simulation.unstable = None;
     }
 
     #[getter]
-    fn control_step(&self) -> u64 {
-        self.world.control_step()
+    fn control_step(&self, py: Python) -> u64 {
+        self.simulation(py).world.control_step()
     }
 
     /// Centre of mass, voxel lengths.
     #[getter]
-    fn centre(&self) -> [f64; 2] {
-        self.lengths(self.world.centre_of_mass())
+    fn centre(&self, py: Python) -> [f64; 2] {
+        let simulation = self.simulation(py);
+        simulation.lengths(simulation.world.centre_of_mass())
     }
 
     /// Points, voxel lengths.
     #[getter]
     fn points<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
-        let places: Vec<f64> = self.world.points().flat_map(|place| self.lengths(place)).collect();
+        let simulation = self.simulation(py);
+        let places: Vec<f64> =
+            simulation.world.points().flat_map(|place| simulation.lengths(place)).collect();
         let array = numpy::ndarray::Array2::from_shape_vec((places.len() / 2, 2), places);
         PyArray2::from_owned_array(py, array.expect("two coordinates a point"))
     }
@@ -451,13 +803,35 @@ impl WorldData {
     /// Corners of every voxel as indices into the points, clockwise from the top left.
     #[getter]
     fn voxels<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<usize>> {
-        let corners: Vec<usize> = self.world.voxels().flat_map(|(_, corners)| corners).collect();
+        let corners: Vec<usize> =
+            self.simulation(py).world.voxels().flat_map(|(_, corners)| corners).collect();
         let array = numpy::ndarray::Array2::from_shape_vec((corners.len() / 4, 4), corners);
         PyArray2::from_owned_array(py, array.expect("four corners a voxel"))
     }
 }
 
 impl WorldData {
+    /// The simulation, without waiting for a thread that needs Python's lock.
+    fn simulation(&self, py: Python) -> MutexGuard<'_, Simulation> {
+        self.simulation.lock_py_attached(py).unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn locked(&self) -> MutexGuard<'_, Simulation> {
+        self.simulation.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Simulation {
+    /// Control steps; why it is unstable, if it is.
+    fn step(&mut self, count: u64) -> Result<(), String> {
+        if let Some(text) = &self.unstable {
+            return Err(format!("{text}; begin anew with reset()"));
+        }
+        let stepped = (0..count).try_for_each(|_| self.world.step()).map_err(|error| error.to_string());
+        self.unstable = stepped.clone().err();
+        stepped
+    }
+
     /// A place in voxel lengths, y from the ground.
     fn lengths(&self, [x, y]: [f64; 2]) -> [f64; 2] {
         let physics = self.world.system().physics();
@@ -482,7 +856,7 @@ fn _morphcog(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("MAX_ROW", MAX_ROW)?;
     module.add("Error", py.get_type::<MorphcogError>())?;
     module.add("Unstable", py.get_type::<Unstable>())?;
-    module.add_class::<Config>()?;
+    module.add_class::<ConfigData>()?;
     module.add_class::<RunData>()?;
     module.add_class::<WorldData>()?;
     module.add_function(wrap_pyfunction!(evolve_run, module)?)?;

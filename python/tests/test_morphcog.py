@@ -1,13 +1,17 @@
 """The module's contract: shapes, units, the same bits as the command, clear refusals, Ctrl-C."""
 
+import copy
 import json
 import os
+import pathlib
 import pickle
+import re
 import signal
 import subprocess
 import sys
 import threading
 import time
+import warnings
 
 import morphcog as mc
 import numpy as np
@@ -33,7 +37,7 @@ def test_a_run_is_a_table_and_its_robots_are_arrays(run):
     row = elites[elites.id == robot.id].filter(regex="^solution_").to_numpy()[0]
     assert np.array_equal(row.reshape(robot.body.shape), robot.body)
     assert run[robot.id[:6]].id == robot.id
-    assert "<iframe" in robot._repr_html_() and robot.id in robot.page()
+    assert robot.id in robot.page()
 
 
 def test_displacements_are_those_of_the_command(run):
@@ -106,6 +110,7 @@ def test_a_controller_can_drive_every_sensor_at_every_step():
         (lambda: mc.displacements([[1, 2]], np.zeros((1, 1, 2))), ["body 0", "shape (2,)"]),
         (lambda: mc.displacements([[[1.0]]], np.zeros((1, 1, 1))), ["float64"]),
         (lambda: mc.displacements([[[-1]]], np.zeros((1, 1, 1))), ["-1"]),
+        (lambda: mc.displacements([[[True]]], np.zeros((1, 1, 1))), ["materials 0 to 6", "bool"]),
         (lambda: mc.displacements([SENSOR], np.zeros((2, 2))), ["shape (2, 2)", "(images, rows, columns)"]),
         (lambda: mc.displacements([SENSOR], np.zeros((1, 3, 3))), ["2 × 3 pixels", "3 × 3"]),
         (lambda: mc.displacements([SENSOR], np.full((1, 2, 3), 255.0)), ["from 0 to 1", "255"]),
@@ -122,13 +127,22 @@ def test_a_controller_can_drive_every_sensor_at_every_step():
         (lambda: mc.evolve("quickstart.toml", resume=True, force=True), ["resume", "force"]),
         (lambda: mc.from_evogym([[4, 3]]), ["vertical actuator"]),
         (lambda: mc.from_evogym([[5]]), ["0 to 3"]),
-        (lambda: mc.stimuli(np.zeros((1, 28, 28)), "zero_one.toml"), ["whole numbers", "float64"]),
+        (lambda: mc.stimuli(np.zeros((1, 28, 28)), "zero_one.toml"), ["whole numbers", "float64", "(255 * images)"]),
+        (lambda: mc.stimuli(np.full((1, 28, 28), 256), "zero_one.toml"), ["0 to 255", "256"]),
+        (lambda: mc.stimuli(np.zeros((2**58, 28, 0), np.uint8), "zero_one.toml"), ["28 x 0 pixels"]),
+        (lambda: mc.displacements([SENSOR], np.zeros((2**58, 2, 0))), ["2 × 3 pixels"]),
         (lambda: mc.stimuli(np.zeros((1, 30, 30), np.uint8), "zero_one.toml"), ["do not divide"]),
         (lambda: mc.load_run("nowhere"), ["nowhere"]),
         (lambda: mc.evolve("nothing.toml"), ["no built-in config"]),
         (lambda: mc.evolve("quickstart.toml", set={"map_elites.parents": 0}), ["map_elites.parents"]),
         (lambda: mc.evolve("quickstart.toml", set="map_elites.parents=0"), ["map_elites.parents = 0"]),
         (lambda: mc.evolve("quickstart.toml", set=["map_elites.parents"]), ["map_elites.parents", "key=value"]),
+        (lambda: mc.evolve("quickstart.toml", set=[3]), ["set:", "dict"]),
+        (lambda: mc.Config("quickstart.toml", {"body": {"hight": 3}}), ["body.hight=3", "unknown field"]),
+        (lambda: mc.load_run("gallery:team"), ["expected one run, these are 45: gallery:team-0v1, "]),
+        (lambda: mc.load_run("gallery:zero_one-1").evaluate("first:3"), ["robots=first:3: expected all, top:N"]),
+        (lambda: mc.load_run("gallery:zero_one-1").evaluate(images="many"), ["images=many"]),
+        (lambda: mc.load_run("gallery:zero_one-1").evaluate(split="train"), ["split=train: expected test or validation"]),
         (lambda: mc.images("builtin", "validation"), ['expected "train" or "test"']),
         (lambda: mc.images("nowhere", data="no-folder"), ["no-folder"]),
     ],
@@ -138,12 +152,281 @@ def test_what_cannot_be_is_refused_with_what_was_expected(call, words):
         call()
     for word in words:
         assert word in str(error.value)
+    # Words of the command line mean nothing here.
+    assert not re.search("--[a-z]", str(error.value))
 
 
 def test_an_error_has_the_name_that_it_is_caught_by():
     for error in [mc.Error, mc.Unstable]:
         assert error is getattr(mc, error.__name__) and error.__module__ == "morphcog"
         assert str(pickle.loads(pickle.dumps(error("what")))) == "what"
+
+
+def test_configs_are_equal_if_their_keys_are_and_say_what_they_are_of():
+    config = mc.Config("quickstart.toml")
+    other = mc.Config(config, {"seed": 2})
+    assert config == mc.Config("quickstart") and config != other and config != "quickstart.toml"
+    assert len({config, other, mc.Config(other, "seed=1")}) == 2
+    assert repr(other) == "Config(quickstart, task=0|1, data=builtin, body=7×7, generations=200, seed=2)"
+    assert "and 6 more" in repr(mc.Config("four_digit.toml"))
+
+
+def test_configs_runs_and_robots_can_be_pickled(run, tmp_path, monkeypatch):
+    config = mc.Config("quickstart.toml", {"physics.time_step": 1 / 3e4})
+    assert pickle.loads(pickle.dumps(config)) == config == copy.deepcopy(config)
+    monkeypatch.chdir(os.path.dirname(run.path))
+    here = mc.load_run(".")
+    monkeypatch.chdir(tmp_path)
+    robot = pickle.loads(pickle.dumps(here["best"]))
+    best = run["best"]
+    assert (robot.id, robot.run.config) == (best.id, run.config) and np.array_equal(robot.body, best.body)
+    shipped = mc.load_run("gallery:zero_one-1")
+    assert repr(pickle.loads(pickle.dumps(shipped))) == repr(shipped)
+    # Another run in the same place is not taken for it.
+    place = tmp_path / "place"
+    pickled = pickle.dumps(mc.evolve("quickstart.toml", generations=1, out=place, quiet=True))
+    mc.evolve("quickstart.toml", generations=1, seed=2, out=place, force=True, quiet=True)
+    with pytest.raises(mc.Error, match="another run"):
+        pickle.loads(pickled)
+
+
+def test_a_pool_of_processes_takes_robots_and_configs(run):
+    joblib = pytest.importorskip("joblib")
+    x = np.zeros((1, *run["best"].body.shape))
+    jobs = [joblib.delayed(mc.displacements)([run["best"].body], x, control_steps=50, config=run.config)]
+    jobs += [joblib.delayed(mc.Robot.displacements)(run["best"], x, control_steps=50)]
+    one, other = joblib.Parallel(n_jobs=2)(jobs)
+    assert np.array_equal(one[0], other)
+
+
+def test_a_copy_of_a_world_goes_on_by_itself():
+    world = mc.World(SENSOR)
+    world.stimulus = np.ones((2, 3))
+    world.step(30)
+    for copied in [copy.copy(world), copy.deepcopy(world)]:
+        assert np.array_equal(copied.points, world.points)
+        before = world.points
+        copied.step(30)
+        assert np.array_equal(world.points, before)
+    world.step(30)
+    assert np.array_equal(copied.points, world.points)
+    with pytest.raises(TypeError, match="cannot be pickled: pickle its body and config"):
+        pickle.dumps(world)
+
+
+def test_images_of_bool_are_black_and_white_and_whole_numbers_may_have_any_type():
+    images = np.arange(2 * 28 * 28).reshape(2, 28, 28) % 3 == 0
+    full = mc.stimuli(images, "zero_one.toml")
+    assert full.max() == 1 and np.array_equal(full, mc.stimuli(255 * images.astype(np.uint8), "zero_one.toml"))
+    for kind in [np.int64, np.uint16, np.int8]:
+        bright = (100 * images).astype(kind)
+        assert np.array_equal(mc.stimuli(bright, "zero_one.toml"), mc.stimuli(bright.astype(np.uint8), "zero_one.toml"))
+    with pytest.warns(UserWarning, match="1 of 255"):
+        mc.stimuli(images.astype(int), "zero_one.toml")
+
+
+def test_everything_that_takes_a_config_takes_all_its_forms(tmp_path, monkeypatch):
+    monkeypatch.setenv("HOME", str(tmp_path))
+    file = tmp_path / "own.toml"
+    file.write_text(mc.Config("quickstart.toml", ["seed=5"]).to_toml())
+    pixels, x = np.zeros((1, 28, 28), np.uint8), np.zeros((1, 4, 6))
+    forms = [mc.Config(file), file, str(file), "~/own.toml", pathlib.Path("~/own.toml")]
+    for number, form in enumerate(forms):
+        assert mc.Config(form) == forms[0]
+        assert mc.stimuli(pixels, form).shape == (1, 7, 7)
+        assert mc.displacements([WALKER], x, config=form, control_steps=1).shape == (1, 1)
+        mc.World(WALKER, config=form).step()
+        run = mc.evolve(form, generations=1, out=f"~/runs/{number}", quiet=True)
+        assert run.path == tmp_path / "runs" / str(number) / "run.json"
+        assert mc.load_run(f"~/runs/{number}").config == run.config == mc.Config(form, {"generations": 1})
+    with pytest.raises(mc.Error, match=re.escape(str(tmp_path / "nowhere"))):
+        mc.images("mnist", data="~/nowhere")
+    with pytest.raises(mc.Error, match=re.escape(str(tmp_path / "nowhere"))):
+        mc.load_run("gallery:zero_one-1").evaluate(data="~/nowhere")
+
+
+def test_changes_of_keys_are_text_several_or_a_dict():
+    made = [
+        mc.Config("quickstart.toml", changes)
+        for changes in [
+            ["body.height=5", "body.width=6", "data.dir=/a b"],
+            {"body.height": 5, "body": {"width": np.int64(6)}, "data.dir": pathlib.Path("/a b")},
+            {"body": {"height": 5, "width": 6}, "data": {"dir": "/a b"}},
+        ]
+    ]
+    assert made[0] == made[1] == made[2] == mc.Config(made[0], "seed=1")
+    assert mc.Config(made[0], {"data.dir": None}) == mc.Config("quickstart.toml", {"body": {"height": 5, "width": 6}})
+    assert mc.Config("quickstart.toml", "seed=7") == mc.Config("quickstart.toml", {"seed": 7})
+
+
+def test_errors_call_options_as_this_module_does(run, tmp_path):
+    with pytest.raises(mc.Error, match="^map_elites.parents=0: map_elites.parents = 0: expected 1 or more"):
+        mc.evolve("quickstart.toml", set={"map_elites.parents": 0})
+    with pytest.raises(mc.Error) as error:
+        mc.images("mnist", data=tmp_path)
+    assert "data=" in str(error.value) and "morphcog data fetch mnist --to" in str(error.value)
+
+
+def test_evolve_says_how_far_it_is_unless_it_is_quiet(tmp_path, capsys, monkeypatch):
+    mc.evolve("quickstart.toml", generations=2, out=tmp_path / "said")
+    said = capsys.readouterr()
+    assert re.search(r"evolving in .*said; .*\n(.*\n)?generation 2/2 · best .* evaluations/s\n$", said.err), said.err
+    assert said.out == ""
+    mc.evolve("quickstart.toml", generations=2, out=tmp_path / "quiet", quiet=True).evaluate(images=4, quiet=True)
+    assert capsys.readouterr() == ("", "")
+    mc.load_run(tmp_path / "said").evaluate(images=4)
+    assert "rollouts" in capsys.readouterr().err
+    # In a terminal it is one line that changes.
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True, raising=False)
+    progress = mc._Progress(quiet=False)
+    progress._least = 0
+    with progress:
+        progress("progress", "a long line")
+        progress("progress", "short")
+        progress("note", "a note")
+        progress("progress", "end")
+    assert capsys.readouterr().err == "a long line\rshort      \ra note\nend\n"
+    with pytest.warns(UserWarning, match="careful"):
+        mc._Progress(quiet=True)("warning", "careful")
+
+
+@pytest.mark.skipif(not hasattr(os, "killpg"), reason="signals of Unix")
+@pytest.mark.parametrize("call", ["evaluate(images=100_000)", "audit()"])
+def test_sigterm_leaves_no_process_that_goes_on(run, call):
+    code = f"import sys, morphcog as mc; run = mc.load_run(sys.argv[1]); print('begins', flush=True); run.{call}"
+    # All of them are in a group of their own.
+    child = subprocess.Popen(
+        [sys.executable, "-c", code, str(run.path)], stdout=subprocess.PIPE, text=True, start_new_session=True
+    )
+    assert child.stdout.readline() == "begins\n"
+    time.sleep(0.3)
+    child.terminate()
+    child.wait(timeout=20)
+    with pytest.raises(ProcessLookupError):
+        os.killpg(child.pid, 0)
+
+
+def test_a_launcher_of_mpi_is_no_obstacle(run, monkeypatch):
+    monkeypatch.setenv("OMPI_COMM_WORLD_SIZE", "2")
+    assert len(run.evaluate("best", images=4, quiet=True)) == 1
+    assert run.audit("best", quiet=True).id[0] == run["best"].id
+
+
+def test_a_signal_handler_may_read_a_world_that_steps():
+    code = """
+import signal, numpy as np, morphcog as mc
+body = np.full((14, 14), 3, np.uint8); body[:7] = 4
+world = mc.World(body)
+seen = []
+signal.signal(signal.SIGALRM, lambda *_: seen.append((world.control_step, world.points.shape, repr(world))))
+signal.setitimer(signal.ITIMER_REAL, 0.05)
+while not seen:
+    world.step(200)
+print(seen[0][1])
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
+    assert (done.stdout, done.stderr) == ("(225, 2)\n", "")
+
+
+def test_the_first_ctrl_c_ends_threads_that_simulate():
+    code = """
+import signal, sys, numpy as np, morphcog as mc
+from concurrent.futures import ThreadPoolExecutor
+from threading import Thread
+signal.signal(signal.SIGINT, signal.default_int_handler)
+body = np.full((14, 14), 3, np.uint8); body[:7] = 4
+work = lambda *_: mc.displacements([body] * 4000, np.zeros((1, 14, 14)), threads=1)
+def pool():
+    with ThreadPoolExecutor(2) as executor:
+        print("begins", flush=True)
+        list(executor.map(work, range(100)))
+def thread():
+    thread = Thread(target=lambda: mc.World(body).step(10**9))
+    thread.start()
+    print("begins", flush=True)
+    thread.join()
+{"pool": pool, "thread": thread}[sys.argv[1]]()
+"""
+    for kind in ["pool", "thread"]:
+        child = subprocess.Popen(
+            [sys.executable, "-c", code, kind], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
+        )
+        assert child.stdout.readline() == "begins\n"
+        time.sleep(1)
+        child.send_signal(signal.SIGINT)
+        assert child.wait(timeout=5) == -signal.SIGINT
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="limits of Linux")
+def test_too_little_memory_is_a_memory_error():
+    code = """
+import resource, numpy as np, morphcog as mc
+config = mc.Config("zero_one.toml")
+images = np.zeros((400_000, 28, 28), np.uint8)
+x = np.broadcast_to(np.zeros((1, 64, 64)), (20_000, 64, 64)).copy()
+resource.setrlimit(resource.RLIMIT_AS, (1_500_000_000,) * 2)
+for call in [lambda: mc.stimuli(images, config), lambda: mc.displacements([np.full((64, 64), 3)], x)]:
+    try:
+        call()
+    except MemoryError as error:
+        print(error)
+print(mc.stimuli(images[:1], config).shape)
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
+    assert done.stdout == 2 * "there is no memory for the stimuli\n" + "(1, 14, 14)\n", done.stderr
+
+
+def test_stimuli_and_images_see_ctrl_c():
+    code = """
+import signal, sys, time, numpy as np, morphcog as mc
+signal.signal(signal.SIGINT, signal.default_int_handler)
+signal.signal(signal.SIGALRM, signal.default_int_handler)
+config = mc.Config("zero_one.toml", ["stimulus.reduction=area", "body.height=13"])
+images = np.zeros((100_000, 28, 28), np.uint8)
+mc.stimuli(images[:1], config)
+signal.setitimer(signal.ITIMER_REAL, 0.2)
+begun = time.time()
+try:
+    mc.stimuli(images, config) if sys.argv[1] == "stimuli" else mc.images("builtin")
+except KeyboardInterrupt:
+    print(time.time() - begun)
+"""
+    for call in ["stimuli", "images"]:
+        done = subprocess.run([sys.executable, "-c", code, call], capture_output=True, text=True, timeout=60)
+        assert 0.2 <= float(done.stdout) < 0.5, call
+
+
+def test_a_thread_that_cannot_be_started_is_an_error():
+    # Root may start as many as it likes: a stack that no address space holds stands for the limit.
+    code = """
+import numpy as np, morphcog as mc
+try:
+    mc.stimuli(np.zeros((1, 28, 28), np.uint8), "zero_one.toml")
+except mc.Error as error:
+    print(error)
+"""
+    env = {**os.environ, "RUST_MIN_STACK": str(2**50)}
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, env=env)
+    assert done.stdout.startswith("no threads: "), done.stderr
+
+
+def test_a_notebook_shows_a_robot_small_and_with_a_picture(run):
+    shown = run["best"]._repr_html_()
+    picture, page = re.search(r'<img src="data:image/gif;base64,([^"]+)" alt="Robot.*<iframe srcdoc="([^"]+)"', shown).groups()
+    assert len(shown) < 150_000 and len(picture) > 4000 and run["best"].id in page
+
+
+def test_a_robot_of_the_usual_size_is_shown_in_less_than_150_kilobytes(tmp_path):
+    shipped = mc.load_run("gallery:zero_one-1")
+    changes = {"generations": 1, "data": {"dataset": "builtin", "train_images": None, "images_per_class": 1}}
+    run = mc.evolve(mc.Config(shipped.config, changes), out=tmp_path / "run", quiet=True)
+    assert len(run["best"]._repr_html_()) < 150_000
+
+
+def test_a_robot_whose_images_are_not_there_is_shown_with_the_reason(tmp_path, monkeypatch):
+    monkeypatch.setenv("MORPHCOG_DATA", str(tmp_path))
+    shown = mc.load_run("gallery:zero_one-1")["best"]._repr_html_()
+    assert shown.startswith("<pre>Robot(") and str(tmp_path) in shown
 
 
 def test_the_stimulus_of_a_world_changes_as_a_whole_only():
@@ -254,7 +537,7 @@ def test_sigint_stops_the_command_and_the_run_goes_on(tmp_path):
 
 
 def test_runs_that_ship_with_morphcog_are_loaded_by_name():
-    run = mc.load_run("gallery:zero_one")
+    run = mc.load_run("gallery:zero_one-1")
     assert run["best"].task == "0|1" and len(run.elites) == 1
-    with pytest.raises(mc.Error, match="gallery:zero_one"):
+    with pytest.raises(mc.Error, match="gallery:zero_one-1"):
         mc.load_run("gallery:nobody")

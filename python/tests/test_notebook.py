@@ -14,7 +14,9 @@ def said(notebook):
     texts = []
     for cell in notebook.cells:
         outputs = cell.outputs if cell.cell_type == "code" else []
-        streams = ["".join(output.text) for output in outputs if output.output_type == "stream"]
+        streams = [output for output in outputs if output.output_type == "stream"]
+        # How fast it went is on stderr.
+        streams = ["".join(output.text) for output in streams if output.name == "stdout"]
         results = [output.data.get("text/plain", "") for output in outputs if output.output_type == "execute_result"]
         texts.append("".join([*streams, *results]))
     return texts

@@ -244,6 +244,26 @@ Examples:
     },
 }
 
+impl Command {
+    /// Whether it takes so long that several processes may be meant to share it.
+    pub(super) fn is_long(&self) -> bool {
+        matches!(
+            self,
+            Command::Demo(_)
+                | Command::Evolve(_)
+                | Command::Response(_)
+                | Command::Train(_)
+                | Command::Eval(_)
+                | Command::Team(_)
+                | Command::Audit(_)
+                | Command::Capacity(_)
+                | Command::Report(_)
+                | Command::Sweep(_)
+                | Command::Reproduce(_)
+        )
+    }
+}
+
 #[derive(Debug, Args)]
 pub(super) struct EvolveArgs {
     /// Config file (TOML or JSON), or the name of a built-in one (see morphcog config).

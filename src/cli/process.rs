@@ -40,7 +40,11 @@ pub fn main(arguments: impl IntoIterator<Item = OsString>) -> u8 {
         Ok(cli) => cli,
         Err(help) => return say(&help, &arguments),
     };
-    let joined = Ranks::join();
+    // A program that MPI started may call others that have nothing to do with it.
+    let joined = match cli.command.is_long() {
+        true => Ranks::join().map(|(ranks, guard)| (ranks, Some(guard))),
+        false => Ok((Ranks::ALONE, None)),
+    };
     let (ranks, _guard) = match joined {
         Ok(joined) => joined,
         Err(error) => {

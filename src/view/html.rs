@@ -2,7 +2,7 @@
 //!
 //! Positions are embedded as 16-bit numbers, in steps of 1/200 voxel length from an origin per
 //! frame (near the centre of mass, in 64-bit floats): exact within 0.0025 voxel lengths however far
-//! the robot walks.
+//! the robot walks. Small pages are coarser and keep some moments of the walk only.
 
 use crate::body::{Body, Material};
 use crate::task::direction::THRESHOLD;
@@ -22,6 +22,11 @@ const TEMPLATE: &str = include_str!("replay.html");
 const SCRIPT: &str = concat!(include_str!("drawing.js"), include_str!("replay.js"));
 /// Steps of a position per voxel length.
 pub(crate) const STEPS: f64 = 200.0;
+/// The same in small pages, which show a voxel some twenty pixels wide.
+const COARSE_STEPS: f64 = 50.0;
+/// Most coordinates in a small page, about: ten moments a cycle of a body of 14 × 14 voxels under
+/// two images.
+const SMALL: usize = 100_000;
 /// The number for a position that is not finite or more than 163 voxel lengths from the frame's
 /// origin.
 const NOWHERE: i16 = i16::MIN;
@@ -52,6 +57,31 @@ pub fn page(
     metadata: &[(String, String)],
 ) -> Result<String, PictureError> {
     let walk = Walk::new(recording)?;
+    let rollout = rollout(&walk, MOST_BYTES).to_string();
+    // In a script element only "<" could end it or open another.
+    Ok(filled(recording, title, metadata, &rollout.replace('<', "\\u003c")))
+}
+
+/// The page as text, small enough for a notebook that shows many robots: with some moments of the
+/// walk, between which its script moves points on straight lines.
+///
+/// # Errors
+/// [`PictureError`] if the recording cannot be drawn.
+pub fn small_page(
+    recording: &Recording,
+    title: &str,
+    metadata: &[(String, String)],
+) -> Result<String, PictureError> {
+    let walk = Walk::new(recording)?;
+    let coordinates = walk.len() * 2 * points(recording);
+    let (mut rollout, positions) = moments(&walk, coordinates.div_ceil(SMALL).max(1), COARSE_STEPS);
+    rollout["positions"] = packed_bytes(&differences(&positions, 2 * points(recording)))?.into();
+    rollout["small"] = true.into();
+    Ok(filled(recording, title, metadata, &pack(&rollout)?))
+}
+
+/// The template with a recording in it: as JSON, or packed.
+fn filled(recording: &Recording, title: &str, metadata: &[(String, String)], rollout: &str) -> String {
     let rows = metadata.iter().map(|(key, value)| {
         format!("<tr><th scope=\"row\">{}</th><td>{}</td></tr>\n", escape(key), escape(value))
     });
@@ -60,8 +90,7 @@ pub fn page(
     } else {
         ""
     };
-    let rollout = rollout(&walk, MOST_BYTES).to_string();
-    Ok(fill(
+    fill(
         TEMPLATE,
         &[
             ("title", &escape(title)),
@@ -69,10 +98,9 @@ pub fn page(
             ("script", SCRIPT),
             ("metadata", &rows.collect::<String>()),
             ("warning", warning),
-            // In a script element only "<" could end it or open another.
-            ("rollout", &rollout.replace('<', "\\u003c")),
+            ("rollout", rollout),
         ],
-    ))
+    )
 }
 
 /// A page in which `rollout` stands where its recording belongs.
@@ -103,24 +131,53 @@ pub(super) fn packed(walk: &Walk, most: usize) -> Result<String, PictureError> {
 /// # Errors
 /// [`PictureError::Encode`] if it cannot be packed.
 pub(super) fn pack(value: &Value) -> Result<String, PictureError> {
+    packed_bytes(value.to_string().as_bytes())
+}
+
+fn packed_bytes(bytes: &[u8]) -> Result<String, PictureError> {
     let failed = |error: std::io::Error| PictureError::Encode(error.to_string());
     let mut packer = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::best());
-    packer.write_all(value.to_string().as_bytes()).map_err(failed)?;
+    packer.write_all(bytes).map_err(failed)?;
     Ok(BASE64.encode(packer.finish().map_err(failed)?))
+}
+
+/// Positions of moments as their differences to the moment before, coordinate by coordinate: all
+/// low bytes, then all high ones, which pack best.
+fn differences(positions: &[i16], width: usize) -> Vec<u8> {
+    let of_coordinate = |coordinate: usize| {
+        let own = positions.iter().skip(coordinate).step_by(width.max(1));
+        own.scan(0_i16, |before, &now| Some(now.wrapping_sub(std::mem::replace(before, now))))
+    };
+    let words: Vec<[u8; 2]> = (0..width).flat_map(of_coordinate).map(i16::to_le_bytes).collect();
+    [0, 1].into_iter().flat_map(|byte| words.iter().map(move |word| word[byte])).collect()
+}
+
+/// Points of every frame.
+fn points(recording: &Recording) -> usize {
+    recording.frames.iter().map(|f| f.points.len()).min().unwrap_or(0)
 }
 
 /// The recording as the page's script reads it; `most`: bytes of positions, of which there are
 /// fewer for longer rollouts.
 fn rollout(walk: &Walk, most: usize) -> Value {
+    let every = (walk.len() * points(walk.recording()) * 4).div_ceil(most.max(1)).max(1);
+    let (mut rollout, positions) = moments(walk, every, STEPS);
+    rollout["positions"] = BASE64.encode(bytes(positions.into_iter().map(i16::to_le_bytes))).into();
+    rollout
+}
+
+/// Every so many frames of each phase and its last one: all but the positions, and these, in steps
+/// of a voxel length's `unit`th from the origin of their frame.
+fn moments(walk: &Walk, every: usize, unit: f64) -> (Value, Vec<i16>) {
     let recording = walk.recording();
-    let points = recording.frames.iter().map(|f| f.points.len()).min().unwrap_or(0);
-    let every = (walk.len() * points * 4).div_ceil(most.max(1)).max(1);
+    let points = points(recording);
     let shown = gif::shown(walk, every);
     let origins: Vec<[f64; 2]> =
         shown.iter().map(|f| walk.centre(*f).map(|v| (v * STEPS).round() / STEPS)).collect();
     let positions = shown.iter().zip(&origins).flat_map(|(f, origin)| {
-        recording.frames[*f].points.iter().take(points).flat_map(|p| quantised(*p, *origin))
+        recording.frames[*f].points.iter().take(points).flat_map(|p| in_steps(*p, *origin, unit))
     });
+    let positions = positions.collect();
     let phases = recording.phases.iter().enumerate().map(|(k, phase)| {
         let range = walk.phase_frames(k);
         let first = shown.partition_point(|f| *f < range.start);
@@ -138,7 +195,7 @@ fn rollout(walk: &Walk, most: usize) -> Value {
         })
     });
     let body = &recording.body;
-    json!({
+    let rollout = json!({
         "robot": recording.robot,
         "body": body.to_string(),
         "voxels": corners(body, &recording.voxels),
@@ -149,11 +206,11 @@ fn rollout(walk: &Walk, most: usize) -> Value {
         "threshold": THRESHOLD,
         "steps": shown,
         "phases": phases.collect::<Vec<_>>(),
-        "unit": STEPS,
+        "unit": unit,
         "origins": BASE64.encode(bytes(origins.iter().flatten().map(|v| v.to_le_bytes()))),
-        "positions": BASE64.encode(bytes(positions.map(i16::to_le_bytes))),
         "materials": materials(),
-    })
+    });
+    (rollout, positions)
 }
 
 /// What the pages' scripts have to know of materials to draw them.
@@ -179,7 +236,11 @@ fn bytes<const N: usize>(words: impl Iterator<Item = [u8; N]>) -> Vec<u8> {
 }
 
 pub(crate) fn quantised(point: [f64; 2], origin: [f64; 2]) -> [i16; 2] {
-    let steps = [0, 1].map(|k| ((point[k] - origin[k]) * STEPS).round());
+    in_steps(point, origin, STEPS)
+}
+
+fn in_steps(point: [f64; 2], origin: [f64; 2], unit: f64) -> [i16; 2] {
+    let steps = [0, 1].map(|k| ((point[k] - origin[k]) * unit).round());
     if steps.iter().all(|s| s.abs() < 32767.0) { steps.map(|s| s as i16) } else { [NOWHERE; 2] }
 }
 
@@ -301,6 +362,40 @@ mod tests {
         assert!(page.contains("became unstable"));
         let last = positions(&embedded(&page)).pop().unwrap();
         assert!(last[0].is_none() && last[1].is_none() && last[2].is_some());
+    }
+
+    #[test]
+    fn a_small_page_holds_its_moments_and_needs_less_than_130_kilobytes() {
+        let body = ["34215634215634"; 14].join("/");
+        let mut recording = simulated(&body, 2, 500, true);
+        recording.frames[5].points[3] = [f64::NAN, 1.0];
+        let page = small_page(&recording, "a robot", &[]).unwrap();
+        assert!(page.len() < 130_000, "{}", page.len());
+        let unpacked = |text: &str| {
+            let mut bytes = Vec::new();
+            let packed = BASE64.decode(text).unwrap();
+            std::io::Read::read_to_end(&mut flate2::read::GzDecoder::new(&packed[..]), &mut bytes).unwrap();
+            bytes
+        };
+        let (_, rest) = page.split_once("id=\"rollout\">").unwrap();
+        let rollout: Value = serde_json::from_slice(&unpacked(rest.split_once('<').unwrap().0)).unwrap();
+        let steps: Vec<usize> = serde_json::from_value(rollout["steps"].clone()).unwrap();
+        assert_eq!((steps[1], steps.last()), (5, Some(&1001)));
+        let bytes = unpacked(rollout["positions"].as_str().unwrap());
+        let width = 2 * points(&recording);
+        let (low, high) = bytes.split_at(bytes.len() / 2);
+        let mut at = vec![0_i16; width];
+        for (moment, step) in steps.iter().enumerate() {
+            for (coordinate, at) in at.iter_mut().enumerate() {
+                let place = coordinate * steps.len() + moment;
+                *at = at.wrapping_add(i16::from_le_bytes([low[place], high[place]]));
+            }
+            let walk = Walk::new(&recording).unwrap();
+            let origin = walk.centre(*step).map(|v| (v * STEPS).round() / STEPS);
+            let expected: Vec<i16> =
+                recording.frames[*step].points.iter().flat_map(|p| in_steps(*p, origin, 50.0)).collect();
+            assert_eq!(at, expected, "moment {moment}");
+        }
     }
 
     #[test]

@@ -1,14 +1,43 @@
-(() => {
+(async () => {
   const { css, fit } = Drawing;
   const $ = (id) => document.getElementById(id);
-  const rollout = JSON.parse($("rollout").textContent);
   const view = (text) => {
     const raw = atob(text), bytes = new Uint8Array(raw.length);
     for (let i = 0; i < raw.length; i++) bytes[i] = raw.charCodeAt(i);
     return new DataView(bytes.buffer);
   };
-  const N = rollout.steps.length, P = rollout.points, UNIT = rollout.unit, NOWHERE = -32768;
-  const positions = view(rollout.positions), origins = view(rollout.origins);
+  const unpack = (text) => new Response(new Blob([view(text)]).stream().pipeThrough(new DecompressionStream("gzip")));
+  const given = $("rollout").textContent;
+  const rollout = given[0] === "{" ? JSON.parse(given) : await unpack(given).json();
+  const P = rollout.points, UNIT = rollout.unit, NOWHERE = -32768;
+  // A small page has some moments of the walk, as html.rs packs them: all frames again, points between moments on straight lines.
+  const widened = async () => {
+    const bytes = new Uint8Array(await unpack(rollout.positions).arrayBuffer()), { steps, phases } = rollout;
+    const M = steps.length, width = 2 * P, known = new Int16Array(M * width), centres = view(rollout.origins);
+    for (let c = 0; c < width; c++) {
+      for (let m = 0, at = 0; m < M; m++) known[m * width + c] = at += bytes[c * M + m] + 256 * bytes[width * M + c * M + m];
+    }
+    const begins = new Set(phases.map((p) => p.first)), frames = [], all = [];
+    steps.forEach((step, m) => {
+      const k = frames.length, goesOn = m + 1 < M && !begins.has(m + 1), length = goesOn ? steps[m + 1] - step : 1;
+      phases.forEach((p) => { if (p.first === m) p.begin = k; });
+      for (let s = 0; s < length; s++) { frames.push([m, s / length]); all.push(step + s); }
+    });
+    phases.forEach((p) => { p.first = p.begin; });
+    rollout.steps = all;
+    const places = new Int16Array(all.length * width), origins = new Float64Array(2 * all.length);
+    frames.forEach(([m, t], f) => {
+      const mix = (a, b) => (t ? a * (1 - t) + b * t : a);
+      for (let k = 0; k < 2; k++) origins[2 * f + k] = mix(centres.getFloat64(16 * m + 8 * k, true), t && centres.getFloat64(16 * m + 16 + 8 * k, true));
+      for (let c = 0; c < width; c++) {
+        const a = known[m * width + c], b = t ? known[(m + 1) * width + c] : a;
+        places[f * width + c] = a === NOWHERE || b === NOWHERE ? NOWHERE : Math.round(mix(a, b));
+      }
+    });
+    return [places, origins].map((numbers) => new DataView(numbers.buffer));
+  };
+  const [positions, origins] = rollout.small ? await widened() : [view(rollout.positions), view(rollout.origins)];
+  const N = rollout.steps.length;
   const origin = (f, k) => origins.getFloat64(16 * f + 8 * k, true);
   // A point in voxel lengths, or null where the simulation had lost it.
   const point = (f, i) => {

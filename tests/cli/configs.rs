@@ -303,3 +303,17 @@ fn a_config_that_is_not_there_is_refused_naming_the_built_in_ones() {
         Sandbox::new().run("evolve -c nowhere.toml").ended(3, &["nowhere.toml", "hint:", "quickstart.toml"]);
     assert!(said.out.is_empty());
 }
+
+#[test]
+#[cfg(not(feature = "mpi"))]
+fn what_needs_no_mpi_runs_also_under_its_launcher() {
+    let sandbox = Sandbox::tiny();
+    let launched = |args: &str| {
+        let mut command = sandbox.command(args.split_whitespace());
+        said(command.env("OMPI_COMM_WORLD_SIZE", "4"))
+    };
+    launched("config tiny.toml").ended(0, &[]);
+    launched("data info builtin").ended(0, &[]);
+    launched("evolve -c tiny.toml").ended(2, &["MPI started 4 processes"]);
+    launched("sweep plan.toml").ended(2, &["MPI started 4 processes"]);
+}
