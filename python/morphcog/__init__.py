@@ -419,7 +419,7 @@ class Run:
         self._data = _morphcog.RunData(_path(folder))
 
     def __reduce__(self):
-        return _restored_run, (self._data.absolute(), self._data.settings())
+        return _restored_run, (self._data.place, self._data.settings())
 
     @property
     def path(self):

@@ -363,7 +363,10 @@ impl ConfigData {
 #[pyclass(frozen, module = "morphcog._morphcog")]
 struct RunData {
     run: RunFile,
+    /// As it was given.
     path: PathBuf,
+    /// The same from everywhere: the present folder may change.
+    place: PathBuf,
 }
 
 #[pymethods]
@@ -378,15 +381,17 @@ impl RunData {
             return Err(refused(format!("{text}: {}", names.join(", "))));
         };
         let run = RunFile::read(path).map_err(|error| raised(&error))?;
-        Ok(RunData { run, path: path.clone() })
+        let place = match named::is_named(path) {
+            true => path.clone(),
+            false => std::path::absolute(path)?,
+        };
+        Ok(RunData { run, path: path.clone(), place })
     }
 
     /// The path of its run.json from everywhere, or its name.
-    fn absolute(&self) -> PyResult<PathBuf> {
-        match named::is_named(&self.path) {
-            true => Ok(self.path.clone()),
-            false => Ok(std::path::absolute(&self.path)?),
-        }
+    #[getter]
+    fn place(&self) -> PathBuf {
+        self.place.clone()
     }
 
     /// A hash of all settings that its robots depend on.
@@ -421,7 +426,7 @@ impl RunData {
         robot: String,
     ) -> PyResult<(String, String, f64, Bound<'py, PyArray2<u8>>)> {
         let options =
-            replay::Options { robot, archive: Some(self.path.clone()), ..replay::Options::default() };
+            replay::Options { robot, archive: Some(self.place.clone()), ..replay::Options::default() };
         let found = replay::find(&options).map_err(|error| raised(&error))?;
         let known = self.run.elites.iter().find(|elite| elite.id == found.name);
         let elite = known
@@ -457,7 +462,7 @@ impl RunData {
     ) -> PyResult<PathBuf> {
         let split: HeldOut = parsed("split", split)?;
         let options = eval::Options {
-            archives: vec![self.path.clone()],
+            archives: vec![self.place.clone()],
             robots: parsed("robots", robots)?,
             images: parsed("images", images)?,
             split,
@@ -467,7 +472,7 @@ impl RunData {
             cycles: showing::CYCLES,
             data,
             dataset: None,
-            out: folder::beside(&self.path, eval::own_name(split)),
+            out: folder::beside(&self.place, eval::own_name(split)),
             threads: None,
             ranks: Ranks::ALONE,
         };
@@ -486,14 +491,14 @@ impl RunData {
         listener: &Bound<PyAny>,
     ) -> PyResult<PathBuf> {
         let robots: Selection = parsed("robots", robots)?;
-        let out = folder::beside(&self.path, AUDIT_JSON);
+        let out = folder::beside(&self.place, AUDIT_JSON);
         let unwritten = heard(py, listener, |stop, observer| {
             let robots = match robots.validated() {
                 None => robots,
                 Some(_) => {
                     let search = one_by_one::Options {
                         robots,
-                        archives: vec![self.path.clone()],
+                        archives: vec![self.place.clone()],
                         physical_only: false,
                         seed: 1,
                         data: data.clone(),
@@ -503,7 +508,7 @@ impl RunData {
                 }
             };
             let options = audit::Options {
-                source: audit::Source::Archive(self.path.clone()),
+                source: audit::Source::Archive(self.place.clone()),
                 robots,
                 seed: 1,
                 criteria: Criteria::default(),
@@ -527,7 +532,7 @@ impl RunData {
         make: impl Fn(&replay::Replay, &str) -> Result<T, Error> + Sync,
     ) -> PyResult<T> {
         let options =
-            replay::Options { robot, archive: Some(self.path.clone()), ..replay::Options::default() };
+            replay::Options { robot, archive: Some(self.place.clone()), ..replay::Options::default() };
         let pool = pool(None).map_err(|error| raised(&error))?;
         let made = watched(py, |_| {
             pool.install(|| {
