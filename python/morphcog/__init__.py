@@ -103,7 +103,8 @@ def _images(value):
     if given.dtype.kind == "b":
         given = _np.multiply(given, 255, dtype=_np.uint8)
     elif given.dtype.kind == "f":
-        raise Error(f"images: expected {expected}, found type {given.dtype}; if 1 is full, (255 * images).astype('uint8')")
+        remedy = "if 1 is full, (255 * images).astype('uint8')"
+        raise Error(f"images: expected {expected}, found type {given.dtype}; {remedy}")
     images = _array(given, _np.uint8, 3, "images", expected)
     if images.size and images.max() == 1:
         _warnings.warn("images: the largest pixel is 1 of 255, nearly black; pass bool if 1 is full", stacklevel=3)
@@ -187,7 +188,7 @@ def _restored_config(toml, name):
 
 
 def _config(config):
-    """What the simulator takes, from whatever stands for a config; None stays."""
+    """The simulator's config, from whatever stands for one; None stays."""
     if config is None:
         return None
     return (config if isinstance(config, Config) else Config(config))._data
@@ -243,7 +244,7 @@ class _Progress:
 
 
 def _main_is_interrupted():
-    """Whether Ctrl-C is ending the main thread. It would then wait for this one, which is told of no signal."""
+    """True in another thread than the main one while Ctrl-C ends that, which would wait for this one."""
     main = _threading.main_thread()
     if _threading.current_thread() is main:
         return False

@@ -122,7 +122,7 @@ fn room<T>(count: Option<usize>, what: &str) -> PyResult<Vec<T>> {
     Ok(list)
 }
 
-/// Whether Ctrl-C ends this work: in the main thread as Python says, in others if it is ending the
+/// Fails if Ctrl-C ends this work: in the main thread as Python says, in others if it is ending the
 /// main thread, which would wait for them.
 fn check_interrupt(py: Python) -> PyResult<()> {
     py.check_signals()?;
@@ -179,7 +179,7 @@ fn watched_and<T: Send>(
     })
 }
 
-/// What a command says while it works, for the thread that called it to pass on.
+/// Keeps what a command says while it works, for the thread that called it to pass on.
 struct Heard {
     began: Instant,
     said: Mutex<Said>,
@@ -194,7 +194,7 @@ struct Said {
 }
 
 impl Said {
-    /// How far it is now; of two, the later one counts.
+    /// Says how far it is now, instead of the last line that did.
     fn moved(&mut self, line: String) {
         match self.lines.last_mut() {
             Some((PROGRESS, last)) => *last = line,
@@ -259,7 +259,7 @@ impl Observer for Heard {
     }
 }
 
-/// A value that Python gives as text.
+/// Reads a value that Python gives as text.
 fn parsed<T: FromStr<Err: std::fmt::Display>>(keyword: &str, text: &str) -> PyResult<T> {
     text.parse().map_err(|error| refused(format!("{keyword}={text}: {error}")))
 }
@@ -344,7 +344,7 @@ impl ConfigData {
         serde_json::to_string(&self.inner).expect("every field is a number, text, list or table")
     }
 
-    /// What it is of, in a few words.
+    /// Describes it in a few words.
     fn about(&self) -> String {
         let config::Config { seed, generations, body, data, .. } = &self.inner;
         let tasks = self.inner.grouping().expect("a config's groups are checked when it is read");
@@ -524,7 +524,7 @@ impl RunData {
 }
 
 impl RunData {
-    /// What is made of a recording of a robot, which has the title of its page.
+    /// Records a robot and makes something of it; `make` takes the recording and its title.
     fn shown<T: Send>(
         &self,
         py: Python,
@@ -555,7 +555,7 @@ fn heard<T: Send>(
     found.map_err(|error| raised(&error))
 }
 
-/// Where the table beside results is, if they could be written.
+/// The table beside results, if they could be written.
 fn written(unwritten: Option<Error>, out: &Path) -> PyResult<PathBuf> {
     match unwritten {
         Some(error) => Err(raised(&error)),

@@ -1,6 +1,7 @@
 """The module's contract: shapes, units, the same bits as the command, clear refusals, Ctrl-C."""
 
 import copy
+import io
 import json
 import os
 import pathlib
@@ -11,7 +12,6 @@ import subprocess
 import sys
 import threading
 import time
-import warnings
 
 import morphcog as mc
 import numpy as np
@@ -412,7 +412,8 @@ except mc.Error as error:
 
 def test_a_notebook_shows_a_robot_small_and_with_a_picture(run):
     shown = run["best"]._repr_html_()
-    picture, page = re.search(r'<img src="data:image/gif;base64,([^"]+)" alt="Robot.*<iframe srcdoc="([^"]+)"', shown).groups()
+    found = re.search(r'<img src="data:image/gif;base64,([^"]+)" alt="Robot.*<iframe srcdoc="([^"]+)"', shown)
+    picture, page = found.groups()
     assert len(shown) < 150_000 and len(picture) > 4000 and run["best"].id in page
 
 
@@ -453,6 +454,11 @@ def test_keys_take_numbers_of_numpy(tmp_path):
     config = mc.evolve("quickstart.toml", generations=1, set=changes, out=tmp_path / "run").config
     config = json.loads(config.to_json())
     assert config["map_elites"]["parents"] == 3 and config["task"]["groups"] == [[0], [1]]
+
+
+def test_ids_are_text_also_where_they_look_like_numbers():
+    table = mc._table(io.StringIO("id,objective\n0636890406,1\n18e2354970,2\n"))
+    assert list(table.id) == ["0636890406", "18e2354970"]
 
 
 def test_a_folder_that_holds_a_run_is_not_written_over(run):

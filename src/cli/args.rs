@@ -245,7 +245,7 @@ Examples:
 }
 
 impl Command {
-    /// Whether it takes so long that several processes may be meant to share it.
+    /// Tells the commands that take so long that several processes may be meant to share them.
     pub(super) fn is_long(&self) -> bool {
         matches!(
             self,
