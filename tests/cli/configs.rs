@@ -310,7 +310,8 @@ fn what_needs_no_mpi_runs_also_under_its_launcher() {
     let sandbox = Sandbox::tiny();
     let launched = |args: &str| {
         let mut command = sandbox.command(args.split_whitespace());
-        said(command.env("OMPI_COMM_WORLD_SIZE", "4"))
+        command.env("OMPI_COMM_WORLD_SIZE", "4");
+        said(command)
     };
     launched("config tiny.toml").ended(0, &[]);
     launched("data info builtin").ended(0, &[]);
