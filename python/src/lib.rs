@@ -25,7 +25,7 @@ use morphcog::task::direction;
 use morphcog::task::evaluation::fresh_rollouts;
 use morphcog::task::protocol::{MAX_ROW, MAX_STEPS, Protocol, RolloutMode};
 use morphcog::task::stimulus::stimulus;
-use morphcog::view::progress::{Recent, count_line, generation_line};
+use morphcog::view::progress::{Recent, Words, count_line, generation_line};
 use morphcog::view::walk::Walk;
 use morphcog::view::{gif, html};
 use numpy::{PyArray1, PyArray2, PyArray3, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
@@ -195,7 +195,8 @@ struct Said {
 
 impl Said {
     /// Says how far it is now, instead of the last line that did.
-    fn moved(&mut self, line: String) {
+    fn moved(&mut self, Words { label, parts }: Words) {
+        let line = format!("{label} {}", parts.join(" · "));
         match self.lines.last_mut() {
             Some((PROGRESS, last)) => *last = line,
             _ => self.lines.push((PROGRESS, line)),
