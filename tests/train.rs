@@ -393,7 +393,8 @@ fn a_class_above_nine_is_never_taken_for_its_digits() {
             );
             sandbox.run(&format!("eval -q -a {folder} --images 6 --cycles 1")).ended(0, &[]);
         }
-        let response = format!("response -q -a walkers --task {task} {letters} -n 60 -o response.json");
+        let response =
+            format!("response -q -a walkers --robots top:3 --task {task} {letters} -n 60 -o response.json");
         sandbox.run(&response).ended(0, &[]);
         assert!(sandbox.read("response.json").contains(&format!("\"task\":\"{name}\"")));
     }
