@@ -228,7 +228,7 @@ impl World {
             options: replay::Options::default(),
             every: 0,
             out: Some(self.sandbox.path("figure.svg")),
-            dpi: 36,
+            dpi: Some(36),
             background: Background::Paper,
         };
         case.check(figures::make(&console, &wanted), name);

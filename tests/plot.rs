@@ -123,6 +123,23 @@ fn the_ending_says_the_format_and_the_resolution_is_a_choice() {
 }
 
 #[test]
+fn a_figure_that_is_too_long_for_print_has_fewer_pixels_and_nothing_is_written_before_that_is_known() {
+    let sandbox = Sandbox::new();
+    let tasks = TINY.replace("groups = [[0], [1]]", "splits = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9]");
+    let tasks = tasks.replace("train_images = [0, 1]", "images_per_class = 1");
+    sandbox.write("tasks.toml", tasks.replace("generations = 12", "generations = 1"));
+    sandbox.run("evolve -q -c tasks.toml -o run").ended(0, &[]);
+    let refused = sandbox.run("plot archive -a run --dpi 300").ended(2, &["--dpi 300", "expected at most 6"]);
+    assert!(refused.out.is_empty(), "{refused:?}");
+    assert!(!sandbox.path("run/plot-archive.svg").exists());
+    sandbox.run("plot archive -a run --dpi 300 -o a.svg").ended(0, &[]);
+    sandbox.run("plot archive -a run").ended(0, &["note: run/plot-archive.png: 6", "pixels per inch"]);
+    assert_eq!(sandbox.read("run/plot-archive.svg"), sandbox.read("a.svg"));
+    let [_, height] = png_size(&std::fs::read(sandbox.path("run/plot-archive.png")).unwrap());
+    assert!((15_000..=16_000).contains(&height), "{height}");
+}
+
+#[test]
 fn seeds_become_one_figure_and_robots_one_each() {
     let sandbox = with_run();
     sandbox.run("evolve -q -c tiny.toml --seed 4 -o other").ended(0, &[]);

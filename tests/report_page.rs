@@ -154,3 +154,72 @@ fn a_team_walks_on_the_page_and_says_there_what_it_said_in_its_test() {
         said.err
     );
 }
+
+/// Images of 26 classes in `letters/`, and runs of them: half of the classes against the other half,
+/// and single ones against all others.
+fn letters() -> Sandbox {
+    let sandbox = Sandbox::new();
+    for (split, count) in [("train", 52_u8), ("t10k", 104)] {
+        let label = |image: u8| 1 + image % 26;
+        let pixel = |image: u8, pixel: u8| if (pixel / 3 * label(image)) % 7 < 3 { 255 } else { image };
+        let pixels: Vec<u8> = (0..count).flat_map(|image| (0..100).map(move |p| pixel(image, p))).collect();
+        let header = [0, 0, 8, 3, 0, 0, 0, count, 0, 0, 0, 10, 0, 0, 0, 10];
+        sandbox.write(&format!("letters/{split}-images-idx3-ubyte"), [&header[..], &pixels].concat());
+        let header = [0, 0, 8, 1, 0, 0, 0, count];
+        let labels: Vec<u8> = (0..count).map(label).collect();
+        sandbox.write(&format!("letters/{split}-labels-idx1-ubyte"), [&header[..], &labels].concat());
+    }
+    let groups = [vec![1], vec![13], vec![26], (1..=13).collect::<Vec<u8>>()];
+    for (number, first) in groups.into_iter().enumerate() {
+        let rest: Vec<u8> = (1..=26).filter(|class| !first.contains(class)).collect();
+        let config = TINY
+            .replace("groups = [[0], [1]]", &format!("groups = [{first:?}, {rest:?}]"))
+            .replace("dataset = \"builtin\"", "dataset = \"letters\"")
+            .replace("train_images = [0, 1]", "images_per_class = 1");
+        sandbox.write("run.toml", config);
+        sandbox.run(&format!("evolve -q -c run.toml --data letters -o runs/{number}")).ended(0, &[]);
+    }
+    sandbox
+}
+
+#[test]
+fn with_26_classes_nothing_on_the_page_covers_anything_else() {
+    let Some(program) = found() else { return };
+    let sandbox = letters();
+    let runs = "--archive runs/0 runs/1 runs/2 runs/3";
+    sandbox.run("eval -q --archive runs/3 --images 26 --robots top:3").ended(0, &[]);
+    sandbox.run(&format!("team -q {runs} --images 104")).ended(0, &[]);
+    sandbox.run(&format!("report -q {runs} --rollouts 1")).ended(0, &[]);
+    let address = format!("file://{}", sandbox.path("runs/report.html").display());
+    let mut browser = Browser::start(&program, &sandbox);
+    for (width, height, dark) in [(1280, 900, false), (390, 844, true)] {
+        let mut tab = browser.tab(width, height, dark);
+        tab.open(&address);
+        tab.wait("document.querySelector('.stages figcaption') && document.querySelector('.tally li')");
+        keep_picture(&format!("report-26-{width}.png"), &tab.screenshot());
+        // Words of a figure, what stands beside each other, and what stands in a button.
+        let covered = "(() => {
+           const box = (e) => e.getBoundingClientRect(), found = [];
+           const apart = (a, b) => a.right <= b.left + 1 || b.right <= a.left + 1 || a.bottom <= b.top + 2 || b.bottom <= a.top + 2;
+           const check = (all) => all.forEach((a, i) => all.slice(i + 1).forEach((b) => {
+             if (!apart(box(a), box(b))) found.push(a.textContent + ' / ' + b.textContent);
+           }));
+           const seen = (e) => e.textContent && box(e).width > 0;
+           document.querySelectorAll('.figure svg').forEach((svg) => check([...svg.querySelectorAll('text')].filter(seen)));
+           document.querySelectorAll('.tally li, .stages figcaption, .watch button, .bodies button').forEach((e) => check([...e.children].filter(seen)));
+           document.querySelectorAll('.bodies button *, .stages figcaption *').forEach((e) => {
+             const own = box(e), room = box(e.closest('button, figcaption'));
+             if (own.right > room.right + 1 || own.left < room.left - 1) found.push('sticks out: ' + e.tagName + ' ' + e.textContent);
+           });
+           document.querySelectorAll('.figure svg').forEach((svg) => svg.querySelectorAll('text').forEach((e) => {
+             if (box(e).right > box(svg).right + 1 || box(e).left < box(svg).left - 1) found.push('cut off: ' + e.textContent);
+           }));
+           return found;
+         })()";
+        assert_eq!(tab.eval(covered), serde_json::json!([]), "{width} pixels");
+        let wide = tab.eval("document.documentElement.scrollWidth").as_u64().unwrap();
+        assert!(wide <= u64::from(width), "{wide} pixels wide");
+        assert_eq!(tab.complaints(), Vec::<String>::new());
+        tab.close();
+    }
+}

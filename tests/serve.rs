@@ -63,9 +63,12 @@ fn the_page_its_headers_and_what_there_is() {
         let text = server.get(&path);
         assert_eq!(text.status, 200, "{path}");
         assert!(!text.body.contains("https://") && !text.body.contains("//cdn"), "{path}");
-        for piece in text.body.split('"').filter(|piece| piece.starts_with('/') || piece.starts_with("./")) {
-            let path = piece.trim_start_matches('.').to_string();
-            let is_file = [".js", ".css", ".svg"].iter().any(|ending| path.ends_with(ending));
+        // Addresses are relative: the page may be below a prefix of a proxy.
+        assert!(["\"/api", "'/api", "`/api"].iter().all(|address| !text.body.contains(address)), "{path}");
+        for piece in text.body.split('"').filter(|piece| !piece.contains(char::is_whitespace)) {
+            let is_file = [".js", ".css", ".svg"].iter().any(|ending| piece.ends_with(ending));
+            assert!(!is_file || !piece.starts_with('/'), "{path}: {piece}");
+            let path = format!("/{}", piece.trim_start_matches("./"));
             if is_file && !files.contains(&path) {
                 files.push(path);
             }
@@ -193,11 +196,6 @@ fn what_is_wrong_is_refused_with_one_line_and_hurts_nothing() {
     refused(&server.get("/api/simulations"), 405, "POST");
     refused(&server.send(format!("DELETE /api/status HTTP/1.1\r\n{own}\r\n")), 405, "GET");
 
-    // Names that others let point here, and pages of others.
-    let port = server.port;
-    for host in ["evil.example", "127.0.0.1", "127.0.0.1:1", &format!("evil.example:{port}")] {
-        refused(&server.send(format!("GET /api/status HTTP/1.1\r\nHost: {host}\r\n\r\n")), 403, "Host");
-    }
     refused(&server.send("GET / HTTP/1.1\r\n\r\n"), 400, "Host");
     refused(&server.send(format!("GET / HTTP/1.1\r\n{own}{own}\r\n")), 400, "host");
     let with = |headers: String| {
@@ -207,17 +205,11 @@ fn what_is_wrong_is_refused_with_one_line_and_hurts_nothing() {
             body.len()
         ))
     };
-    let from = |origin: &str| with(format!("Origin: {origin}\r\n"));
     // Two of them: neither is believed.
-    let (ours, others) = (format!("http://127.0.0.1:{port}"), "http://evil.example");
+    let (ours, others) = (format!("http://127.0.0.1:{}", server.port), "http://evil.example");
     for [first, second] in [[&ours, others], [others, &ours], [&ours, &ours]] {
         refused(&with(format!("Origin: {first}\r\norigin: {second}\r\n")), 400, "origin");
     }
-    for origin in ["http://evil.example", "null", &format!("https://127.0.0.1:{port}"), "http://127.0.0.1"] {
-        refused(&from(origin), 403, "Origin");
-    }
-    assert_eq!(from(&format!("http://127.0.0.1:{port}")).status, 200);
-    assert_eq!(from(&format!("http://localhost:{port}")).status, 200);
 
     // What is no HTTP, or too much of it.
     refused(&server.send("\u{16}\u{3}\u{1} hello\r\n\r\n"), 400, "HTTP");
@@ -273,6 +265,133 @@ fn what_is_wrong_is_refused_with_one_line_and_hurts_nothing() {
     let status = json_of(&server.get("/api/status"));
     assert_eq!((&status["simulations"], &status["begun"]), (&json!(0), &json!(0)));
     server.ended_by("INT");
+}
+
+/// What a server answers to a POST with these headers.
+fn posted_with(server: &Server, headers: &str) -> Answer {
+    let body = "{\"body\": [[3]]}";
+    let length = body.len();
+    server.send(format!("POST /api/body HTTP/1.1\r\n{headers}Content-Length: {length}\r\n\r\n{body}"))
+}
+
+#[test]
+fn the_page_is_reached_by_names_of_this_machine_on_any_port_and_by_no_others() {
+    let sandbox = Sandbox::new();
+    let server = Server::start(&sandbox, "");
+    let get = |host: &str| server.send(format!("GET /api/status HTTP/1.1\r\nHost: {host}\r\n\r\n"));
+    // A tunnel has a port of its own.
+    for host in ["localhost:9000", "LocalHost", "127.0.0.1:1", "[::1]:9000"] {
+        assert_eq!(get(host).status, 200, "{host}");
+    }
+    // Names that others let point here.
+    for host in ["evil.example", "localhost.evil.example:80", "evil.localhost", "0.0.0.0", "localhost:99999"]
+    {
+        let answer = get(host);
+        refused(&answer, 403, "Host");
+        assert!(answer.body.contains("morphcog serve --allow-host NAME"), "{}", answer.body);
+    }
+    refused(
+        &server.send(format!("GET http://evil.example/ HTTP/1.1\r\nHost: evil.example\r\n\r\n")),
+        403,
+        "",
+    );
+}
+
+#[test]
+fn a_name_that_is_allowed_is_one_more_and_only_that_one() {
+    let sandbox = Sandbox::new();
+    let server = Server::start(&sandbox, "--allow-host Hub.example --allow-host 10.0.0.7");
+    let get = |host: &str| server.send(format!("GET / HTTP/1.1\r\nHost: {host}\r\n\r\n"));
+    for host in ["hub.example", "HUB.example:8443", "10.0.0.7:80", "localhost:9000"] {
+        assert_eq!(get(host).status, 200, "{host}");
+    }
+    for host in ["evil.hub.example", "hub.example.evil.example", "10.0.0.8", "hub.example:x", "hub"] {
+        refused(&get(host), 403, "Host");
+    }
+    let ours = "Host: hub.example\r\nOrigin: https://hub.example\r\n";
+    assert_eq!(posted_with(&server, ours).status, 200);
+    for wrong in ["*", "hub.example:80", "https://hub.example", ""] {
+        let said = sandbox.command(["serve", "--no-open", "--allow-host", wrong]);
+        common::program::said(said).ended(2, &["--allow-host", "such as hub.example.org"]);
+    }
+}
+
+#[test]
+fn what_pages_of_other_origins_send_is_refused_also_from_other_ports_of_this_machine() {
+    let sandbox = Sandbox::new();
+    let server = Server::start(&sandbox, "--allow-host hub.example");
+    let port = server.port;
+    for (host, origin) in [
+        ("localhost:9000", "http://localhost:9000"),
+        ("localhost:9000", "http://LOCALHOST:9000"),
+        ("127.0.0.1", "http://127.0.0.1"),
+        ("hub.example:8888", "https://hub.example:8888"),
+    ] {
+        let answer = posted_with(&server, &format!("Host: {host}\r\nOrigin: {origin}\r\n"));
+        assert_eq!(answer.status, 200, "{host}, {origin}: {}", answer.body);
+    }
+    let here = format!("127.0.0.1:{port}");
+    for (host, origin) in [
+        (here.as_str(), "http://evil.example"),
+        (&here, "null"),
+        (&here, ""),
+        (&here, "http://127.0.0.1"),
+        (&here, &format!("http://localhost:{port}")),
+        (&here, &format!("ftp://{here}")),
+        (&here, &here),
+        (&here, &format!("http://{here}/")),
+        (&here, &format!("http://{here}.evil.example")),
+        (&here, &format!("http://evil.example@{here}")),
+        (&here, "http://hub.example"),
+        ("localhost:9000", "http://localhost:9001"),
+        ("hub.example", "http://hub.example:9001"),
+        ("hub.example", "http://evil.hub.example"),
+    ] {
+        let answer = posted_with(&server, &format!("Host: {host}\r\nOrigin: {origin}\r\n"));
+        refused(&answer, 403, "Origin");
+        assert!(answer.body.contains(&format!("this page is at {host}")), "{}", answer.body);
+    }
+    // Rebound names do not pass because the origin is theirs, too.
+    refused(&posted_with(&server, "Host: evil.example\r\nOrigin: http://evil.example\r\n"), 403, "Host");
+}
+
+/// Makes a pipe that nobody writes to.
+fn pipe(sandbox: &Sandbox, name: &str) {
+    let path = sandbox.path(name);
+    std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+    assert!(std::process::Command::new("mkfifo").arg(path).status().unwrap().success());
+}
+
+#[test]
+fn a_pipe_in_the_place_of_a_file_of_a_run_blocks_nobody() {
+    let sandbox = Sandbox::tiny();
+    sandbox.run("evolve -q -c tiny.toml -o runs/one").ended(0, &[]);
+    // The newest there is.
+    pipe(&sandbox, "runs/pipe/run.json");
+    sandbox.run("eval -q --robots top:1 --images 2").ended(0, &[]);
+    sandbox.run("replay -q --format html -o walk.html").ended(0, &[]);
+    sandbox.run("plot -q archive -a runs/pipe").ended(3, &["runs/pipe/run.json", "expected a regular file"]);
+    let server = Server::start(&sandbox, "");
+    let names = || json_of(&server.get("/api/archives")).as_array().unwrap().len();
+    assert_eq!(names(), 4);
+    pipe(&sandbox, "runs/later/run.json");
+    for name in ["metrics.csv", "audit.json", ".lock"] {
+        pipe(&sandbox, &format!("runs/two/{name}"));
+    }
+    std::fs::copy(sandbox.path("runs/one/run.json"), sandbox.path("runs/two/run.json")).unwrap();
+    std::thread::sleep(Duration::from_millis(600));
+    assert_eq!(names(), 5);
+    refused(
+        &server.get("/api/archives/4/progress"),
+        404,
+        "runs/two/metrics.csv: cannot be read: expected a regular file",
+    );
+    server.ended_by("TERM");
+    for name in ["run.json", "metrics.csv", "config.toml", "checkpoint.json", ".lock"] {
+        pipe(&sandbox, &format!("busy/{name}"));
+        sandbox.run("evolve -q -c tiny.toml -o busy --resume").ended(3, &[name, "expected a regular file"]);
+        std::fs::remove_dir_all(sandbox.path("busy")).unwrap();
+    }
 }
 
 #[test]

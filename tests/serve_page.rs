@@ -8,7 +8,7 @@ mod common;
 use common::browser::{Browser, Tab, found, keep_picture};
 use common::hostile::Dice;
 use common::program::{Sandbox, terminate};
-use common::server::Server;
+use common::server::{Proxy, Server};
 use morphcog::analysis::gallery;
 use morphcog::base::shipped::ZERO_ONE;
 use serde_json::Value;
@@ -339,6 +339,40 @@ fn a_run_that_begins_while_the_page_is_open_appears_grows_and_ends_on_it() {
     child.wait().unwrap();
     tab.wait("document.getElementById('course').textContent.includes('not running now')");
     assert_eq!(tab.complaints(), Vec::<String>::new());
+}
+
+#[test]
+fn below_the_prefix_of_a_proxy_and_by_a_name_that_is_allowed_all_of_the_page_works() {
+    let sandbox = Sandbox::tiny();
+    let Some(mut browser) = browser(&sandbox) else { return };
+    sandbox.run("evolve -q -c tiny.toml -o runs/one").ended(0, &[]);
+    // Browsers take names that end so for this machine; the server does not by itself.
+    let server = Server::start(&sandbox, "--allow-host hub.localhost");
+    let proxy = Proxy::start(&server);
+    for name in ["hub.localhost", "localhost"] {
+        let mut tab = browser.tab(1280, 900, false);
+        tab.open(&format!("http://{name}:{}{}/", proxy.port, Proxy::PREFIX));
+        tab.wait("document.documentElement?.dataset.ready === 'yes'");
+        as_fast_as_possible(&mut tab);
+        let (says, _) = answer(&mut tab, &zero());
+        assert_eq!(says, "0");
+        // What the pad is seen as, a change while it walks, test images, curves, team and editor.
+        tab.click("#tab-test");
+        tab.click("#thumbs button");
+        at_end(&mut tab);
+        choose(&mut tab, "3");
+        tab.wait("document.querySelectorAll('#curves svg').length === 3");
+        tab.click("#tab-team");
+        at_end(&mut tab);
+        assert_eq!(tab.eval("document.images[0].naturalWidth > 0"), true);
+        tab.click("#tab-editor");
+        tab.wait("document.getElementById('checked').dataset.state === 'good'");
+        tab.click("#live");
+        at_end(&mut tab);
+        assert_eq!(tab.eval("document.getElementById('error').hidden"), true);
+        assert_eq!((tab.complaints(), proxy.strays()), (Vec::new(), Vec::new()));
+        tab.close();
+    }
 }
 
 #[test]

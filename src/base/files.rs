@@ -18,18 +18,68 @@ const TO_LOCK: Duration = Duration::from_secs(10);
 /// Most bytes of a text: many times what any file of ours has.
 const MOST_TEXT: u64 = 256 << 20;
 
-/// Reads a text, also one of a [named] run. What does not end, as a device, is refused before it
-/// fills the memory.
+/// Opens a file of a run or a dataset, which may lie where anybody can put one: a pipe, a socket or
+/// a device is refused at once, because opening or reading it could block for ever. (A folder says
+/// what it is when it is read.)
 ///
 /// # Errors
-/// What the system says; if it is no UTF-8; if it has more than 256 megabytes.
+/// What the system says; if it is no file.
+pub fn open_file(path: &Path) -> io::Result<File> {
+    let mut options = File::options();
+    options.read(true);
+    #[cfg(unix)]
+    {
+        use rustix::fs::OFlags;
+        use std::os::unix::fs::OpenOptionsExt;
+        // Without this, to open a pipe waits for its other end.
+        let flags = OFlags::NONBLOCK | OFlags::NOCTTY;
+        options.custom_flags(flags.bits().cast_signed());
+    }
+    let file = options.open(path)?;
+    // Of what is open, so that nothing can take its place in between.
+    let found = file.metadata()?.file_type();
+    match found.is_file() || found.is_dir() {
+        true => Ok(file),
+        false => Err(io::Error::new(
+            io::ErrorKind::InvalidInput,
+            "expected a regular file, found a pipe, a socket or a device",
+        )),
+    }
+}
+
+/// Reads such a file to its end.
+///
+/// # Errors
+/// As [`open_file`].
+pub fn read_bytes(path: &Path) -> io::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    open_file(path)?.read_to_end(&mut bytes)?;
+    Ok(bytes)
+}
+
+/// Reads a text, also one of a [named] run.
+///
+/// # Errors
+/// As [`open_file`]; if it is no UTF-8; if it has more than 256 megabytes.
 pub fn read_text(path: &Path) -> io::Result<String> {
     let source: Box<dyn Read> = match named::place(path).transpose()? {
         Some(Place::Shipped(text)) => return Ok(text.to_string()),
-        Some(Place::Compressed(file)) => Box::new(MultiGzDecoder::new(File::open(file)?)),
-        None => Box::new(File::open(path)?),
+        Some(Place::Compressed(file)) => Box::new(MultiGzDecoder::new(open_file(&file)?)),
+        None => Box::new(open_file(path)?),
     };
     read_limited(source)
+}
+
+/// Reads a text that the user wrote and named: it may come through a pipe, as from `<(…)` of a
+/// shell. What does not end, as a device, is refused before it fills the memory.
+///
+/// # Errors
+/// As [`read_text`].
+pub fn read_given(path: &Path) -> io::Result<String> {
+    match std::fs::metadata(path).is_ok_and(|found| !found.is_file() && !found.is_dir()) {
+        true => read_limited(File::open(path)?),
+        false => read_text(path),
+    }
 }
 
 /// Reads a text to its end: UTF-8, or UTF-16 that begins with its mark, as PowerShell's `>` writes
@@ -281,6 +331,41 @@ mod tests {
         write_atomically(&pipe, b"content").unwrap();
         assert_eq!(reader.join().unwrap(), b"content");
         assert!(pipe.metadata().unwrap().file_type().is_fifo());
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_pipe_or_a_device_is_no_file_of_a_run_and_is_refused_without_waiting_for_it() {
+        let folder = tempfile::tempdir().unwrap();
+        let pipe = folder.path().join("run.json");
+        assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+        let link = folder.path().join("link.json");
+        std::os::unix::fs::symlink("/dev/zero", &link).unwrap();
+        for path in [&pipe, &link] {
+            for error in [open_file(path).unwrap_err(), read_text(path).unwrap_err()] {
+                assert!(error.to_string().contains("regular file"), "{error}");
+            }
+        }
+        // A folder is what the system calls it, a link to a file that file.
+        assert_eq!(read_text(folder.path()).unwrap_err().kind(), io::ErrorKind::IsADirectory);
+        std::fs::write(folder.path().join("file"), "text").unwrap();
+        std::fs::remove_file(&link).unwrap();
+        std::os::unix::fs::symlink("file", &link).unwrap();
+        assert_eq!((read_text(&link).unwrap(), read_bytes(&link).unwrap()), ("text".into(), b"text".into()));
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn what_the_user_names_may_come_through_a_pipe() {
+        let folder = tempfile::tempdir().unwrap();
+        let pipe = folder.path().join("config.toml");
+        assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+        let writer = std::thread::spawn({
+            let pipe = pipe.clone();
+            move || std::fs::write(pipe, "seed = 1").unwrap()
+        });
+        assert_eq!(read_given(&pipe).unwrap(), "seed = 1");
+        writer.join().unwrap();
     }
 
     #[test]

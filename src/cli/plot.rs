@@ -71,9 +71,9 @@ pub(super) struct PlotArgs {
     /// run.json).
     #[arg(short, long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// Resolution of the PNG, pixels per inch.
-    #[arg(long, default_value_t = 300, value_parser = whole::<u32>(36..=2400))]
-    dpi: u32,
+    /// Resolution of the PNG, pixels per inch (default: 300, or less if a side had over 16000 pixels).
+    #[arg(long, value_parser = whole::<u32>(36..=2400))]
+    dpi: Option<u32>,
     /// Transparent background.
     #[arg(long)]
     transparent: bool,

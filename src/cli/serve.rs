@@ -5,6 +5,7 @@ use crate::base::signals;
 use crate::cli::choice;
 use crate::cli::choice::Archives;
 use crate::cli::values::whole;
+use crate::serve::hosts::{HostName, Hosts};
 use crate::serve::server::Server;
 use crate::serve::{Options, Service};
 use crate::store::folder;
@@ -19,9 +20,13 @@ Examples:
   morphcog serve --archive runs/zero_one-seed1 runs/pairs/*/
   # then open http://127.0.0.1:8080/
   morphcog serve --port 8080 --no-open
+  # from another machine; then open http://localhost:9000/
+  ssh -t -L 9000:localhost:8080 HOST morphcog serve --port 8080 --no-open
 
 Runs under runs/ that begin or go on meanwhile appear by themselves. Only this machine can reach \
 the page. Ctrl-C ends it.";
+
+const ADVICE: &str = "if you reach the page by this name: morphcog serve --allow-host NAME";
 
 #[derive(Debug, Args)]
 pub(super) struct ServeArgs {
@@ -36,6 +41,9 @@ pub(super) struct ServeArgs {
     /// Do not open the browser.
     #[arg(long)]
     no_open: bool,
+    /// A name by which the page may be reached besides those of this machine, as that of a proxy.
+    #[arg(long, value_name = "NAME")]
+    allow_host: Vec<HostName>,
 }
 
 pub(super) fn run(args: ServeArgs, console: &Console) -> Result<(), Error> {
@@ -44,7 +52,8 @@ pub(super) fn run(args: ServeArgs, console: &Console) -> Result<(), Error> {
     let newest = if archives.is_empty() { folder::newest_run().ok() } else { None };
     let stop = signals::stop_flag()?;
     let shown: Vec<_> = archives.iter().chain(&newest).cloned().collect();
-    let options = Options { archives, newest, data: args.data, runs: folder::RUNS.into() };
+    let hosts = Hosts::new(args.allow_host, ADVICE);
+    let options = Options { archives, newest, data: args.data, runs: folder::RUNS.into(), hosts };
     let (service, notes) = Service::open(&options)?;
     let server = Server::bind(service, args.port)?;
     choice::warn_of_versions(&shown, console);

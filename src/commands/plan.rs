@@ -1,7 +1,7 @@
 //! [`Plan`]: what belongs to a reproduction of the paper.
 
 use crate::base::error::Error;
-use crate::base::files::read_text;
+use crate::base::files::read_given;
 use crate::config::audit::Criteria;
 use crate::config::capacity::CapacityConfig;
 use crate::config::{Config, reading};
@@ -68,7 +68,7 @@ impl Plan {
     /// # Errors
     /// What is wrong with it, with file, line and key.
     pub fn load(name: &str, overrides: &[String]) -> Result<Self, Error> {
-        let text = match read_text(Path::new(name)) {
+        let text = match read_given(Path::new(name)) {
             Err(_) if Plan::is_built_in(name) => PAPER_TOML.1.to_string(),
             Err(error) => return Err(Error::reading(Path::new(name), &error)),
             Ok(text) => text,

@@ -2,7 +2,7 @@
 
 use crate::base::Grid;
 use crate::base::error::{Error, ErrorKind};
-use crate::base::files::{read_limited, read_text, write_whole};
+use crate::base::files::{read_given, read_limited, write_whole};
 use crate::base::stop::check;
 use crate::body::Body;
 use crate::config::reading;
@@ -125,7 +125,7 @@ impl Scenario {
             let text = text.map_err(|error| Error::reading(Path::new("standard input"), &error))?;
             return Scenario::parse(&text, "standard input");
         }
-        let text = read_text(path).map_err(|error| Error::reading(path, &error))?;
+        let text = read_given(path).map_err(|error| Error::reading(path, &error))?;
         Scenario::parse(&text, &path.display().to_string())
     }
 

@@ -2,7 +2,7 @@
 //! combination is a task.
 
 use crate::base::error::Error;
-use crate::base::files::{home_expanded, read_text};
+use crate::base::files::{home_expanded, read_given};
 use crate::base::hash::sha256_hex;
 use crate::base::named;
 use crate::commands::tasks::task::selection;
@@ -82,7 +82,7 @@ impl SweepPlan {
     /// # Errors
     /// What is wrong with it, with file, line and key.
     pub fn load(path: &Path, overrides: &[String]) -> Result<Self, Error> {
-        let text = read_text(path).map_err(|error| {
+        let text = read_given(path).map_err(|error| {
             let error = Error::reading(path, &error);
             error
                 .hint("morphcog schema sweep says what a plan holds; morphcog help sweep has one".to_string())

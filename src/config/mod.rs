@@ -10,7 +10,7 @@ pub mod train;
 pub mod validation;
 
 use crate::base::error::Error;
-use crate::base::files::{home_expanded, read_text};
+use crate::base::files::{home_expanded, read_given};
 use crate::body::MAX_SIDE;
 use crate::config::evaluation::EvaluationConfig;
 use crate::config::reading::Format;
@@ -272,7 +272,7 @@ impl Config {
             std::io::ErrorKind::IsADirectory => built_in().is_some(),
             _ => false,
         };
-        let text = match read_text(&path) {
+        let text = match read_given(&path) {
             Ok(text) => return Config::parse(&text, &path.to_string_lossy(), overrides),
             Err(error) if is_no_file(&error) => match built_in() {
                 Some((_, text)) => (*text).to_string(),

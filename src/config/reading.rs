@@ -1,7 +1,7 @@
 //! Reading configs: errors with file, line and key; `key=value` overrides.
 
 use crate::base::error::Error;
-use crate::base::files::{home_expanded, read_text};
+use crate::base::files::{home_expanded, read_given};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
@@ -144,7 +144,7 @@ pub(crate) fn load<T: Serialize + DeserializeOwned + Default>(
         return changed(T::default(), overrides, check, |error| error);
     };
     let path = &home_expanded(path);
-    let text = read_text(path).map_err(|error| Error::reading(path, &error))?;
+    let text = read_given(path).map_err(|error| Error::reading(path, &error))?;
     let format = Format::of(path);
     let name = path.display().to_string();
     let settings = read(&text, format, &name)?;

@@ -1,7 +1,7 @@
 //! `morphcog data fetch`: downloads the files of a dataset and lets none in that is not the
 //! published one.
 
-use crate::base::files::write_atomically;
+use crate::base::files::{read_bytes, write_atomically};
 use crate::base::hash::sha256_hex;
 use crate::base::observer::{Observer, Work};
 use crate::data::catalogue::{Catalogue, RemoteFile};
@@ -193,7 +193,7 @@ fn found(folder: &Path, remote: &RemoteFile) -> Result<Option<PathBuf>, FetchErr
     let unpacked = unpacked(folder, remote).filter(|_| remote.content_sha256.is_some());
     let mut right = None;
     for file in [Some(packed), unpacked].into_iter().flatten() {
-        let bytes = match std::fs::read(&file) {
+        let bytes = match read_bytes(&file) {
             Ok(bytes) => bytes,
             Err(error) if error.kind() == io::ErrorKind::NotFound => continue,
             Err(source) => return Err(FetchError::Disk { path: file, source }),

@@ -8,9 +8,9 @@
 //! header announces.
 
 use crate::base::Grid;
+use crate::base::files::open_file;
 use crate::base::hash::sha256_hex;
 use flate2::read::MultiGzDecoder;
-use std::fs::File;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
@@ -240,7 +240,7 @@ fn read_file(file: &Path) -> Result<Vec<u8>, IdxError> {
         return Err(io(io::Error::other("it is not a regular file")));
     }
     let mut stored = Vec::new();
-    File::open(file).map_err(io)?.take(MAX_BYTES + 1).read_to_end(&mut stored).map_err(io)?;
+    open_file(file).map_err(io)?.take(MAX_BYTES + 1).read_to_end(&mut stored).map_err(io)?;
     if stored.len() as u64 > MAX_BYTES {
         return Err(IdxError::Large { file: file.to_path_buf(), found: found.len() });
     }

@@ -2,6 +2,7 @@
 
 use crate::analysis::gallery;
 use crate::base::error::Error;
+use crate::base::files::read_text;
 use crate::base::shipped;
 use crate::body::{Body, VoxelCounts};
 use crate::config::Config;
@@ -16,9 +17,9 @@ use crate::task::judge::Judge;
 use crate::task::protocol::Protocol;
 use crate::task::stimulus::StimulusParams;
 use serde::Serialize;
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError};
 use std::time::{Duration, Instant, SystemTime};
 
 /// Robots from one source. They live in the same world; robots that ship together may look at
@@ -122,22 +123,31 @@ pub struct Summary {
 /// An archive whose file is looked at again and again.
 struct Watched {
     path: PathBuf,
-    /// Of the run, and of the audit beside it.
-    stamps: [Option<Stamp>; 2],
-    changes: u64,
+    /// What the files were like that were read last.
+    stamps: Stamps,
+    known: Known,
+}
+
+/// An archive as it was read last.
+#[derive(Clone)]
+struct Known {
     collection: Arc<Collection>,
+    changes: u64,
 }
 
 /// By what a file that was written anew is known: when, and how long it is.
 type Stamp = (SystemTime, u64);
 
+/// Of a run and of the verdicts on it.
+type Stamps = [Option<Stamp>; 2];
+
+/// None of what is no file, or not there.
 fn stamp(path: &Path) -> Option<Stamp> {
-    let about = path.metadata().ok()?;
+    let about = path.metadata().ok().filter(|about| about.is_file())?;
     Some((about.modified().ok()?, about.len()))
 }
 
-/// Of a run and of the verdicts on it.
-fn stamps(run_json: &Path) -> [Option<Stamp>; 2] {
+fn stamps(run_json: &Path) -> Stamps {
     [stamp(run_json), stamp(&AuditFile::path(run_json))]
 }
 
@@ -151,14 +161,23 @@ const LOOK_EVERY: Duration = Duration::from_millis(500);
 /// are read anew when they have changed, and runs that begin or go on meanwhile are added.
 pub struct Catalogue {
     built_in: Vec<Arc<Collection>>,
-    archives: Mutex<Archives>,
+    /// The archives as they are known; locked only to copy or to replace the list.
+    known: Mutex<Arc<[Known]>>,
+    /// Locked while files are read, which may take its time: requests that come meanwhile are
+    /// answered with what is known.
+    watch: Mutex<Watch>,
+}
+
+/// The files that are looked at.
+struct Watch {
+    watched: Vec<Watched>,
+    /// Their paths, as they were named and as they are without links.
+    paths: HashSet<PathBuf>,
+    /// Runs that could not be read as they were then: they are read again when they have changed.
+    unreadable: HashMap<PathBuf, Stamps>,
     /// Where new runs appear.
     runs: PathBuf,
     opened: SystemTime,
-}
-
-struct Archives {
-    watched: Vec<Watched>,
     looked: Option<Instant>,
 }
 
@@ -178,45 +197,39 @@ impl Catalogue {
         let zero_one = trained(shipped::ZERO_ONE, "Trained on thousands of images")?;
         let team = trained(shipped::TEAM, "Ten digits: a robot for each pair")?;
         let built_in = [zero_one, published()?, team].map(Arc::new).to_vec();
-        let opened = SystemTime::now();
-        let mut watched = Vec::new();
+        let mut watch = Watch {
+            watched: Vec::new(),
+            paths: HashSet::new(),
+            unreadable: HashMap::new(),
+            runs: runs.to_path_buf(),
+            opened: SystemTime::now(),
+            looked: None,
+        };
         for path in archives {
-            watched.push(Watched::read(path, &mut notes)?);
+            watch.open(path, &mut notes)?;
         }
-        if let Some(path) = newest {
-            match Watched::read(path, &mut notes) {
-                Ok(newest) => watched.push(newest),
-                Err(error) => notes.push(format!("{error}; left out")),
-            }
+        if let Some(path) = newest
+            && let Err(error) = watch.open(path, &mut notes)
+        {
+            notes.push(format!("{error}; left out"));
         }
-        let archives = Mutex::new(Archives { watched, looked: None });
-        Ok((Catalogue { built_in, archives, runs: runs.to_path_buf(), opened }, notes))
+        Ok((Catalogue { built_in, known: Mutex::new(watch.known()), watch: Mutex::new(watch) }, notes))
     }
 
-    /// The archives as they are now.
-    fn archives(&self) -> MutexGuard<'_, Archives> {
-        let mut archives = self.archives.lock().unwrap_or_else(PoisonError::into_inner);
-        if archives.looked.is_none_or(|looked| looked.elapsed() >= LOOK_EVERY) {
-            archives.watched.iter_mut().for_each(Watched::look);
-            for path in self.begun() {
-                if archives.watched.iter().all(|watched| !is_same(&watched.path, &path)) {
-                    // One that cannot be read, perhaps not yet, is no reason to stop.
-                    archives.watched.extend(Watched::read(&path, &mut Vec::new()));
-                }
-            }
-            archives.looked = Some(Instant::now());
+    /// The archives as they are now; or, while another request reads them, as they were.
+    fn archives(&self) -> Arc<[Known]> {
+        let watch = match self.watch.try_lock() {
+            Ok(watch) => Some(watch),
+            Err(TryLockError::Poisoned(watch)) => Some(watch.into_inner()),
+            Err(TryLockError::WouldBlock) => None,
+        };
+        let is_due = |watch: &MutexGuard<Watch>| watch.looked.is_none_or(|at| at.elapsed() >= LOOK_EVERY);
+        let known = || self.known.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(mut watch) = watch.filter(is_due) {
+            watch.look();
+            *known() = watch.known();
         }
-        archives
-    }
-
-    /// Runs that were written since the page was opened, by name.
-    fn begun(&self) -> Vec<PathBuf> {
-        let folders = std::fs::read_dir(&self.runs).into_iter().flatten().flatten();
-        let files = folders.map(|folder| folder.path().join(RUN_JSON));
-        let is_new = |path: &PathBuf| stamp(path).is_some_and(|(modified, _)| modified >= self.opened);
-        let mut begun: Vec<PathBuf> = files.filter(is_new).collect();
-        begun.sort();
-        begun
+        Arc::clone(&known())
     }
 
     /// All collections in short.
@@ -235,7 +248,7 @@ impl Catalogue {
         };
         let archives = self.archives();
         let built_in = self.built_in.iter().map(|from| (&**from, None, 0));
-        let read = archives.watched.iter().map(|Watched { collection, changes, .. }| {
+        let read = archives.iter().map(|Known { collection, changes }| {
             (&**collection, Some(collection.config.generations), *changes)
         });
         let list = built_in.chain(read).map(short).enumerate();
@@ -245,11 +258,7 @@ impl Catalogue {
     /// The collections.
     pub fn collections(&self) -> Vec<Arc<Collection>> {
         let archives = self.archives();
-        self.built_in
-            .iter()
-            .chain(archives.watched.iter().map(|watched| &watched.collection))
-            .cloned()
-            .collect()
+        self.built_in.iter().chain(archives.iter().map(|known| &known.collection)).cloned().collect()
     }
 
     /// A collection by its number.
@@ -276,34 +285,88 @@ impl Catalogue {
     }
 }
 
-/// Whether two paths name one file.
-fn is_same(a: &Path, b: &Path) -> bool {
-    let real = |path: &Path| path.canonicalize().unwrap_or_else(|_| path.to_path_buf());
-    a == b || real(a) == real(b)
+/// A path without links.
+fn real(path: &Path) -> PathBuf {
+    path.canonicalize().unwrap_or_else(|_| path.to_path_buf())
+}
+
+impl Watch {
+    /// Adds an archive.
+    fn open(&mut self, path: &Path, notes: &mut Vec<String>) -> Result<(), Error> {
+        let stamps = stamps(path);
+        let collection = archive(RunFile::read(path)?, path, notes)?;
+        self.add(path, stamps, collection);
+        Ok(())
+    }
+
+    fn add(&mut self, path: &Path, stamps: Stamps, collection: Collection) {
+        self.paths.extend([path.to_path_buf(), real(path)]);
+        let known = Known { collection: Arc::new(collection), changes: 0 };
+        self.watched.push(Watched { path: path.to_path_buf(), stamps, known });
+    }
+
+    fn known(&self) -> Arc<[Known]> {
+        self.watched.iter().map(|watched| watched.known.clone()).collect()
+    }
+
+    /// Reads what has changed, and runs that have begun.
+    fn look(&mut self) {
+        self.watched.iter_mut().for_each(Watched::look);
+        for path in self.begun() {
+            let now = stamps(&path);
+            if self.unreadable.get(&path) == Some(&now) || self.paths.contains(&real(&path)) {
+                continue;
+            }
+            match read(&path) {
+                Some(Ok(collection)) => {
+                    self.unreadable.remove(&path);
+                    self.add(&path, now, collection);
+                }
+                Some(Err(_)) => _ = self.unreadable.insert(path, now),
+                None => {}
+            }
+        }
+        self.looked = Some(Instant::now());
+    }
+
+    /// Runs that were written since the page was opened and are not known by this name, by name.
+    fn begun(&self) -> Vec<PathBuf> {
+        let folders = std::fs::read_dir(&self.runs).into_iter().flatten().flatten();
+        let files = folders.map(|folder| folder.path().join(RUN_JSON));
+        let files = files.filter(|path| !self.paths.contains(path));
+        let is_new = |path: &PathBuf| stamp(path).is_some_and(|(modified, _)| modified >= self.opened);
+        let mut begun: Vec<PathBuf> = files.filter(is_new).collect();
+        begun.sort();
+        begun
+    }
 }
 
 impl Watched {
-    fn read(path: &Path, notes: &mut Vec<String>) -> Result<Self, Error> {
-        let stamps = stamps(path);
-        let collection = Arc::new(archive(path, notes)?);
-        Ok(Watched { path: path.to_path_buf(), stamps, changes: 0, collection })
-    }
-
-    /// Reads it anew if it has changed; one that cannot be read, perhaps for the moment, stays as it
-    /// was.
+    /// Reads it anew if it has changed; one that cannot be read stays as it was.
     fn look(&mut self) {
         let now = stamps(&self.path);
-        if now != self.stamps
-            && let Ok(collection) = archive(&self.path, &mut Vec::new())
-        {
-            let Collection { robots, gone, .. } = &*self.collection;
+        if now == self.stamps {
+            return;
+        }
+        let Some(read) = read(&self.path) else { return };
+        self.stamps = now;
+        if let Ok(collection) = read {
+            let Collection { robots, gone, .. } = &*self.known.collection;
             let mut known: HashSet<&str> = collection.robots.iter().map(|robot| robot.id.as_str()).collect();
             let gone = robots.iter().chain(gone).filter(|robot| known.insert(&robot.id));
             let gone = gone.take(MOST_GONE).cloned().collect();
-            (self.stamps, self.collection) = (now, Arc::new(Collection { gone, ..collection }));
-            self.changes += 1;
+            self.known.collection = Arc::new(Collection { gone, ..collection });
+            self.known.changes += 1;
         }
     }
+}
+
+/// The archive of a run that nobody waits for: what is wrong with its text, which will be so until
+/// it changes. None if there is no text, perhaps for the moment.
+fn read(path: &Path) -> Option<Result<Collection, Error>> {
+    let text = read_text(path).ok()?;
+    let run = RunFile::parse(&text, &path.display().to_string());
+    Some(run.and_then(|run| archive(run, path, &mut Vec::new())))
 }
 
 impl Collection {
@@ -385,8 +448,7 @@ fn trained(set: &str, name: &str) -> Result<Collection, Error> {
     Ok(Collection { name, generations: None, dataset: None, bins: Vec::new(), tasks, robots, ..first })
 }
 
-fn archive(path: &Path, notes: &mut Vec<String>) -> Result<Collection, Error> {
-    let run = RunFile::read(path)?;
+fn archive(run: RunFile, path: &Path, notes: &mut Vec<String>) -> Result<Collection, Error> {
     let audit = AuditFile::if_any(&run, path).unwrap_or_else(|error| {
         notes.push(error.message);
         None
@@ -424,4 +486,86 @@ fn of_run(run: RunFile, audit: Option<&AuditFile>) -> Result<Collection, Error> 
         robots,
         gone: Vec::new(),
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::store::samples;
+    use std::fs::File;
+
+    /// A run of the quick-start config as text.
+    fn run() -> String {
+        let mut run = samples::run(&[("a", 1.5)]);
+        for robot in &mut run.elites {
+            robot.id = robot.genome.id();
+        }
+        serde_json::to_string(&run).unwrap()
+    }
+
+    fn write(runs: &Path, name: &str, text: &str) -> PathBuf {
+        let path = runs.join(name).join(RUN_JSON);
+        std::fs::create_dir_all(runs.join(name)).unwrap();
+        std::fs::write(&path, text).unwrap();
+        path
+    }
+
+    /// Names of the folders of the archives after another look.
+    fn known(catalogue: &Catalogue) -> Vec<String> {
+        catalogue.watch.lock().unwrap().looked = None;
+        let folder = |from: &Summary| {
+            let path = PathBuf::from(from.path.clone()?);
+            Some(path.parent()?.file_name()?.to_string_lossy().into_owned())
+        };
+        catalogue.list().iter().filter_map(folder).collect()
+    }
+
+    #[test]
+    fn a_run_that_cannot_be_read_is_read_again_only_when_it_has_changed() {
+        let runs = tempfile::tempdir().unwrap();
+        let (catalogue, _) = Catalogue::open(&[], None, runs.path()).unwrap();
+        let good = run();
+        // As long, and of the same time.
+        let path = write(runs.path(), "a", &good.replacen('{', "[", 1));
+        assert_eq!(known(&catalogue), [""; 0]);
+        let modified = path.metadata().unwrap().modified().unwrap();
+        write(runs.path(), "a", &good);
+        let file = File::options().write(true).open(&path).unwrap();
+        file.set_modified(modified).unwrap();
+        assert_eq!(known(&catalogue), [""; 0]);
+        file.set_modified(modified + Duration::from_millis(1)).unwrap();
+        assert_eq!(known(&catalogue), ["a"]);
+        // So it is with one that could be read before.
+        write(runs.path(), "a", &good.replacen('{', "[", 1));
+        file.set_modified(modified).unwrap();
+        assert_eq!((known(&catalogue), catalogue.list()[3].changes), (vec!["a".to_string()], 0));
+        write(runs.path(), "a", &good);
+        file.set_modified(modified).unwrap();
+        assert_eq!((known(&catalogue), catalogue.list()[3].changes), (vec!["a".to_string()], 0));
+        file.set_modified(modified + Duration::from_millis(1)).unwrap();
+        assert_eq!((known(&catalogue), catalogue.list()[3].changes), (vec!["a".to_string()], 1));
+    }
+
+    #[test]
+    fn requests_are_answered_while_another_one_reads() {
+        let runs = tempfile::tempdir().unwrap();
+        let (catalogue, _) = Catalogue::open(&[], None, runs.path()).unwrap();
+        write(runs.path(), "a", &run());
+        let reads = catalogue.watch.lock().unwrap();
+        assert_eq!((catalogue.list().len(), catalogue.collections().len()), (3, 3));
+        assert!(catalogue.collection(0).is_ok() && catalogue.course(0).is_err());
+        drop(reads);
+        assert_eq!(known(&catalogue), ["a"]);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_run_by_several_names_is_listed_once() {
+        let runs = tempfile::tempdir().unwrap();
+        let path = write(runs.path(), "a", &run());
+        let (catalogue, _) = Catalogue::open(std::slice::from_ref(&path), None, runs.path()).unwrap();
+        std::os::unix::fs::symlink("a", runs.path().join("link")).unwrap();
+        write(runs.path(), "a", &run());
+        assert_eq!(known(&catalogue), ["a"]);
+    }
 }

@@ -146,7 +146,8 @@ fn head(status: u16, content_type: &str, more: &str) -> String {
 /// If the reader has gone.
 pub fn begin_events(stream: &mut TcpStream) -> io::Result<()> {
     stream.set_nodelay(true)?;
-    stream.write_all(head(200, "text/event-stream", "").as_bytes())
+    // Or a proxy keeps events until there are many.
+    stream.write_all(head(200, "text/event-stream", "X-Accel-Buffering: no\r\n").as_bytes())
 }
 
 /// Reads a request. `None`: there was none.

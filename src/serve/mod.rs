@@ -4,6 +4,7 @@
 pub mod assets;
 pub mod catalogue;
 pub mod course;
+pub mod hosts;
 pub mod http;
 pub mod images;
 pub mod refusal;
@@ -22,6 +23,7 @@ use crate::commands::simulate::Scenario;
 use crate::sim::{Physics, Start};
 use crate::task::protocol::Protocol;
 use catalogue::Catalogue;
+use hosts::Hosts;
 use images::ImageSets;
 use refusal::Refusal;
 use request::Plan;
@@ -40,6 +42,8 @@ pub struct Options {
     pub data: Option<PathBuf>,
     /// The folder whose runs appear on the page when they change.
     pub runs: PathBuf,
+    /// By which names the page may be reached.
+    pub hosts: Hosts,
 }
 
 /// Everything a page can ask for.
@@ -52,6 +56,8 @@ pub struct Service {
     pub simulations: Simulations,
     /// The threads that the robots of teams walk in.
     pub pool: rayon::ThreadPool,
+    /// By which names it may be reached.
+    pub hosts: Hosts,
 }
 
 /// What `/api/status` says.
@@ -104,12 +110,12 @@ impl Service {
     /// # Errors
     /// What is wrong with an archive; if the system has no threads left.
     pub fn open(options: &Options) -> Result<(Self, Vec<String>), Error> {
-        let Options { archives, newest, data, runs } = options;
+        let Options { archives, newest, data, runs, hosts } = options;
         let (catalogue, mut notes) = Catalogue::open(archives, newest.as_deref(), runs)?;
         let (images, missing) = ImageSets::open(&catalogue, data.as_deref())?;
         notes.extend(missing);
-        let pool = threads::pool(None)?;
-        Ok((Service { catalogue, images, simulations: Simulations::default(), pool }, notes))
+        let (simulations, pool) = (Simulations::default(), threads::pool(None)?);
+        Ok((Service { catalogue, images, simulations, pool, hosts: hosts.clone() }, notes))
     }
 
     /// How it is doing.

@@ -21,9 +21,9 @@ pub enum Reply {
     Team(Box<TeamPlan>),
 }
 
-/// Answers a request to the server at a port.
-pub fn reply(service: &Service, port: u16, request: &Request) -> Reply {
-    if let Err(refusal) = no_stranger(port, request) {
+/// Answers a request.
+pub fn reply(service: &Service, request: &Request) -> Reply {
+    if let Err(refusal) = service.hosts.check(request) {
         return Reply::Whole(refusal);
     }
     let parts: Vec<&str> = request.path.split('/').skip(1).collect();
@@ -101,32 +101,6 @@ pub fn refused(refusal: Refusal) -> Response {
         Refusal::Busy(_) => 503,
     };
     Response::refusal(status, &refusal.to_string())
-}
-
-/// Refuses other sites that let a name of theirs point here (DNS rebinding), and requests that
-/// other sites' pages send.
-fn no_stranger(port: u16, request: &Request) -> Result<(), Response> {
-    let names = ["127.0.0.1", "localhost"];
-    let mut own = names.map(|name| format!("{name}:{port}")).to_vec();
-    if port == 80 {
-        // HTTP's own port is not named.
-        own.extend(names.map(str::to_string));
-    }
-    match request.header("host")? {
-        None => return Err(Response::refusal(400, "expected a Host header")),
-        Some(host) if !own.iter().any(|name| name.eq_ignore_ascii_case(host)) => {
-            return Err(Response::refusal(403, &format!("Host: expected {}", own.join(" or "))));
-        }
-        Some(_) => {}
-    }
-    let sent = request.header("origin")?;
-    let is_own = |origin: &str| own.iter().any(|name| origin.eq_ignore_ascii_case(&format!("http://{name}")));
-    // Programs like curl send none; browsers always do where it matters.
-    let foreign = request.method == "POST" && sent.is_some_and(|origin| !is_own(origin));
-    match foreign {
-        true => Err(Response::refusal(403, "Origin: requests from other sites are refused")),
-        false => Ok(()),
-    }
 }
 
 fn number<T: std::str::FromStr>(text: &str, what: &str) -> Result<T, Refusal> {

@@ -59,7 +59,7 @@ impl Server {
         let Server { listener, address, service } = self;
         let ended = Arc::new(AtomicBool::new(false));
         let (own, over) = (Arc::clone(&service), Arc::clone(&ended));
-        threads::start("server", move || accept(&listener, address.port(), &own, &over))?;
+        threads::start("server", move || accept(&listener, &own, &over))?;
         while !stop.load(Ordering::Relaxed) {
             std::thread::sleep(LOOK);
         }
@@ -75,7 +75,7 @@ impl Server {
     }
 }
 
-fn accept(listener: &TcpListener, port: u16, service: &Arc<Service>, ended: &AtomicBool) {
+fn accept(listener: &TcpListener, service: &Arc<Service>, ended: &AtomicBool) {
     let connections = Arc::new(AtomicUsize::new(0));
     for stream in listener.incoming() {
         if ended.load(Ordering::Relaxed) {
@@ -97,7 +97,7 @@ fn accept(listener: &TcpListener, port: u16, service: &Arc<Service>, ended: &Ato
         // If the system has no thread left, the connection is closed and its place is free again.
         let _ = threads::start("connection", move || {
             let _place = place;
-            connection(&service, port, &mut stream);
+            connection(&service, &mut stream);
         });
     }
 }
@@ -111,11 +111,11 @@ impl Drop for Place {
     }
 }
 
-fn connection(service: &Service, port: u16, stream: &mut TcpStream) {
+fn connection(service: &Service, stream: &mut TcpStream) {
     let (response, head_only) = match http::read(stream) {
         Ok(None) => return,
         Err(refusal) => (refusal, false),
-        Ok(Some(request)) => match routes::reply(service, port, &request) {
+        Ok(Some(request)) => match routes::reply(service, &request) {
             Reply::Whole(response) => (response, request.method == "HEAD"),
             Reply::Simulation(plan) => {
                 let lives =

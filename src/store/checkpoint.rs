@@ -2,7 +2,7 @@
 //! survives.
 
 use crate::base::error::Error;
-use crate::base::files::{sync_folder, write_atomically};
+use crate::base::files::{read_bytes, sync_folder, write_atomically};
 use crate::base::hash::sha256_hex;
 use crate::base::ownership;
 use crate::config::reading;
@@ -145,7 +145,7 @@ fn read_one(path: &Path) -> Result<Option<Checkpoint>, Error> {
 
 /// What a checkpoint file holds, if its checksum is right; `None` if there is no such file.
 fn content(path: &Path) -> Result<Option<String>, Error> {
-    let text = match std::fs::read(path) {
+    let text = match read_bytes(path) {
         Ok(bytes) => String::from_utf8_lossy(&bytes).into_owned(),
         Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
         Err(error) => return Err(Error::reading(path, &error)),

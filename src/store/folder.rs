@@ -117,13 +117,14 @@ impl RunFolder {
     /// If a file of that name, without a run beside it, is somebody else's; what the system says.
     pub(crate) fn write_config(&self, config: &Config) -> Result<(), Error> {
         let path = self.path.join(CONFIG);
-        let there = Config::load(&path.to_string_lossy(), &[]);
-        if there.as_ref().is_ok_and(|there| there == config) {
+        let text = read_text(&path).ok();
+        let parsed = |text: &String| Config::parse(text, &path.to_string_lossy(), &[]).ok();
+        let there = text.as_ref().and_then(parsed);
+        if there.as_ref() == Some(config) {
             return Ok(());
         }
         // A run that was killed before its first checkpoint leaves one that a program wrote.
-        let is_written =
-            || there.is_ok_and(|there| read_text(&path).is_ok_and(|text| text == there.to_toml()));
+        let is_written = || there.is_some_and(|there| text == Some(there.to_toml()));
         if !self.replaces && path.exists() && vacant(&self.path).is_ok() && !is_written() {
             let text = format!("{}: there is a file of that name that says something else", path.display());
             let hint = "move it away, write elsewhere with --out, or replace it by --force";
@@ -344,7 +345,9 @@ fn above(archives: &[PathBuf]) -> PathBuf {
 pub fn newest_run() -> Result<PathBuf, Error> {
     let runs = std::fs::read_dir(RUNS).into_iter().flatten().flatten();
     let files = runs.map(|entry| entry.path().join(RUN_JSON));
-    let dated = files.filter_map(|file| Some((file.metadata().ok()?.modified().ok()?, file)));
+    let found = files.filter_map(|file| Some((file.metadata().ok()?, file)));
+    let found = found.filter(|(about, _)| about.is_file());
+    let dated = found.filter_map(|(about, file)| Some((about.modified().ok()?, file)));
     dated.max().map(|(_, file)| file).ok_or_else(|| {
         let hint = "name one with --archive, or make one: morphcog evolve --config quickstart.toml";
         Error::input("there is no run under runs/".to_string()).hint(hint.to_string())

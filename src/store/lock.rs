@@ -6,6 +6,7 @@
 //! whether the heart still beats.
 
 use crate::base::error::Error;
+use crate::base::files::read_bytes;
 use crate::base::observer::Observer;
 use crate::base::ownership::{Lost, Ownership};
 use crate::base::stop::{Stopped, check};
@@ -332,7 +333,7 @@ fn lock(file: &File, manner: Manner) -> Result<bool, Refusal> {
 
 /// Who is named in a lock file; what is no name, as after a power cut, is none.
 fn read(path: &Path) -> io::Result<Option<Holder>> {
-    Ok(serde_json::from_slice(&std::fs::read(path)?).ok())
+    Ok(serde_json::from_slice(&read_bytes(path)?).ok())
 }
 
 /// Names a holder; the text has the same length at every heartbeat, so that it is never half there.

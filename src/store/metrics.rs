@@ -1,7 +1,7 @@
 //! `metrics.csv`: a line per generation, with pyribs' names.
 
 use crate::base::error::Error;
-use crate::base::files::{read_text, write_atomically};
+use crate::base::files::{read_bytes, read_text, write_atomically};
 use crate::base::ownership;
 use crate::base::ranges;
 use crate::qd::ArchiveStats;
@@ -68,7 +68,7 @@ impl Metrics {
     /// If it cannot be read or written.
     pub fn open(folder: &Path, generations: u64) -> Result<Self, Error> {
         let path = folder.join(METRICS);
-        let old = match std::fs::read(&path) {
+        let old = match read_bytes(&path) {
             _ if generations == 0 => String::new(),
             // What is no text is no whole line, and left out as such.
             Ok(bytes) => String::from_utf8_lossy(&bytes).into_owned(),

@@ -14,9 +14,9 @@ use crate::store::names::METRICS;
 use crate::store::names::{CAPACITY_JSON, EVAL_JSON, RUN_JSON};
 use crate::store::run::{RunFile, different};
 use crate::view::console::Console;
-use crate::view::error::{PictureError, write_whole};
+use crate::view::error::write_whole;
 use crate::view::plot;
-use crate::view::plot::{Background, Figure};
+use crate::view::plot::{Background, Figure, PRINT};
 use crate::view::sweeps;
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -89,8 +89,8 @@ pub struct Wanted {
     pub every: usize,
     /// The file; `None`: SVG and PNG beside the run.json.
     pub out: Option<PathBuf>,
-    /// Pixels of PNG per inch.
-    pub dpi: u32,
+    /// Pixels of PNG per inch; none: as for print, or as many as there can be.
+    pub dpi: Option<u32>,
     /// What is behind it.
     pub background: Background,
 }
@@ -129,16 +129,20 @@ pub fn make(console: &Console, wanted: &Wanted) -> Result<Vec<PathBuf>, Error> {
     let mut files = Vec::new();
     let mut write = |made: Made| -> Result<(), Error> {
         let figure = made.figure.on(wanted.background);
-        for ending in &endings {
+        let made = |ending: &&str| -> Result<(PathBuf, Vec<u8>), Error> {
             let path = match &wanted.out {
                 Some(path) => named(path, ending),
                 None => with_ending(&made.stem, ending),
             };
             let bytes = match *ending {
                 "svg" => figure.svg().into_bytes(),
-                _ => figure.png(f64::from(wanted.dpi) / 72.0).map_err(failed)?,
+                _ => png(console, &path, &figure, wanted.dpi)?,
             };
-            write_whole(&path, &bytes).map_err(failed)?;
+            Ok((path, bytes))
+        };
+        // Nothing is written before all of it is made.
+        for (path, bytes) in endings.iter().map(made).collect::<Result<Vec<_>, _>>()? {
+            write_whole(&path, &bytes)?;
             console.line_about(&path, &format!("wrote {}", path.display()));
             files.push(path);
         }
@@ -175,14 +179,43 @@ pub fn make(console: &Console, wanted: &Wanted) -> Result<Vec<PathBuf>, Error> {
                 archives.iter().map(|path| RunFile::read(path)).collect::<Result<_, _>>()?;
             different(archives.iter().map(PathBuf::as_path).zip(&runs))?;
         }
-        for path in &archives {
-            write(Made {
-                figure: of_run(wanted.kind, path)?,
-                stem: stem(Some(path), wanted.kind, &result_name(wanted.kind, path)),
-            })?;
+        let made = |path: &PathBuf| -> Result<Made, Error> {
+            let stem = stem(Some(path), wanted.kind, &result_name(wanted.kind, path));
+            Ok(Made { figure: of_run(wanted.kind, path)?, stem })
+        };
+        let all = archives.iter().map(made).collect::<Result<Vec<_>, _>>()?;
+        if let Some(dpi) = wanted.dpi.filter(|_| endings.contains(&"png")) {
+            all.iter().try_for_each(|made| possible(&made.figure, dpi))?;
         }
+        all.into_iter().try_for_each(write)?;
     }
     Ok(files)
+}
+
+/// A figure as PNG; says if it has fewer pixels than figures usually have.
+fn png(console: &Console, path: &Path, figure: &Figure, dpi: Option<u32>) -> Result<Vec<u8>, Error> {
+    if let Some(dpi) = dpi {
+        possible(figure, dpi)?;
+        return Ok(figure.png(dpi)?);
+    }
+    let fitting = figure.fitting(PRINT);
+    if fitting < PRINT {
+        let text = format!("{fitting} pixels per inch, because with {PRINT} it would be too large");
+        console.info(&format!("note: {}: {text}", path.display()));
+    }
+    Ok(figure.print()?)
+}
+
+/// Whether a figure can have so many pixels per inch.
+fn possible(figure: &Figure, dpi: u32) -> Result<(), Error> {
+    let most = figure.fitting(dpi);
+    match most < dpi {
+        true => {
+            let text = format!("--dpi {dpi}: {}: expected at most {most}, or an .svg file", figure.title());
+            Err(Error::usage(text))
+        }
+        false => Ok(()),
+    }
 }
 
 /// The formats that a file name asks for.
@@ -253,8 +286,7 @@ fn of_robot(wanted: &Wanted, named: &Named) -> Result<Made, Error> {
     let figure = match wanted.kind {
         Kind::Snapshots => plot::snapshots(&recording, wanted.every, &title),
         _ => plot::spacetime(&recording, &title),
-    }
-    .map_err(failed)?;
+    }?;
     Ok(made(&subject.found, figure))
 }
 
@@ -316,13 +348,6 @@ fn result_name(kind: Kind, path: &Path) -> String {
     let stem =
         path.file_stem().filter(|_| is_result && path.file_name().is_some_and(|name| name != RUN_JSON));
     stem.map_or(String::new(), |stem| stem.to_string_lossy().into_owned())
-}
-
-fn failed(error: PictureError) -> Error {
-    match error {
-        PictureError::Figure { .. } => Error::usage(format!("--dpi: {error}")),
-        error => error.into(),
-    }
 }
 
 #[cfg(test)]

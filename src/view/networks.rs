@@ -99,7 +99,7 @@ pub fn figure(file: &CapacityFile, out: &Path) -> Result<[PathBuf; 2], PictureEr
     let figure = plot::capacity(file);
     let files = FIGURES.map(|ending| out.with_extension(ending));
     write_whole(&files[0], figure.svg().as_bytes())?;
-    write_whole(&files[1], &figure.png(plot::PRINT)?)?;
+    write_whole(&files[1], &figure.print()?)?;
     Ok(files)
 }
 

@@ -99,7 +99,7 @@ pub fn pictures(console: &Console, finished: &Finished) -> Result<(), PictureErr
         };
         let figure = plot::response(robot, file.setting.task.as_deref(), &of);
         write_whole(svg, figure.svg().as_bytes())?;
-        write_whole(png, &figure.png(plot::PRINT)?)?;
+        write_whole(png, &figure.print()?)?;
         for path in [&svg, &png] {
             console.line_about(path, &format!("wrote {}", path.display()));
         }

@@ -12,7 +12,7 @@ use crate::store::task::State;
 use crate::view::console::{Console, Mode};
 use crate::view::error::write_whole;
 use crate::view::plot;
-use crate::view::plot::{Figure, PRINT};
+use crate::view::plot::Figure;
 use crate::view::progress::duration;
 use serde::Serialize;
 use serde_json::{Map, Value};
@@ -80,7 +80,7 @@ pub fn collected(
     console.line("");
     console.line_about(&path, &format!("wrote {}", path.display()));
     let draw = |stem: &str, figure: Figure| -> Result<(), Error> {
-        for (ending, bytes) in [("svg", figure.svg().into_bytes()), ("png", figure.png(PRINT)?)] {
+        for (ending, bytes) in [("svg", figure.svg().into_bytes()), ("png", figure.print()?)] {
             let path = out.join(format!("{stem}.{ending}"));
             write_whole(&path, &bytes)?;
             console.line_about(&path, &format!("wrote {}", path.display()));

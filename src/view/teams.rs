@@ -8,7 +8,6 @@ use crate::task::voting::Accuracy;
 use crate::view::console::{Console, Mode};
 use crate::view::error::write_whole;
 use crate::view::plot;
-use crate::view::plot::PRINT;
 use std::path::Path;
 
 /// What others did with the ten digits of MNIST in mechanics.
@@ -129,7 +128,7 @@ fn pictures(file: &TeamFile, out: &Path) -> Result<Vec<String>, Error> {
     let mut written = Vec::new();
     for (name, drawn) in FIGURES.into_iter().zip([plot::confusion(file), plot::poster(file)]) {
         let Some(drawn) = drawn else { continue };
-        for (path, bytes) in figure(out, name).into_iter().zip([drawn.svg().into_bytes(), drawn.png(PRINT)?])
+        for (path, bytes) in figure(out, name).into_iter().zip([drawn.svg().into_bytes(), drawn.print()?])
         {
             write_whole(&path, &bytes)?;
             written.push(path.display().to_string());

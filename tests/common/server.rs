@@ -3,8 +3,9 @@
 use super::program::Sandbox;
 use serde_json::Value;
 use std::io::{BufRead, BufReader, Read, Write};
-use std::net::TcpStream;
+use std::net::{Shutdown, TcpListener, TcpStream};
 use std::process::Child;
+use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 /// Nothing that is waited for may take longer.
@@ -136,6 +137,61 @@ impl Server {
         let mut said = String::new();
         child.stderr.take().unwrap().read_to_string(&mut said).unwrap();
         assert_eq!((status.code(), said.contains("panicked")), (Some(0), false), "{said}");
+    }
+}
+
+/// A proxy that has a server under a prefix of its own, as Jupyter's does: it cuts the prefix off and
+/// passes on everything else as it is.
+pub struct Proxy {
+    pub port: u16,
+    strays: Arc<Mutex<Vec<String>>>,
+}
+
+impl Proxy {
+    pub const PREFIX: &str = "/user/me/proxy/8080";
+
+    pub fn start(server: &Server) -> Self {
+        let listener = TcpListener::bind(("127.0.0.1", 0)).unwrap();
+        let (port, to) = (listener.local_addr().unwrap().port(), server.port);
+        let strays = Arc::new(Mutex::new(Vec::new()));
+        let stray = Arc::clone(&strays);
+        std::thread::spawn(move || {
+            for stream in listener.incoming() {
+                let stray = Arc::clone(&stray);
+                std::thread::spawn(move || Proxy::pass_on(stream.unwrap(), to, &stray));
+            }
+        });
+        Proxy { port, strays }
+    }
+
+    fn pass_on(stream: TcpStream, to: u16, strays: &Mutex<Vec<String>>) {
+        let mut from = BufReader::new(stream.try_clone().unwrap());
+        let mut first = String::new();
+        // A browser opens connections that it then does not use.
+        if from.read_line(&mut first).is_err() || first.is_empty() {
+            return;
+        }
+        let asked = first.split(' ').nth(1).unwrap_or_default();
+        if !asked.starts_with(&format!("{}/", Proxy::PREFIX)) {
+            strays.lock().unwrap().push(first);
+            let _ = (&stream)
+                .write_all(b"HTTP/1.1 404 Not Found\r\nContent-Length: 0\r\nConnection: close\r\n\r\n");
+            return;
+        }
+        let mut server = TcpStream::connect(("127.0.0.1", to)).unwrap();
+        server.write_all(first.replacen(Proxy::PREFIX, "", 1).as_bytes()).unwrap();
+        let mut answers = server.try_clone().unwrap();
+        std::thread::spawn(move || {
+            let _ = std::io::copy(&mut answers, &mut &stream);
+            let _ = stream.shutdown(Shutdown::Both);
+        });
+        let _ = std::io::copy(&mut from, &mut server);
+        let _ = server.shutdown(Shutdown::Both);
+    }
+
+    /// What was asked for outside of the prefix.
+    pub fn strays(&self) -> Vec<String> {
+        self.strays.lock().unwrap().clone()
     }
 }
 

@@ -1,6 +1,7 @@
 //! How far tasks are, read from their folders.
 
 use crate::base::error::Error;
+use crate::base::files::open_file;
 use crate::commands::tasks::steps::is_done;
 use crate::commands::tasks::task::{Place, Run, Task};
 use crate::store::lock;
@@ -86,7 +87,7 @@ fn status_of(number: usize, task: &Task, folder: &Path) -> Result<Status, Error>
 /// Generations that a metrics.csv has, and the wall-clock time they took \[s\]. Only the end of the
 /// file is read: a long run's has megabytes.
 fn last_generation(path: &Path) -> Option<(u64, f64)> {
-    let mut file = std::fs::File::open(path).ok()?;
+    let mut file = open_file(path).ok()?;
     let length = file.metadata().ok()?.len();
     file.seek(SeekFrom::Start(length.saturating_sub(ROW))).ok()?;
     let mut text = Vec::new();

@@ -18,9 +18,10 @@ export const post = async (path, value, signal) => {
 };
 
 // Server-sent events in the answer to a POST (EventSource can only GET): one request begins a simulation, and to drop it ends
-// that simulation.
+// that simulation. Jupyter's proxy hands on events as they come only where they are asked for by this Accept.
 export const stream = async (path, value, signal, tell) => {
-  const response = await fetch(path, { method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify(value), signal });
+  const headers = { "Content-Type": "application/json", Accept: "text/event-stream" };
+  const response = await fetch(path, { method: "POST", headers, body: JSON.stringify(value), signal });
   if (!response.ok) return fail(response);
   const reader = response.body.pipeThrough(new TextDecoderStream()).getReader();
   let rest = "";

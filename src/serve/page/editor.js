@@ -125,7 +125,7 @@ export class Editor {
   }
 
   async check() {
-    const checked = await post("/api/body", { body: this.cells });
+    const checked = await post("api/body", { body: this.cells });
     const counts = `${checked.total} voxels: ${checked.muscle} muscle, ${checked.sensor} sensor`;
     $("checked").dataset.state = checked.problem ? "bad" : "good";
     $("checked").textContent = checked.problem ? `It cannot live: ${checked.problem}` : counts + (checked.note ? `; ${checked.note}` : "");
@@ -159,7 +159,7 @@ export class Editor {
 
   async save() {
     const shown = this.see();
-    const { stimulus } = await post("/api/stimulus", { subject: this.subject, shown });
+    const { stimulus } = await post("api/stimulus", { subject: this.subject, shown });
     const lines = (grid) => "[" + grid.map((row) => JSON.stringify(row)).join(",\n    ") + "]";
     const text = `{\n  "body": ${lines(this.cells)},\n  "stimulus": ${lines(stimulus)},\n  "control_steps": ${this.steps}\n}\n`;
     const link = element("a", { href: URL.createObjectURL(new Blob([text], { type: "application/json" })), download: "scenario.json" });
@@ -171,7 +171,7 @@ export class Editor {
     const file = $("file").files[0];
     $("file").value = "";
     if (!file) return;
-    const loaded = await post("/api/scenario", await file.text());
+    const loaded = await post("api/scenario", await file.text());
     if (loaded.body.length > 32 || loaded.body[0].length > 32) throw new Error("scenario: body: the editor has room for 32 × 32 voxels");
     this.encoding = AREA("threshold"); $("pixels").value = "threshold";
     this.set(loaded.body);

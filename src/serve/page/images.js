@@ -15,7 +15,7 @@ export class Images {
   }
 
   async load() {
-    this.sets = await get("/api/images");
+    this.sets = await get("api/images");
     for (const { name } of this.sets) $("set").add(new Option(name === "builtin" ? "built-in digits" : name, name));
     await this.open(this.sets[0].name);
   }
@@ -39,7 +39,7 @@ export class Images {
   async turn(by) { this.from = Math.max(0, Math.min(this.from + by, Math.floor((this.total - 1) / PAGE) * PAGE)); await this.page(); }
 
   async page() {
-    const wanted = `/api/images?set=${this.set.name}&class=${this.class}&from=${this.from}&count=${PAGE}`;
+    const wanted = `api/images?set=${this.set.name}&class=${this.class}&from=${this.from}&count=${PAGE}`;
     this.wanted = wanted;
     const images = await get(wanted);
     if (this.wanted !== wanted) return;

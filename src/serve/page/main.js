@@ -12,7 +12,7 @@ import { Team } from "./team.js";
 // Strokes may follow each other that fast without a simulation for each.
 const AFTER_STROKE = 300, WHILE_DRAWING = 60;
 
-const materials = await get("/api/materials");
+const materials = await get("api/materials");
 let simulation = null, timer = 0, seen = null, previous = 0, drawn = null, looked = 0;
 // The picture: { drawing } or { image }; and the words for it.
 let picture = { shown: {}, about: "nothing, it is dark" };
@@ -80,7 +80,7 @@ const show = (next, after) => {
 const glance = async () => {
   if (!who || who.team) return;
   const number = ++looked;
-  const answer = await post("/api/stimulus", { subject: who.subject(), shown: shownTo() });
+  const answer = await post("api/stimulus", { subject: who.subject(), shown: shownTo() });
   if (number === looked) { seen = answer; look(); }
 };
 
@@ -165,6 +165,7 @@ const drawTeam = () => {
   if (!walk?.begun) return;
   const says = walk.tally?.says ?? null, known = walk.end && says !== null && walk.begun.classes.includes(walk.begun.seen.label);
   $("verdict").dataset.state = known ? (says === walk.begun.seen.label ? "right" : "wrong") : says === null ? (walk.end ? "none" : "idle") : "answer";
+  $("verdict").dataset.long = "false";
   $("says").textContent = says === null ? (walk.end ? "undecided" : "") : says;
   $("moved").textContent = `step ${walk.step} of ${walk.begun.until}`;
   const play = walk.end || walk.paused ? "Play" : "Pause";
@@ -195,6 +196,7 @@ const draw = () => {
   const unstable = simulation.over && simulation.end.unstable;
   const text = unstable ? { state: "none", says: "unstable", moved: simulation.end.unstable } : words(answer, simulation.over);
   $("verdict").dataset.state = text.state;
+  $("verdict").dataset.long = String(text.says.length > 14);
   $("says").textContent = text.says;
   $("moved").textContent = text.moved;
   const play = simulation.over ? "Play" : simulation.playing ? "Pause" : "Play";
@@ -246,7 +248,7 @@ document.addEventListener("keydown", (e) => {
 
 const status = async () => {
   try {
-    const { simulations, max_simulations: most } = await get("/api/status");
+    const { simulations, max_simulations: most } = await get("api/status");
     $("status").dataset.state = simulations ? "alive" : "";
     $("status").textContent = simulations === 1 ? "1 simulation running" : `${simulations} simulations running`;
     $("status").title = `at most ${most} at once`;

@@ -16,7 +16,7 @@ export class Robots {
   }
 
   async load() {
-    this.list = await get("/api/archives");
+    this.list = await get("api/archives");
     this.names();
     await this.open(0);
   }
@@ -34,7 +34,7 @@ export class Robots {
   // What has changed meanwhile: runs that began, elites of a run that goes on. The chosen robot stays.
   async refresh() {
     const before = this.list?.[this.index]?.changes;
-    this.list = await get("/api/archives");
+    this.list = await get("api/archives");
     this.names();
     const now = this.list[this.index];
     if (!now || !this.from) return;
@@ -52,13 +52,13 @@ export class Robots {
     await this.progress();
   }
 
-  async archive(index) { return { ...await get("/api/archives/" + index), index, name: this.list[index].called }; }
+  async archive(index) { return { ...await get("api/archives/" + index), index, name: this.list[index].called }; }
 
   // The curves of a run, and how long it will go on.
   async progress() {
     const { index } = this, now = this.list[index];
     if (!now?.asked) { $("progress").hidden = true; return; }
-    const course = await get(`/api/archives/${index}/progress`).catch(() => null);
+    const course = await get(`api/archives/${index}/progress`).catch(() => null);
     if (this.index !== index) return;
     $("progress").hidden = !course || course.done < 2;
     if ($("progress").hidden) return;

@@ -9,7 +9,7 @@ export class Simulation {
     // Whether we look at a moment of our own choice and not at the newest.
     this.apart = false;
     this.abort = new AbortController();
-    this.running = stream("/api/simulations", { ...request, speed }, this.abort.signal, (name, data) => this.hear(name, data));
+    this.running = stream("api/simulations", { ...request, speed }, this.abort.signal, (name, data) => this.hear(name, data));
   }
 
   hear(name, data) {
@@ -70,7 +70,7 @@ export class Simulation {
     if (!this.begun) this.waiting = { ...this.waiting, ...value };
     if (this.end || !this.begun) return Promise.resolve();
     // A simulation that has just ended cannot be changed any more, and need not.
-    return post("/api/simulations/" + this.begun.id, value).catch((error) => { if (error.status !== 404) throw error; });
+    return post("api/simulations/" + this.begun.id, value).catch((error) => { if (error.status !== 404) throw error; });
   }
 
   play(on) { this.playing = on; return this.change({ paused: !on }); }

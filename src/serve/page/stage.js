@@ -58,14 +58,17 @@ export class Stage {
     }
     ctx.setLineDash([]);
     if (!judge) return;
-    const text = (way) => judge[way].join(" ");
     ctx.textBaseline = "top";
     for (const way of ["left", "right"]) {
-      const on = answer && answer.way === way, right = way === "right";
+      const on = answer && answer.way === way, right = way === "right", classes = judge[way];
+      let count = classes.length;
+      const text = () => classes.slice(0, count).join(" ") + (count < classes.length ? " …" : "");
       ctx.fillStyle = css(on ? "accent" : "mark");
       ctx.textAlign = right ? "right" : "left";
-      ctx.font = "700 " + (text(way).length > 3 ? 22 : 30) + "px system-ui, sans-serif";
-      ctx.fillText(right ? text(way) + " →" : "← " + text(way), right ? width - 12 : 12, 8);
+      ctx.font = "700 " + (text().length > 3 ? 22 : 30) + "px system-ui, sans-serif";
+      // Of many classes, as many as fit beside those of the other side.
+      while (count > 1 && ctx.measureText(text()).width > width / 2 - 60) count--;
+      ctx.fillText(right ? text() + " →" : "← " + text(), right ? width - 12 : 12, 8);
     }
   }
 

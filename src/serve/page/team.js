@@ -9,7 +9,7 @@ export class Team {
 
   // Who is in it.
   async load() {
-    const { members, classes } = await get("/api/team");
+    const { members, classes } = await get("api/team");
     this.members = members; this.classes = classes;
     $("about-team").textContent = `${members.length} robots, each of which tells two groups of classes apart, answer together. Each has one vote for every class of the side it walks to; a walk of at most 3 voxel lengths gives none.`;
   }
@@ -27,7 +27,7 @@ export class Team {
       walk.stale = true;
       this.changed(name, walk);
     };
-    return stream("/api/team", { shown, speed }, walk.abort.signal, hear).finally(() => { if (this.walk === walk) { walk.end = true; walk.stale = true; } });
+    return stream("api/team", { shown, speed }, walk.abort.signal, hear).finally(() => { if (this.walk === walk) { walk.end = true; walk.stale = true; } });
   }
 
   stop() { this.walk?.abort.abort(); this.walk = null; }
@@ -36,7 +36,7 @@ export class Team {
   change(value) {
     if (!this.walk?.begun || this.walk.end) return Promise.resolve();
     if (value.paused !== undefined) this.walk.paused = value.paused;
-    return post("/api/simulations/" + this.walk.begun.id, value).catch((error) => { if (error.status !== 404) throw error; });
+    return post("api/simulations/" + this.walk.begun.id, value).catch((error) => { if (error.status !== 404) throw error; });
   }
 
   build() {

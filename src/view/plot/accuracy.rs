@@ -37,7 +37,7 @@ pub fn accuracy(report: &EvalFile) -> Figure {
     let mut y = top;
     for task in &tasks {
         if tasks.len() > 1 {
-            canvas.text([left + 3.0, y + 9.0], task, Words::default().bold());
+            canvas.fitted([left + 3.0, y + 9.0], task, size[0] - 3.0, Words::default().bold());
         }
         y += block_head + 3.0;
         let robots: Vec<&RobotReport> = report.robots.iter().filter(|robot| robot.task == *task).collect();

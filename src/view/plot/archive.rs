@@ -47,7 +47,7 @@ pub fn archive(run: &RunFile) -> Figure {
         let x = MARGIN + LEFT + column as f64 * (side + LEFT + 4.0);
         let y = top + title + row as f64 * (map_height + 4.0);
         if tasks > 1 {
-            canvas.text([x, y - 4.0], &run.dimensions.tasks[task], Words::default().bold());
+            canvas.fitted([x, y - 4.0], &run.dimensions.tasks[task], side, Words::default().bold());
         }
         let cell = |bins: [usize; 3]| {
             let mut cell = bins.to_vec();

@@ -79,7 +79,9 @@ fn panel(canvas: &mut Canvas, at: [f64; 2], size: [f64; 2], y: &Axis, task: &Tas
         Some(at @ Crossing::At(size)) => (format!("capacity {at} {unit}"), Some(size)),
         None => ("no capacity: the curve never reaches the robots".to_string(), None),
     };
-    let title = format!("{}, {kind}", task.task);
+    // Half of the room is for the words beside it.
+    let title = fonts::fitted(&task.task, Words::default().size, true, 0.4 * size[0]);
+    let title = format!("{title}, {kind}");
     canvas.text([at[0], at[1] - 5.0], &title, Words::default().bold());
     let left = fonts::width(&title, Words::default().size, true) + 6.0;
     canvas.fitted([at[0] + left, at[1] - 5.0], &found, size[0] - left, Words::default());
@@ -195,6 +197,6 @@ mod tests {
         empty.tasks.truncate(1);
         assert!(capacity(&empty).svg().contains("0|1, CNN"));
         empty.tasks.clear();
-        assert!(capacity(&empty).png(1.0).is_ok());
+        assert!(capacity(&empty).png(72).is_ok());
     }
 }

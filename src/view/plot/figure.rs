@@ -11,8 +11,8 @@ use resvg::usvg::{Options, Tree};
 pub const COLUMN: f64 = 241.0;
 /// Width of a journal's page: 178 mm in points.
 pub const PAGE: f64 = 504.0;
-/// Pixels per point of pictures for print: 300 per inch.
-pub const PRINT: f64 = 300.0 / 72.0;
+/// Pixels per inch of pictures for print.
+pub const PRINT: u32 = 300;
 /// Most pixels on a side of a PNG.
 const MOST_PIXELS: f64 = 16_000.0;
 
@@ -77,13 +77,28 @@ impl Figure {
         )
     }
 
-    /// The figure as PNG, `scale` pixels per point ([`PRINT`] is good for print); the file says how
-    /// large it is meant to be.
+    /// The most pixels per inch, up to `dpi`, with which its PNG does not have too many on a side.
+    pub fn fitting(&self, dpi: u32) -> u32 {
+        let longest = self.size.into_iter().fold(1.0, f64::max);
+        // One pixel less: what is cut by the edge counts as a pixel, too.
+        dpi.min(((MOST_PIXELS - 1.0) * 72.0 / longest) as u32).max(1)
+    }
+
+    /// The figure as PNG for print: with [`PRINT`] pixels per inch, or as many as it can have.
+    ///
+    /// # Errors
+    /// As [`png`](Figure::png).
+    pub fn print(&self) -> Result<Vec<u8>, PictureError> {
+        self.png(self.fitting(PRINT))
+    }
+
+    /// The figure as PNG with `dpi` pixels per inch; the file says how large it is meant to be.
     ///
     /// # Errors
     /// [`PictureError::Figure`] if it would have no pixels or too many, [`PictureError::Encode`] if
     /// it cannot be made.
-    pub fn png(&self, scale: f64) -> Result<Vec<u8>, PictureError> {
+    pub fn png(&self, dpi: u32) -> Result<Vec<u8>, PictureError> {
+        let scale = f64::from(dpi) / 72.0;
         let [width, height] = self.size.map(|points| (points * scale).ceil());
         let possible = |pixels: f64| (1.0..=MOST_PIXELS).contains(&pixels);
         if !possible(width) || !possible(height) {
@@ -164,16 +179,31 @@ mod tests {
     #[test]
     fn a_png_has_the_asked_size_and_background() {
         let read = |bytes: &[u8]| Pixmap::decode_png(bytes).unwrap();
-        let paper = read(&figure().png(2.0).unwrap());
+        let paper = read(&figure().png(144).unwrap());
         assert_eq!((paper.width(), paper.height()), (120, 100));
         assert_eq!(paper.pixel(1, 1).unwrap().red(), 255);
         assert_eq!(paper.pixel(30, 30).unwrap().red(), colour::INK.rgb[0]);
-        let clear = read(&figure().on(Background::Transparent).png(2.0).unwrap());
+        let clear = read(&figure().on(Background::Transparent).png(144).unwrap());
         assert_eq!((clear.pixel(1, 1).unwrap().alpha(), clear.pixel(30, 30).unwrap().alpha()), (0, 255));
         // The letters are there, in the embedded font.
         let dark = (60..90).any(|y| (8..100).any(|x| paper.pixel(x, y).unwrap().red() < 100));
         assert!(dark);
-        assert!(figure().png(0.0).is_err() && figure().png(1e9).is_err() && figure().png(f64::NAN).is_err());
-        assert_eq!(figure().png(2.0).unwrap(), figure().png(2.0).unwrap());
+        assert!(figure().png(0).is_err() && figure().png(u32::MAX).is_err());
+        assert_eq!(figure().png(144).unwrap(), figure().png(144).unwrap());
+    }
+
+    #[test]
+    fn a_figure_has_as_many_pixels_as_it_can_have_and_no_more() {
+        assert_eq!(figure().fitting(PRINT), PRINT);
+        for height in [3839.9, 3840.0, 3840.1, 17_003.25, 720.0, 1e5, 1e9] {
+            let long = Figure::new("long", [60.0, height], String::new());
+            let pixels = |dpi: u32| (height * f64::from(dpi) / 72.0).ceil();
+            let dpi = long.fitting(2400);
+            assert!(pixels(dpi) <= MOST_PIXELS || dpi == 1, "{height}: {dpi}");
+            assert!(pixels(dpi + 1) >= MOST_PIXELS, "{height}: {dpi}");
+            assert_eq!(long.fitting(PRINT), dpi.min(PRINT));
+        }
+        let long = Figure::new("long", [60.0, 17_000.0], String::new());
+        assert_eq!(Pixmap::decode_png(&long.print().unwrap()).unwrap().height(), 15_820);
     }
 }

@@ -6,6 +6,7 @@ use crate::store::team::{Member, TeamFile};
 use crate::task::direction::Direction;
 use crate::view::colour;
 use crate::view::colour::Colour;
+use crate::view::fonts;
 use crate::view::plot::axes::{MARGIN, heading};
 use crate::view::plot::canvas::{Canvas, Pen, TEXT, Words};
 use crate::view::plot::figure::{COLUMN, Figure, PAGE};
@@ -13,6 +14,9 @@ use crate::view::plot::{robot, scales};
 
 /// Space between bodies, points.
 const GAP: f64 = 4.0;
+
+/// Largest side of a body, points.
+const LARGEST: f64 = 110.0;
 
 /// Space for what stands below a body, points.
 const CAPTION: f64 = 17.0;
@@ -29,9 +33,19 @@ pub fn confusion(file: &TeamFile) -> Option<Figure> {
         file.images.len(),
         file.split
     );
-    let top = heading(&mut canvas, "Answers of the team", &of, COLUMN) + 8.0 + 2.0 * TEXT;
-    let left = MARGIN + 3.0 * TEXT;
-    let side = (COLUMN - MARGIN - left) / count as f64;
+    let widest = |texts: &mut dyn Iterator<Item = String>| {
+        texts.map(|text| fonts::width(&text, TEXT, false)).fold(0.0, f64::max)
+    };
+    let names = widest(&mut file.classes.iter().map(u8::to_string));
+    let numbers = widest(&mut votes.confusion.iter().flatten().map(usize::to_string));
+    let left = MARGIN + (3.0 * TEXT).max(TEXT + names + 8.0);
+    // Of many classes the figure is as wide as names and numbers need, up to a page.
+    let within = |width: f64| (width - MARGIN - left) / count as f64;
+    let side = (names.max(numbers) + 3.0).min(within(PAGE)).max(within(COLUMN));
+    let width = left + side * count as f64 + MARGIN;
+    let [every_row, every_column] = [TEXT, names + 2.0].map(|room| (room / side).ceil() as usize);
+    let has_numbers = numbers <= side && TEXT <= side;
+    let top = heading(&mut canvas, "Answers of the team", &of, width) + 8.0 + 2.0 * TEXT;
     let middle = left + side * count as f64 / 2.0;
     canvas.text([middle, top - 1.7 * TEXT], "answer", Words::middle());
     let at = [MARGIN + TEXT, top + side * count as f64 / 2.0];
@@ -40,8 +54,12 @@ pub fn confusion(file: &TeamFile) -> Option<Figure> {
         let of_class: usize = votes.confusion[row].iter().sum();
         let name = class.to_string();
         let y = top + side * row as f64;
-        canvas.text([left - 3.0, y + side / 2.0 + 0.36 * TEXT], &name, Words::end());
-        canvas.text([left + side * (row as f64 + 0.5), top - 3.0], &name, Words::middle());
+        if row % every_row == 0 {
+            canvas.text([left - 3.0, y + side / 2.0 + 0.36 * TEXT], &name, Words::end());
+        }
+        if row % every_column == 0 {
+            canvas.text([left + side * (row as f64 + 0.5), top - 3.0], &name, Words::middle());
+        }
         for (column, images) in votes.confusion[row].iter().enumerate() {
             let x = left + side * column as f64;
             let share = *images as f64 / of_class.max(1) as f64;
@@ -51,15 +69,15 @@ pub fn confusion(file: &TeamFile) -> Option<Figure> {
                 size,
                 if *images == 0 { Colour::gray(0.97) } else { scales::sequential(share) },
             );
-            if *images > 0 {
+            if *images > 0 && has_numbers {
                 let ink = if share > 0.6 { colour::INK } else { colour::PAPER };
-                let words = Words { size: TEXT.min(0.42 * side), ..Words::middle() }.colour(ink);
-                canvas.text([x + side / 2.0, y + side / 2.0 + 0.36 * words.size], &images.to_string(), words);
+                let at = [x + side / 2.0, y + side / 2.0 + 0.36 * TEXT];
+                canvas.text(at, &images.to_string(), Words::middle().colour(ink));
             }
         }
     }
     let height = top + side * count as f64 + MARGIN;
-    Some(Figure::new(&format!("Answers: {of}"), [COLUMN, height], canvas.finish()))
+    Some(Figure::new(&format!("Answers: {of}"), [width, height], canvas.finish()))
 }
 
 /// All bodies, with what each tells apart and how well: where every task is a pair of classes, as a
@@ -69,7 +87,12 @@ pub fn poster(file: &TeamFile) -> Option<Figure> {
     if file.members.is_empty() {
         return None;
     }
-    let places = triangle(file).unwrap_or_else(|| rows(file.members.len()));
+    let captions = file.members.iter().map(|member| fonts::width(&ways(member, f64::INFINITY), TEXT, false));
+    let widest = captions.fold(1.0, f64::max).min(LARGEST);
+    // Columns that leave room for what stands below a body.
+    let most = ((PAGE - 2.0 * MARGIN) / widest) as usize;
+    let of_pairs = triangle(file).filter(|_| file.classes.len() - 1 <= most);
+    let places = of_pairs.unwrap_or_else(|| rows(file.members.len(), most));
     let columns = places.iter().map(|[column, _]| column + 1).max()?;
     let lines = places.iter().map(|[_, line]| line + 1).max()?;
     let mut canvas = Canvas::new();
@@ -82,7 +105,7 @@ pub fn poster(file: &TeamFile) -> Option<Figure> {
     };
     let count = file.members.len();
     let top = heading(&mut canvas, &format!("A team of {count} bodies"), &of, PAGE) + 4.0;
-    let side = ((PAGE - 2.0 * MARGIN) / columns as f64 - GAP).min(110.0);
+    let side = ((PAGE - 2.0 * MARGIN) / columns as f64 - GAP).min(LARGEST);
     for (member, [column, line]) in file.members.iter().zip(&places) {
         let at = [MARGIN + (side + GAP) * *column as f64, top + (side + CAPTION) * *line as f64];
         drawn(&mut canvas, at, side, &member.body);
@@ -115,12 +138,14 @@ fn triangle(file: &TeamFile) -> Option<Vec<[usize; 2]>> {
     let mut different = places.clone();
     different.sort_unstable();
     different.dedup();
-    (different.len() == places.len() && file.classes.len() > 2).then_some(places)
+    let pairs = file.classes.len() * file.classes.len().saturating_sub(1) / 2;
+    (different.len() == places.len() && places.len() == pairs && pairs > 1).then_some(places)
 }
 
-/// Column and line of each of so many, about as many lines as columns.
-fn rows(count: usize) -> Vec<[usize; 2]> {
-    let columns = (count as f64).sqrt().ceil().max(4.0) as usize;
+/// Column and line of each of so many, about as many lines as columns, of which there are some at
+/// most.
+fn rows(count: usize, most: usize) -> Vec<[usize; 2]> {
+    let columns = ((count as f64).sqrt().ceil().max(4.0) as usize).min(most);
     (0..count).map(|number| [number % columns, number / columns]).collect()
 }
 
@@ -140,11 +165,7 @@ fn drawn(canvas: &mut Canvas, at: [f64; 2], side: f64, body: &Body) {
 
 /// What a robot tells apart by walking left or right, and how well.
 fn caption(canvas: &mut Canvas, [middle, y]: [f64; 2], most: f64, member: &Member) {
-    // The classes under which it walks left, a bar, those under which it walks right.
-    let (a, b) = if member.first_group_walks == Direction::Left.name() { (0, 1) } else { (1, 0) };
-    let group = |k: usize| member.groups[k].iter().map(u8::to_string).collect::<Vec<_>>().join(" ");
-    let text = format!("← {} | {} →", group(a), group(b));
-    canvas.fitted([middle, y + 7.5], &text, most + GAP, Words::middle());
+    canvas.text([middle, y + 7.5], &ways(member, most + GAP), Words::middle());
     let accuracy = format!("{} %", percent(member.own.accuracy));
     canvas.fitted(
         [middle, y + 15.0],
@@ -152,6 +173,23 @@ fn caption(canvas: &mut Canvas, [middle, y]: [f64; 2], most: f64, member: &Membe
         most,
         Words { size: 6.2, ..Words::middle() }.colour(colour::FAINT),
     );
+}
+
+/// The classes under which it walks left, a bar, those under which it walks right; of many, as many as
+/// fit.
+fn ways(member: &Member, most: f64) -> String {
+    let (a, b) = if member.first_group_walks == Direction::Left.name() { (0, 1) } else { (1, 0) };
+    let groups = [a, b].map(|k| {
+        let classes: Vec<String> = member.groups[k].iter().map(u8::to_string).collect();
+        classes.join(" ")
+    });
+    let with = |[left, right]: [&str; 2]| format!("← {left} | {right} →");
+    let room = most - fonts::width(&with(["", ""]), TEXT, false);
+    let [left, right] = [&groups[0], &groups[1]].map(|group| fonts::width(group, TEXT, false));
+    // One that needs less than its half leaves the rest to the other.
+    let fitted =
+        |k: usize, other: f64| fonts::fitted(&groups[k], TEXT, false, (room / 2.0).max(room - other));
+    with([&fitted(0, right), &fitted(1, left)])
 }
 
 #[cfg(test)]
@@ -181,5 +219,13 @@ mod tests {
         assert!(said(&member).contains(">← 1 2 3 | 0 →<"), "{}", said(&member));
         member.first_group_walks = "left".into();
         assert!(said(&member).contains(">← 0 | 1 2 3 →<"), "{}", said(&member));
+        // Of many classes on one side, the few on the other are still there.
+        member.groups = [(1..26).collect(), vec![26]];
+        let text = ways(&member, 80.0);
+        assert!(text.starts_with("← 1 2 3") && text.ends_with("… | 26 →"), "{text}");
+        assert!(fonts::width(&text, TEXT, false) <= 80.0);
+        member.groups = [(1..14).collect(), (14..27).collect()];
+        let text = ways(&member, 80.0);
+        assert!(text.starts_with("← 1 2 3") && text.contains("… | 14 1") && text.ends_with("… →"), "{text}");
     }
 }

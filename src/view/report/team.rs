@@ -11,6 +11,7 @@ use crate::task::recording::{Frame, Recording, VoxelCorners};
 use crate::task::voting::Tally;
 use crate::view::error::PictureError;
 use crate::view::html::{corners, escape, materials, pack};
+use crate::view::plot::{COLUMN, Figure};
 use crate::view::report::{figure, tables};
 use crate::view::{plot, teams};
 use base64::Engine;
@@ -56,9 +57,9 @@ pub(super) fn section(
     if count(team) > 0 {
         out += &watched(team, runs, simulated)?;
     }
-    let figures = [(plot::confusion(file), "column"), (plot::poster(file), "page")];
-    let figures: String =
-        figures.iter().filter_map(|(found, class)| Some(figure(found.as_ref()?, class))).collect();
+    let figures = [plot::confusion(file), plot::poster(file)].into_iter().flatten();
+    let class = |figure: &Figure| if figure.size()[0] > COLUMN + 1.0 { "page" } else { "column" };
+    let figures: String = figures.map(|found| figure(&found, class(&found))).collect();
     out += &format!("<div class=\"figures\">\n{figures}</div>\n");
     Ok(out + "</section>\n")
 }
