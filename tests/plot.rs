@@ -3,7 +3,7 @@
 
 mod common;
 
-use common::program::{Sandbox, files};
+use common::program::{Sandbox, TINY, files};
 use resvg::usvg::roxmltree::{Document, Node};
 use std::collections::BTreeMap;
 use std::sync::OnceLock;

@@ -161,7 +161,8 @@ fn letters() -> Sandbox {
     let sandbox = Sandbox::new();
     for (split, count) in [("train", 52_u8), ("t10k", 104)] {
         let label = |image: u8| 1 + image % 26;
-        let pixel = |image: u8, pixel: u8| if (pixel / 3 * label(image)) % 7 < 3 { 255 } else { image };
+        let is_ink = |image: u8, pixel: u8| u32::from(pixel / 3) * u32::from(label(image)) % 7 < 3;
+        let pixel = |image: u8, pixel: u8| if is_ink(image, pixel) { 255 } else { image };
         let pixels: Vec<u8> = (0..count).flat_map(|image| (0..100).map(move |p| pixel(image, p))).collect();
         let header = [0, 0, 8, 3, 0, 0, 0, count, 0, 0, 0, 10, 0, 0, 0, 10];
         sandbox.write(&format!("letters/{split}-images-idx3-ubyte"), [&header[..], &pixels].concat());

@@ -4,7 +4,7 @@ use crate::base::named::{self, Place};
 use crate::base::ownership::{self, folder_of};
 use flate2::read::MultiGzDecoder;
 use std::ffi::{OsStr, OsString};
-use std::fs::{DirEntry, File};
+use std::fs::{DirEntry, File, Metadata};
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};
@@ -37,14 +37,27 @@ pub fn open_file(path: &Path) -> io::Result<File> {
     }
     let file = options.open(path)?;
     // Of what is open, so that nothing can take its place in between.
-    let found = file.metadata()?.file_type();
+    regular(&file.metadata()?)?;
+    Ok(file)
+}
+
+fn regular(found: &Metadata) -> io::Result<()> {
     match found.is_file() || found.is_dir() {
-        true => Ok(file),
+        true => Ok(()),
         false => Err(io::Error::new(
             io::ErrorKind::InvalidInput,
             "expected a regular file, found a pipe, a socket or a device",
         )),
     }
+}
+
+/// Whether [`open_file`] would open a file, or there is none: to be known before one is written,
+/// because opening a pipe to write could block for ever, too.
+///
+/// # Errors
+/// If something else is in its place.
+pub fn check_file(path: &Path) -> io::Result<()> {
+    std::fs::metadata(path).map_or(Ok(()), |found| regular(&found))
 }
 
 /// Reads such a file to its end.

@@ -491,16 +491,11 @@ fn of_run(run: RunFile, audit: Option<&AuditFile>) -> Result<Collection, Error> 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::store::samples;
     use std::fs::File;
 
-    /// A run of the quick-start config as text.
-    fn run() -> String {
-        let mut run = samples::run(&[("a", 1.5)]);
-        for robot in &mut run.elites {
-            robot.id = robot.genome.id();
-        }
-        serde_json::to_string(&run).unwrap()
+    /// A run as text.
+    fn run() -> &'static str {
+        shipped::text("gallery:zero_one-1", RUN_JSON).unwrap()
     }
 
     fn write(runs: &Path, name: &str, text: &str) -> PathBuf {
@@ -529,7 +524,7 @@ mod tests {
         let path = write(runs.path(), "a", &good.replacen('{', "[", 1));
         assert_eq!(known(&catalogue), [""; 0]);
         let modified = path.metadata().unwrap().modified().unwrap();
-        write(runs.path(), "a", &good);
+        write(runs.path(), "a", good);
         let file = File::options().write(true).open(&path).unwrap();
         file.set_modified(modified).unwrap();
         assert_eq!(known(&catalogue), [""; 0]);
@@ -539,7 +534,7 @@ mod tests {
         write(runs.path(), "a", &good.replacen('{', "[", 1));
         file.set_modified(modified).unwrap();
         assert_eq!((known(&catalogue), catalogue.list()[3].changes), (vec!["a".to_string()], 0));
-        write(runs.path(), "a", &good);
+        write(runs.path(), "a", good);
         file.set_modified(modified).unwrap();
         assert_eq!((known(&catalogue), catalogue.list()[3].changes), (vec!["a".to_string()], 0));
         file.set_modified(modified + Duration::from_millis(1)).unwrap();
@@ -550,7 +545,7 @@ mod tests {
     fn requests_are_answered_while_another_one_reads() {
         let runs = tempfile::tempdir().unwrap();
         let (catalogue, _) = Catalogue::open(&[], None, runs.path()).unwrap();
-        write(runs.path(), "a", &run());
+        write(runs.path(), "a", run());
         let reads = catalogue.watch.lock().unwrap();
         assert_eq!((catalogue.list().len(), catalogue.collections().len()), (3, 3));
         assert!(catalogue.collection(0).is_ok() && catalogue.course(0).is_err());
@@ -562,10 +557,10 @@ mod tests {
     #[test]
     fn a_run_by_several_names_is_listed_once() {
         let runs = tempfile::tempdir().unwrap();
-        let path = write(runs.path(), "a", &run());
+        let path = write(runs.path(), "a", run());
         let (catalogue, _) = Catalogue::open(std::slice::from_ref(&path), None, runs.path()).unwrap();
         std::os::unix::fs::symlink("a", runs.path().join("link")).unwrap();
-        write(runs.path(), "a", &run());
+        write(runs.path(), "a", run());
         assert_eq!(known(&catalogue), ["a"]);
     }
 }

@@ -1,7 +1,7 @@
 //! A run's folder: made, locked, and never overwritten by accident.
 
 use crate::base::error::Error;
-use crate::base::files::{check_writable, read_text, remove_half_written, write_atomically};
+use crate::base::files::{check_file, check_writable, read_text, remove_half_written, write_atomically};
 use crate::base::named;
 use crate::base::observer::Observer;
 use crate::base::shell::in_shell;
@@ -77,6 +77,10 @@ impl RunFolder {
             return Err(Error::usage(format!("{text}: so are runs called that lie elsewhere")));
         }
         std::fs::create_dir_all(path).map_err(|error| Error::writing(path, &error))?;
+        for name in RunFolder::files().into_iter().chain([LOCK]) {
+            let file = path.join(name);
+            check_file(&file).map_err(|error| Error::reading(&file, &error))?;
+        }
         let refuse_run = || match if_exists {
             IfExists::Refuse => vacant(path),
             _ => Ok(()),
