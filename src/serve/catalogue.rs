@@ -502,6 +502,9 @@ mod tests {
         let path = runs.join(name).join(RUN_JSON);
         std::fs::create_dir_all(runs.join(name)).unwrap();
         std::fs::write(&path, text).unwrap();
+        // Clocks of file systems tick more coarsely than the system's.
+        let file = File::options().write(true).open(&path).unwrap();
+        file.set_modified(SystemTime::now() + Duration::from_secs(10)).unwrap();
         path
     }
 
