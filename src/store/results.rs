@@ -195,6 +195,8 @@ mod tests {
             assert_eq!(refusal(&name, &sample.to_string()).map(|error| error.message), None, "{name}");
             let mut places = Vec::new();
             numbers(&sample, "", &mut places);
+            // A setting may be endless, as the seconds between two checkpoints.
+            places.retain(|place| !place.starts_with("/config/"));
             assert!(places.len() >= 2, "{name}: {places:?}");
             for place in places {
                 for number in [1e308, -1e308] {
