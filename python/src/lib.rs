@@ -15,7 +15,7 @@ use morphcog::config::audit::Criteria;
 use morphcog::data::dataset::{Dataset, DatasetError, Split};
 use morphcog::data::files::places;
 use morphcog::search::{evolve, showing};
-use morphcog::sim::{Physics, Start, System};
+use morphcog::sim::{FloatEnvironment, InstructionSet, Physics, Start, System};
 use morphcog::store::folder::{self, IfExists};
 use morphcog::store::images::HeldOut;
 use morphcog::store::names::AUDIT_JSON;
@@ -74,6 +74,13 @@ fn raised(error: &Error) -> PyErr {
 
 fn refused(text: impl Into<String>) -> PyErr {
     MorphcogError::new_err(text.into())
+}
+
+/// Refuses a `MORPHCOG_ISA` that this machine cannot follow, and computes as everywhere, whatever
+/// rounding the host has chosen, as long as the value lives.
+fn entered() -> PyResult<FloatEnvironment> {
+    InstructionSet::asked().map_err(refused)?;
+    Ok(FloatEnvironment::standard())
 }
 
 /// Options of the command line in an error as this module calls them; commands for a shell stay as
@@ -320,6 +327,7 @@ impl ConfigData {
     /// Reads a config file, or a built-in one by its name; `set` changes keys.
     #[new]
     fn new(config: PathBuf, set: Vec<String>) -> PyResult<Self> {
+        let _environment = entered()?;
         let source = config.to_string_lossy();
         let inner = config::Config::load(&source, &set).map_err(|error| raised(&error))?;
         Ok(ConfigData { inner, name: folder::name_of(&source) })
@@ -328,6 +336,7 @@ impl ConfigData {
     /// Reads a config's text, as `to_toml` has it.
     #[staticmethod]
     fn parsed(toml: &str, name: String, set: Vec<String>) -> PyResult<Self> {
+        let _environment = entered()?;
         let inner = config::Config::parse(toml, &name, &set).map_err(|error| raised(&error))?;
         Ok(ConfigData { inner, name })
     }
@@ -374,6 +383,7 @@ struct RunData {
 impl RunData {
     #[new]
     fn new(path: PathBuf) -> PyResult<Self> {
+        let _environment = entered()?;
         let of_name = path.display().to_string();
         let paths = folder::run_json(path).map_err(|text| raised(&Error::input(text)))?;
         let [path] = &paths[..] else {
@@ -426,6 +436,7 @@ impl RunData {
         py: Python<'py>,
         robot: String,
     ) -> PyResult<(String, String, f64, Bound<'py, PyArray2<u8>>)> {
+        let _environment = entered()?;
         let options =
             replay::Options { robot, archive: Some(self.place.clone()), ..replay::Options::default() };
         let found = replay::find(&options).map_err(|error| raised(&error))?;
@@ -437,11 +448,13 @@ impl RunData {
 
     /// A page on which the robot walks under its training images.
     fn page(&self, py: Python, robot: String) -> PyResult<String> {
+        let _environment = entered()?;
         self.shown(py, robot, |replay, title| Ok(html::page(&replay.recording, title, &replay.about)?))
     }
 
     /// A small page, and a picture of the last moment, a GIF.
     fn small_page<'py>(&self, py: Python<'py>, robot: String) -> PyResult<(String, Bound<'py, PyBytes>)> {
+        let _environment = entered()?;
         let (page, still) = self.shown(py, robot, |replay, title| {
             let walk = Walk::new(&replay.recording)?;
             let still = gif::still(&walk, walk.len() - 1, WIDTH)?;
@@ -461,6 +474,7 @@ impl RunData {
         data: Option<PathBuf>,
         listener: &Bound<PyAny>,
     ) -> PyResult<PathBuf> {
+        let _environment = entered()?;
         let split: HeldOut = parsed("split", split)?;
         let options = eval::Options {
             archives: vec![self.place.clone()],
@@ -491,6 +505,7 @@ impl RunData {
         data: Option<PathBuf>,
         listener: &Bound<PyAny>,
     ) -> PyResult<PathBuf> {
+        let _environment = entered()?;
         let robots: Selection = parsed("robots", robots)?;
         let out = folder::beside(&self.place, AUDIT_JSON);
         let unwritten = heard(py, listener, |stop, observer| {
@@ -585,6 +600,7 @@ fn evolve_run(
     threads: Option<usize>,
     listener: &Bound<PyAny>,
 ) -> PyResult<PathBuf> {
+    let _environment = entered()?;
     let (config, name) = (config.inner.clone(), config.name.clone());
     let out = out.unwrap_or_else(|| Path::new(folder::RUNS).join(format!("{name}-seed{}", config.seed)));
     let if_exists = match (resume, force) {
@@ -610,6 +626,7 @@ fn stimuli<'py>(
     images: PyReadonlyArray3<u8>,
     config: &ConfigData,
 ) -> PyResult<Bound<'py, PyArray3<f64>>> {
+    let _environment = entered()?;
     let config::BodyConfig { height, width, .. } = config.inner.body;
     let view = images.as_array();
     let (count, tall, wide) = view.dim();
@@ -642,6 +659,7 @@ fn images<'py>(
     split: &str,
     data: Option<PathBuf>,
 ) -> PyResult<Labelled<'py>> {
+    let _environment = entered()?;
     let split = match split {
         "train" => Split::Train,
         "test" => Split::Test,
@@ -679,6 +697,7 @@ fn displacements<'py>(
     config: Option<&ConfigData>,
     threads: Option<usize>,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let _environment = entered()?;
     let bodies = bodies.iter().map(body).collect::<PyResult<Vec<Body>>>()?;
     let (physics, protocol) = setting(config);
     let control_steps = control_steps.unwrap_or(protocol.control_steps);
@@ -742,6 +761,7 @@ impl WorldData {
         start_row: Option<u32>,
         config: Option<&ConfigData>,
     ) -> PyResult<Self> {
+        let _environment = entered()?;
         let body = body(&voxels)?;
         let (physics, protocol) = setting(config);
         let (lowest, row) = (physics.ground_row, start_row.unwrap_or(protocol.start_row));
@@ -759,12 +779,14 @@ impl WorldData {
     }
 
     fn set_stimulus(&self, py: Python, pixels: PyReadonlyArray2<f64>) -> PyResult<()> {
+        let _environment = entered()?;
         let pixels = seen(pixels.as_array(), &self.body)?;
         self.simulation(py).world.set_stimulus(&pixels);
         Ok(())
     }
 
     fn step(&self, py: Python, count: u64) -> PyResult<()> {
+        let _environment = entered()?;
         // A part at a time, so that Ctrl-C is seen; a control step takes milliseconds at most.
         let mut left = count;
         loop {
@@ -792,6 +814,7 @@ impl WorldData {
     /// Centre of mass, voxel lengths.
     #[getter]
     fn centre(&self, py: Python) -> [f64; 2] {
+        let _environment = FloatEnvironment::standard();
         let simulation = self.simulation(py);
         simulation.lengths(simulation.world.centre_of_mass())
     }
@@ -799,6 +822,7 @@ impl WorldData {
     /// Points, voxel lengths.
     #[getter]
     fn points<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
+        let _environment = FloatEnvironment::standard();
         let simulation = self.simulation(py);
         let places: Vec<f64> =
             simulation.world.points().flat_map(|place| simulation.lengths(place)).collect();

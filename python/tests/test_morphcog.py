@@ -1,11 +1,14 @@
 """The module's contract: shapes, units, the same bits as the command, clear refusals, Ctrl-C."""
 
 import copy
+import ctypes
+import ctypes.util
 import io
 import json
 import os
 import pathlib
 import pickle
+import platform
 import re
 import signal
 import subprocess
@@ -547,3 +550,31 @@ def test_runs_that_ship_with_morphcog_are_loaded_by_name():
     assert run["best"].task == "0|1" and len(run.elites) == 1
     with pytest.raises(mc.Error, match="gallery:zero_one-1"):
         mc.load_run("gallery:nobody")
+
+
+def test_no_choice_of_the_host_for_its_numbers_changes_ours(tmp_path):
+    """Rounding upwards, as a library of the host may have chosen it."""
+    if platform.machine() not in ("x86_64", "AMD64") or sys.platform == "win32":
+        pytest.skip("the name of the mode is that of x86-64 with a libm")
+    libm = ctypes.CDLL(ctypes.util.find_library("m"))
+    upwards, nearest = 0x800, 0
+    runs = []
+    for mode in (nearest, upwards):
+        assert libm.fesetround(mode) == 0
+        try:
+            out = tmp_path / str(mode)
+            mc.evolve("quickstart.toml", generations=2, out=out)
+            runs.append((out / "run.json").read_bytes())
+            mc.load_run(out)
+            assert libm.fegetround() == mode
+        finally:
+            libm.fesetround(nearest)
+    assert runs[0] == runs[1]
+
+
+def test_a_wrong_instruction_set_is_refused():
+    words = "MORPHCOG_ISA=avx1024: expected one of baseline"
+    code = "import morphcog as mc; mc.Config('quickstart.toml')"
+    env = {**os.environ, "MORPHCOG_ISA": "avx1024"}
+    said = subprocess.run([sys.executable, "-c", code], env=env, capture_output=True, text=True, check=False)
+    assert said.returncode == 1 and words in said.stderr.splitlines()[-1], said.stderr
