@@ -128,8 +128,7 @@ fn pictures(file: &TeamFile, out: &Path) -> Result<Vec<String>, Error> {
     let mut written = Vec::new();
     for (name, drawn) in FIGURES.into_iter().zip([plot::confusion(file), plot::poster(file)]) {
         let Some(drawn) = drawn else { continue };
-        for (path, bytes) in figure(out, name).into_iter().zip([drawn.svg().into_bytes(), drawn.print()?])
-        {
+        for (path, bytes) in figure(out, name).into_iter().zip([drawn.svg().into_bytes(), drawn.print()?]) {
             write_whole(&path, &bytes)?;
             written.push(path.display().to_string());
         }

@@ -147,6 +147,21 @@ fn no_command_writes_over_results_that_it_cannot_read() {
     }
 }
 
+#[cfg(unix)]
+#[test]
+fn an_archive_that_is_no_file_is_refused_at_once() {
+    let sandbox = with_run();
+    let pipe = sandbox.path("pipe.json");
+    assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+    for archive in ["pipe.json", "/dev/stdin", "/dev/zero"] {
+        for command in ["eval", "replay", "audit", "report", "plot archive", "plot progress", "team"] {
+            let said = sandbox.run(&format!("{command} -a {archive}")).ended(3, &["expected a regular file"]);
+            assert_eq!(said.err.matches(archive).count(), 1, "{command}: {said:?}");
+        }
+    }
+    sandbox.run("capacity --eval pipe.json").ended(3, &["pipe.json", "expected a regular file"]);
+}
+
 #[test]
 fn quiet_leaves_results_only() {
     let sandbox = Sandbox::tiny();
