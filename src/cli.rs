@@ -46,7 +46,7 @@ use crate::view::sheet::SheetError;
 use crate::view::{pictures, sheet, summary};
 pub use args::Cli;
 use args::{Command, DataCommand, DatasetArgs, EvalArgs, EvolveArgs, ReplayArgs, SimulateArgs};
-use choice::selected;
+use choice::{Runs, selected};
 use clap::CommandFactory;
 pub use process::{called, main};
 use std::path::{Path, PathBuf};
@@ -268,13 +268,13 @@ fn run_replay(args: ReplayArgs, console: &Console) -> Result<(), Error> {
     // Without a run, the best body that ships with the program.
     let is_bare = args.archive.is_none() && args.robot == Selection::Ids(vec![BEST.to_string()]);
     let is_first_look = is_bare && folder::newest_run().is_err();
-    let archive = match is_first_look {
-        true => Some(folder::first_run(PathBuf::from(shipped::ZERO_ONE)).map_err(Error::other)?),
-        false => args.archive,
+    let archives = match is_first_look {
+        true => vec![folder::first_run(PathBuf::from(shipped::ZERO_ONE)).map_err(Error::other)?],
+        false => args.archive.map_or(Vec::new(), |Runs(paths)| paths),
     };
     let search = one_by_one::Options {
         robots: args.robot,
-        archives: archive.into_iter().collect(),
+        archives,
         physical_only,
         seed: args.seed,
         data: data.clone(),

@@ -258,6 +258,7 @@ fn what_a_stopped_audit_was_done_with_is_kept() {
         robots: Selection::All,
         seed: 1,
         criteria: whole.criteria.clone(),
+        fresh: false,
         data: None,
         out: sandbox.path("run/audit.json"),
         threads: Some(1),
@@ -271,4 +272,27 @@ fn what_a_stopped_audit_was_done_with_is_kept() {
     assert!(kept.robots.iter().all(|robot| whole.robots.contains(robot)));
     audit(&sandbox, "");
     assert_eq!(verdicts(&sandbox), whole);
+}
+
+#[test]
+fn known_verdicts_are_said_to_be_known_and_made_again_only_if_asked_for() {
+    let sandbox = evolved();
+    audit(&sandbox, "--robots top:3");
+    let made = sandbox.read("run/audit.json");
+    // As they might have been found in another way.
+    let mut verdicts: serde_json::Value = serde_json::from_str(&made).unwrap();
+    verdicts["robots"][0]["reason"] = "as it was".into();
+    sandbox.write("run/audit.json", verdicts.to_string());
+    let said = sandbox.run(&format!("audit -a run {MILD} --robots top:3")).ended(0, &["not audited again"]);
+    assert!(said.out.contains("as it was") && said.err.contains("--fresh"), "{said:?}");
+    let said =
+        sandbox.run(&format!("audit -a run {MILD} --robots top:4")).ended(0, &["not audited again: 3"]);
+    assert!(said.out.contains("as it was"), "{said:?}");
+    let said = sandbox.run(&format!("audit -a run {MILD} --robots top:3 --fresh")).ended(0, &[]);
+    assert!(!said.out.contains("as it was") && !said.err.contains("not audited again"), "{said:?}");
+    // The fourth one's verdict has stayed.
+    let now = AuditFile::read(&sandbox.path("run/audit.json")).unwrap();
+    let before: AuditFile = serde_json::from_str(&made).unwrap();
+    assert_eq!((now.robots.len(), before.robots.len()), (4, 3));
+    assert!(before.robots.iter().all(|robot| now.robot(&robot.id) == Some(robot)));
 }

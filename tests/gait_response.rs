@@ -221,6 +221,18 @@ fn what_was_measured_before_is_not_simulated_again() {
 }
 
 #[test]
+fn what_was_known_before_makes_no_speed() {
+    let sandbox = run_of(&[WALKER]);
+    sandbox.run("response -a run --images 120 --error 0").ended(0, &["measuring 1 robot: 60/120"]);
+    sandbox
+        .run("response -a run --images 120 --error 0")
+        .ended(0, &["(120 rollouts known from before): 120/120 rollouts · 0.0 rollouts/s"]);
+    // Nor does what is not needed any more.
+    let said = sandbox.run("response -a run --images 10000 --error 0.9").ended(0, &["10000/10000 rollouts"]);
+    assert!(said.err.contains("· 0.0 rollouts/s"), "{}", said.err);
+}
+
+#[test]
 fn a_file_keeps_what_it_has_of_other_robots() {
     let other = WALKER.replace("666", "444");
     let sandbox = run_of(&[WALKER, &other]);

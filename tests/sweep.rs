@@ -120,7 +120,7 @@ fn listed_commands_do_the_tasks_from_any_folder() {
     assert_eq!(std::fs::read_dir(away.path()).unwrap().count(), 0);
     let script = sandbox.run("sweep plan.toml --out elsewhere --slurm").ended(0, &[]).out;
     assert!(script.starts_with("#!/bin/bash\n") && script.contains("#SBATCH --array=1-4\n"), "{script}");
-    assert!(script.contains("--requeue") && script.contains("--task &"), "{script}");
+    assert!(script.contains("--requeue") && script.contains("--task \"$number\" &"), "{script}");
 }
 
 #[test]
@@ -518,4 +518,142 @@ fn listed_commands_name_the_images_and_the_atlas_of_this_folder() {
     command.env("MORPHCOG_ATLAS", &atlas);
     let list = said(command).ended(0, &[]).out;
     assert!(list.starts_with(&format!("env MORPHCOG_ATLAS={} ", atlas.display())), "{list}");
+}
+
+/// A sandbox with one task and its folder.
+fn one_task() -> (Sandbox, String) {
+    let sandbox = sandbox();
+    sandbox.write("plan.toml", PLAN.replace("[1, 2]", "[1]").replace("[4, 8]", "[4]"));
+    (sandbox, "all/tiny-parents=4-seed1".to_string())
+}
+
+/// The one row of the table of a sweep with one task.
+fn collected(sandbox: &Sandbox, words: &[&str]) -> BTreeMap<String, String> {
+    sandbox.run("sweep plan.toml --out all --collect").ended(0, words);
+    let table = sandbox.read("all/sweep.csv");
+    let rows: Result<Vec<_>, _> = csv::Reader::from_reader(table.as_bytes()).deserialize().collect();
+    let [row] = <[_; 1]>::try_from(rows.unwrap()).unwrap();
+    row
+}
+
+#[test]
+fn a_test_with_other_settings_is_never_taken_for_the_plans_own() {
+    let (sandbox, folder) = one_task();
+    sandbox.run("sweep plan.toml --out all -q").ended(0, &[]);
+    let (own, row) = (sandbox.read(&format!("{folder}/eval.json")), collected(&sandbox, &[]));
+    assert!(!row["accuracy"].is_empty());
+    for (setting, key) in [
+        ("--cycles 1", "control_steps = 50, not 500"),
+        ("--threshold 1", "threshold = 1, not 3"),
+        ("--seed 2", "seed = 2, not 1"),
+        ("--images 30", "images = 30, not 20"),
+        ("--robots top:1", "robots = "),
+    ] {
+        let others = if setting.contains("robots") { "" } else { "--robots top:2" };
+        let images = if setting.contains("images") { "" } else { "--images 20" };
+        let words = format!("eval -a {folder} {others} {images} {setting}");
+        sandbox.run(&words).ended(0, &["held the results of another test"]);
+        let row = collected(&sandbox, &["another test than the plan's", key, "left out"]);
+        assert_eq!((row["accuracy"].as_str(), row["state"].as_str()), ("", "stopped"), "{setting}");
+        let said = sandbox.run("sweep plan.toml --out all").ended(0, &["task 1", "held the results"]);
+        assert!(said.out.contains("1 task is done"), "{said:?}");
+        assert_eq!(sandbox.read(&format!("{folder}/eval.json")), own, "{setting}");
+    }
+    assert_eq!(collected(&sandbox, &[]), row);
+    // Every one of them is still there.
+    let kept = files(&sandbox.path(&folder));
+    let kept = kept.keys().filter(|name| name.starts_with("eval-") && name.ends_with(".json"));
+    assert_eq!(kept.count(), 1 + 5);
+}
+
+#[test]
+fn verdicts_and_choices_by_other_settings_are_never_taken_for_the_plans_own() {
+    let (sandbox, folder) = one_task();
+    let validation = "set = [\"validation.best=1\", \"validation.images=40\"]\n[vary]";
+    sandbox.write("plan.toml", sandbox.read("plan.toml").replace("[vary]", validation));
+    sandbox.run("sweep plan.toml --out all -q").ended(0, &[]);
+    let row = collected(&sandbox, &[]);
+    assert!(!row["validation_balanced_accuracy"].is_empty() && !row["audited"].is_empty());
+    let chosen = "--robots best-validation:2 --validation 60 --images 20 -o other.json";
+    sandbox.run(&format!("eval -q -a {folder} {chosen}")).ended(0, &[]);
+    assert_eq!(collected(&sandbox, &[]), row);
+    std::fs::remove_file(sandbox.path(&format!("{folder}/audit.json"))).unwrap();
+    sandbox.run(&format!("audit -q -a {folder} --set threshold=1")).ended(0, &[]);
+    let row = collected(&sandbox, &["an audit by other criteria than the plan's", "left out"]);
+    assert!(row["audited"].is_empty(), "{row:?}");
+}
+
+#[test]
+fn a_done_task_whose_results_are_gone_is_done_again() {
+    let (sandbox, folder) = one_task();
+    sandbox.run("sweep plan.toml --out all -q").ended(0, &[]);
+    let before = files(&sandbox.path(&folder));
+    for name in ["eval.json", "audit.json", "run.json"] {
+        std::fs::remove_file(sandbox.path(&format!("{folder}/{name}"))).unwrap();
+        let said = sandbox.run("sweep plan.toml --out all --status").ended(0, &[]);
+        assert!(said.out.contains(&format!("{name} is missing")), "{said:?}");
+        assert_eq!(states(&sandbox, "all"), ["stopped"]);
+        sandbox.run("sweep plan.toml --out all -q").ended(0, &[]);
+        assert_eq!(states(&sandbox, "all"), ["done"]);
+        let now = files(&sandbox.path(&folder));
+        assert_eq!(now.keys().collect::<Vec<_>>(), before.keys().collect::<Vec<_>>());
+        assert!(["eval.json", "audit.json", "run.json"].iter().all(|name| now[*name] == before[*name]));
+    }
+}
+
+/// What a job script does that gets the signal before its time limit at once, with a `scontrol` that
+/// fails. `change`: of the script.
+#[cfg(unix)]
+fn job(change: (&str, &str)) -> std::process::Output {
+    use std::os::unix::fs::PermissionsExt;
+    let sandbox = Sandbox::tiny();
+    sandbox.write("plan.toml", SHORT.replace("generations=2", "generations=10000000"));
+    let script = sandbox.run("sweep plan.toml --out all --slurm").ended(0, &[]).out;
+    assert!(script.contains(change.0), "{script}");
+    sandbox.write("job.sh", script.replace(change.0, change.1));
+    let scontrol = sandbox.write("bin/scontrol", "#!/bin/sh\necho \"scontrol $*\" >&2\nexit 1\n");
+    std::fs::set_permissions(scontrol, std::fs::Permissions::from_mode(0o755)).unwrap();
+    let path = format!("{}:{}", sandbox.path("bin").display(), std::env::var("PATH").unwrap());
+    let mut command = std::process::Command::new("bash");
+    SETTINGS.iter().for_each(|name| {
+        command.env_remove(name);
+    });
+    command.arg("job.sh").current_dir(sandbox.path("")).env("PATH", path);
+    command.env("SLURM_ARRAY_JOB_ID", "7").env("SLURM_ARRAY_TASK_ID", "1").env("TASKS_BEFORE", "1");
+    command.stderr(std::process::Stdio::piped()).stdout(std::process::Stdio::piped());
+    let job = command.spawn().unwrap();
+    // The second task: one was before.
+    wait_for(&sandbox.path("all/tiny-seed2/metrics.csv"));
+    common::program::terminate(&job);
+    job.wait_with_output().unwrap()
+}
+
+#[cfg(unix)]
+#[test]
+fn a_job_with_too_short_a_time_limit_is_not_queued_again() {
+    let ended = job(("-lt 10 ]", "-lt 60 ]"));
+    let said = String::from_utf8_lossy(&ended.stderr);
+    assert_eq!(ended.status.code(), Some(75), "{said}");
+    assert!(said.contains("task 2 had") && said.contains("not queued again"), "{said}");
+    assert!(said.contains("more than three minutes") && !said.contains("scontrol requeue"), "{said}");
+}
+
+#[cfg(unix)]
+#[test]
+fn a_job_that_cannot_be_queued_again_says_what_to_do() {
+    let ended = job(("-lt 10 ]", "-lt 0 ]"));
+    let said = String::from_utf8_lossy(&ended.stderr);
+    assert_eq!(ended.status.code(), Some(75), "{said}");
+    assert!(said.contains("scontrol requeue 7_1") && said.contains("task 2 is saved"), "{said}");
+    assert!(said.contains("submit the script again"), "{said}");
+}
+
+#[test]
+fn more_tasks_than_slurm_takes_are_said_with_what_to_do() {
+    let sandbox = Sandbox::tiny();
+    let seeds: Vec<String> = (1..=1100).map(|seed: u32| seed.to_string()).collect();
+    sandbox.write("plan.toml", SHORT.replace("[1, 2]", &format!("[{}]", seeds.join(","))));
+    let words = ["1100 tasks", "MaxArraySize", "sbatch --array=1-100 --export=ALL,TASKS_BEFORE=1000"];
+    let script = sandbox.run("sweep plan.toml --slurm").ended(0, &words).out;
+    assert!(script.contains("#SBATCH --array=1-1000\n"), "{script}");
 }

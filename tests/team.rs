@@ -272,3 +272,16 @@ fn what_is_missing_or_does_not_go_together_is_said_with_exit_code_3() {
         .ended(3, &["expected robots of the same data"]);
     assert!(!sandbox.path("pairs/team.json").exists());
 }
+
+#[test]
+fn a_second_test_on_other_images_keeps_the_first() {
+    let sandbox = pairs();
+    sandbox.run(&format!("{TEAM} -q --images 30")).ended(0, &[]);
+    let first = sandbox.read("pairs/team.json");
+    let said =
+        sandbox.run(&format!("{TEAM} --images 30")).ended(0, &["3 known from before", " 0.0 rollouts/s"]);
+    assert!(!said.err.contains("another test"), "{}", said.err);
+    sandbox.run(&format!("{TEAM} --images 30 --seed 2")).ended(0, &["held the results of another test"]);
+    assert_ne!(sandbox.read("pairs/team.json"), first);
+    assert!(files(&sandbox.path("pairs")).values().any(|content| content == first.as_bytes()));
+}

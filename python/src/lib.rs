@@ -528,6 +528,7 @@ impl RunData {
                 robots,
                 seed: 1,
                 criteria: Criteria::default(),
+                fresh: false,
                 data,
                 out: out.clone(),
                 threads: None,

@@ -148,10 +148,6 @@ pub fn measure(options: &Options, stop: &AtomicBool, observer: &dyn Observer) ->
         unfinished: Vec::new(),
         robots: Vec::new(),
     };
-    if !subjects.is_empty() {
-        let label = format!("measuring {}:", counted(subjects.len(), "robot", "robots"));
-        observer.begins(&Work::new(label, (subjects.len() * options.images) as u64, "rollouts"));
-    }
     let earlier = earlier(options, observer)?;
     if let Some((path, before)) = earlier.iter().find(|(path, _)| *path == options.out)
         && before.run_sha256 == provenance.sha256
@@ -171,13 +167,20 @@ pub fn measure(options: &Options, stop: &AtomicBool, observer: &dyn Observer) ->
         Measuring { options, config, probing, task, earlier, run_sha256: &provenance.sha256, seed, stop };
     let asked: Vec<&str> = subjects.iter().map(|subject| subject.id.as_str()).collect();
     let drawn = pictures(&options.out, &asked);
+    if !subjects.is_empty() {
+        let known: usize = subjects.iter().map(|subject| measuring.known(&subject.gait).0.len()).sum();
+        let kept = if known > 0 { format!(" ({known} rollouts known from before)") } else { String::new() };
+        let label = format!("measuring {}{kept}:", counted(subjects.len(), "robot", "robots"));
+        observer.begins(&Work::new(label, (subjects.len() * options.images) as u64, "rollouts"));
+    }
     let mut unwritten = Unwritten::default();
     let mut stopped = false;
     for (number, subject) in subjects.iter().enumerate() {
         let mut displacements = Vec::new();
         let found = pool.install(|| {
-            measuring.robot(subject, &mut displacements, &mut |rollouts| {
-                observer.progress((number * options.images + rollouts) as u64)
+            measuring.robot(subject, &mut displacements, &mut |rollouts, skipped| {
+                observer.skips(skipped as u64);
+                observer.progress((number * options.images + rollouts) as u64);
             })
         });
         match found {
@@ -461,12 +464,12 @@ impl Measuring<'_> {
 
     /// A robot's response; `None` if most of its rollouts are unstable. `displacements` are those
     /// under the random images so far, also if it is stopped; `progress` is told how many rollouts
-    /// are done.
+    /// are done, and how many of those since the last call were not simulated.
     fn robot(
         &self,
         Subject { id, gait }: &Subject,
         displacements: &mut Vec<Option<f64>>,
-        progress: &mut dyn FnMut(usize),
+        progress: &mut dyn FnMut(usize, usize),
     ) -> Result<Option<RobotResponse>, Error> {
         let Measuring { options, config, probing, stop, .. } = self;
         let (known, ended) = self.known(gait);
@@ -494,7 +497,7 @@ impl Measuring<'_> {
                 ended?;
                 Ok::<_, Error>(displacements[before..].to_vec())
             })?);
-            progress(rollouts.min(options.images));
+            progress(rollouts.min(options.images), known.len().min(options.images));
             check(stop)?;
             let Some(response) = probing::response(&shown, rollouts) else { return Ok(None) };
             let ended_by = if response.relative_error() <= options.error {
@@ -504,7 +507,7 @@ impl Measuring<'_> {
             } else {
                 continue;
             };
-            progress(options.images);
+            progress(options.images, options.images - rollouts.min(options.images));
             let taught =
                 self.task.as_ref().map(|task| task.taught(gait, &response, &shown, stop)).transpose()?;
             let taught = taught.flatten();

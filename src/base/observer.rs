@@ -10,6 +10,9 @@ pub trait Observer: Sync {
     fn begins(&self, _work: &Work) {}
     /// So much of the work that began last is done, in all.
     fn progress(&self, _done: u64) {}
+    /// So much of the work counts as done without having taken time: it was known, or is not
+    /// needed. No speed counts it.
+    fn skips(&self, _count: u64) {}
     /// A generation is done; first of all, those that were done before.
     fn generation(&self, _generation: &Generation) {}
     /// A finding for programs: its kind, and its fields.

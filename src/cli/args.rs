@@ -2,7 +2,7 @@
 
 use crate::cli::audit::AuditArgs;
 use crate::cli::capacity::CapacityArgs;
-use crate::cli::choice::{Archives, ROBOTS, run_json};
+use crate::cli::choice::{Archives, ROBOTS, Runs, run_jsons};
 use crate::cli::demo::DemoArgs;
 use crate::cli::plot::PlotArgs;
 use crate::cli::report::ReportArgs;
@@ -353,9 +353,9 @@ pub(super) struct ReplayArgs {
     /// Only robots that morphcog audit found physical: "best" is the best of them.
     #[arg(long)]
     pub(super) physical_only: bool,
-    /// The run.json, or its folder (default: the newest under runs/).
-    #[arg(short, long, value_name = "FILE", value_parser = run_json())]
-    pub(super) archive: Option<PathBuf>,
+    /// The run.json, or its folder, or runs of the gallery (default: the newest under runs/).
+    #[arg(short, long, value_name = "FILE", value_parser = run_jsons())]
+    pub(super) archive: Option<Runs>,
     /// Images by index, such as train:1,test:17 (default: the training images).
     #[arg(short, long, value_delimiter = ',')]
     pub(super) images: Vec<Shown>,

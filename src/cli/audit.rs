@@ -9,7 +9,7 @@ use crate::cli::choice;
 use crate::cli::choice::{Archives, ROBOTS, selected};
 use crate::cli::values::{seed, threads};
 use crate::commands::audit;
-use crate::commands::audit::{Options, Source};
+use crate::commands::audit::{Finished, Options, Source};
 use crate::config::audit::Criteria;
 use crate::search::validation;
 use crate::store::names::AUDIT_JSON;
@@ -55,6 +55,9 @@ pub(super) struct AuditArgs {
     /// is reset to its default; may be given several times.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
+    /// Audit robots again of which there are verdicts.
+    #[arg(long)]
+    fresh: bool,
     /// Folder with the images.
     #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,
@@ -111,6 +114,7 @@ pub(super) fn run(args: AuditArgs, console: &Console, ranks: Ranks) -> Result<()
             robots,
             seed: args.seed,
             criteria: criteria.clone(),
+            fresh: args.fresh,
             data: args.data.clone(),
             out: args.out.clone().unwrap_or(beside),
             threads: args.threads.map(usize::from),
@@ -118,6 +122,7 @@ pub(super) fn run(args: AuditArgs, console: &Console, ranks: Ranks) -> Result<()
         };
         let finished = audit::audit(&options, &stop, &Reporter::new(console))?;
         verdicts::audit(console, &finished, &options.out);
+        say_known(&finished, &options.out, console);
         if let Some(error) = finished.unwritten {
             return Err(error);
         }
@@ -132,6 +137,24 @@ pub(super) fn run(args: AuditArgs, console: &Console, ranks: Ranks) -> Result<()
         }
     }
     Ok(())
+}
+
+/// Says which verdicts were there before.
+fn say_known(finished: &Finished, out: &Path, console: &Console) {
+    let Finished { asked, known, shipped, .. } = finished;
+    if *known == 0 {
+        return;
+    }
+    let from = match shipped {
+        Some(path) => format!("{}, which ships with the run", path.display()),
+        None => out.display().to_string(),
+    };
+    let of = if *known == asked.len() {
+        "these verdicts".to_string()
+    } else {
+        counted(*known, "verdict", "verdicts")
+    };
+    console.info(&format!("not audited again: {of} from {from}; --fresh audits anew"));
 }
 
 /// The best robots on validation images: those found before, or else searched for now.

@@ -127,9 +127,9 @@ pub(super) fn say_unfinished<'a>(archives: impl IntoIterator<Item = &'a PathBuf>
     }
 }
 
-/// Reads the path of a run.json, or of its folder; of a set of shipped runs, the first.
+/// Reads the path of a run.json, or of its folder, or the name of one shipped run.
 pub(super) fn run_json() -> impl TypedValueParser<Value = PathBuf> {
-    PathBufValueParser::new().try_map(folder::first_run)
+    PathBufValueParser::new().try_map(folder::one_run)
 }
 
 /// Reads the path of a run.json, or of its folder, or the name of shipped runs.

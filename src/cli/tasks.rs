@@ -16,6 +16,13 @@ use std::path::{Path, PathBuf};
 /// Numbers of tasks that engines give their processes, the innermost engine first.
 const NUMBERS: [&str; 3] = ["HQ_TASK_ID", "SLURM_ARRAY_TASK_ID", "PBS_ARRAY_INDEX"];
 
+/// Most tasks of an array job, unless a cluster says otherwise (Slurm's `MaxArraySize`, 1001).
+const MOST_OF_AN_ARRAY: usize = 1000;
+
+/// A task that is stopped by its time limit sooner is not queued again: it spends all its time on
+/// starting.
+const LEAST_SECONDS: u32 = 10;
+
 /// Without one of these, all tasks are done here.
 #[derive(Debug, Args)]
 #[group(multiple = false)]
@@ -117,10 +124,24 @@ impl Command<'_> {
         let out = std::path::absolute(out).map_err(|error| Error::reading(out, &error))?;
         let (name, line, threads) = (self.name, self.line()?, self.place.threads.unwrap_or(1));
         let (name, log) = (quoted(name), out.join("slurm-%a.log"));
+        // Slurm reads its own lines, and no shell's escapes.
+        if [name.as_str(), &in_shell(&log)].iter().any(|word| word.starts_with('$')) {
+            let text = format!("--slurm: {}: expected names of plan and folder that are text", log.display());
+            return Err(Error::usage(text).hint("rename them, or use --list".to_string()));
+        }
+        let first = count.min(MOST_OF_AN_ARRAY);
+        if count > first {
+            console.warning(&format!(
+                "{count} tasks are more than Slurm's arrays have by default (up to {first}, MaxArraySize - 1): the \
+                 script is for the first {first}. For those after them, submit it again, as in: \
+                 sbatch --array=1-{} --export=ALL,TASKS_BEFORE={first} job.sh",
+                (count - first).min(first)
+            ));
+        }
         console.text(&format!(
             r#"#!/bin/bash
 #SBATCH --job-name={name}
-#SBATCH --array=1-{count}
+#SBATCH --array=1-{first}
 #SBATCH --cpus-per-task={threads}
 #SBATCH --signal=B:USR1@120
 #SBATCH --requeue
@@ -128,11 +149,13 @@ impl Command<'_> {
 #SBATCH --output={log}
 
 # Two minutes before the time limit Slurm sends SIGUSR1. The task saves itself and ends with 75, and is queued again; so is a
-# task that the signal meets while it starts: it ends with 138.
-task= again=no
-trap 'again=yes; [ -z "$task" ] || kill -USR1 "$task"' USR1
+# task that the signal meets while it starts: it ends with 138. One that had less than {LEAST_SECONDS} seconds is not: it would
+# never end.
+task= again=no had=
+trap 'again=yes had=${{had:-$SECONDS}}; [ -z "$task" ] || kill -USR1 "$task"' USR1
 trap '[ -z "$task" ] || kill -TERM "$task"' TERM
-{line} --threads "${{SLURM_CPUS_PER_TASK:-1}}" --task &
+number=$((${{TASKS_BEFORE:-0}} + SLURM_ARRAY_TASK_ID))
+{line} --threads "${{SLURM_CPUS_PER_TASK:-1}}" --task "$number" &
 task=$!
 if [ "$again" = yes ]; then kill -USR1 "$task"; fi
 while true; do
@@ -141,7 +164,12 @@ while true; do
   kill -0 "$task" 2>/dev/null || break
 done
 if [ "$again" = yes ] && {{ [ "$code" -eq 75 ] || [ "$code" -eq 138 ]; }}; then
-  scontrol requeue "${{SLURM_ARRAY_JOB_ID}}_${{SLURM_ARRAY_TASK_ID}}"
+  if [ "$had" -lt {LEAST_SECONDS} ]; then
+    echo "error: task $number had $had s: it is saved, and not queued again; give it more than three minutes (sbatch --time=04:00:00)" >&2
+  else
+    scontrol requeue "${{SLURM_ARRAY_JOB_ID}}_${{SLURM_ARRAY_TASK_ID}}" ||
+      echo "error: task $number is saved, but scontrol could not queue it again; submit the script again: it goes on" >&2
+  fi
 fi
 exit "$code"
 "#,

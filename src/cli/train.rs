@@ -178,6 +178,7 @@ pub(super) fn trained(options: &Options, stop: &AtomicBool, console: &Console) -
         robots: Selection::All,
         seed: 1,
         criteria: Criteria::load(None, &[])?,
+        fresh: false,
         data: options.data.clone(),
         out: archive.with_file_name(AUDIT_JSON),
         threads: options.threads,

@@ -3,7 +3,6 @@
 use crate::analysis::gallery;
 use crate::analysis::verdict::Behaviour;
 use crate::base::error::Error;
-use crate::base::hash::sha256_hex;
 use crate::base::observer::{Observer, Work};
 use crate::base::ranks::Ranks;
 use crate::base::stop::Stopped;
@@ -62,6 +61,8 @@ pub struct Options {
     pub seed: u64,
     /// How they are judged.
     pub criteria: Criteria,
+    /// Whether robots are audited again of which there are verdicts.
+    pub fresh: bool,
     /// Where the data are, if the command line says.
     pub data: Option<PathBuf>,
     /// Where the verdicts go (audit.json; audit.csv beside it).
@@ -79,6 +80,10 @@ pub struct Finished {
     pub file: AuditFile,
     /// Ids of the robots that were asked for.
     pub asked: Vec<String>,
+    /// How many of them were audited before, and not again.
+    pub known: usize,
+    /// Where verdicts on them that came with their run are, if any did.
+    pub shipped: Option<PathBuf>,
     /// Whether a signal stopped it before the last of them.
     pub stopped: bool,
     /// Why what was found is not, or not as a whole, in its file, if so.
@@ -122,15 +127,19 @@ pub fn audit(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> R
         return Err(Error::input(text).hint(hint));
     }
     file.add_known(&options.out);
+    let mut shipped = None;
     if let Source::Archive(path) = &options.source
         && options.out == folder::beside(path, AUDIT_JSON)
     {
         // What came with a named run; of another run this is the same file.
-        file.add_known(&path.with_file_name(AUDIT_JSON));
+        let (with_it, before) = (path.with_file_name(AUDIT_JSON), file.robots.len());
+        file.add_known(&with_it);
+        shipped = Some(with_it).filter(|_| file.robots.len() > before);
     }
-    let asked = subjects.iter().map(|subject| subject.id.clone()).collect();
-    let open: Vec<Subject> =
-        subjects.into_iter().filter(|subject| file.robot(&subject.id).is_none()).collect();
+    let asked: Vec<String> = subjects.iter().map(|subject| subject.id.clone()).collect();
+    let is_open = |subject: &Subject| options.fresh || file.robot(&subject.id).is_none();
+    let open: Vec<Subject> = subjects.into_iter().filter(is_open).collect();
+    let known = asked.len() - open.len();
     let rollouts: usize = open.iter().map(|subject| 1 + trial.perturbations(subject).len()).sum();
     let rollouts = rollouts.div_ceil(options.ranks.size());
     let label = format!("auditing {}:", counted(open.len(), "robot", "robots"));
@@ -155,7 +164,10 @@ pub fn audit(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> R
                 observer.warning(&format!("{}: {text}", subject.id));
             }
         }
-        file.robots.extend(found.into_iter().flatten());
+        for found in found.into_iter().flatten() {
+            file.robots.retain(|before| before.id != found.id);
+            file.robots.push(found);
+        }
         // Another audit of the same run may have written meanwhile.
         file.add_known(&options.out);
         file.robots.sort_by_key(|robot| order.iter().position(|id| *id == robot.id));
@@ -163,13 +175,13 @@ pub fn audit(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> R
             unwritten.tried(file.write(&options.out), |text| observer.warning(text))?;
         }
         if stopped {
-            return Ok(Finished { file, asked, stopped, unwritten: unwritten.error() });
+            return Ok(Finished { file, asked, known, shipped, stopped, unwritten: unwritten.error() });
         }
     }
     if ranks.leads() {
         unwritten.tried(file.write(&options.out), |text| observer.warning(text))?;
     }
-    Ok(Finished { file, asked, stopped: false, unwritten: unwritten.error() })
+    Ok(Finished { file, asked, known, shipped, stopped: false, unwritten: unwritten.error() })
 }
 
 type Opened = (Config, Fitness, Training, Vec<Subject>, Vec<String>, AuditFile);
@@ -181,7 +193,8 @@ fn open(options: &Options) -> Result<Opened, Error> {
     match &options.source {
         Source::Gallery => {
             check_out(&options.out, Path::new(""), AUDIT_JSON)?;
-            let config = gallery::config()?;
+            let source = gallery::source(data, None)?;
+            let config = source.run.config.clone();
             let training = Training::load(&config, data)?;
             let all = gallery::gallery()?;
             let order: Vec<String> = all.iter().map(|robot| robot.name.clone()).collect();
@@ -198,8 +211,7 @@ fn open(options: &Options) -> Result<Opened, Error> {
                 known: None,
             };
             let subjects = all.into_iter().filter(|robot| is_asked(&robot.name)).map(subject).collect();
-            let sha = sha256_hex(gallery::TEXT.as_bytes());
-            let file = AuditFile::new("gallery", sha, order.len(), &options.criteria);
+            let file = AuditFile::new("gallery", source.run.fingerprint(), order.len(), &options.criteria);
             Ok((config, Fitness::Min, training, subjects, order, file))
         }
         Source::Archive(path) => {
@@ -305,6 +317,7 @@ impl Trial {
                 rollouts?.into_iter().zip(&perturbations).filter(counts).map(|(rollout, _)| rollout).collect()
             }
             false => {
+                observer.skips(perturbations.len() as u64);
                 count(perturbations.len());
                 Vec::new()
             }

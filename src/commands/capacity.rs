@@ -22,7 +22,7 @@ use crate::store::run::RunFile;
 use crate::store::setting::{RunRef, Setting};
 use crate::store::trainings::Trainings;
 use crate::store::unwritten::Unwritten;
-use crate::task::grouping;
+use crate::task::grouping::{self, Group};
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -181,6 +181,13 @@ fn kernel_fits(config: &CapacityConfig, setting: &Setting) -> Result<(), Error> 
     Ok(())
 }
 
+/// Of all that the trainings of a kind of networks depend on; `images` names those they see.
+fn key(split: &grouping::Split, kind: Kind, config: &CapacityConfig, images: &str) -> String {
+    let groups = [Group::A, Group::B].map(|group| split.classes(group));
+    let all = (env!("CARGO_PKG_VERSION"), groups, kind.name(), config.of(kind), images, config.seed);
+    sha256_hex(serde_json::to_string(&all).expect("JSON has all of it").as_bytes())
+}
+
 /// The networks that robots are compared with.
 struct Networks<'a> {
     config: &'a CapacityConfig,
@@ -197,11 +204,8 @@ struct Networks<'a> {
 }
 
 impl Networks<'_> {
-    /// Names what is trained on what.
     fn key(&self, split: &grouping::Split, kind: Kind) -> String {
-        let hyper = serde_json::to_string(self.config.of(kind)).expect("JSON has all of it");
-        let (images, seed) = (&self.images.key, self.config.seed);
-        sha256_hex(format!("{} {} {hyper} {images} {seed}", split.name(), kind.name()).as_bytes())
+        key(split, kind, self.config, &self.images.key)
     }
 
     /// Says how many there are to train, and how many are known.
@@ -334,4 +338,30 @@ fn robots<'a>(report: &'a EvalFile, options: &Options) -> Result<Vec<&'a RobotRe
         )));
     }
     Ok(physical)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::task::grouping::Grouping;
+
+    #[test]
+    fn trainings_are_known_again_by_all_that_they_depend_on() {
+        let config = CapacityConfig::default();
+        let of = |groups: [&[u8]; 2], kind: Kind, config: &CapacityConfig, images: &str| {
+            let grouping = Grouping::two_groups(groups[0], groups[1]).unwrap();
+            key(&grouping.tasks()[0], kind, config, images)
+        };
+        let other_seed = CapacityConfig { seed: config.seed + 1, ..config.clone() };
+        let keys = [
+            of([&[1], &[26]], Kind::Mlp, &config, "a"),
+            // Classes of two digits are no classes of one.
+            of([&[1], &[2, 6]], Kind::Mlp, &config, "a"),
+            of([&[1], &[26]], Kind::Cnn, &config, "a"),
+            of([&[1], &[26]], Kind::Mlp, &config, "b"),
+            of([&[1], &[26]], Kind::Mlp, &other_seed, "a"),
+        ];
+        let different: std::collections::BTreeSet<&String> = keys.iter().collect();
+        assert_eq!(different.len(), keys.len());
+    }
 }

@@ -60,13 +60,14 @@ impl Images {
         let training: Result<Vec<_>, Error> =
             report.runs.iter().map(|run| see(Split::Train, &run.training_images)).collect();
         let (training, test_images) = (training?, see(Split::Test, &report.images)?);
+        let waiting = see(Split::Train, &waited)?;
         // Pixels, not indices: what is learnt depends on those.
-        let all = training.iter().flatten().chain(&test_images);
+        let all = training.iter().flatten().chain(&test_images).chain(&waiting);
         let pixels: Vec<(u8, &[f64])> = all.map(|seen| (seen.class, seen.stimulus.cells())).collect();
         let counts: Vec<usize> = training.iter().map(Vec::len).collect();
-        let indices: Vec<usize> = waited.iter().map(|image| image.index).collect();
-        let key = sha256_hex(format!("{counts:?} {pixels:?} {indices:?}").as_bytes());
-        Ok(Images { training, waiting: see(Split::Train, &waited)?, test: test_images, key })
+        let (size, waited) = ((setting.body.height, setting.body.width), waiting.len());
+        let key = sha256_hex(format!("{size:?} {counts:?} {pixels:?} {waited}").as_bytes());
+        Ok(Images { training, waiting, test: test_images, key })
     }
 }
 

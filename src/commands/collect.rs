@@ -2,8 +2,10 @@
 
 use crate::base::error::Error;
 use crate::base::table;
+use crate::commands::eval;
 use crate::commands::eval::own_name;
 use crate::commands::plot::Progress;
+use crate::commands::tasks::steps::test_of;
 use crate::commands::tasks::task::another;
 use crate::commands::tasks::{Place, Status, Task};
 use crate::store::audit::AuditFile;
@@ -15,7 +17,7 @@ use crate::store::run::RunFile;
 use crate::store::task::State;
 use crate::store::validation::ranking;
 use serde::Serialize;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// What a task found on one of the tasks that its robots do, as 0|1.
 #[derive(Clone, Debug, PartialEq)]
@@ -93,6 +95,8 @@ pub fn collect(
     warn: &dyn Fn(&str),
 ) -> Result<Collected, Error> {
     let mut all = Collected { rows: Vec::new(), progress: Vec::new(), archives: Vec::new() };
+    // The first of those tests that were made without the plan.
+    let mut without_plan = None;
     for (task, status) in tasks.iter().zip(status) {
         let folder = place.out.join(&task.name);
         let archive = folder.join(RUN_JSON);
@@ -115,7 +119,15 @@ pub fn collect(
             all.rows.push(row(None));
             continue;
         }
-        let found = Found::of(&source, &folder, task.steps.eval.as_ref().map(|step| step.split), warn);
+        let found = Found::of(task, &source, place, warn)?;
+        if let (None, Some(test)) = (&task.steps.eval, &found.eval) {
+            let settings = eval::settings(test);
+            let (first, of_first) = without_plan.get_or_insert_with(|| (task.name.clone(), settings.clone()));
+            let differs = |(there, other): &(_, _)| there != other;
+            if let Some(((key, there), (_, other))) = settings.iter().zip(of_first.iter()).find(differs) {
+                warn(&format!("{}: another test than of {first}: {key} = {there}, not {other}", task.name));
+            }
+        }
         // As the run's own files call them.
         let grouping = run.config.grouping()?;
         let tasks = grouping.tasks().iter().zip(&run.dimensions.tasks);
@@ -138,17 +150,40 @@ struct Found {
 }
 
 impl Found {
-    /// `split`: which images the plan tests on, if it does.
-    fn of(source: &Source, folder: &Path, split: Option<HeldOut>, warn: &dyn Fn(&str)) -> Self {
+    /// What the plan asks for, or what was found without it; nothing by other settings than the plan's.
+    fn of(task: &Task, source: &Source, place: &Place, warn: &dyn Fn(&str)) -> Result<Self, Error> {
         let run = &source.run;
-        let told = |error: Error| warn(&format!("{error}; left out"));
+        let left_out = |text: &str| warn(&format!("{text}; left out"));
+        let told = |error: Error| left_out(&error.to_string());
         let audit = AuditFile::if_any(run, &source.path).map_err(told).ok().flatten();
-        // Tests may have been made without the plan.
-        let splits = split.map_or(vec![HeldOut::Test, HeldOut::Validation], |split| vec![split]);
-        let tests = splits.iter().map(|split| folder.join(own_name(*split))).filter(|path| path.exists());
-        let eval = tests.into_iter().find_map(|path| EvalFile::of_runs(&path, &[run]).map_err(told).ok());
+        let is_planned = |audit: &AuditFile| match &task.steps.audit {
+            Some(step) if step.criteria != audit.criteria => {
+                let path = AuditFile::path(&source.path);
+                left_out(&format!("{}: an audit by other criteria than the plan's", path.display()));
+                false
+            }
+            _ => true,
+        };
+        let audit = audit.filter(is_planned);
+        let eval = match test_of(task, place)? {
+            Some(test) if test.out.exists() => match EvalFile::of_runs(&test.out, &[run]) {
+                Ok(found) => is_planned_test(&found, source, &test, &left_out).then_some(found),
+                Err(error) => {
+                    told(error);
+                    None
+                }
+            },
+            Some(_) => None,
+            // Tests may have been made without the plan.
+            None => {
+                let splits = [HeldOut::Test, HeldOut::Validation];
+                let tests = splits.map(|split| source.path.with_file_name(own_name(split)));
+                let read = |path: PathBuf| EvalFile::of_runs(&path, &[run]).map_err(told).ok();
+                tests.into_iter().filter(|path| path.exists()).find_map(read)
+            }
+        };
         let validated = ranking(source).map_err(told).ok().flatten().unwrap_or_default();
-        Found { validated, audit, eval }
+        Ok(Found { validated, audit, eval })
     }
 
     fn of_task(&self, run: &RunFile, recognises: String, seconds: f64) -> RunRow {
@@ -180,6 +215,29 @@ impl Found {
             audited,
             tested,
             recognises,
+        }
+    }
+}
+
+/// Whether a test is the plan's; `left_out` is told in what it is another.
+fn is_planned_test(found: &EvalFile, source: &Source, test: &eval::Options, left_out: &dyn Fn(&str)) -> bool {
+    let path = test.out.display();
+    let differing = eval::differing(found, test, source.run.config.physics.cycle_steps);
+    if !differing.is_empty() {
+        let said = |(key, there, asked): &(&str, String, String)| format!("{key} = {there}, not {asked}");
+        let said: Vec<String> = differing.iter().map(said).collect();
+        left_out(&format!("{path}: another test than the plan's: {}", said.join("; ")));
+        return false;
+    }
+    match eval::is_of_robots(found, std::slice::from_ref(source), test) {
+        Ok(true) => true,
+        Ok(false) => {
+            left_out(&format!("{path}: a test of other robots than the plan's"));
+            false
+        }
+        Err(error) => {
+            left_out(&error.to_string());
+            false
         }
     }
 }

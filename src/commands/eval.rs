@@ -10,14 +10,15 @@ use crate::base::threads::pool;
 use crate::commands::eval_images::HeldOutImages;
 use crate::config::validation::{IMAGES_KEY, LEAST};
 use crate::config::{Config, TaskConfig};
-use crate::data::dataset::Split;
+use crate::data::dataset::{Dataset, Split};
 use crate::search::showing::{Walker, control_steps, task_of};
 use crate::search::validation;
+use crate::store::audit::{AuditFile, RobotAudit};
 use crate::store::eval::{EvalFile, RobotReport, Trial};
 use crate::store::folder::check_out;
 use crate::store::images::{HeldOut, HowMany};
 use crate::store::names::{EVAL_JSON, EVAL_VALIDATION_JSON};
-use crate::store::results::{replaced, write_with_table};
+use crate::store::results::{self, replaced, write_with_table};
 use crate::store::robots::{Chosen, Selection, Source};
 use crate::store::run::different;
 use crate::store::unwritten::Unwritten;
@@ -71,79 +72,38 @@ pub struct Finished {
 }
 
 /// Evaluates robots; results are written after every robot, so that stopping keeps what is
-/// finished.
+/// finished. Those of another test in the file stay, under another name.
 ///
 /// # Errors
 /// What is wrong with archive, data or selection.
 pub fn eval(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Result<Finished, Error> {
-    let threshold = options.threshold;
-    if !(0.0..=MOST).contains(&threshold) {
-        return Err(Error::usage(format!("--threshold {threshold}: expected 0 or more voxel lengths")));
+    let opened = Opened::new(options)?;
+    let Opened { sources, config, grouping, wanted, dataset, steps, .. } = &opened;
+    if let Some(name) = opened.other {
+        say_transposed(dataset, &config.data.of(name), observer);
     }
-    let sources = sources(options)?;
-    let first = &sources[0];
-    // Several trainings may have found different windows: what takes no body is on what they see
-    // together.
-    let configs = || sources.iter().map(|source| &source.run.config);
-    let config = Config::together(configs()).expect("there is a run, or the published robots");
-    let task = TaskConfig::together(configs().map(|config| &config.task));
-    let config = &Config { task: task.expect("the tasks of all runs were compared"), ..config };
-    let wanted = wanted(options, config)?;
-    let grouping = config.grouping()?;
-    let other = options.dataset.as_deref().filter(|name| *name != config.data.dataset);
-    if other.is_some() && options.split == HeldOut::Validation {
-        let text = "--dataset: expected with --split test only: validation images are of the runs' own data";
-        return Err(Error::usage(text.to_string()));
-    }
-    let mut whereabouts = Whereabouts::given(options.data.as_deref());
-    for archive in &options.archives {
-        whereabouts = whereabouts.and_of(archive);
-    }
-    let own = |splits: &[Split]| {
-        load_dataset_of(Some(&first.run.dataset), config, &whereabouts, splits).map_err(|error| {
-            let hint =
-                error.hint.clone().unwrap_or("name the folder of the run's data with --data".to_string());
-            error.hint(format!("{hint}; robots are shown another dataset's images with --dataset NAME"))
-        })
-    };
-    let dataset = match other {
-        None if options.split == HeldOut::Validation => own(&[Split::Train])?,
-        None => own(&Split::ALL)?,
-        Some(name) => {
-            let data = config.data.of(name);
-            let dataset = whereabouts.load(&data, &Split::ALL)?;
-            say_transposed(&dataset, &data, observer);
-            dataset
-        }
-    };
-    let size = size_of(Some(&first.run.dataset), &config.data.dataset, &dataset);
-    let said = configs().find_map(|config| part_of_others(config, size, &dataset, options.split.split()));
-    said.iter().for_each(|text| observer.warning(text));
-    let robots = skilled(options.robots.of(&sources, options.seed)?, &grouping, observer)?;
-    let shown = HeldOutImages::draw(config, &sources, &dataset, options)?;
-    let test_sha256 = dataset.fingerprint(Split::Test);
-    let steps = checked_steps(config, options.cycles)?;
-    let asked = (options.robots.describe(), options.split, options.seed, threshold);
-    let mut report = EvalFile::new((&sources, config), asked, steps, &shown.images, test_sha256);
-    if let Some(name) = other {
-        report.transfer(name, &dataset);
-    }
+    let size = size_of(Some(&sources[0].run.dataset), &config.data.dataset, dataset);
+    let part = |source: &Source| part_of_others(&source.run.config, size, dataset, options.split.split());
+    sources.iter().find_map(part).iter().for_each(|text| observer.warning(text));
+    let robots = skilled(options.robots.of(sources, options.seed)?, grouping, observer)?;
+    let shown = HeldOutImages::draw(config, sources, dataset, options)?;
+    let mut report = opened.report(options, &shown);
     let tasks = robots
         .iter()
-        .filter_map(|Chosen { robot, .. }| Some((robot.task.as_str(), task_of(&grouping, robot)?)));
-    report.baselines = shown.baselines(&sources, tasks)?;
+        .filter_map(|Chosen { robot, .. }| Some((robot.task.as_str(), task_of(grouping, robot)?)));
+    report.baselines = shown.baselines(sources, tasks)?;
     let pool = pool(options.threads)?;
     let walker =
-        || Walker { config, control_steps: steps, pool: &pool, stop, observer, done: AtomicU64::new(0) };
+        || Walker { config, control_steps: *steps, pool: &pool, stop, observer, done: AtomicU64::new(0) };
     let (robots, scores): (Vec<Chosen>, Vec<Validated>) = match wanted {
         None => (robots, Vec::new()),
         Some(wanted) => {
             // Which images are for validation is known by their indices, in the run's own data
             // only.
-            let others = other.map(|_| own(&[Split::Train])).transpose()?;
-            let of_runs = others.as_ref().unwrap_or(&dataset);
+            let others = opened.other.map(|_| opened.own(&[Split::Train])).transpose()?;
+            let of_runs = others.as_ref().unwrap_or(dataset);
             let best =
-                validation::chosen(&sources, &robots, &options.robots, of_runs, &grouping, &wanted, &walker)?;
+                validation::chosen(sources, &robots, &options.robots, of_runs, grouping, wanted, &walker)?;
             let all_know = options.ranks.all(best.is_some());
             let Some(best) = best.filter(|_| all_know) else {
                 report.stopped = true;
@@ -160,9 +120,186 @@ pub fn eval(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Re
     );
     let own_share = count.div_ceil(options.ranks.size());
     observer.begins(&Work::new(label, (own_share * images) as u64, "rollouts"));
-    let testing = Testing { options, sources: &sources, grouping: &grouping, shown: &shown };
+    let testing = Testing { options, sources, grouping, shown: &shown };
     let unwritten = testing.test(&robots, scores, &walker(), &mut report)?;
     Ok(Finished { file: report, unwritten: unwritten.error() })
+}
+
+/// The results in their file, if they are those of this very test: the same version of the program,
+/// runs, robots and images, shown in the same way and judged by the same threshold.
+///
+/// # Errors
+/// As of [`eval`].
+pub(crate) fn known(options: &Options) -> Result<Option<EvalFile>, Error> {
+    let Ok(known) = EvalFile::read(&options.out) else { return Ok(None) };
+    let opened = Opened::new(options)?;
+    let shown = HeldOutImages::draw(&opened.config, &opened.sources, &opened.dataset, options)?;
+    let is_it = !known.stopped
+        && known.head() == opened.report(options, &shown)
+        && is_of_robots(&known, &opened.sources, options)?;
+    Ok(is_it.then_some(known))
+}
+
+/// How robots were chosen and shown images: keys with their values.
+pub(crate) fn settings(file: &EvalFile) -> [(&'static str, String); 8] {
+    [
+        ("robots", file.selected.clone()),
+        ("dataset", file.dataset.clone()),
+        ("split", file.split.to_string()),
+        ("images", file.images.len().to_string()),
+        ("seed", file.seed.to_string()),
+        ("threshold", file.threshold.to_string()),
+        ("control_steps", file.control_steps.to_string()),
+        ("stopped", file.stopped.to_string()),
+    ]
+}
+
+/// In what an evaluation is another than the one asked for, as far as that can be told without
+/// images: the key, its value there, and what is asked for. `cycle_steps` are the control steps of
+/// an actuation cycle.
+pub(crate) fn differing(
+    known: &EvalFile,
+    options: &Options,
+    cycle_steps: u32,
+) -> Vec<(&'static str, String, String)> {
+    let images = match options.images {
+        HowMany::All => known.images.len(),
+        HowMany::Evenly(count) => count,
+    };
+    let own = known.trained_on.as_ref().map_or(&known.dataset, |own| &own.name);
+    let asked = [
+        options.robots.describe(),
+        options.dataset.as_ref().unwrap_or(own).clone(),
+        options.split.to_string(),
+        images.to_string(),
+        options.seed.to_string(),
+        options.threshold.to_string(),
+        options.cycles.saturating_mul(cycle_steps).to_string(),
+        false.to_string(),
+    ];
+    let both = settings(known).into_iter().zip(asked);
+    both.filter(|((_, there), asked)| there != asked)
+        .map(|((key, there), asked)| (key, there, asked))
+        .collect()
+}
+
+/// Whether an evaluation is of the robots that would be chosen from its runs now: verdicts may be
+/// others than they were.
+///
+/// # Errors
+/// If robots cannot be chosen.
+pub(crate) fn is_of_robots(known: &EvalFile, sources: &[Source], options: &Options) -> Result<bool, Error> {
+    let of_run = |run: usize| known.robots.iter().filter(move |robot| robot.run == run);
+    if options.robots.validated().is_some() {
+        // Validation images choose the same robots again, of those that are physical now.
+        let wanted = |config: &Config| options.validation.unwrap_or(config.validation.images);
+        for (number, source) in sources.iter().enumerate() {
+            let images = wanted(&source.run.config);
+            if of_run(number).any(|robot| robot.validation.as_ref().is_none_or(|v| v.images != images)) {
+                return Ok(false);
+            }
+            if !matches!(options.robots, Selection::Physical(_)) {
+                continue;
+            }
+            let audit = AuditFile::if_any(&source.run, &source.path)?;
+            let is_physical = |robot: &RobotReport| {
+                audit.as_ref().and_then(|audit| audit.robot(&robot.id)).is_some_and(RobotAudit::is_physical)
+            };
+            if !of_run(number).all(is_physical) {
+                return Ok(false);
+            }
+        }
+        return Ok(true);
+    }
+    let (_, grouping) = together(sources)?;
+    let chosen = options.robots.of(sources, options.seed)?;
+    let chosen = chosen.iter().filter(|chosen| task_of(&grouping, chosen.robot).is_some());
+    let chosen = chosen.map(|chosen| (chosen.source, &chosen.robot.id));
+    Ok(chosen.eq(known.robots.iter().map(|robot| (robot.run, &robot.id))))
+}
+
+/// How the robots of some runs see images together, and all their tasks.
+fn together(sources: &[Source]) -> Result<(Config, Grouping), Error> {
+    // Several trainings may have found different windows: what takes no body is on what they see
+    // together.
+    let configs = || sources.iter().map(|source| &source.run.config);
+    let config = Config::together(configs()).expect("there is a run, or the published robots");
+    let task = TaskConfig::together(configs().map(|config| &config.task));
+    let config = Config { task: task.expect("the tasks of all runs were compared"), ..config };
+    let grouping = config.grouping()?;
+    Ok((config, grouping))
+}
+
+/// What a test is about, but for its robots and images.
+struct Opened<'o> {
+    sources: Vec<Source>,
+    /// With what all robots see together.
+    config: Config,
+    grouping: Grouping,
+    /// How robots are chosen by validation images, if they are.
+    wanted: Option<validation::Wanted>,
+    whereabouts: Whereabouts,
+    /// Another dataset than the runs', if one is asked for.
+    other: Option<&'o str>,
+    /// That, or the runs' own.
+    dataset: Dataset,
+    /// Control steps per image.
+    steps: u32,
+}
+
+impl<'o> Opened<'o> {
+    fn new(options: &'o Options) -> Result<Self, Error> {
+        let threshold = options.threshold;
+        if !(0.0..=MOST).contains(&threshold) {
+            return Err(Error::usage(format!("--threshold {threshold}: expected 0 or more voxel lengths")));
+        }
+        let sources = sources(options)?;
+        let (config, grouping) = together(&sources)?;
+        let wanted = wanted(options, &config)?;
+        let other = options.dataset.as_deref().filter(|name| *name != config.data.dataset);
+        if other.is_some() && options.split == HeldOut::Validation {
+            let text =
+                "--dataset: expected with --split test only: validation images are of the runs' own data";
+            return Err(Error::usage(text.to_string()));
+        }
+        let mut whereabouts = Whereabouts::given(options.data.as_deref());
+        for archive in &options.archives {
+            whereabouts = whereabouts.and_of(archive);
+        }
+        let own = |splits: &[Split]| own(&sources[0], &config, &whereabouts, splits);
+        let dataset = match other {
+            None if options.split == HeldOut::Validation => own(&[Split::Train])?,
+            None => own(&Split::ALL)?,
+            Some(name) => whereabouts.load(&config.data.of(name), &Split::ALL)?,
+        };
+        let steps = checked_steps(&config, options.cycles)?;
+        Ok(Opened { sources, config, grouping, wanted, whereabouts, other, dataset, steps })
+    }
+
+    /// The runs' own data.
+    fn own(&self, splits: &[Split]) -> Result<Dataset, Error> {
+        own(&self.sources[0], &self.config, &self.whereabouts, splits)
+    }
+
+    /// What is known of the test before its first robot.
+    fn report(&self, options: &Options, shown: &HeldOutImages) -> EvalFile {
+        let Opened { sources, config, other, dataset, steps, .. } = self;
+        let asked = (options.robots.describe(), options.split, options.seed, options.threshold);
+        let test_sha256 = dataset.fingerprint(Split::Test);
+        let mut report = EvalFile::new((sources, config), asked, *steps, &shown.images, test_sha256);
+        if let Some(name) = other {
+            report.transfer(name, dataset);
+        }
+        report
+    }
+}
+
+/// The data of a run, and of those that are tested with it.
+fn own(run: &Source, config: &Config, whereabouts: &Whereabouts, splits: &[Split]) -> Result<Dataset, Error> {
+    load_dataset_of(Some(&run.run.dataset), config, whereabouts, splits).map_err(|error| {
+        let hint = error.hint.clone().unwrap_or("name the folder of the run's data with --data".to_string());
+        error.hint(format!("{hint}; robots are shown another dataset's images with --dataset NAME"))
+    })
 }
 
 /// What all robots are tested with.
@@ -215,7 +352,9 @@ impl Testing<'_> {
                 report.conclude();
             }
             if ranks.leads() && report.robots.len() > before {
-                unwritten.tried(write(options, report), |text| walker.observer.warning(text))?;
+                let written =
+                    make_room(options, report, walker.observer).and_then(|()| write(options, report));
+                unwritten.tried(written, |text| walker.observer.warning(text))?;
             }
             if is_stopped {
                 break;
@@ -311,6 +450,13 @@ fn same_setting(first: &Source, other: &Source) -> Result<(), Error> {
             Err(Error::input(text).hint("evaluate runs of different experiments one by one".to_string()))
         }
     }
+}
+
+/// Sets the results of another test aside, if they are in the file.
+fn make_room(options: &Options, report: &EvalFile, observer: &dyn Observer) -> Result<(), Error> {
+    let validated = |file: &EvalFile| file.robots.first()?.validation.as_ref().map(|of| of.images);
+    let is_same = |known: EvalFile| known.head() == report.head() && validated(&known) == validated(report);
+    results::make_room(&options.out, || EvalFile::read(&options.out).is_ok_and(is_same), observer)
 }
 
 fn write(options: &Options, report: &EvalFile) -> Result<(), Error> {

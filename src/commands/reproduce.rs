@@ -8,7 +8,7 @@ use crate::base::text::counted;
 use crate::commands::plan::Plan;
 use crate::commands::table::Row;
 use crate::commands::tasks::all::check_test;
-use crate::commands::tasks::steps::{is_of, written};
+use crate::commands::tasks::steps::written;
 use crate::commands::tasks::task::another;
 use crate::commands::tasks::{self, Place, Run, Steps, Summary, Task};
 use crate::commands::{audit, capacity, eval, plan, table};
@@ -233,6 +233,7 @@ impl Job<'_> {
                 robots: Selection::Ids(ids),
                 seed: 0,
                 criteria: self.plan.audit.clone(),
+                fresh: false,
                 data: self.place.data.clone(),
                 out: source.path.with_file_name(AUDIT_JSON),
                 threads: self.place.threads,
@@ -264,7 +265,7 @@ impl Job<'_> {
         );
         let options = eval::Options {
             archives: sources.iter().map(|source| source.path.clone()).collect(),
-            robots: Selection::Drawn { robots: ids.clone(), about },
+            robots: Selection::Drawn { robots: ids, about },
             images: HowMany::Evenly(self.plan.images),
             split: HeldOut::Test,
             validation: None,
@@ -277,10 +278,7 @@ impl Job<'_> {
             threads: self.place.threads,
             ranks: Ranks::ALONE,
         };
-        if let Ok(known) = EvalFile::read(path)
-            && is_of(&known, sources, &options)
-            && ids.iter().map(|(run, id)| (*run, id)).eq(known.robots.iter().map(|r| (r.run, &r.id)))
-        {
+        if let Some(known) = eval::known(&options)? {
             return Ok(Some(known));
         }
         self.observer.note(&format!(

@@ -9,7 +9,7 @@ use crate::commands::tasks::task::selection;
 use crate::commands::tasks::{AuditStep, EvalStep, Run, Steps, Task, Training};
 use crate::config::{Config, Settings, flatten, reading};
 use crate::search::train;
-use crate::store::folder::{self, first_run};
+use crate::store::folder::{self, one_run};
 use crate::store::robots::Source;
 use crate::task::grouping::{Groups, groups_text};
 use schemars::JsonSchema;
@@ -258,7 +258,7 @@ impl SweepPlan {
         if let Some(archive) = &self.archive {
             let is_named = named::is_named(archive);
             let archive = if is_named { archive.clone() } else { folder.join(home_expanded(archive)) };
-            let archive = first_run(archive).map_err(|text| Error::at("archive", text))?;
+            let archive = one_run(archive).map_err(|text| Error::at("archive", text))?;
             let source = Source::read(&archive).map_err(|error| error.within("archive").of("archive"))?;
             let archive = match is_named {
                 true => archive,

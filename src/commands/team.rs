@@ -17,7 +17,7 @@ use crate::store::eval::Trial;
 use crate::store::folder::check_out;
 use crate::store::images::{HeldOut, HowMany, ImageRef};
 use crate::store::names::{TEAM_JSON, TEAM_VALIDATION_JSON};
-use crate::store::results::replaced;
+use crate::store::results::{self, replaced};
 use crate::store::robots::{BEST, Chosen, Selection, Source};
 use crate::store::run::different;
 use crate::store::team::{FORMAT, FORMAT_VERSION, Member, TeamBaselines, TeamFile};
@@ -133,14 +133,16 @@ pub fn team(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Re
             known.iter().find(is_it).cloned()
         })
         .collect();
-    let open = members.iter().filter(|member| member.is_none()).count();
+    let before = members.iter().flatten().count();
+    let kept = if before > 0 { format!(" ({before} known from before)") } else { String::new() };
     let label = format!(
-        "showing {} to {}:",
+        "showing {} to {}{kept}:",
         counted(images.len(), "image", "images"),
-        counted(open, "robot", "robots")
+        counted(robots.len(), "robot", "robots")
     );
-    observer.begins(&Work::new(label, (open * images.len()) as u64, "rollouts"));
-    let (pool, mut done, mut unwritten) = (pool(options.threads)?, 0, Unwritten::default());
+    let [total, mut done] = [robots.len(), before].map(|robots| (robots * images.len()) as u64);
+    observer.begins(&Work { label, total, known: done, unit: "rollouts" });
+    let (pool, mut unwritten) = (pool(options.threads)?, Unwritten::default());
     for (place, (chosen, of_robot)) in robots.iter().zip(&splits).enumerate() {
         if members[place].is_some() {
             continue;
@@ -159,12 +161,12 @@ pub fn team(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Re
             Trial { run, robot: chosen.robot, split: of_robot, images: &images, threshold: THRESHOLD };
         members[place] = Some(Member::new(&trial, &hashes[chosen.source], displacements));
         file.members = members.iter().flatten().cloned().collect();
-        unwritten.tried(file.write(&options.out), |text| observer.warning(text))?;
+        unwritten.tried(write(options, &file, observer), |text| observer.warning(text))?;
     }
     file.members = members.into_iter().flatten().collect();
     file.baselines = pool.install(|| baselines(&file, (&sources, &robots, &splits), &dataset, split))?;
     file.answers = Some(file.decided());
-    unwritten.tried(file.write(&options.out), |text| observer.warning(text))?;
+    unwritten.tried(write(options, &file, observer), |text| observer.warning(text))?;
     Ok(Finished { file, unwritten: unwritten.error() })
 }
 
@@ -268,17 +270,30 @@ fn validation_images(
     images_besides(&besides, &runs, classes, dataset, "--images", options.images)
 }
 
+/// Whether two tests show the same images in the same way: what one found of a robot holds for the
+/// other.
+fn is_same(a: &TeamFile, b: &TeamFile) -> bool {
+    let about = |file: &TeamFile| {
+        let TeamFile { program_version, test_sha256, images, cycles, split, .. } = file;
+        (program_version.clone(), test_sha256.clone(), images.clone(), *cycles, *split)
+    };
+    about(a) == about(b)
+}
+
 /// Robots that an earlier test on the same images, stopped or with fewer of them, has shown these.
 ///
 /// # Errors
 /// If the file of an earlier test cannot be read.
 fn known(options: &Options, now: &TeamFile) -> Result<Vec<Member>, Error> {
-    let about = |file: &TeamFile| {
-        let TeamFile { program_version, test_sha256, images, cycles, split, .. } = file;
-        (program_version.clone(), test_sha256.clone(), images.clone(), *cycles, *split)
-    };
-    let earlier = replaced::<TeamFile>(&options.out)?.filter(|file| about(file) == about(now));
+    let earlier = replaced::<TeamFile>(&options.out)?.filter(|file| is_same(file, now));
     Ok(earlier.map_or(Vec::new(), |file| file.members))
+}
+
+/// Writes what is known so far; the results of another test that are in the file are set aside.
+fn write(options: &Options, file: &TeamFile, observer: &dyn Observer) -> Result<(), Error> {
+    let is_same = || TeamFile::read(&options.out).is_ok_and(|known| is_same(&known, file));
+    results::make_room(&options.out, is_same, observer)?;
+    file.write(&options.out)
 }
 
 /// What answers the same images without bodies: on the pixels that the robots see, all together; a

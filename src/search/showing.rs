@@ -57,7 +57,11 @@ impl Walker<'_> {
             control_steps: self.control_steps,
             ..config.protocol.clone()
         };
-        let told = |count: u64| observer.progress(done.fetch_add(count, Ordering::Relaxed) + count);
+        let told = |count: u64| {
+            // One rollout stands for all of them.
+            observer.skips(count - 1);
+            observer.progress(done.fetch_add(count, Ordering::Relaxed) + count);
+        };
         let found = self
             .pool
             .install(|| fresh_rollouts(&robot.body, stimuli, &[], (&config.physics, &protocol), &told, stop));

@@ -10,7 +10,7 @@ use crate::base::hash::sha256_hex;
 use crate::base::observer::Observer;
 use crate::base::threads::pool;
 use crate::config::Config;
-use crate::config::validation::IMAGES_KEY;
+use crate::config::validation::{IMAGES_KEY, ValidationConfig};
 use crate::data::dataset::{Dataset, Split};
 use crate::search::held_out::images;
 use crate::search::showing;
@@ -20,7 +20,7 @@ use crate::store::images::ImageRef;
 use crate::store::names::VALIDATION_JSON;
 use crate::store::robots::{Chosen, Selection, Source, first_physical};
 use crate::store::run::{Robot, RunFile};
-use crate::store::validation::{FORMAT, Validated, ValidationFile};
+use crate::store::validation::{FORMAT, Ranking, Validated, ValidationFile};
 use crate::store::whereabouts::{Whereabouts, load_dataset_of, see_all};
 use crate::task::direction;
 use crate::task::grouping;
@@ -178,19 +178,26 @@ pub(crate) fn best<'a>(
         let is_first = |(place, robot): &(usize, &Validated)| before(*place, &robot.task) < wanted.count;
         all.iter().enumerate().filter(is_first).filter_map(|(_, robot)| by_id(robot)).collect()
     };
-    if let Some(file) = known.filter(|file| file.key == key) {
-        return Ok(Some(first(&file.robots)));
+    if let Some(robots) = known.as_ref().and_then(|file| file.of(&key)) {
+        return Ok(Some(first(robots)));
     }
     let Some(chosen) = screened(run, dataset, grouping, &robots, searched, &images, walker)? else {
         return Ok(None);
     };
-    let file = ValidationFile {
+    let found = first(&chosen);
+    let run_sha256 = run.fingerprint();
+    let mut file = known.filter(|file| file.run_sha256 == run_sha256).unwrap_or_else(|| ValidationFile {
         format: FORMAT.0.to_string(),
         format_version: FORMAT.1,
-        run_sha256: run.fingerprint(),
-        key,
-        robots: chosen,
-    };
+        run_sha256,
+        key: String::new(),
+        robots: Vec::new(),
+        others: Vec::new(),
+    });
+    match is_own(run, &robots, searched, walker.control_steps) {
+        true => (file.key, file.robots) = (key, chosen),
+        false => file.others.push(Ranking { key, robots: chosen }),
+    }
     let text = serde_json::to_string(&file).map_err(|error| Error::other(error.to_string()))? + "\n";
     if let Err(error) = write_atomically(&path, text.as_bytes()) {
         let error = Error::writing(&path, &error);
@@ -199,7 +206,18 @@ pub(crate) fn best<'a>(
         }
         walker.observer.warning(&format!("{error}; the next time robots are chosen anew"));
     }
-    Ok(Some(first(&file.robots)))
+    Ok(Some(found))
+}
+
+/// Whether robots are chosen as the run's config says: from all that it has.
+fn is_own(run: &RunFile, robots: &[&Robot], wanted: &Wanted, control_steps: u32) -> bool {
+    let ValidationConfig { images, best } = run.config.validation;
+    let Ok(grouping) = run.config.grouping() else { return false };
+    let all = run.elites.iter().filter(|robot| showing::task_of(&grouping, robot).is_some()).count();
+    let usual = (images, direction::THRESHOLD, showing::control_steps(&run.config, showing::CYCLES));
+    (wanted.images, wanted.threshold, control_steps) == usual
+        && (best == 0 || wanted.count == best)
+        && robots.len() == all
 }
 
 /// Of all that the result depends on.

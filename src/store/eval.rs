@@ -341,6 +341,17 @@ impl EvalFile {
         }
     }
 
+    /// All of it but what was found.
+    pub(crate) fn head(&self) -> Self {
+        EvalFile {
+            stopped: false,
+            baselines: BTreeMap::new(),
+            means: BTreeMap::new(),
+            robots: Vec::new(),
+            ..self.clone()
+        }
+    }
+
     /// Averages over the robots so far.
     pub(crate) fn conclude(&mut self) {
         let mut by_task = BTreeMap::<&str, Vec<&RobotReport>>::new();

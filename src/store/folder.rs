@@ -292,7 +292,22 @@ pub fn run_json(path: PathBuf) -> Result<Vec<PathBuf>, String> {
     }
 }
 
-/// The same, of several the first.
+/// The same, where one run is wanted.
+///
+/// # Errors
+/// As [`run_json`]; if several are named together.
+pub fn one_run(path: PathBuf) -> Result<PathBuf, String> {
+    let mut runs = run_json(path)?;
+    match runs.as_slice() {
+        [] | [_] => Ok(runs.pop().expect("a path means at least one run")),
+        several => {
+            let (count, first) = (several.len(), archive(&several[0]));
+            Err(format!("expected one run, these are {count}; name one, such as {first}"))
+        }
+    }
+}
+
+/// The first of the runs that are named together.
 ///
 /// # Errors
 /// As [`run_json`].

@@ -29,6 +29,10 @@ const BEAT: Duration = Duration::from_secs(5);
 /// later; shorter: a file system that hesitates looks like a death.
 const DEAD_AFTER: Duration = Duration::from_secs(25);
 
+/// A heart that did not beat for so long is dead whatever the clocks say. Longer: more dead ones are
+/// watched; shorter: clocks that differ more make living ones look dead.
+const LONG_DEAD: Duration = Duration::from_secs(3600);
+
 /// How often a waiting process looks.
 const LOOK: Duration = Duration::from_millis(500);
 
@@ -64,6 +68,9 @@ pub enum State {
     Held(Option<Holder>),
     /// A process was at work, and ended without letting go.
     Stale(Holder),
+    /// A process was at work, and its heart has been silent for too long, by the clock of this
+    /// machine: its own may go behind.
+    Silent(Holder),
 }
 
 /// Why a lock could not be taken.
@@ -281,16 +288,39 @@ fn now() -> u64 {
     u64::try_from(since.as_nanos()).unwrap_or_default()
 }
 
+/// What lock files say. Hearts that are silent by the clock of this machine are watched for a little
+/// longer than a heartbeat, all of them at once.
+pub fn states(paths: &[PathBuf]) -> Vec<State> {
+    // What cannot be read says nothing.
+    let mut all: Vec<State> = paths.iter().map(|path| state(path).unwrap_or(State::Free)).collect();
+    let began = Instant::now();
+    while all.iter().any(|state| matches!(state, State::Silent(_))) {
+        let is_over = began.elapsed() > BEAT + 2 * LOOK;
+        std::thread::sleep(if is_over { Duration::ZERO } else { LOOK });
+        for (path, state) in paths.iter().zip(&mut all) {
+            let State::Silent(before) = state else { continue };
+            match read(path) {
+                Ok(None) => *state = State::Free,
+                Ok(Some(now)) if now != *before => *state = State::Held(Some(now)),
+                _ if is_over => *state = State::Stale(before.clone()),
+                _ => {}
+            }
+        }
+    }
+    all
+}
+
 /// What a lock file says; it takes no time, and the system's lock for a moment only, to see whether
 /// it is held.
 ///
 /// # Errors
 /// What the system says.
 pub fn state(path: &Path) -> io::Result<State> {
+    use io::ErrorKind::{NotFound, PermissionDenied, ReadOnlyFilesystem};
     let file = match File::options().read(true).write(true).open(path) {
-        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(State::Free),
-        // Others may look, too.
-        Err(error) if error.kind() == io::ErrorKind::PermissionDenied => File::open(path)?,
+        Err(error) if error.kind() == NotFound => return Ok(State::Free),
+        // Others may look, too, and from everywhere.
+        Err(error) if [PermissionDenied, ReadOnlyFilesystem].contains(&error.kind()) => File::open(path)?,
         opened => opened?,
     };
     let is_locked = match file.try_lock() {
@@ -307,9 +337,12 @@ pub fn state(path: &Path) -> io::Result<State> {
     let beaten = file.metadata()?.modified()?;
     // A clock that goes ahead on the other machine counts as no time.
     let silent = SystemTime::now().duration_since(beaten).unwrap_or_default();
-    let is_silent = silent > DEAD_AFTER + BEAT;
-    let has_ended = is_silent || is_here && is_locked == Some(false);
-    Ok(if has_ended { State::Stale(holder) } else { State::Held(Some(holder)) })
+    let has_ended = silent > LONG_DEAD || is_here && is_locked == Some(false);
+    Ok(match () {
+        () if has_ended => State::Stale(holder),
+        () if silent > DEAD_AFTER + BEAT => State::Silent(holder),
+        () => State::Held(Some(holder)),
+    })
 }
 
 /// Takes the system's lock; whether the system has locks.
@@ -468,9 +501,34 @@ mod tests {
         let path = path(&folder);
         elsewhere(&path);
         assert!(matches!(state(&path).unwrap(), State::Held(Some(_))));
-        let long_ago = SystemTime::now() - Duration::from_secs(3600);
+        let long_ago = SystemTime::now() - Duration::from_secs(3601);
         File::options().write(true).open(&path).unwrap().set_modified(long_ago).unwrap();
         assert!(matches!(state(&path).unwrap(), State::Stale(_)));
+    }
+
+    #[test]
+    fn a_heart_that_beats_by_a_clock_that_goes_behind_is_alive() {
+        let folder = tempfile::tempdir().unwrap();
+        let paths = ["alive", "dead"].map(|name| folder.path().join(name));
+        let age = |path: &Path| {
+            let before = SystemTime::now() - Duration::from_secs(60);
+            File::options().write(true).open(path).unwrap().set_modified(before).unwrap();
+        };
+        for path in &paths {
+            elsewhere(path);
+            age(path);
+            assert!(matches!(state(path).unwrap(), State::Silent(_)));
+        }
+        std::thread::scope(|threads| {
+            threads.spawn(|| {
+                std::thread::sleep(LOOK);
+                let name = Holder { host: "another-machine".to_string(), process: 7, beats: 4 };
+                write(&paths[0], &name).unwrap();
+                age(&paths[0]);
+            });
+            let states = states(&paths);
+            assert!(matches!(&states[..], [State::Held(Some(_)), State::Stale(_)]), "{states:?}");
+        });
     }
 
     #[test]

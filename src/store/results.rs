@@ -3,6 +3,8 @@
 
 use crate::base::error::Error;
 use crate::base::files::{read_text, write_atomically};
+use crate::base::hash::{sha256_hex, short};
+use crate::base::observer::Observer;
 use crate::base::ownership;
 use crate::config::reading;
 use serde::Serialize;
@@ -63,6 +65,42 @@ pub(crate) fn by_lines(head: &impl Serialize, list: &[impl Serialize]) -> String
     let head = head.strip_suffix("]}").expect("the last key of the head is an empty list");
     let lines: Vec<String> = list.iter().map(|one| serde_json::to_string(one).expect(JSON)).collect();
     format!("{head}\n{}\n]}}\n", lines.join(",\n"))
+}
+
+/// Sets the file at a path aside, with the table beside it, if results are about to be written there
+/// that it is not about: under its own name and the beginning of its SHA-256. `is_same` says whether
+/// it is about the same.
+///
+/// # Errors
+/// If it cannot be read or renamed.
+pub(crate) fn make_room(
+    path: &Path,
+    is_same: impl FnOnce() -> bool,
+    observer: &dyn Observer,
+) -> Result<(), Error> {
+    if !path.is_file() || is_same() {
+        return Ok(());
+    }
+    let found = std::fs::read(path).map_err(|error| Error::reading(path, &error))?;
+    let hash = sha256_hex(&found);
+    let aside = |path: &Path| {
+        let mut name = path.file_stem().unwrap_or_default().to_os_string();
+        name.push(format!("-{}.", short(&hash)));
+        name.push(path.extension().unwrap_or_default());
+        path.with_file_name(name)
+    };
+    for path in [path, &path.with_extension("csv")] {
+        match ownership::check(path).and_then(|()| std::fs::rename(path, aside(path))) {
+            Err(error) if error.kind() != io::ErrorKind::NotFound => {
+                return Err(Error::writing(path, &error));
+            }
+            _ => {}
+        }
+    }
+    let (path, aside) = (path.display(), aside(path));
+    observer
+        .warning(&format!("{path}: held the results of another test; they are in {} now", aside.display()));
+    Ok(())
 }
 
 /// Writes results, and their table beside them with the ending `csv`. The results are written last: if

@@ -23,7 +23,7 @@ pub(crate) struct Trainings {
 struct Content {
     format: String,
     format_version: u32,
-    /// By what was trained on what (a hash) and by size: accuracy and parameters of each training,
+    /// By all that the trainings depend on (a hash) and by size: accuracy and parameters of each training,
     /// in order.
     trainings: BTreeMap<String, BTreeMap<usize, Vec<(f64, usize)>>>,
 }

@@ -3,6 +3,7 @@
 use crate::base::error::Error;
 use crate::base::files::exists;
 use crate::base::ranges;
+use crate::config::validation::ValidationConfig;
 use crate::store::names::VALIDATION_JSON;
 use crate::store::results::{self, Stored};
 use crate::store::robots::Source;
@@ -38,6 +39,20 @@ pub(crate) struct ValidationFile {
     pub format_version: u32,
     /// SHA-256 of the run's content: of a run that has gone on since, this says nothing.
     pub run_sha256: String,
+    /// SHA-256 of all that the result depends on; empty if the run's own choice is not known.
+    pub key: String,
+    /// The best of each task, best first, as the run's config chooses them.
+    pub robots: Vec<Validated>,
+    /// Those that were chosen in other ways.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub others: Vec<Ranking>,
+}
+
+/// Robots that were chosen otherwise than the run's config says: of other robots, by more images, by
+/// another threshold.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Ranking {
     /// SHA-256 of all that the result depends on.
     pub key: String,
     /// The best of each task, best first.
@@ -54,23 +69,41 @@ impl Validated {
     }
 }
 
+/// Checks that robots are there once for a task, and their counts go together.
+fn check_robots(robots: &[Validated]) -> Result<(), Error> {
+    for (number, robot) in robots.iter().enumerate() {
+        robot.check().map_err(|error| error.within(&format!("robots[{number}]")))?;
+        let is_it = |other: &Validated| (&other.id, &other.task) == (&robot.id, &robot.task);
+        if robots[..number].iter().any(is_it) {
+            let text = format!("{} is there twice for {}", robot.id, robot.task);
+            return Err(Error::at(&format!("robots[{number}].id"), text));
+        }
+    }
+    Ok(())
+}
+
 impl Stored for ValidationFile {
     const FORMAT: (&'static str, u32) = FORMAT;
 
     fn check(&self) -> Result<(), Error> {
-        for (number, robot) in self.robots.iter().enumerate() {
-            robot.check().map_err(|error| error.within(&format!("robots[{number}]")))?;
-            let is_it = |other: &Validated| (&other.id, &other.task) == (&robot.id, &robot.task);
-            if self.robots[..number].iter().any(is_it) {
-                let text = format!("{} is there twice for {}", robot.id, robot.task);
-                return Err(Error::at(&format!("robots[{number}].id"), text));
-            }
+        check_robots(&self.robots)?;
+        let others = self.others.iter().enumerate();
+        for (number, Ranking { robots, .. }) in others {
+            check_robots(robots).map_err(|error| error.within(&format!("others[{number}]")))?;
         }
         Ok(())
     }
 }
 
 impl ValidationFile {
+    /// The robots that were chosen in the way that a key names.
+    pub fn of(&self, key: &str) -> Option<&[Validated]> {
+        match self.key == key {
+            true => Some(&self.robots),
+            false => self.others.iter().find(|other| other.key == key).map(|other| other.robots.as_slice()),
+        }
+    }
+
     /// What is in a file, if there is one.
     ///
     /// # Errors
@@ -84,23 +117,33 @@ impl ValidationFile {
     }
 }
 
-/// The best robots of a run on validation images, as far as they are known for the run as it is;
-/// `None` if none are.
+/// The best robots of a run on validation images, as its config chooses them, as far as they are
+/// known for the run as it is; `None` if none are.
 ///
 /// # Errors
 /// If the file that says so cannot be read.
 pub(crate) fn ranking(source: &Source) -> Result<Option<Vec<Validated>>, Error> {
+    let ValidationConfig { images, best } = source.run.config.validation;
     let file = ValidationFile::read(&source.path.with_file_name(VALIDATION_JSON))?;
     let is_of = |file: &ValidationFile| file.run_sha256 == source.run.fingerprint();
-    Ok(file.filter(|file| is_of(file) && !file.robots.is_empty()).map(|file| file.robots))
+    // Earlier versions kept whatever choice was made last.
+    let is_own = |robots: &[Validated]| {
+        let of_task = |task: &str| robots.iter().filter(|other| other.task == task).count();
+        robots.iter().all(|robot| robot.images == images && (best == 0 || of_task(&robot.task) <= best))
+    };
+    let is_known = |file: &ValidationFile| is_of(file) && !file.robots.is_empty() && is_own(&file.robots);
+    Ok(file.filter(is_known).map(|file| file.robots))
 }
 
-/// How many images the robots in the `validation.json` beside a run were chosen by; `None` without
-/// such a file.
+/// How many images the robots in the `validation.json` beside a run were chosen by, at most; `None`
+/// without such a file.
 ///
 /// # Errors
 /// If it cannot be read.
 pub(crate) fn shown(source: &Source) -> Result<Option<usize>, Error> {
-    let file = ValidationFile::read(&source.path.with_file_name(VALIDATION_JSON))?;
-    Ok(file.and_then(|file| file.robots.first().map(|robot| robot.images)))
+    let Some(file) = ValidationFile::read(&source.path.with_file_name(VALIDATION_JSON))? else {
+        return Ok(None);
+    };
+    let all = file.others.iter().flat_map(|other| &other.robots).chain(&file.robots);
+    Ok(all.map(|robot| robot.images).max())
 }

@@ -103,6 +103,11 @@ impl<'c> Counter<'c> {
         self.update(known);
     }
 
+    /// Leaves `count` of the things that will be shown as done out of the speed.
+    pub fn skip(&self, count: u64) {
+        lock(&self.recent).shift(|done| *done += count);
+    }
+
     /// Shows that `done` of the things are done (JSON: an event `progress`, as often as a plain
     /// line).
     pub fn update(&self, done: u64) {

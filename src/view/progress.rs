@@ -19,6 +19,11 @@ impl<T: Copy> Recent<T> {
         Recent { marks: [(seconds, begin); 2] }
     }
 
+    /// Changes where it was, so that something counts as done before.
+    pub fn shift(&mut self, change: impl Fn(&mut T)) {
+        self.marks.iter_mut().for_each(|(_, mark)| change(mark));
+    }
+
     /// Seconds from where it was to now, and what it was then; `done` counts what is done.
     pub fn since(&mut self, seconds: f64, now: T, done: impl Fn(&T) -> u64) -> (f64, T) {
         let [_, (then, mark)] = self.marks;
@@ -157,6 +162,13 @@ mod tests {
         assert_eq!(since(3730.0, 211), (60.0, 111));
         // Slow things are measured over as long as it takes.
         assert_eq!(since(7000.0, 215), (3330.0, 111));
+    }
+
+    #[test]
+    fn what_was_skipped_counts_as_done_before() {
+        let mut recent = Recent::new(0.0, 0);
+        recent.shift(|done| *done += 980);
+        assert_eq!(recent.since(2.0, 1000, |done| *done), (2.0, 980));
     }
 
     #[test]

@@ -53,6 +53,12 @@ impl Observer for Reporter<'_> {
         }
     }
 
+    fn skips(&self, count: u64) {
+        if let Line::Work(counter) = &*self.line.read().unwrap_or_else(PoisonError::into_inner) {
+            counter.skip(count);
+        }
+    }
+
     fn generation(&self, generation: &Generation) {
         let is_shown =
             matches!(&*self.line.read().unwrap_or_else(PoisonError::into_inner), Line::Evolution(_));

@@ -9,14 +9,14 @@ use std::path::Path;
 
 /// After an audit: a line per robot, how many there are of each verdict, and what breaks walks.
 pub fn audit(console: &Console, finished: &Finished, out: &Path) {
-    let Finished { file, asked, stopped, unwritten } = finished;
+    let Finished { file, asked, known, stopped, unwritten, .. } = finished;
     let robots: Vec<&RobotAudit> = asked.iter().filter_map(|id| file.robot(id)).collect();
     let is_written = unwritten.is_none() && !(*stopped && file.robots.is_empty());
     if console.mode() == Mode::Json {
         let short = |robot: &&RobotAudit| RobotAudit { rollouts: Vec::new(), ..(*robot).clone() };
         let done = serde_json::json!({
             "file": is_written.then(|| out.display().to_string()), "stopped": stopped, "run": file.run,
-            "elites": file.elites,
+            "elites": file.elites, "known": known,
             "robots": robots.iter().map(short).collect::<Vec<_>>(),
         });
         return console.event("audited", &done);

@@ -222,3 +222,24 @@ fn what_an_evaluation_is_asked_for_must_make_sense() {
         .ended(2, &["run/run.json", "copy.json", "different"]);
     Sandbox::new().run("eval").ended(3, &["runs/", "hint:", "--archive"]);
 }
+
+#[test]
+fn a_second_test_with_other_settings_keeps_the_first() {
+    let sandbox = with_run();
+    let test = |options: &str| sandbox.run(&format!("eval -a run --images 20 --robots top:2 {options}"));
+    test("").ended(0, &[]);
+    let first = files(&sandbox.path("run"));
+    // The same again is no other test.
+    assert!(!test("").ended(0, &[]).err.contains("another test"));
+    assert_eq!(files(&sandbox.path("run")), first);
+    let said = test("--cycles 2").ended(0, &["run/eval.json: held the results of another test"]);
+    let now = files(&sandbox.path("run"));
+    assert_ne!(now["eval.json"], first["eval.json"]);
+    for ending in ["json", "csv"] {
+        let is_kept = |name: &&String| name.starts_with("eval-") && name.ends_with(ending);
+        let kept: Vec<&String> = now.keys().filter(is_kept).collect();
+        assert_eq!(kept.len(), 1, "{:?}", now.keys());
+        assert_eq!(now[kept[0]], first[&format!("eval.{ending}")]);
+        assert!(ending == "csv" || said.err.contains(kept[0].as_str()), "{}", said.err);
+    }
+}

@@ -192,6 +192,14 @@ fn robots_that_ship_with_the_program_are_named_where_archives_are() {
     sandbox
         .run("replay -q -a gallery:zero_one --robot best --dataset builtin --images 0 -o walk.png")
         .ended(0, &[]);
+    // Where one run is wanted, a set is no answer.
+    for command in ["response", "train --task 0|1"] {
+        sandbox
+            .run(&format!("{command} -a gallery:team"))
+            .ended(2, &["expected one run, these are 45", "gallery:team-0v1"]);
+    }
+    sandbox.write("plan.toml", "archive = \"gallery:team\"\npairs = [0, 1]\n");
+    sandbox.run("sweep plan.toml --status").ended(3, &["archive", "these are 45"]);
     // Of a set, every run; results go to the present folder, under the name of the set.
     sandbox
         .run("eval -q -a gallery:zero_one --dataset builtin --images 2 --cycles 1 --physical-only")

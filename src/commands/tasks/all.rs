@@ -104,7 +104,7 @@ pub fn run_all(
 ) -> Result<Summary, Error> {
     let is_open = |task: &&Task| {
         let known = TaskFile::read(&place.folder(task).join(TASK_JSON)).ok().flatten();
-        !is_done(known.as_ref(), task)
+        !is_done(known.as_ref(), task, place)
     };
     let numbered: Vec<(usize, &Task)> = (1..).zip(tasks).filter(|(_, task)| is_open(task)).collect();
     check_data(numbered.iter().copied(), place)?;
@@ -133,7 +133,8 @@ pub fn run_all(
         while !stop.load(Ordering::Relaxed) {
             let index = next.fetch_add(1, Ordering::Relaxed);
             let Some((number, task)) = numbered.get(index) else { break };
-            let part = Part { all: &all, index, amount: task.amount(), name: &task.name };
+            let has_begun = AtomicBool::new(false);
+            let part = Part { all: &all, index, amount: task.amount(), name: &task.name, has_begun };
             let ended = catch_unwind(AssertUnwindSafe(|| run(task, &place, stop, &part)));
             let ended = ended.unwrap_or_else(|_| {
                 Err(Error::other("a bug of morphcog; what it said stands above".to_string()))
@@ -142,6 +143,7 @@ pub fn run_all(
             match ended {
                 Ok(()) => {
                     summary.done += 1;
+                    part.begins_at(part.amount);
                     part.is_at(part.amount);
                     observer.note(&format!(
                         "task {number} ({}): done, {} of {}",
@@ -188,9 +190,18 @@ struct Part<'a, 'o> {
     index: usize,
     amount: u64,
     name: &'a str,
+    /// Whether it has said how many generations were done before.
+    has_begun: AtomicBool,
 }
 
 impl Part<'_, '_> {
+    /// So much was done before it began here, if it has not said so yet.
+    fn begins_at(&self, done: u64) {
+        if !self.has_begun.swap(true, Ordering::Relaxed) {
+            self.all.observer.skips(done.min(self.amount));
+        }
+    }
+
     fn is_at(&self, done: u64) {
         let All { observer, known, parts } = self.all;
         parts[self.index].fetch_max(done.min(self.amount), Ordering::Relaxed);
@@ -201,11 +212,13 @@ impl Part<'_, '_> {
 
 impl Observer for Part<'_, '_> {
     fn generation(&self, generation: &Generation) {
+        self.begins_at(generation.done);
         self.is_at(generation.done);
     }
 
     fn finding(&self, _kind: &str, fields: &Value) {
         if let Some(challenger) = fields.get("challenger").and_then(Value::as_u64) {
+            self.begins_at(0);
             self.is_at(challenger);
         }
     }

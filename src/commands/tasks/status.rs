@@ -2,14 +2,14 @@
 
 use crate::base::error::Error;
 use crate::base::files::open_file;
-use crate::commands::tasks::steps::is_done;
+use crate::commands::tasks::steps::{lacking, was_done};
 use crate::commands::tasks::task::{Place, Run, Task};
 use crate::store::lock;
 use crate::store::names::{METRICS, TASK_JSON, TASK_LOCK};
 use crate::store::task::{State, TaskFile};
 use serde::Serialize;
 use std::io::{Read, Seek, SeekFrom};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Bytes at the end of a metrics.csv that hold its last whole row; rows have about 150.
 const ROW: u64 = 4096;
@@ -38,9 +38,10 @@ pub struct Status {
 /// # Errors
 /// If a folder cannot be read.
 pub fn status(tasks: &[Task], place: &Place) -> Result<Vec<Status>, Error> {
+    let locks: Vec<PathBuf> = tasks.iter().map(|task| place.folder(task).join(TASK_LOCK)).collect();
     let mut all = Vec::new();
-    for (number, task) in (1..).zip(tasks) {
-        all.push(status_of(number, task, &place.folder(task))?);
+    for ((number, task), held) in (1..).zip(tasks).zip(lock::states(&locks)) {
+        all.push(status_of(number, task, place, held)?);
     }
     // A task of which nothing else is known takes as long as those that are done.
     let done: Vec<f64> = all.iter().filter(|s| s.state == State::Done).filter_map(|s| s.seconds).collect();
@@ -51,13 +52,16 @@ pub fn status(tasks: &[Task], place: &Place) -> Result<Vec<Status>, Error> {
     Ok(all)
 }
 
-fn status_of(number: usize, task: &Task, folder: &Path) -> Result<Status, Error> {
+fn status_of(number: usize, task: &Task, place: &Place, held: lock::State) -> Result<Status, Error> {
+    let folder = place.folder(task);
     let known = TaskFile::read(&folder.join(TASK_JSON))?;
-    let held = lock::state(&folder.join(TASK_LOCK)).unwrap_or(lock::State::Free);
     let (state, about) = match (&known, held) {
         (_, lock::State::Held(holder)) => (State::Running, holder.map(|holder| holder.to_string())),
         (None, _) => (State::Waiting, None),
-        (Some(known), _) if is_done(Some(known), task) => (State::Done, None),
+        (Some(known), _) if was_done(known, task) => match lacking(task, place) {
+            None => (State::Done, None),
+            lacking => (State::Stopped, lacking),
+        },
         (Some(TaskFile { state: State::Failed, error, .. }), _) => (State::Failed, error.clone()),
         (Some(TaskFile { state: State::Running, .. }), lock::State::Stale(holder)) => {
             (State::Stopped, Some(format!("{holder} was ended")))

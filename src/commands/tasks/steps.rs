@@ -5,20 +5,14 @@ use crate::base::observer::Observer;
 use crate::base::ranks::Ranks;
 use crate::commands::tasks::task::{Place, Run, Task, selection};
 use crate::commands::{audit, eval};
-use crate::search::showing::task_of;
 use crate::search::{evolve, showing, train, validation};
-use crate::store::audit::{AuditFile, RobotAudit};
 use crate::store::eval::EvalFile;
 use crate::store::folder::IfExists;
-use crate::store::images::HowMany;
 use crate::store::lock::Lock;
 use crate::store::names::{AUDIT_JSON, RUN_JSON, TASK_JSON, TASK_LOCK};
-use crate::store::robots::{Selection, Source};
-use crate::store::run::Robot;
-use crate::store::setting::RunRef;
+use crate::store::robots::Selection;
 use crate::store::task::{State, TaskFile};
 use crate::task::direction;
-use std::collections::BTreeSet;
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
@@ -36,7 +30,7 @@ pub fn run(task: &Task, place: &Place, stop: &AtomicBool, observer: &dyn Observe
     })?;
     let path = folder.join(TASK_JSON);
     let known = TaskFile::read(&path)?;
-    if is_done(known.as_ref(), task) {
+    if is_done(known.as_ref(), task, place) {
         return Ok(());
     }
     let mut file = TaskFile::new(task.settings(), task.asked());
@@ -56,11 +50,60 @@ pub fn run(task: &Task, place: &Place, stop: &AtomicBool, observer: &dyn Observe
     ended.and(written)
 }
 
-/// Whether all of a task is done. More generations, or other steps, are still to do.
-pub(super) fn is_done(known: Option<&TaskFile>, task: &Task) -> bool {
-    known.is_some_and(|known| {
-        known.state == State::Done && known.settings == task.settings() && known.asked == task.asked()
-    })
+/// Whether all of a task is done, as its file says, and still there. More generations, or other
+/// steps, are still to do.
+pub(super) fn is_done(known: Option<&TaskFile>, task: &Task, place: &Place) -> bool {
+    known.is_some_and(|known| was_done(known, task)) && lacking(task, place).is_none()
+}
+
+/// Whether a task's file says that all of it is done.
+pub(super) fn was_done(known: &TaskFile, task: &Task) -> bool {
+    known.state == State::Done && known.settings == task.settings() && known.asked == task.asked()
+}
+
+/// What of a task that was done is not there any more, or not its own: why it is to be done again.
+pub(super) fn lacking(task: &Task, place: &Place) -> Option<String> {
+    let folder = place.folder(task);
+    let audit = task.steps.audit.as_ref().map(|_| AUDIT_JSON);
+    if let Some(name) =
+        [Some(RUN_JSON), audit].into_iter().flatten().find(|name| !folder.join(name).is_file())
+    {
+        return Some(format!("{name} is missing"));
+    }
+    let test = test_of(task, place).ok()??;
+    let name = eval::own_name(test.split);
+    match EvalFile::read(&test.out) {
+        Err(_) if !test.out.exists() => Some(format!("{name} is missing")),
+        Err(_) => Some(format!("{name} cannot be read")),
+        Ok(known) => match eval::differing(&known, &test, task.cycle_steps()).first() {
+            None => None,
+            Some((key, there, asked)) => Some(format!("{name} has {key} {there}, not {asked}")),
+        },
+    }
+}
+
+/// The test that a task's plan asks for, if it does.
+///
+/// # Errors
+/// If its selection of robots cannot be read.
+pub(crate) fn test_of(task: &Task, place: &Place) -> Result<Option<eval::Options>, Error> {
+    let Some(step) = &task.steps.eval else { return Ok(None) };
+    let folder = place.folder(task);
+    Ok(Some(eval::Options {
+        archives: vec![folder.join(RUN_JSON)],
+        robots: selection("eval.robots", &step.robots)?.physical(step.physical_only),
+        images: step.images,
+        split: step.split,
+        validation: None,
+        seed: 1,
+        threshold: direction::THRESHOLD,
+        cycles: showing::CYCLES,
+        data: place.data.clone(),
+        dataset: None,
+        out: folder.join(eval::own_name(step.split)),
+        threads: place.threads,
+        ranks: Ranks::ALONE,
+    }))
 }
 
 /// The run, and the steps after it. What was done before is not done again.
@@ -125,6 +168,7 @@ fn steps(task: &Task, place: &Place, stop: &AtomicBool, observer: &dyn Observer)
             robots,
             seed: 1,
             criteria: step.criteria.clone(),
+            fresh: false,
             data: place.data.clone(),
             out: folder.join(AUDIT_JSON),
             threads: place.threads,
@@ -135,27 +179,8 @@ fn steps(task: &Task, place: &Place, stop: &AtomicBool, observer: &dyn Observer)
             return Err(stopped());
         }
     }
-    if let Some(step) = &task.steps.eval {
-        let sources = [Source::read(&archive)?];
-        let options = eval::Options {
-            archives: vec![archive],
-            robots: selection("eval.robots", &step.robots)?.physical(step.physical_only),
-            images: step.images,
-            split: step.split,
-            validation: None,
-            seed: 1,
-            threshold: direction::THRESHOLD,
-            cycles: showing::CYCLES,
-            data: place.data.clone(),
-            dataset: None,
-            out: folder.join(eval::own_name(step.split)),
-            threads: place.threads,
-            ranks: Ranks::ALONE,
-        };
-        if let Ok(known) = EvalFile::read(&options.out)
-            && is_of(&known, &sources, &options)
-            && is_of_robots(&known, &sources[0], &options)?
-        {
+    if let Some(options) = test_of(task, place)? {
+        if eval::known(&options)?.is_some() {
             return Ok(());
         }
         let finished = eval::eval(&options, stop, observer)?;
@@ -182,39 +207,6 @@ fn elsewhere(error: Error) -> Error {
         }
         _ => error,
     }
-}
-
-/// Whether an evaluation is whole, and of these runs and images; its robots are another question.
-pub(crate) fn is_of(known: &EvalFile, sources: &[Source], options: &eval::Options) -> bool {
-    let runs: Vec<RunRef> = sources.iter().map(RunRef::of).collect();
-    let same = (known.seed, known.split, HowMany::Evenly(known.images.len()), known.threshold)
-        == (options.seed, options.split, options.images, options.threshold);
-    let is_ours = known.program_version == env!("CARGO_PKG_VERSION");
-    is_ours && !known.stopped && known.trained_on.is_none() && known.runs == runs && same
-}
-
-/// Whether an evaluation is of the robots that would be chosen from a run now: verdicts may be others
-/// than they were.
-fn is_of_robots(known: &EvalFile, source: &Source, options: &eval::Options) -> Result<bool, Error> {
-    let run = &source.run;
-    let is_known = |robot: &Robot| known.robots.iter().any(|other| other.id == robot.id);
-    if known.selected != options.robots.describe() {
-        return Ok(false);
-    }
-    if options.robots.validated().is_some() {
-        // Validation images choose the same robots again, of those that are physical now.
-        let audit = AuditFile::if_any(run, &source.path)?;
-        let is_physical = |robot: &Robot| {
-            audit.as_ref().and_then(|audit| audit.robot(&robot.id)).is_some_and(RobotAudit::is_physical)
-        };
-        let wants_physical = matches!(options.robots, Selection::Physical(_));
-        return Ok(!wants_physical || run.elites.iter().filter(|robot| is_known(robot)).all(is_physical));
-    }
-    let grouping = run.config.grouping()?;
-    let chosen = options.robots.of(std::slice::from_ref(source), options.seed)?;
-    let mut ids: BTreeSet<&str> = BTreeSet::new();
-    ids.extend(chosen.iter().filter(|c| task_of(&grouping, c.robot).is_some()).map(|c| c.robot.id.as_str()));
-    Ok(ids == known.robots.iter().map(|robot| robot.id.as_str()).collect())
 }
 
 /// What later steps read from its file, which must be there.

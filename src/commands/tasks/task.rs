@@ -175,7 +175,8 @@ pub struct Place {
 }
 
 impl Place {
-    pub(super) fn folder(&self, task: &Task) -> PathBuf {
+    /// The run folder of a task.
+    pub(crate) fn folder(&self, task: &Task) -> PathBuf {
         self.out.join(&task.name)
     }
 }
@@ -192,6 +193,14 @@ impl Task {
         };
         let config = config.into_iter().filter(|(key, _)| key != "train.challengers");
         config.chain(more.into_iter().map(|(key, value)| (key.to_string(), value.into()))).collect()
+    }
+
+    /// Control steps of an actuation cycle.
+    pub(crate) fn cycle_steps(&self) -> u32 {
+        match &self.run {
+            Run::Evolve(config, _) => config.physics.cycle_steps,
+            Run::Train(training) => training.config.physics.cycle_steps,
+        }
     }
 
     /// What is asked for beyond that: it may grow or change, and the task goes on.

@@ -12,6 +12,7 @@ use crate::task::evaluation::fresh_rollouts_so_far;
 use crate::task::perturbation::Condition;
 use crate::task::teach::{Plan, Rollouts};
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
@@ -35,6 +36,8 @@ pub(super) struct Log<'a> {
     saved: (usize, Instant),
     /// Rollouts of the work that began last; none if others are counted than rollouts.
     done: Option<AtomicU64>,
+    /// Whether anything was simulated since it was looked at last.
+    pub(super) has_simulated: Arc<AtomicBool>,
     pub(super) stop: &'a AtomicBool,
     observer: &'a dyn Observer,
 }
@@ -65,7 +68,19 @@ impl<'a> Log<'a> {
             batches = file.rollouts;
         }
         let saved = (count(&batches), Instant::now());
-        Ok(Log { path, key, batches, asked: 0, simulated: 0, saved, done: None, stop, observer })
+        let has_simulated = Arc::default();
+        Ok(Log {
+            path,
+            key,
+            batches,
+            asked: 0,
+            simulated: 0,
+            saved,
+            done: None,
+            has_simulated,
+            stop,
+            observer,
+        })
     }
 
     /// Work begins whose rollouts are counted.
@@ -88,8 +103,13 @@ impl<'a> Log<'a> {
         self.done = None;
     }
 
-    fn rolled(&self, count: u64) {
+    /// So many rollouts are done, of which `simulated` took time.
+    fn rolled(&self, count: u64, simulated: u64) {
+        if simulated > 0 {
+            self.has_simulated.store(true, Ordering::Relaxed);
+        }
         if let Some(done) = &self.done {
+            self.observer.skips(count - simulated);
             self.observer.progress(done.fetch_add(count, Ordering::Relaxed) + count);
         }
     }
@@ -107,7 +127,7 @@ impl<'a> Log<'a> {
         self.simulated += stimuli.len();
         let begun = match self.batches.get(number) {
             Some(batch) if batch.len() == stimuli.len() => {
-                self.rolled(batch.len() as u64);
+                self.rolled(batch.len() as u64, 0);
                 return Ok(batch.clone());
             }
             // It was stopped within its last batch.
@@ -123,14 +143,14 @@ impl<'a> Log<'a> {
         };
         let setting = (&config.physics, &config.protocol);
         self.batches.push(begun.unwrap_or_else(|| known[..known.len().min(stimuli.len())].to_vec()));
-        self.rolled(self.batches[number].len() as u64);
+        self.rolled(self.batches[number].len() as u64, 0);
         // A part at a time: what is stopped goes on after the last one.
         let part = PART * rayon::current_num_threads();
         while self.batches[number].len() < stimuli.len() {
             let begin = self.batches[number].len();
             let end = stimuli.len().min(begin + part);
             let (stimuli, conditions) = (&stimuli[begin..end], &conditions[begin..end]);
-            let told = |count| self.rolled(count);
+            let told = |count| self.rolled(count, 1);
             let (found, _, ended) =
                 fresh_rollouts_so_far(body, stimuli, conditions, setting, &told, self.stop);
             self.batches[number].extend(found.into_iter().map(Result::ok));

@@ -22,6 +22,8 @@ use crate::task::perturbation::Condition;
 use crate::task::refine::Challenge;
 use crate::task::response::Response;
 use crate::task::teach::{Image, Plan, Round, Taught, Teacher};
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
 
 /// What all gaits are trained with.
 pub(super) struct Trainer<'a> {
@@ -152,7 +154,15 @@ impl Trainer<'_> {
         }
         let challengers = teacher.challengers();
         rollouts.log.begins_challenges(challengers);
-        let told = |challenge: &Challenge| told_challenge(observer, challenge, challengers);
+        let has_simulated = Arc::clone(&rollouts.log.has_simulated);
+        has_simulated.store(false, Ordering::Relaxed);
+        let told = |challenge: &Challenge| {
+            // One that was kept by an earlier session took no time.
+            if !has_simulated.swap(false, Ordering::Relaxed) {
+                observer.skips(1);
+            }
+            told_challenge(observer, challenge, challengers);
+        };
         Ok((walker, seeing, teacher.finish(&mut rollouts, told)?))
     }
 }
