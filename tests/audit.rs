@@ -283,13 +283,16 @@ fn known_verdicts_are_said_to_be_known_and_made_again_only_if_asked_for() {
     let mut verdicts: serde_json::Value = serde_json::from_str(&made).unwrap();
     verdicts["robots"][0]["reason"] = "as it was".into();
     sandbox.write("run/audit.json", verdicts.to_string());
-    let said = sandbox.run(&format!("audit -a run {MILD} --robots top:3")).ended(0, &["not audited again"]);
+    let said = sandbox
+        .run(&format!("audit -a run {MILD} --robots top:3"))
+        .ended(0, &["3 robots were audited before"]);
     assert!(said.out.contains("as it was") && said.err.contains("--fresh"), "{said:?}");
-    let said =
-        sandbox.run(&format!("audit -a run {MILD} --robots top:4")).ended(0, &["not audited again: 3"]);
+    let said = sandbox
+        .run(&format!("audit -a run {MILD} --robots top:4"))
+        .ended(0, &["3 robots were audited before"]);
     assert!(said.out.contains("as it was"), "{said:?}");
     let said = sandbox.run(&format!("audit -a run {MILD} --robots top:3 --fresh")).ended(0, &[]);
-    assert!(!said.out.contains("as it was") && !said.err.contains("not audited again"), "{said:?}");
+    assert!(!said.out.contains("as it was") && !said.err.contains("audited before"), "{said:?}");
     // The fourth one's verdict has stayed.
     let now = AuditFile::read(&sandbox.path("run/audit.json")).unwrap();
     let before: AuditFile = serde_json::from_str(&made).unwrap();

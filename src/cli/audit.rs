@@ -121,8 +121,8 @@ pub(super) fn run(args: AuditArgs, console: &Console, ranks: Ranks) -> Result<()
             ranks,
         };
         let finished = audit::audit(&options, &stop, &Reporter::new(console))?;
-        verdicts::audit(console, &finished, &options.out);
         say_known(&finished, &options.out, console);
+        verdicts::audit(console, &finished, &options.out);
         if let Some(error) = finished.unwritten {
             return Err(error);
         }
@@ -141,20 +141,16 @@ pub(super) fn run(args: AuditArgs, console: &Console, ranks: Ranks) -> Result<()
 
 /// Says which verdicts were there before.
 fn say_known(finished: &Finished, out: &Path, console: &Console) {
-    let Finished { asked, known, shipped, .. } = finished;
+    let Finished { known, shipped, .. } = finished;
     if *known == 0 {
         return;
     }
-    let from = match shipped {
+    let robots = counted(*known, "robot was", "robots were");
+    let place = match shipped {
         Some(path) => format!("{}, which ships with the run", path.display()),
         None => out.display().to_string(),
     };
-    let of = if *known == asked.len() {
-        "these verdicts".to_string()
-    } else {
-        counted(*known, "verdict", "verdicts")
-    };
-    console.info(&format!("not audited again: {of} from {from}; --fresh audits anew"));
+    console.info(&format!("{robots} audited before ({place}); --fresh audits again"));
 }
 
 /// The best robots on validation images: those found before, or else searched for now.
