@@ -208,7 +208,7 @@ fn a_test_that_was_stopped_goes_on_and_ends_with_the_same_bytes_on_any_threads()
     (part.answers, part.baselines) = (None, None);
     part.write(&sandbox.path("parts/team.json")).unwrap();
     let said = sandbox.run(&format!("{TEAM} --images 30 -o parts/team.json --threads 3")).ended(0, &[]);
-    assert!(said.err.contains("30 images to 2 robots"), "{}", said.err);
+    assert!(said.err.contains("30 images to 3 robots (1 known from before)"), "{}", said.err);
     assert!(files(&sandbox.path("whole")) == files(&sandbox.path("parts")));
     // With a run more, before the others: only its robot is shown the images, and what is known of the
     // others is in the file from then on.
@@ -216,11 +216,11 @@ fn a_test_that_was_stopped_goes_on_and_ends_with_the_same_bytes_on_any_threads()
     std::fs::create_dir(sandbox.path("more")).unwrap();
     sandbox.run(&format!("{fewer} -q --images 30 -o more/team.json")).ended(0, &[]);
     let said = sandbox.run(&format!("{TEAM} --images 30 -o more/team.json")).ended(0, &[]);
-    assert!(said.err.contains("30 images to 1 robot:"), "{}", said.err);
+    assert!(said.err.contains("30 images to 3 robots (2 known from before)"), "{}", said.err);
     assert!(files(&sandbox.path("whole")) == files(&sandbox.path("more")));
     // Other images are shown to all.
     let said = sandbox.run(&format!("{TEAM} --images 30 --seed 2 -o parts/team.json")).ended(0, &[]);
-    assert!(said.err.contains("30 images to 3 robots"), "{}", said.err);
+    assert!(said.err.contains("30 images to 3 robots:"), "{}", said.err);
 }
 
 #[test]
