@@ -198,7 +198,7 @@ impl Task {
     /// Control steps of an actuation cycle.
     pub(crate) fn cycle_steps(&self) -> u32 {
         match &self.run {
-            Run::Evolve(config, _) => config.physics.cycle_steps,
+            Run::Evolve(config, ..) => config.physics.cycle_steps,
             Run::Train(training) => training.config.physics.cycle_steps,
         }
     }
