@@ -398,7 +398,7 @@ split = "validation"
     // Which classes there are, only the images tell.
     sandbox
         .run("sweep plans/pairs.toml --out pairs --set pairs=[1,12]")
-        .ended(3, &["task 1 (walkers-1v12-seed3)", "class 12"]);
+        .ended(3, &["task 1 (walkers-1v12,-seed3)", "class 12"]);
 }
 
 #[test]

@@ -2,6 +2,7 @@
 
 use crate::base::error::Error;
 use crate::base::files::{home_expanded, read_given};
+use crate::base::number;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
@@ -198,10 +199,10 @@ fn spoken(message: &str) -> String {
 /// begins a message of serde's about it.
 fn meant(start: &str, is_decimal: bool) -> Option<String> {
     let text = start.strip_prefix("invalid type: string \"")?.strip_suffix("\", ")?;
-    let number = text.parse::<f64>().ok().filter(|number| number.is_finite())?;
+    let value = text.parse::<f64>().ok().filter(|value| value.is_finite())?;
     match is_decimal {
-        true => Some(format!("{number:?}")),
-        false => (number.fract() == 0.0 && number.abs() < 1e15).then(|| format!("{number:.0}")),
+        true => Some(format!("{value:?}")),
+        false => (value.fract() == 0.0 && value.abs() < 1e15).then(|| number::fixed(value, 0)),
     }
 }
 

@@ -9,6 +9,9 @@ use crate::data::pen;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+/// Name of the built-in digits as a dataset.
+pub const BUILTIN: &str = "builtin";
+
 /// Which built-in digits there are. In each split the classes take turns: index i shows `classes[i
 /// % k]`, so that indices 0, 1, …, k − 1 are one image of each class.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]

@@ -1,7 +1,8 @@
 //! What can be downloaded, from where, and how to know that it is the right thing.
 
-use crate::data::files::FETCHABLE;
 use crate::data::info::FileInfo;
+/// Datasets that `morphcog data fetch` can download.
+pub const FETCHABLE: [&str; 2] = ["mnist", "fashion-mnist"];
 
 /// A file to be downloaded, as published.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -2,17 +2,15 @@
 
 use crate::base::Grid;
 use crate::base::random::{Purpose, stream};
+pub use crate::data::builtin::BUILTIN;
 use crate::data::builtin::{BuiltinDigits, BuiltinError};
-use crate::data::catalogue::known_as;
+use crate::data::catalogue::{FETCHABLE, known_as};
 use crate::data::files;
-use crate::data::files::{FETCHABLE, FilesError, Place, StoredSplit};
+use crate::data::files::{FilesError, Place, StoredSplit};
 pub use crate::data::info::Split;
 use crate::data::info::{DatasetInfo, SplitInfo};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-
-/// Name of the built-in digits as a dataset.
-pub const BUILTIN: &str = "builtin";
 
 /// Why a dataset cannot be loaded, or does not have what it was asked for.
 #[derive(Debug, thiserror::Error)]

@@ -3,8 +3,8 @@
 use crate::base::files::home_expanded;
 use crate::base::hash::{hex, sha256_hex};
 use crate::base::shell::in_shell;
-use crate::data::builtin::BuiltinDigits;
-use crate::data::dataset::BUILTIN;
+use crate::data::builtin::{BUILTIN, BuiltinDigits};
+use crate::data::catalogue::FETCHABLE;
 use crate::data::idx;
 use crate::data::idx::{IdxError, IdxImages};
 use crate::data::info::{FileInfo, Split};
@@ -14,9 +14,6 @@ use std::ffi::OsString;
 use std::fmt;
 use std::io;
 use std::path::{Path, PathBuf};
-
-/// Datasets that `morphcog data fetch` can download.
-pub const FETCHABLE: [&str; 2] = ["mnist", "fashion-mnist"];
 
 /// Height and width of the images of a dataset of this name, if it is one that everybody has.
 pub(crate) fn published_size(name: &str) -> Option<[usize; 2]> {
