@@ -129,7 +129,7 @@ fn without_verdicts_on_this_very_archive_nothing_is_drawn() {
     let draw = |sandbox: &Sandbox| {
         sandbox.run("eval --archive run/run.json --images 4 --cycles 1 --select random:10 --physical-only")
     };
-    draw(&sandbox).ended(3, &["have not been audited", "hint: morphcog audit --archive run/run.json"]);
+    draw(&sandbox).ended(3, &["have not been audited", "hint: `morphcog audit --archive run/run.json`"]);
     // Of a part of an archive no fair draw is possible.
     audit(&sandbox, "--robots top:2");
     draw(&sandbox).ended(3, &["has not been audited", "2 of"]);
@@ -137,7 +137,7 @@ fn without_verdicts_on_this_very_archive_nothing_is_drawn() {
     draw(&sandbox).ended(0, &[]);
     // The run goes on: its verdicts are stale.
     sandbox.run("evolve --config tiny.toml --out run --generations 45 --resume").ended(0, &[]);
-    draw(&sandbox).ended(3, &["audit.json", "stale", "hint: morphcog audit --archive run/run.json"]);
+    draw(&sandbox).ended(3, &["audit.json", "stale", "hint: `morphcog audit --archive run/run.json`"]);
     audit(&sandbox, "");
     draw(&sandbox).ended(0, &[]);
     // Broken files are refused as broken.
@@ -161,7 +161,7 @@ fn the_best_physical_on_validation_needs_no_verdicts_on_those_behind_it() {
         robots.iter().map(|robot| robot["id"].as_str().unwrap().to_string()).collect()
     };
     let best = "best-validation:1 --physical-only";
-    eval(best).ended(3, &["hint: morphcog audit --archive run/run.json"]);
+    eval(best).ended(3, &["hint: `morphcog audit --archive run/run.json`"]);
     audit(&sandbox, "");
     let whole = verdicts(&sandbox);
     eval("best-validation:8").ended(0, &[]);

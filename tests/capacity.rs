@@ -58,8 +58,10 @@ fn several_archives_are_evaluated_together_above_their_folders() {
 fn robots_that_know_less_than_the_smallest_network_are_worth_less_than_it() {
     let sandbox = sandbox();
     let mut report: serde_json::Value = serde_json::from_str(&sandbox.read("runs/eval.json")).unwrap();
-    report["robots"].as_array_mut().unwrap().iter_mut().for_each(|robot| robot["accuracy"] = 0.01.into());
-    report["means"]["0|1"]["accuracy"] = 0.01.into();
+    for robot in report["robots"].as_array_mut().unwrap() {
+        (robot["right"], robot["accuracy"]) = (1.into(), 0.025.into());
+    }
+    report["means"]["0|1"]["accuracy"] = 0.025.into();
     sandbox.write("runs/eval.json", report.to_string());
     let said = sandbox.run(&format!("capacity --eval runs/eval.json {FEW} --set sizes.1=2")).ended(0, &[]);
     let row = said.out.lines().find(|line| line.starts_with("0|1")).unwrap();
@@ -145,6 +147,7 @@ fn what_cannot_be_compared_is_refused() {
     // Nothing to learn from.
     let mut runless: serde_json::Value = serde_json::from_str(&sandbox.read("runs/eval.json")).unwrap();
     runless["runs"] = serde_json::json!([]);
+    runless["robots"].as_array_mut().unwrap().iter_mut().for_each(|robot| robot["run"] = 0.into());
     sandbox.write("runless.json", runless.to_string());
     sandbox.run("capacity --eval runless.json").ended(3, &["runless.json: runs: expected one or more"]);
     let published = sandbox.read("runs/eval.json").replace("\"name\":\"tiny\"", "\"name\":\"gallery\"");

@@ -42,7 +42,7 @@ fn an_evaluation_that_cannot_be_written_is_shown() {
     let sandbox = sandbox();
     let before = files(&sandbox.path("run"));
     let eval = "eval --archive run/run.json --images 4 --cycles 1 --robots top:2";
-    let said = said_why(without_room(&sandbox, 0, eval), "run/eval.json");
+    let said = said_why(without_room(&sandbox, 0, eval), "run/eval.csv");
     if let Some(elite) =
         sandbox.run_file("run").elites.iter().max_by(|a, b| a.objective.total_cmp(&b.objective))
     {
@@ -72,7 +72,7 @@ fn an_audit_that_cannot_be_written_is_shown() {
     let sandbox = sandbox();
     let before = files(&sandbox.path("run"));
     let audit = "audit --archive run/run.json --robots top:1 --set perturbations.time_step=[2]";
-    let said = said_why(without_room(&sandbox, 0, audit), "run/audit.json");
+    let said = said_why(without_room(&sandbox, 0, audit), "run/audit.csv");
     assert!(said.out.contains("verdict") && said.out.contains("1 robot: "), "{}", said.out);
     assert_eq!(files(&sandbox.path("run")), before);
 }
@@ -85,7 +85,7 @@ fn a_response_that_cannot_be_written_is_shown() {
     let is_place = |robot: &&Robot| Gait::of(&robot.body).is_some();
     let id = &run.elites.iter().find(is_place).unwrap().id;
     let response = format!("response --archive run --robots {id} --images 60");
-    let said = said_why(without_room(&sandbox, 0, &response), "run/response.json");
+    let said = said_why(without_room(&sandbox, 0, &response), "run/response.csv");
     assert!(said.out.contains("explained %") && said.out.contains(id), "{}", said.out);
     assert_eq!(files(&sandbox.path("run")), before);
 }
@@ -98,7 +98,7 @@ fn a_capacity_that_cannot_be_written_is_shown() {
     let capacity =
         "capacity --eval run/eval.json --set trainings=1 --set sizes=[1,3] --set networks=[\"mlp\"]";
     let said = without_room(&sandbox, 0, capacity);
-    let said = said.ended(1, &["error: run/capacity.json: cannot be written", "hint:"]);
+    let said = said.ended(1, &["error: run/capacity.csv: cannot be written", "hint:"]);
     assert!(said.out.contains("MLP neurons") && !said.out.contains("wrote"), "{}", said.out);
     assert!(!said.err.contains(".tmp"), "{}", said.err);
     assert_eq!(files(&sandbox.path("run")), before);

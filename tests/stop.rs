@@ -177,6 +177,9 @@ fn every_command_ends_in_its_documented_way_at_every_signal_that_asks_it_to() {
         ("serve -q --no-open".to_string(), End::Done),
     ];
     for (signal, number) in [("HUP", 1), ("TERM", 15), ("INT", 2)] {
+        if signal == "HUP" && common::program::hangups_are_ignored() {
+            continue;
+        }
         let mut started: Vec<(Child, &str, End)> = Vec::new();
         for (command, end) in &commands {
             started.push((sandbox.start(&command.replace("-N", signal)), command, *end));
@@ -186,6 +189,16 @@ fn every_command_ends_in_its_documented_way_at_every_signal_that_asks_it_to() {
         for (child, ..) in &started {
             let sent = Command::new("kill").args(["-s", signal, &child.id().to_string()]).status().unwrap();
             assert!(sent.success());
+        }
+        // One that goes on has died by 9 when its end is compared, and none outlives the test.
+        let begin = Instant::now();
+        for (child, ..) in &mut started {
+            while child.try_wait().unwrap().is_none() {
+                if begin.elapsed() > 3 * SOON {
+                    child.kill().unwrap();
+                }
+                std::thread::sleep(Duration::from_millis(5));
+            }
         }
         for (child, command, end) in started {
             let ended = child.wait_with_output().unwrap();

@@ -153,8 +153,12 @@ fn a_run_that_asks_for_it_chooses_robots_at_its_end() {
         robots.iter().map(|robot| robot.id.clone()).collect::<Vec<_>>()
     };
     assert_eq!((fewer.len(), ids(&fewer)), (1, ids(&report.robots[..1])));
-    // What is of another kind or version is not believed.
-    sandbox.write("run/validation.json", kept.replace("\"format_version\":1", "\"format_version\":2"));
+    // A file of a newer version is not written over.
+    let newer = kept.replace("\"format_version\":1", "\"format_version\":2");
+    sandbox.write("run/validation.json", &newer);
+    sandbox.run(&format!("eval {archive}")).ended(3, &["run/validation.json: format_version", "delete it"]);
+    assert_eq!(sandbox.read("run/validation.json"), newer);
+    std::fs::remove_file(sandbox.path("run/validation.json")).unwrap();
     sandbox.run(&format!("eval {archive}")).ended(0, &["validating"]);
     assert_eq!(sandbox.read("run/validation.json"), kept);
     // A run that is resumed at its end, with nothing left to do, says it again.

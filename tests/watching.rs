@@ -71,6 +71,7 @@ fn the_server_shows_runs_that_begin_how_far_they_are_and_that_they_have_ended() 
     // A robot that has lost its place meanwhile can still be watched by a page that lists it.
     let mut run = sandbox.run_file("runs/live");
     let lost = run.elites.pop().unwrap();
+    run.stats = run.archive().unwrap().stats(run.dimensions.possible_cells, run.config.archive.qd_offset);
     let lists = |id: &str| {
         let listed = read(&format!("/api/archives/{built_in}"));
         listed["robots"].as_array().unwrap().iter().any(|robot| robot["id"] == id)

@@ -21,7 +21,8 @@ Examples:
   # then open http://127.0.0.1:8080/
   morphcog serve --port 8080 --no-open
   # from another machine; then open http://localhost:9000/
-  ssh -t -L 9000:localhost:8080 HOST morphcog serve --port 8080 --no-open
+  ssh -t -L 9000:localhost:8080 HOST \\
+    morphcog serve --port 8080 --no-open
 
 Runs under runs/ that begin or go on meanwhile appear by themselves. Only this machine can reach \
 the page. Ctrl-C ends it.";

@@ -208,6 +208,19 @@ pub fn terminate(child: &std::process::Child) {
     assert!(sent.unwrap().success());
 }
 
+/// Tells whether the tests run where hangups are ignored, as under `nohup`: then so do the programs
+/// that they start, and a test of hangups has nothing to see.
+pub fn hangups_are_ignored() -> bool {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let ignored = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
+    let is =
+        ignored.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok()).is_some_and(|mask| mask & 1 == 1);
+    if is {
+        eprintln!("skipped: hangups are ignored here");
+    }
+    is
+}
+
 /// All files of a folder with their content, to compare.
 pub fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
     let entries = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
