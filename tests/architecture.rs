@@ -235,6 +235,23 @@ fn numbers_for_people_are_made_in_one_place_where_none_is_minus_nothing() {
     }
 }
 
+/// Outside of these, a pipe or a device in the place of a file would block or fill the memory.
+#[test]
+fn files_are_opened_in_one_place_that_refuses_pipes_and_devices() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+    for path in sources(&root).into_iter().filter(|path| !path.ends_with("base/files.rs")) {
+        let source = std::fs::read_to_string(&path).unwrap();
+        let bare = bare(source.split("#[cfg(test)]\nmod tests").next().unwrap());
+        // What the kernel says of a process is no file of a user's.
+        let lines = source.lines().zip(bare.lines()).filter(|(line, _)| !line.contains("\"/proc/self/"));
+        let found: Vec<&str> = lines
+            .map(|(_, bare)| bare.trim())
+            .filter(|bare| ["fs::read(", "fs::read_to_string("].iter().any(|call| bare.contains(call)))
+            .collect();
+        assert!(found.is_empty(), "{}: base::files has it: {found:?}", path.display());
+    }
+}
+
 /// Paths that follow `crate::`, each as far as it is written, braces opened.
 fn paths<'a>(tokens: &[&'a str]) -> Vec<Vec<&'a str>> {
     let mut found = Vec::new();

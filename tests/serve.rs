@@ -290,11 +290,7 @@ fn the_page_is_reached_by_names_of_this_machine_on_any_port_and_by_no_others() {
         refused(&answer, 403, "Host");
         assert!(answer.body.contains("morphcog serve --allow-host NAME"), "{}", answer.body);
     }
-    refused(
-        &server.send(format!("GET http://evil.example/ HTTP/1.1\r\nHost: evil.example\r\n\r\n")),
-        403,
-        "",
-    );
+    refused(&server.send("GET http://evil.example/ HTTP/1.1\r\nHost: evil.example\r\n\r\n"), 403, "");
 }
 
 #[test]

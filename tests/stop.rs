@@ -160,7 +160,7 @@ fn every_command_ends_in_its_documented_way_at_every_signal_that_asks_it_to() {
             format!("train -q -a gallery:gaits -t 0|1 --set data.dataset=builtin -o train-N {LONG}"),
             End::Stopped,
         ),
-        ("eval -q -a run --images 40 --cycles 1 -o eval-N.json".to_string(), End::Stopped),
+        ("eval -q -a run --images 40 --cycles 10000 -o eval-N.json".to_string(), End::Stopped),
         ("audit -q -a run -o audit-N.json".to_string(), End::Stopped),
         ("response -q -a run --robots all -o response-N.json".to_string(), End::Stopped),
         (format!("capacity -q --eval short/eval.json {endless} -o capacity-N.json"), End::Stopped),

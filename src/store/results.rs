@@ -2,7 +2,7 @@
 //! long lists line by line.
 
 use crate::base::error::Error;
-use crate::base::files::{read_text, write_atomically};
+use crate::base::files::{read_bytes, read_text, write_atomically};
 use crate::base::hash::{sha256_hex, short};
 use crate::base::observer::Observer;
 use crate::base::ownership;
@@ -81,7 +81,7 @@ pub(crate) fn make_room(
     if !path.is_file() || is_same() {
         return Ok(());
     }
-    let found = std::fs::read(path).map_err(|error| Error::reading(path, &error))?;
+    let found = read_bytes(path).map_err(|error| Error::reading(path, &error))?;
     let hash = sha256_hex(&found);
     let aside = |path: &Path| {
         let mut name = path.file_stem().unwrap_or_default().to_os_string();
@@ -115,7 +115,7 @@ pub(crate) fn write_with_table(
     table: &[u8],
     figures: impl IntoIterator<Item = PathBuf>,
 ) -> Result<(), Error> {
-    let is_known = std::fs::read(path).is_ok_and(|before| before == json.as_bytes());
+    let is_known = read_bytes(path).is_ok_and(|before| before == json.as_bytes());
     for figure in figures.into_iter().filter(|_| !is_known) {
         match ownership::check(&figure).and_then(|()| std::fs::remove_file(&figure)) {
             Err(error) if error.kind() != io::ErrorKind::NotFound => {

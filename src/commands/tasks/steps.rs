@@ -75,10 +75,9 @@ pub(super) fn lacking(task: &Task, place: &Place) -> Option<String> {
     match EvalFile::read(&test.out) {
         Err(_) if !test.out.exists() => Some(format!("{name} is missing")),
         Err(_) => Some(format!("{name} cannot be read")),
-        Ok(known) => match eval::differing(&known, &test, task.cycle_steps()).first() {
-            None => None,
-            Some((key, there, asked)) => Some(format!("{name} has {key} {there}, not {asked}")),
-        },
+        Ok(known) => eval::differing(&known, &test, task.cycle_steps())
+            .first()
+            .map(|(key, there, asked)| format!("{name} has {key} {there}, not {asked}")),
     }
 }
 
