@@ -166,7 +166,7 @@ fn words(text: &str) -> BTreeSet<&str> {
 
 #[test]
 fn a_hangup_ends_a_film_and_the_terminal_is_as_it_was() {
-    if common::program::hangups_are_ignored() {
+    if common::program::is_ignored(1) {
         return;
     }
     let sandbox = Sandbox::new();
@@ -182,7 +182,7 @@ fn a_hangup_ends_a_film_and_the_terminal_is_as_it_was() {
 
 #[test]
 fn a_run_whose_terminal_is_closed_is_saved() {
-    if common::program::hangups_are_ignored() {
+    if common::program::is_ignored(1) {
         return;
     }
     let sandbox = Sandbox::tiny();

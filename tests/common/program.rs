@@ -208,15 +208,16 @@ pub fn terminate(child: &std::process::Child) {
     assert!(sent.unwrap().success());
 }
 
-/// Tells whether the tests run where hangups are ignored, as under `nohup`: then so do the programs
-/// that they start, and a test of hangups has nothing to see.
-pub fn hangups_are_ignored() -> bool {
+/// Tells whether the tests run where a signal is ignored, as hangups are under `nohup` and interrupts
+/// in a shell's background: then so do the programs that they start, and a test of it has nothing to
+/// see.
+pub fn is_ignored(signal: u32) -> bool {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let ignored = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
-    let is =
-        ignored.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok()).is_some_and(|mask| mask & 1 == 1);
+    let mask = ignored.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok()).unwrap_or(0);
+    let is = mask >> (signal - 1) & 1 == 1;
     if is {
-        eprintln!("skipped: hangups are ignored here");
+        eprintln!("skipped: signal {signal} is ignored here");
     }
     is
 }
