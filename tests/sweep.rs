@@ -114,7 +114,7 @@ fn listed_commands_do_the_tasks_from_any_folder() {
             command.env_remove(name);
         });
         let output = command.output().unwrap();
-        assert!(output.status.success(), "{line}: {}", String::from_utf8_lossy(&output.stderr));
+        assert!(output.status.success(), "{line}: {output:?}");
     }
     assert_eq!(results(&sandbox, "elsewhere"), results(&sandbox, "all"));
     assert_eq!(std::fs::read_dir(away.path()).unwrap().count(), 0);
