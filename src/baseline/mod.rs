@@ -12,4 +12,4 @@ pub mod training;
 
 pub use settings::{Activation, Hyperparameters, Kind, Pooling, Trained, Watch};
 #[cfg(feature = "networks")]
-pub use training::{Samples, Untrained, train};
+pub use training::{Samples, SamplesError, train};

@@ -1,22 +1,34 @@
-//! [`Network`]: the paper's two networks, on candle, with parameters from our own random streams.
+//! [`Network`]: the paper's two networks and their gradients, on nalgebra. Sums run in a fixed order
+//! and functions come from `libm`, so a training has the same bits on every machine and on any
+//! number of threads.
 
 use crate::base::Grid;
 use crate::base::random::Stream;
 use crate::baseline::settings::{Activation, Kind, Pooling};
-use candle_core::{Device, Result, Tensor, Var};
+use nalgebra::{DVector, DVectorView};
+use std::ops::Range;
 
 impl Activation {
-    fn apply(self, x: &Tensor) -> Result<Tensor> {
+    fn apply(self, x: f64) -> f64 {
         match self {
-            Activation::Relu => x.relu(),
-            Activation::Tanh => x.tanh(),
-            Activation::Sigmoid => candle_nn::ops::sigmoid(x),
+            Activation::Relu => x.max(0.0),
+            Activation::Tanh => libm::tanh(x),
+            Activation::Sigmoid => 1.0 / (1.0 + libm::exp(-x)),
+        }
+    }
+
+    /// The derivative where the activation has this value.
+    fn slope(self, value: f64) -> f64 {
+        match self {
+            Activation::Relu => f64::from(u8::from(value > 0.0)),
+            Activation::Tanh => 1.0 - value * value,
+            Activation::Sigmoid => value * (1.0 - value),
         }
     }
 }
 
 impl Pooling {
-    /// Rows and columns of pixels that become one, in a map of this side.
+    /// Rows and columns of pixels that become one, in a map of this size.
     fn window(self, (rows, columns): (usize, usize)) -> (usize, usize) {
         match self {
             Pooling::None => (1, 1),
@@ -37,14 +49,17 @@ pub struct Shape {
     pub image: (usize, usize),
     /// Side of a convolution's kernels, not larger than the image's.
     pub kernel: usize,
-    /// What follows the hidden layer.
+    /// The function that follows the hidden layer.
     pub activation: Activation,
-    /// What becomes of a convolution's maps.
+    /// How a convolution's maps are reduced.
     pub pooling: Pooling,
 }
 
+/// Outputs: the two groups of a task.
+pub const OUTPUTS: usize = 2;
+
 impl Shape {
-    /// Rows and columns of what a hidden unit sees of an image.
+    /// Rows and columns of the part of an image that a hidden unit sees at one place.
     fn field(&self) -> (usize, usize) {
         match self.kind {
             Kind::Mlp => self.image,
@@ -52,20 +67,15 @@ impl Shape {
         }
     }
 
-    /// Places of that on an image, by rows and columns: one, of all of the image, for a hidden
-    /// layer.
-    fn places(&self) -> (usize, usize) {
-        (self.image.0 + 1 - self.field().0, self.image.1 + 1 - self.field().1)
-    }
-
-    /// Numbers a hidden unit sees at a place, the constant one for its bias included.
+    /// Pixels that a hidden unit sees at one place.
     fn inputs(&self) -> usize {
-        self.field().0 * self.field().1 + 1
+        self.field().0 * self.field().1
     }
 
-    /// Rows and columns of places of which pooling makes one, and of what it makes of them.
+    /// Rows and columns of places that pooling reduces to one, and of the places it leaves. A hidden
+    /// layer has one place, the whole image.
     fn pooled(&self) -> [(usize, usize); 2] {
-        let (rows, columns) = self.places();
+        let (rows, columns) = (self.image.0 + 1 - self.field().0, self.image.1 + 1 - self.field().1);
         let window = match self.kind {
             Kind::Mlp => (1, 1),
             Kind::Cnn => self.pooling.window((rows, columns)),
@@ -73,115 +83,216 @@ impl Shape {
         [window, (rows / window.0, columns / window.1)]
     }
 
-    /// Outputs of the hidden layer per image, after pooling.
-    fn features(&self) -> usize {
-        let [_, (rows, columns)] = self.pooled();
-        rows * columns * self.size
+    /// Places that pooling reduces to one, and places that it leaves.
+    fn places(&self) -> (usize, usize) {
+        let [window, pooled] = self.pooled();
+        (window.0 * window.1, pooled.0 * pooled.1)
     }
 
-    /// Images as [`Network::forward`] takes them: what the units see at every place, places of a
-    /// pooling window × images × windows × inputs. A convolution is then a product of matrices, and
-    /// made of fixed images only once.
+    /// Outputs of the hidden layer per image, after pooling.
+    fn features(&self) -> usize {
+        self.places().1 * self.size
+    }
+
+    /// Where the parameters lie in one vector: weights of the hidden layer (by pixel, then by unit),
+    /// its biases, weights of the outputs (by output, then by feature), their biases.
+    fn layout(&self) -> [Range<usize>; 4] {
+        let sizes = [self.inputs() * self.size, self.size, self.features() * OUTPUTS, OUTPUTS];
+        let mut end = 0;
+        sizes.map(|size| {
+            end += size;
+            end - size..end
+        })
+    }
+
+    /// Prepares an image: the lit pixels that the hidden units see at each place. Most pixels of a
+    /// drawing are dark and add nothing to a sum, so leaving them out saves most of the work.
     ///
-    /// # Errors
-    /// If an image is not of the shape's size.
-    pub fn seen(&self, images: &[&Grid<f64>]) -> Result<Tensor> {
-        if let Some(other) = images.iter().find(|image| (image.height(), image.width()) != self.image) {
-            let (height, width) = self.image;
-            candle_core::bail!(
-                "expected images of {height} × {width} pixels, found {} × {}",
-                other.height(),
-                other.width()
-            );
-        }
-        let [window, (rows, columns)] = self.pooled();
-        let (height, width) = self.field();
+    /// # Panics
+    /// If the image has another size than the shape.
+    pub fn patches(&self, image: &Grid<f64>) -> Patches {
+        assert_eq!((image.height(), image.width()), self.image, "an image of the shape's size");
+        let [window, pooled] = self.pooled();
         let grid = |(rows, columns): (usize, usize)| {
             (0..rows).flat_map(move |row| (0..columns).map(move |column| (row, column)))
         };
-        let mut seen = Vec::new();
-        for within in grid(window) {
-            for image in images {
-                for place in grid((rows, columns)) {
-                    let corner = (place.0 * window.0 + within.0, place.1 * window.1 + within.1);
-                    let pixels =
-                        grid((height, width)).map(|(row, column)| (corner.0 + row, corner.1 + column));
-                    seen.extend(pixels.map(|pixel| image[pixel] as f32));
-                    seen.push(1.0);
-                }
+        let mut patches = Patches { ends: Vec::new(), lit: Vec::new() };
+        for place in grid(pooled) {
+            for within in grid(window) {
+                let corner = (place.0 * window.0 + within.0, place.1 * window.1 + within.1);
+                let pixels =
+                    grid(self.field()).map(|(row, column)| image[(corner.0 + row, corner.1 + column)]);
+                patches.lit.extend(pixels.enumerate().filter(|(_, value)| *value != 0.0));
+                patches.ends.push(patches.lit.len());
             }
         }
-        let dims = (window.0 * window.1, images.len(), rows * columns, self.inputs());
-        Tensor::from_vec(seen, dims, &Device::Cpu)
+        patches
+    }
+}
+
+/// An image as the hidden units of a network see it.
+#[derive(Clone, Debug)]
+pub struct Patches {
+    /// By place (those that pooling reduces to one stand together): where its pixels end in `lit`.
+    ends: Vec<usize>,
+    /// Number of the pixel within its place, and its value.
+    lit: Vec<(usize, f64)>,
+}
+
+impl Patches {
+    fn at(&self, place: usize) -> &[(usize, f64)] {
+        let begin = if place == 0 { 0 } else { self.ends[place - 1] };
+        &self.lit[begin..self.ends[place]]
     }
 }
 
 /// A network with two outputs.
+#[derive(Clone, Debug)]
 pub struct Network {
     shape: Shape,
-    /// Weights of the hidden layer (inputs × size), the biases in the last row; weights and biases
-    /// of the outputs.
-    parameters: [Var; 3],
+    parameters: DVector<f64>,
+    /// Activations of the hidden units, by place, then by unit.
+    units: Vec<f64>,
+    /// Outputs of the hidden layer after pooling, by place, then by unit.
+    features: DVector<f64>,
 }
-
-/// Outputs: the two groups of a task.
-const OUTPUTS: usize = 2;
 
 impl Network {
-    /// With random parameters: uniform within ±1/√(inputs of a unit), as PyTorch starts such
-    /// layers.
-    ///
-    /// # Errors
-    /// If the library has no memory for them.
-    pub fn new(shape: Shape, rng: &mut Stream) -> Result<Self> {
-        let (inputs, features) = (shape.inputs(), shape.features());
-        let mut uniform = |dims: &[usize], inputs: usize| {
+    /// Makes a network with random parameters: uniform within ±1/√(inputs of a unit), as PyTorch
+    /// starts such layers.
+    pub fn new(shape: Shape, rng: &mut Stream) -> Self {
+        let [hidden, biases, weights, output_biases] = shape.layout();
+        let (size, features) = (shape.size, shape.features());
+        let mut parameters = DVector::zeros(output_biases.end);
+        let mut draw = |inputs: usize| {
             let bound = 1.0 / (inputs as f64).sqrt();
-            let count: usize = dims.iter().product();
-            let values: Vec<f32> = (0..count).map(|_| rng.uniform(-bound, bound) as f32).collect();
-            Var::from_tensor(&Tensor::from_vec(values, dims, &Device::Cpu)?)
+            rng.uniform(-bound, bound)
         };
-        let hidden = uniform(&[inputs, shape.size], inputs - 1)?;
-        let weights = uniform(&[features, OUTPUTS], features)?;
-        let biases = uniform(&[OUTPUTS], features)?;
-        Ok(Network { shape, parameters: [hidden, weights, biases] })
+        for parameter in hidden.chain(biases) {
+            parameters[parameter] = draw(shape.inputs());
+        }
+        for feature in 0..features {
+            for output in 0..OUTPUTS {
+                parameters[weights.start + output * features + feature] = draw(features);
+            }
+        }
+        for parameter in output_biases {
+            parameters[parameter] = draw(features);
+        }
+        let (within, places) = shape.places();
+        let units = vec![0.0; within * places * size];
+        Network { shape, parameters, units, features: DVector::zeros(features) }
     }
 
-    /// What training changes.
-    pub fn parameters(&self) -> Vec<Var> {
-        self.parameters.to_vec()
+    /// The numbers that training changes.
+    pub fn parameters(&self) -> &DVector<f64> {
+        &self.parameters
     }
 
-    /// Numbers that training changes.
-    pub fn count(&self) -> usize {
-        self.parameters.iter().map(|parameter| parameter.elem_count()).sum()
+    /// The same, to be changed.
+    pub fn parameters_mut(&mut self) -> &mut DVector<f64> {
+        &mut self.parameters
     }
 
-    /// Images, [seen](Shape::seen) by its shape, to outputs (n × 2) before the softmax.
-    ///
-    /// # Errors
-    /// If another shape saw them.
-    pub fn forward(&self, seen: &Tensor) -> Result<Tensor> {
-        let [hidden, weights, biases] = &self.parameters;
-        let (within, images, _, inputs) = seen.dims4()?;
-        let units = seen.reshape(((), inputs))?.matmul(hidden)?.reshape((within, ()))?;
-        let activation = self.shape.activation;
-        let features = match self.shape.pooling {
-            Pooling::Mean if within > 1 => activation.apply(&units)?.mean(0)?,
-            // No activation ever falls: the largest stays the largest.
-            _ => activation.apply(&largest(&units, 0, within)?)?,
+    fn output_weights(&self, output: usize) -> DVectorView<'_, f64> {
+        let [_, _, weights, _] = self.shape.layout();
+        let features = self.shape.features();
+        self.parameters.rows(weights.start + output * features, features)
+    }
+
+    /// Computes the outputs for an image, before the softmax.
+    pub fn forward(&mut self, image: &Patches) -> [f64; OUTPUTS] {
+        let Shape { size, activation, .. } = self.shape;
+        let [hidden, biases, _, output_biases] = self.shape.layout();
+        let hidden = &self.parameters.as_slice()[hidden];
+        let biases = &self.parameters.as_slice()[biases];
+        for (place, units) in self.units.chunks_exact_mut(size).enumerate() {
+            units.copy_from_slice(biases);
+            for &(pixel, value) in image.at(place) {
+                add_scaled(units, value, &hidden[pixel * size..][..size]);
+            }
+            units.iter_mut().for_each(|unit| *unit = activation.apply(*unit));
+        }
+        let (within, _) = self.shape.places();
+        let pooled = self.features.as_mut_slice().chunks_exact_mut(size);
+        for (features, units) in pooled.zip(self.units.chunks_exact(within * size)) {
+            features.copy_from_slice(&units[..size]);
+            for other in units.chunks_exact(size).skip(1) {
+                for (feature, unit) in features.iter_mut().zip(other) {
+                    *feature = if self.shape.pooling == Pooling::Mean {
+                        *feature + unit
+                    } else {
+                        feature.max(*unit)
+                    };
+                }
+            }
+            if self.shape.pooling == Pooling::Mean {
+                features.iter_mut().for_each(|feature| *feature /= within as f64);
+            }
+        }
+        let output = |output: usize| {
+            self.output_weights(output).dot(&self.features) + self.parameters[output_biases.start + output]
         };
-        features.reshape((images, ()))?.matmul(weights)?.broadcast_add(biases)
+        std::array::from_fn(output)
+    }
+
+    /// Adds to `gradient` the derivatives of a loss by the parameters, given those by the outputs, for
+    /// the image that [`forward`](Network::forward) saw last.
+    pub fn backward(&self, image: &Patches, outputs: [f64; OUTPUTS], gradient: &mut DVector<f64>) {
+        let Shape { size, activation, pooling, .. } = self.shape;
+        let [hidden, biases, weights, output_biases] = self.shape.layout();
+        let features = self.shape.features();
+        let mut by_features = DVector::zeros(features);
+        for (output, derivative) in outputs.into_iter().enumerate() {
+            gradient.rows_mut(weights.start + output * features, features).axpy(
+                derivative,
+                &self.features,
+                1.0,
+            );
+            gradient[output_biases.start + output] += derivative;
+            by_features.axpy(derivative, &self.output_weights(output), 1.0);
+        }
+        let (within, _) = self.shape.places();
+        let mut by_units = vec![0.0; size];
+        for (place, units) in self.units.chunks_exact(size).enumerate() {
+            let feature = place / within * size;
+            for (number, derivative) in by_units.iter_mut().enumerate() {
+                let share = match pooling {
+                    _ if within == 1 => 1.0,
+                    Pooling::Mean => 1.0 / within as f64,
+                    // The first of equals has all of it.
+                    _ => {
+                        let of_place = (place / within * within..place)
+                            .all(|other| self.units[other * size + number] < units[number]);
+                        f64::from(u8::from(of_place && units[number] == self.features[feature + number]))
+                    }
+                };
+                *derivative = by_features[feature + number] * share * activation.slope(units[number]);
+            }
+            let gradient = gradient.as_mut_slice();
+            add_scaled(&mut gradient[biases.clone()], 1.0, &by_units);
+            for &(pixel, value) in image.at(place) {
+                add_scaled(&mut gradient[hidden.start + pixel * size..][..size], value, &by_units);
+            }
+        }
     }
 }
 
-/// The largest of each column of some rows.
-fn largest(rows: &Tensor, first: usize, count: usize) -> Result<Tensor> {
-    if count <= 1 {
-        return rows.get(first);
+/// Adds a multiple of some numbers to as many others.
+fn add_scaled(sums: &mut [f64], factor: f64, terms: &[f64]) {
+    for (sum, term) in sums.iter_mut().zip(terms) {
+        *sum += factor * term;
     }
-    let half = count / 2;
-    largest(rows, first, half)?.maximum(&largest(rows, first + half, count - half)?)
+}
+
+/// The cross-entropy of outputs against the group of an image, and its derivatives by the outputs.
+pub fn cross_entropy(outputs: [f64; OUTPUTS], group: usize) -> (f64, [f64; OUTPUTS]) {
+    let largest = outputs.into_iter().fold(f64::NEG_INFINITY, f64::max);
+    let powers = outputs.map(|output| libm::exp(output - largest));
+    let sum: f64 = powers.iter().sum();
+    let loss = libm::log(sum) - (outputs[group] - largest);
+    let derivative = |output: usize| powers[output] / sum - f64::from(u8::from(output == group));
+    (loss, std::array::from_fn(derivative))
 }
 
 #[cfg(test)]
@@ -191,29 +302,49 @@ mod tests {
 
     const IMAGE: (usize, usize) = (7, 6);
 
+    /// Noise in which every third pixel is dark.
     fn images() -> Vec<Grid<f64>> {
         let rng = &mut stream(5, Purpose::Networks, 0, 0);
-        (0..3).map(|_| Grid::from_fn(IMAGE.0, IMAGE.1, |_, _| rng.uniform(0.0, 1.0))).collect()
+        let pixel = |row: usize, column: usize, rng: &mut Stream| {
+            if (row + column) % 3 == 0 { 0.0 } else { rng.uniform(0.0, 1.0) }
+        };
+        (0..3).map(|_| Grid::from_fn(IMAGE.0, IMAGE.1, |row, column| pixel(row, column, rng))).collect()
     }
 
-    fn shape(kind: Kind, activation: Activation, pooling: Pooling) -> Shape {
-        Shape { kind, size: 4, image: IMAGE, kernel: 3, activation, pooling }
+    fn shapes() -> impl Iterator<Item = Shape> {
+        let layers = [
+            (Kind::Mlp, Pooling::None),
+            (Kind::Mlp, Pooling::Mean),
+            (Kind::Cnn, Pooling::None),
+            (Kind::Cnn, Pooling::Max2),
+            (Kind::Cnn, Pooling::Mean),
+            (Kind::Cnn, Pooling::Max),
+        ];
+        [Activation::Relu, Activation::Tanh, Activation::Sigmoid].into_iter().flat_map(move |activation| {
+            layers.map(|(kind, pooling)| Shape {
+                kind,
+                size: 4,
+                image: IMAGE,
+                kernel: 3,
+                activation,
+                pooling,
+            })
+        })
     }
 
-    /// What one hidden unit makes of a place, by hand.
-    fn unit(
-        shape: &Shape,
-        hidden: &[Vec<f32>],
-        unit: usize,
-        image: &Grid<f64>,
-        corner: (usize, usize),
-    ) -> f64 {
+    fn network(shape: Shape) -> Network {
+        Network::new(shape, &mut stream(1, Purpose::Networks, 0, 0))
+    }
+
+    /// The value of one hidden unit at a place, by its definition.
+    fn unit(network: &Network, unit: usize, image: &Grid<f64>, corner: (usize, usize)) -> f64 {
+        let shape = network.shape;
         let (height, width) = shape.field();
-        let mut sum = f64::from(hidden[height * width][unit]);
+        let weight = |input: usize| network.parameters[input * shape.size + unit];
+        let mut sum = weight(height * width);
         for row in 0..height {
             for column in 0..width {
-                let weight = f64::from(hidden[row * width + column][unit]);
-                sum += weight * image[(corner.0 + row, corner.1 + column)];
+                sum += weight(row * width + column) * image[(corner.0 + row, corner.1 + column)];
             }
         }
         match shape.activation {
@@ -224,69 +355,70 @@ mod tests {
     }
 
     #[test]
-    fn a_network_is_what_its_layers_say() {
-        let images = images();
+    fn outputs_follow_from_the_definition_of_the_layers() {
         let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
         let most = |values: &[f64]| values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        for activation in [Activation::Relu, Activation::Tanh, Activation::Sigmoid] {
-            for (kind, pooling) in [
-                (Kind::Mlp, Pooling::None),
-                (Kind::Mlp, Pooling::Mean),
-                (Kind::Cnn, Pooling::None),
-                (Kind::Cnn, Pooling::Max2),
-                (Kind::Cnn, Pooling::Mean),
-                (Kind::Cnn, Pooling::Max),
-            ] {
-                let shape = shape(kind, activation, pooling);
-                let network = Network::new(shape, &mut stream(1, Purpose::Networks, 0, 0)).unwrap();
-                let [hidden, weights, biases] = &network.parameters;
-                let (hidden, weights) = (hidden.to_vec2().unwrap(), weights.to_vec2::<f32>().unwrap());
-                let biases = biases.to_vec1::<f32>().unwrap();
-                let outputs = network.forward(&shape.seen(&images.iter().collect::<Vec<_>>()).unwrap());
-                for (image, found) in images.iter().zip(outputs.unwrap().to_vec2::<f32>().unwrap()) {
-                    // A 7 × 6 image has 5 × 4 places for 3 × 3 kernels, in 2 × 2 windows of 2 × 2.
-                    let corners = |rows: std::ops::Range<usize>, columns: std::ops::Range<usize>| {
-                        rows.flat_map(|row| columns.clone().map(move |column| (row, column)))
-                            .collect::<Vec<_>>()
-                    };
-                    let windows: Vec<Vec<(usize, usize)>> = match (kind, pooling) {
-                        (Kind::Mlp, _) => vec![vec![(0, 0)]],
-                        (_, Pooling::None) => {
-                            corners(0..5, 0..4).into_iter().map(|corner| vec![corner]).collect()
-                        }
-                        (_, Pooling::Max2) => corners(0..2, 0..2)
-                            .into_iter()
-                            .map(|(row, column)| corners(2 * row..2 * row + 2, 2 * column..2 * column + 2))
-                            .collect(),
-                        (_, Pooling::Mean | Pooling::Max) => vec![corners(0..5, 0..4)],
-                    };
-                    let mut expected: Vec<f64> = biases.iter().map(|bias| f64::from(*bias)).collect();
+        for shape in shapes() {
+            let mut network = network(shape);
+            // A 7 × 6 image has 5 × 4 places for 3 × 3 kernels, in 2 × 2 windows of 2 × 2.
+            let corners = |rows: Range<usize>, columns: Range<usize>| {
+                rows.flat_map(|row| columns.clone().map(move |column| (row, column))).collect::<Vec<_>>()
+            };
+            let windows: Vec<Vec<(usize, usize)>> = match (shape.kind, shape.pooling) {
+                (Kind::Mlp, _) => vec![vec![(0, 0)]],
+                (_, Pooling::None) => corners(0..5, 0..4).into_iter().map(|corner| vec![corner]).collect(),
+                (_, Pooling::Max2) => corners(0..2, 0..2)
+                    .into_iter()
+                    .map(|(row, column)| corners(2 * row..2 * row + 2, 2 * column..2 * column + 2))
+                    .collect(),
+                (_, Pooling::Mean | Pooling::Max) => vec![corners(0..5, 0..4)],
+            };
+            let features = windows.len() * shape.size;
+            let [_, _, weights, biases] = shape.layout();
+            for image in images() {
+                let found = network.forward(&shape.patches(&image));
+                for (output, found) in found.into_iter().enumerate() {
+                    let mut expected = network.parameters[biases.start + output];
                     for (number, window) in windows.iter().enumerate() {
                         for k in 0..shape.size {
-                            let all: Vec<f64> = window
-                                .iter()
-                                .map(|corner| unit(&shape, &hidden, k, image, *corner))
-                                .collect();
-                            let pooled = if pooling == Pooling::Mean { mean(&all) } else { most(&all) };
-                            for (output, sum) in expected.iter_mut().enumerate() {
-                                *sum += pooled * f64::from(weights[number * shape.size + k][output]);
-                            }
+                            let all: Vec<f64> =
+                                window.iter().map(|corner| unit(&network, k, &image, *corner)).collect();
+                            let pooled = if shape.pooling == Pooling::Mean { mean(&all) } else { most(&all) };
+                            let weight = weights.start + output * features + number * shape.size + k;
+                            expected += pooled * network.parameters[weight];
                         }
                     }
-                    for (found, expected) in found.iter().zip(expected) {
-                        let off = (f64::from(*found) - expected).abs();
-                        assert!(off < 1e-5, "{kind:?} {activation:?} {pooling:?}: {found} {expected}");
-                    }
+                    assert!((found - expected).abs() < 1e-12, "{shape:?}: {found} {expected}");
                 }
             }
         }
     }
 
     #[test]
-    fn images_of_another_size_are_refused() {
-        let other = Grid::from_fn(6, 7, |_, _| 0.0);
-        let shape = shape(Kind::Cnn, Activation::Relu, Pooling::Max2);
-        let error = shape.seen(&[&other]).unwrap_err().to_string();
-        assert!(error.contains("7 × 6") && error.contains("6 × 7"), "{error}");
+    fn gradients_agree_with_finite_differences() {
+        const STEP: f64 = 1e-5;
+        for shape in shapes() {
+            let mut network = network(shape);
+            let images: Vec<Patches> = images().iter().map(|image| shape.patches(image)).collect();
+            let loss = |network: &mut Network| -> f64 {
+                let of_image = |(number, image)| cross_entropy(network.forward(image), number % 2).0;
+                images.iter().enumerate().map(of_image).sum()
+            };
+            let mut gradient = DVector::zeros(network.parameters.len());
+            for (number, image) in images.iter().enumerate() {
+                let (_, by_outputs) = cross_entropy(network.forward(image), number % 2);
+                network.backward(image, by_outputs, &mut gradient);
+            }
+            for parameter in 0..network.parameters.len() {
+                let kept = network.parameters[parameter];
+                let [above, below] = [STEP, -STEP].map(|step| {
+                    network.parameters[parameter] = kept + step;
+                    loss(&mut network)
+                });
+                network.parameters[parameter] = kept;
+                let (found, expected) = (gradient[parameter], (above - below) / (2.0 * STEP));
+                assert!((found - expected).abs() < 1e-8, "{shape:?}, {parameter}: {found} {expected}");
+            }
+        }
     }
 }

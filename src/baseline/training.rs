@@ -3,148 +3,162 @@
 use crate::base::Grid;
 use crate::base::random::Stream;
 use crate::base::stop::{Stopped, check};
-use crate::baseline::network::{Network, Shape};
+use crate::baseline::network::{Network, Patches, Shape, cross_entropy};
 use crate::baseline::settings::{Hyperparameters, Kind, Trained, Watch};
-use candle_core::{D, DType, Device, Result, Tensor};
-use candle_nn::{AdamW, Optimizer, ParamsAdamW};
+use nalgebra::DVector;
 use std::sync::atomic::AtomicBool;
 
-/// Images with their groups (0 or 1), as networks of a kind see them.
+/// Images with their groups (0 or 1), prepared for networks of a kind.
 #[derive(Clone, Debug)]
 pub struct Samples {
-    /// As [`Shape::seen`] returns them.
-    seen: Tensor,
-    /// n, u32.
-    groups: Tensor,
-    /// Of the networks but for their size.
+    images: Vec<(Patches, usize)>,
+    /// The networks' shape but for their size.
     shape: Shape,
 }
 
+/// Why images make no samples.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum SamplesError {
+    /// There are no images.
+    #[error("expected images, found none")]
+    Empty,
+    /// An image has another size than the first.
+    #[error("expected images of {} × {} pixels, found {} × {}", first.0, first.1, other.0, other.1)]
+    Size {
+        /// Rows and columns of the first image.
+        first: (usize, usize),
+        /// Rows and columns of the other.
+        other: (usize, usize),
+    },
+}
+
 impl Samples {
-    /// From images of one size, in [0, 1], and their groups, as many, for networks of a kind.
+    /// Prepares images of one size, with values in [0, 1], each with its group (0 or 1).
     ///
     /// # Errors
-    /// If there are none, or they are not as many or not of one size.
-    pub fn new(images: &[&Grid<f64>], groups: &[u32], kind: Kind, hyper: &Hyperparameters) -> Result<Self> {
-        let Some(first) = images.first() else { candle_core::bail!("expected images, found none") };
-        if images.len() != groups.len() {
-            candle_core::bail!(
-                "expected as many groups as images, found {} and {}",
-                groups.len(),
-                images.len()
-            );
+    /// If there are no images, or they differ in size.
+    pub fn new(
+        images: &[(&Grid<f64>, usize)],
+        kind: Kind,
+        hyper: &Hyperparameters,
+    ) -> Result<Self, SamplesError> {
+        let size = |(image, _): &(&Grid<f64>, usize)| (image.height(), image.width());
+        let first = images.first().map(size).ok_or(SamplesError::Empty)?;
+        if let Some(other) = images.iter().map(size).find(|other| *other != first) {
+            return Err(SamplesError::Size { first, other });
         }
         let Hyperparameters { kernel, activation, pooling, .. } = *hyper;
-        let shape =
-            Shape { kind, size: 1, image: (first.height(), first.width()), kernel, activation, pooling };
-        let groups = Tensor::from_vec(groups.to_vec(), groups.len(), &Device::Cpu)?;
-        Ok(Samples { seen: shape.seen(images)?, groups, shape })
-    }
-
-    fn len(&self) -> usize {
-        self.groups.elem_count()
+        let shape = Shape { kind, size: 1, image: first, kernel, activation, pooling };
+        let images = images.iter().map(|(image, group)| (shape.patches(image), *group)).collect();
+        Ok(Samples { images, shape })
     }
 }
 
-/// Images judged at once \[images\]: activations of this many stay in a core's cache; with more, it
-/// is slower.
-const JUDGED_AT_ONCE: usize = 64;
-
-/// Why a training has no result.
-#[derive(Debug, thiserror::Error)]
-pub enum Untrained {
-    /// It was stopped.
-    #[error(transparent)]
-    Stopped(#[from] Stopped),
-    /// The images do not go with each other or with the kernels.
-    #[error(transparent)]
-    Failed(#[from] candle_core::Error),
-}
-
-/// A network's accuracy, and what its training waits for an improvement of; larger is better.
-fn judge(
-    network: &Network,
+/// Returns a network's accuracy on samples, and the value that training is to improve; larger is
+/// better.
+fn test(
+    network: &mut Network,
     samples: &Samples,
     watch: Watch,
     stop: &AtomicBool,
-) -> std::result::Result<(f64, f64), Untrained> {
-    let (mut right, mut loss) = (0.0, 0.0);
-    for first in (0..samples.len()).step_by(JUDGED_AT_ONCE) {
+) -> Result<(f64, f64), Stopped> {
+    let (mut correct, mut loss) = (0, 0.0);
+    for (image, group) in &samples.images {
         check(stop)?;
-        let count = JUDGED_AT_ONCE.min(samples.len() - first);
-        let groups = samples.groups.narrow(0, first, count)?;
-        let outputs = network.forward(&samples.seen.narrow(1, first, count)?.contiguous()?)?;
-        let hits = outputs.argmax(D::Minus1)?.eq(&groups)?.to_dtype(DType::F32)?.sum_all()?;
-        right += f64::from(hits.to_scalar::<f32>()?);
-        if watch == Watch::Loss {
-            let mean = candle_nn::loss::cross_entropy(&outputs, &groups)?.to_scalar::<f32>()?;
-            loss += f64::from(mean) * count as f64;
-        }
+        let outputs = network.forward(image);
+        correct += usize::from(usize::from(outputs[1] > outputs[0]) == *group);
+        loss += cross_entropy(outputs, *group).0;
     }
-    let accuracy = right / samples.len() as f64;
+    let accuracy = correct as f64 / samples.images.len() as f64;
     Ok((accuracy, if watch == Watch::Accuracy { accuracy } else { -loss }))
 }
 
+/// Adam (Kingma & Ba 2015) with its usual constants.
+struct Adam {
+    rate: f64,
+    /// Running means of the gradient and of its square.
+    moments: [DVector<f64>; 2],
+    /// β₁ᵗ and β₂ᵗ after t steps.
+    powers: [f64; 2],
+}
+
+impl Adam {
+    const BETAS: [f64; 2] = [0.9, 0.999];
+    const EPSILON: f64 = 1e-8;
+
+    fn new(rate: f64, parameters: usize) -> Self {
+        Adam { rate, moments: [0, 1].map(|_| DVector::zeros(parameters)), powers: [1.0, 1.0] }
+    }
+
+    fn step(&mut self, parameters: &mut DVector<f64>, gradient: &DVector<f64>) {
+        let [beta1, beta2] = Self::BETAS;
+        self.powers = [self.powers[0] * beta1, self.powers[1] * beta2];
+        let scales = self.powers.map(|power| 1.0 / (1.0 - power));
+        let [first, second] = &mut self.moments;
+        let moments = first.iter_mut().zip(second.iter_mut());
+        for ((parameter, g), (m, v)) in parameters.iter_mut().zip(gradient).zip(moments) {
+            *m = beta1 * *m + (1.0 - beta1) * g;
+            *v = beta2 * *v + (1.0 - beta2) * g * g;
+            *parameter -= self.rate * (*m * scales[0]) / ((*v * scales[1]).sqrt() + Self::EPSILON);
+        }
+    }
+}
+
 /// Trains a network of a size on `training`, waits for improvement on `waiting`, and tests it on
-/// `test`: samples for networks of one kind. Unless `stop` is set meanwhile, which is looked at
-/// between batches.
+/// `test_set`: samples for networks of one kind.
 ///
 /// # Errors
-/// If it was stopped; if the images do not go with each other or with the kernels.
+/// [`Stopped`] if `stop` is set meanwhile; it is looked at for every image.
 pub fn train(
     size: usize,
     hyper: &Hyperparameters,
     training: &Samples,
     waiting: &Samples,
-    test: &Samples,
+    test_set: &Samples,
     rng: &mut Stream,
     stop: &AtomicBool,
-) -> std::result::Result<Trained, Untrained> {
+) -> Result<Trained, Stopped> {
     let Hyperparameters { epochs, patience, watch, .. } = *hyper;
-    let network = Network::new(Shape { size, ..training.shape }, rng)?;
-    let adam = ParamsAdamW { lr: hyper.learning_rate, weight_decay: 0.0, ..ParamsAdamW::default() };
-    let mut optimizer = AdamW::new(network.parameters(), adam)?;
-    let batch = if hyper.batch == 0 { training.len() } else { hyper.batch };
-    let mut best: Option<(f64, Vec<Tensor>)> = None;
+    let mut network = Network::new(Shape { size, ..training.shape }, rng);
+    let parameters = network.parameters().len();
+    let mut adam = Adam::new(hyper.learning_rate, parameters);
+    let mut gradient = DVector::zeros(parameters);
+    let count = training.images.len();
+    let batch = if hyper.batch == 0 { count } else { hyper.batch };
+    let mut best: Option<(f64, Option<DVector<f64>>)> = None;
     let mut waited = 0;
     let mut done = 0;
-    // Of the network as it is, on the images waited on.
+    // The accuracy of the network as it is, on the images that training waits on.
     let mut present = None;
     while done < epochs && waited < patience {
-        let order: Vec<u32> =
-            rng.sample(training.len(), training.len()).into_iter().map(|index| index as u32).collect();
-        for chosen in order.chunks(batch) {
-            check(stop)?;
-            let chosen = Tensor::from_vec(chosen.to_vec(), chosen.len(), &Device::Cpu)?;
-            let seen = training.seen.index_select(&chosen, 1)?;
-            let groups = training.groups.index_select(&chosen, 0)?;
-            optimizer.backward_step(&candle_nn::loss::cross_entropy(&network.forward(&seen)?, &groups)?)?;
+        for chosen in rng.sample(count, count).chunks(batch) {
+            gradient.fill(0.0);
+            for (image, group) in chosen.iter().map(|index| &training.images[*index]) {
+                check(stop)?;
+                let (_, by_outputs) = cross_entropy(network.forward(image), *group);
+                let by_outputs = by_outputs.map(|derivative| derivative / chosen.len() as f64);
+                network.backward(image, by_outputs, &mut gradient);
+            }
+            adam.step(network.parameters_mut(), &gradient);
         }
         done += 1;
-        let (accuracy, value) = judge(&network, waiting, watch, stop)?;
+        let (accuracy, value) = test(&mut network, waiting, watch, stop)?;
         present = Some(accuracy);
         if best.as_ref().is_none_or(|(least, _)| value > *least) {
-            let kept = if hyper.restore_best {
-                network.parameters().iter().map(|p| p.as_tensor().copy()).collect::<Result<_>>()?
-            } else {
-                Vec::new()
-            };
-            (best, waited) = (Some((value, kept)), 0);
+            (best, waited) = (Some((value, hyper.restore_best.then(|| network.parameters().clone()))), 0);
         } else {
             waited += 1;
         }
     }
-    if let Some((_, kept)) = best.filter(|_| waited > 0 && hyper.restore_best) {
-        for (parameter, value) in network.parameters().iter().zip(&kept) {
-            parameter.set(value)?;
-        }
+    if let Some((_, Some(kept))) = best.filter(|_| waited > 0) {
+        *network.parameters_mut() = kept;
         present = None;
     }
-    let accuracy = match present.filter(|_| std::ptr::eq(waiting, test)) {
+    let accuracy = match present.filter(|_| std::ptr::eq(waiting, test_set)) {
         Some(known) => known,
-        None => judge(&network, test, Watch::Accuracy, stop)?.0,
+        None => test(&mut network, test_set, Watch::Accuracy, stop)?.0,
     };
-    Ok(Trained { accuracy, epochs: done, parameters: network.count() })
+    Ok(Trained { accuracy, epochs: done, parameters })
 }
 
 #[cfg(test)]
@@ -153,10 +167,10 @@ mod tests {
     use crate::base::random::{Purpose, stream};
     use crate::base::stop::NEVER;
 
-    /// Noisy images that are brighter above, or below: more of them than are judged at once.
+    /// Noisy images that are brighter above, or below.
     fn samples(seed: u64, count: usize, kind: Kind, hyper: &Hyperparameters) -> Samples {
         let rng = &mut stream(seed, Purpose::Networks, 0, 0);
-        let groups: Vec<u32> = (0..count).map(|number| u32::from(number % 3 == 0)).collect();
+        let groups: Vec<usize> = (0..count).map(|number| usize::from(number % 3 == 0)).collect();
         let images: Vec<Grid<f64>> = groups
             .iter()
             .map(|&group| {
@@ -166,7 +180,7 @@ mod tests {
                 })
             })
             .collect();
-        Samples::new(&images.iter().collect::<Vec<_>>(), &groups, kind, hyper).unwrap()
+        Samples::new(&images.iter().zip(groups).collect::<Vec<_>>(), kind, hyper).unwrap()
     }
 
     fn trained(kind: Kind, hyper: &Hyperparameters, seed: u64) -> Trained {
@@ -193,7 +207,7 @@ mod tests {
     }
 
     #[test]
-    fn the_best_epochs_network_is_tested_if_wished_and_patience_ends_training() {
+    fn the_best_epochs_network_is_tested_on_request_and_patience_ends_training() {
         let last = Hyperparameters { learning_rate: 0.03, batch: 0, ..Default::default() };
         let best = Hyperparameters { restore_best: true, ..last };
         let mut better = 0;
@@ -205,24 +219,37 @@ mod tests {
         assert!(better > 0);
     }
 
+    /// A change of one bit in any parameter, of any kind of layer, changes this hash.
     #[test]
-    fn accuracy_is_over_all_images_however_they_are_judged() {
-        let hyper = Hyperparameters::default();
-        let samples = samples(3, 150, Kind::Cnn, &hyper);
-        let shape = Shape { size: 3, ..samples.shape };
-        let network = Network::new(shape, &mut stream(4, Purpose::Networks, 0, 0)).unwrap();
-        let outputs = network.forward(&samples.seen).unwrap();
-        let answers = outputs.argmax(D::Minus1).unwrap().to_vec1::<u32>().unwrap();
-        let groups = samples.groups.to_vec1::<u32>().unwrap();
-        let right = answers.iter().zip(&groups).filter(|(answer, group)| answer == group).count();
-        let loss = candle_nn::loss::cross_entropy(&outputs, &samples.groups).unwrap();
-        let (accuracy, value) = judge(&network, &samples, Watch::Loss, &NEVER).unwrap();
-        assert_eq!(accuracy, right as f64 / 150.0);
-        assert!((value / 150.0 + f64::from(loss.to_scalar::<f32>().unwrap())).abs() < 1e-5);
+    fn trained_parameters_are_pinned_to_the_bit() {
+        use crate::baseline::{Activation, Pooling};
+        let mut bits = String::new();
+        for kind in Kind::ALL {
+            for (activation, pooling) in [
+                (Activation::Relu, Pooling::None),
+                (Activation::Tanh, Pooling::Max2),
+                (Activation::Sigmoid, Pooling::Mean),
+            ] {
+                let hyper = Hyperparameters { activation, pooling, batch: 5, ..Default::default() };
+                let images = samples(1, 12, kind, &hyper);
+                let rng = &mut stream(6, Purpose::Networks, 1, 0);
+                let mut network = Network::new(Shape { size: 5, ..images.shape }, rng);
+                let mut adam = Adam::new(hyper.learning_rate, network.parameters().len());
+                for (image, group) in &images.images {
+                    let mut gradient = DVector::zeros(network.parameters().len());
+                    let (_, by_outputs) = cross_entropy(network.forward(image), *group);
+                    network.backward(image, by_outputs, &mut gradient);
+                    adam.step(network.parameters_mut(), &gradient);
+                }
+                bits.extend(network.parameters().iter().map(|x| format!("{:016x}", x.to_bits())));
+            }
+        }
+        assert_eq!(crate::base::hash::sha256_hex(bits.as_bytes()), PINNED);
     }
+    const PINNED: &str = "a8a07b6a20b7beaa339945be3378d89a3839e2912a1b47d73bb22884e367c083";
 
     #[test]
-    fn a_training_is_stopped_between_batches() {
+    fn a_training_is_stopped_between_images() {
         let hyper = Hyperparameters { epochs: 1_000_000, patience: 1_000_000, ..Default::default() };
         let [learn, test] = [12, 150].map(|count| samples(1, count, Kind::Cnn, &hyper));
         let rng = &mut stream(1, Purpose::Networks, 1, 0);
@@ -235,20 +262,17 @@ mod tests {
             });
             train(8, &hyper, &learn, &test, &test, rng, &stop)
         });
-        assert!(matches!(ended, Err(Untrained::Stopped(Stopped))), "{ended:?}");
+        assert_eq!(ended, Err(Stopped));
         assert!(begin.elapsed().as_secs() < 5, "{:?}", begin.elapsed());
     }
 
     #[test]
-    fn images_and_groups_must_go_together() {
-        let image = Grid::from_fn(6, 6, |_, _| 0.5);
-        let new = |images: &[&Grid<f64>], groups: &[u32]| {
-            Samples::new(images, groups, Kind::Mlp, &Hyperparameters::default())
-                .map(|_| ())
-                .unwrap_err()
-                .to_string()
+    fn no_images_and_images_of_several_sizes_are_refused() {
+        let [image, other] = [(6, 6), (6, 7)].map(|(rows, columns)| Grid::from_fn(rows, columns, |_, _| 0.5));
+        let new = |images: &[(&Grid<f64>, usize)]| {
+            Samples::new(images, Kind::Mlp, &Hyperparameters::default()).map(|_| ()).unwrap_err().to_string()
         };
-        assert!(new(&[], &[]).contains("found none"));
-        assert!(new(&[&image], &[0, 1]).contains("found 2 and 1"));
+        assert_eq!(new(&[]), "expected images, found none");
+        assert_eq!(new(&[(&image, 0), (&other, 1)]), "expected images of 6 × 6 pixels, found 6 × 7");
     }
 }

@@ -4,7 +4,7 @@ use crate::base::Grid;
 use crate::base::error::Error;
 use crate::base::hash::sha256_hex;
 use crate::base::random::{Purpose, stream};
-use crate::baseline::{Kind, Samples, Trained, Untrained, train};
+use crate::baseline::{Kind, Samples, Trained, train};
 use crate::commands::capacity::Options;
 use crate::config::capacity::CapacityConfig;
 use crate::data::dataset::{Dataset, Split};
@@ -129,9 +129,10 @@ impl Task {
     ) -> Result<Self, Error> {
         let samples = |of: &[Seen]| {
             let grouped = of.iter().filter_map(|seen| Some((&seen.stimulus, split.group(seen.class)?)));
-            let (stimuli, groups): (Vec<&Grid<f64>>, Vec<u32>) =
-                grouped.map(|(stimulus, group)| (stimulus, u32::from(group == Group::B))).unzip();
-            Samples::new(&stimuli, &groups, kind, config.of(kind)).map_err(failed)
+            let grouped: Vec<(&Grid<f64>, usize)> =
+                grouped.map(|(stimulus, group)| (stimulus, usize::from(group == Group::B))).collect();
+            Samples::new(&grouped, kind, config.of(kind))
+                .map_err(|error| Error::input(format!("capacity: {error}")))
         };
         let training: Result<Vec<Samples>, Error> = images.training.iter().map(|run| samples(run)).collect();
         let waiting = (!images.waiting.is_empty()).then(|| samples(&images.waiting)).transpose()?;
@@ -142,7 +143,7 @@ impl Task {
     ///
     /// # Errors
     /// Of kind [`ErrorKind::Stopped`](crate::base::error::ErrorKind::Stopped) if `stop` is set
-    /// meanwhile; if networks cannot be trained.
+    /// meanwhile.
     pub fn train(
         &self,
         size: usize,
@@ -155,14 +156,6 @@ impl Task {
         let waiting = self.waiting.as_ref().unwrap_or(&self.test);
         let rng =
             &mut stream(config.seed, Purpose::Networks, ((kind as u64) << 32) + size as u64, number as u64);
-        let trained = train(size, config.of(kind), training, waiting, &self.test, rng, stop);
-        trained.map_err(|error| match error {
-            Untrained::Stopped(stopped) => stopped.into(),
-            Untrained::Failed(error) => failed(error),
-        })
+        Ok(train(size, config.of(kind), training, waiting, &self.test, rng, stop)?)
     }
-}
-
-fn failed(error: candle_core::Error) -> Error {
-    Error::other(format!("networks: {error}"))
 }
