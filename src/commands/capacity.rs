@@ -184,7 +184,9 @@ fn kernel_fits(config: &CapacityConfig, setting: &Setting) -> Result<(), Error> 
 /// Of all that the trainings of a kind of networks depend on; `images` names those they see.
 fn key(split: &grouping::Split, kind: Kind, config: &CapacityConfig, images: &str) -> String {
     let groups = [Group::A, Group::B].map(|group| split.classes(group));
-    let all = (env!("CARGO_PKG_VERSION"), groups, kind.name(), config.of(kind), images, config.seed);
+    // Other arithmetic gives other trainings, so those of networks in f32 are not taken for these.
+    let by = concat!(env!("CARGO_PKG_VERSION"), " in f64");
+    let all = (by, groups, kind.name(), config.of(kind), images, config.seed);
     sha256_hex(serde_json::to_string(&all).expect("JSON has all of it").as_bytes())
 }
 

@@ -20,7 +20,6 @@ pub mod setting;
 pub mod task;
 pub mod team;
 pub mod training;
-#[cfg(feature = "networks")]
 pub mod trainings;
 pub mod unwritten;
 pub mod validation;
