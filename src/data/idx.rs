@@ -342,7 +342,7 @@ fn decode<const N: usize>(
 
 #[cfg(test)]
 mod tests {
-    //! Contract of the IDX reader on broken files; `tests/idx_reader.rs` compares it with another
+    //! Contract of the IDX reader on broken files; `tests/library/idx_reader.rs` compares it with another
     //! reader.
 
     use super::*;

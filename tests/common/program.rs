@@ -1,13 +1,13 @@
 //! Running the program itself, as a user does: in a folder of its own, with no settings from
 //! outside.
 
-use assert_cmd::Command;
 use morphcog::store::run::RunFile;
 use std::collections::BTreeMap;
 use std::ffi::OsStr;
+use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
-use std::process::Stdio;
-use std::time::Duration;
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
 use tempfile::TempDir;
 
 /// Where the program is.
@@ -118,7 +118,7 @@ impl Sandbox {
     }
 
     /// Starts a run that does not end by itself, and writes checkpoints all the time.
-    pub fn endless(&self, out: &str) -> std::process::Child {
+    pub fn endless(&self, out: &str) -> Child {
         self.write("long.toml", TINY.replace("generations = 12", "generations = 10000000"));
         self.start(&format!("evolve -q -c long.toml -o {out} --set checkpoint.seconds=0.1"))
     }
@@ -141,7 +141,7 @@ impl Sandbox {
     /// The program, not yet started.
     pub fn command<A: AsRef<OsStr>>(&self, args: impl IntoIterator<Item = A>) -> Command {
         let mut command = Command::new(PROGRAM);
-        command.current_dir(self.0.path()).args(args).timeout(LIMIT);
+        command.current_dir(self.0.path()).args(args);
         SETTINGS.iter().for_each(|name| {
             command.env_remove(name);
         });
@@ -155,12 +155,8 @@ impl Sandbox {
     }
 
     /// Starts the program in the background, stdout to be read; arguments are separated by blanks.
-    pub fn start(&self, args: &str) -> std::process::Child {
-        let mut command = std::process::Command::new(PROGRAM);
-        command.current_dir(self.0.path()).args(args.split_whitespace());
-        SETTINGS.iter().for_each(|name| {
-            command.env_remove(name);
-        });
+    pub fn start(&self, args: &str) -> Child {
+        let mut command = self.command(args.split_whitespace());
         command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap()
     }
 
@@ -193,18 +189,46 @@ pub fn write_images(sandbox: &Sandbox, prefix: &str, [height, width]: [usize; 2]
 
 /// Runs a command. Whatever it is asked, it must not panic.
 #[track_caller]
-pub fn said(mut command: Command) -> Said {
-    let output = command.output().unwrap();
-    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
-    let said = Said { code: output.status.code(), out: text(&output.stdout), err: text(&output.stderr) };
+pub fn said(command: Command) -> Said {
+    said_of(command, "", LIMIT)
+}
+
+/// Runs a command that reads `input` and must end within `limit`.
+#[track_caller]
+pub fn said_of(mut command: Command, input: &str, limit: Duration) -> Said {
+    let mut child =
+        command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    // A command that does not read it may have ended already.
+    let _ = child.stdin.take().unwrap().write_all(input.as_bytes());
+    fn reader(mut pipe: impl Read + Send + 'static) -> std::thread::JoinHandle<String> {
+        std::thread::spawn(move || {
+            let mut bytes = Vec::new();
+            pipe.read_to_end(&mut bytes).unwrap();
+            String::from_utf8_lossy(&bytes).into_owned()
+        })
+    }
+    let (out, err) = (reader(child.stdout.take().unwrap()), reader(child.stderr.take().unwrap()));
+    let begin = Instant::now();
+    let status = loop {
+        if let Some(status) = child.try_wait().unwrap() {
+            break status;
+        }
+        if begin.elapsed() > limit {
+            child.kill().unwrap();
+            child.wait().unwrap();
+            panic!("still running after {limit:?}: {command:?}");
+        }
+        std::thread::sleep(Duration::from_millis(2));
+    };
+    let said = Said { code: status.code(), out: out.join().unwrap(), err: err.join().unwrap() };
     assert!(!said.err.contains("panicked") && said.code != Some(101), "{said:#?}");
     assert!(said.code.is_some(), "ended by a signal: {said:#?}");
     said
 }
 
 /// Asks a program that was started to end, as Slurm does.
-pub fn terminate(child: &std::process::Child) {
-    let sent = std::process::Command::new("kill").args(["-s", "USR1", &child.id().to_string()]).status();
+pub fn terminate(child: &Child) {
+    let sent = Command::new("kill").args(["-s", "USR1", &child.id().to_string()]).status();
     assert!(sent.unwrap().success());
 }
 

@@ -1,0 +1,11 @@
+//! The library, called as other projects call it.
+
+#[path = "../common/mod.rs"]
+mod common;
+
+mod architecture;
+mod data_fetch;
+mod idx_reader;
+mod pinned_numbers;
+mod published_robots;
+mod trained_robots;

@@ -1,0 +1,150 @@
+//! Same numbers: no bit of a simulation or of a run changes unnoticed.
+//!
+//! Where one of these fails and the change is meant, the changelog says so under
+//! "Reproducibility-breaking", and the new hashes, which the failure shows, take the places of the
+//! old ones.
+
+use crate::common::program::{Sandbox, TINY, gaits};
+use crate::common::reference::{Reference, references, sensitive};
+use morphcog::base::hash::sha256_hex;
+use morphcog::sim::{Physics, World};
+use rayon::prelude::*;
+use serde_json::{Map, Value};
+use std::fmt::Write;
+
+/// SHA-256 over the bits of x and y of all points before the first control step and after each, in
+/// little endian.
+const SIMULATIONS: [(&str, &str); 21] = [
+    ("bar_12x12_09", "4f30bdc53ddfc5b08c29d4233784a1a20bcd314b72d26e0fdb95229e24f26fd2"),
+    ("bar_14x14_05", "39b53683f9d1fcb20c2cf8aca6643d087f54472fe659ce471ba32e8f22e67d9f"),
+    ("bar_6x9_01", "8affb5d81a11eadfb8b35e28d41d7a11fc745a9846574b00d6c6fe1765415197"),
+    ("bar_6x9_13", "a17ef37af3d644b8fa9d58e39274633cb7ea5b4e7ef40d9a729de9a1ebd6320b"),
+    ("disc_14x14_04", "bd0047549ac0193ae3c2c38aed4ea5f50b4072e5ce28c323628e7f2ca2b8b6cf"),
+    ("disc_14x14_08", "a250081ee007d7f0067bb9be473dea8ebd2e69f20915b1849df878b422c8083f"),
+    ("disc_5x5_00", "6e8f0adf35ec04c0e2a91820ff5f831a59dd67f62e510796f1e60da607809020"),
+    ("disc_5x5_12", "ed18d282bab082f091be15b0e0aa841cdf34c01ff26ff5b7d3d7890d7fd52bc7"),
+    ("grad_10x14_06", "789a44a5d46d8f4180fbbe19832bf57dc82fcaec4d35b560bfddb9455b0a0d9e"),
+    ("grad_14x14_10", "e8475ffafba391b708cc2f3417470141a3bd83b8822d25c6d7d90d4813f1e38b"),
+    ("grad_8x8_02", "b94a6c34d8e1b2edd2275d18c07be3d9b18df78ceeba481cf4fd6255dddee75a"),
+    ("grad_8x8_14", "29501037e92f385347ae0678670694493f09476517e531111ad02bd3259331ee"),
+    ("rand_14x14_03", "ca7d7a247c77e5f5d36561825001773efda690dd97a15815bd193e2603393911"),
+    ("rand_14x14_11", "73affda7d7cb8941f1acee0242a76715b1befb5046f3e0bc0a26b00c574f8b0a"),
+    ("rand_14x14_15", "43f168476770a11ffe1b66e5d652e37a4aced09bfd9cfb88d5d45d50780255aa"),
+    ("rand_14x7_07", "67861562abd747fafaa24787e56ea51c72f041b1d1ad3c1569a90693c08784c9"),
+    ("unstable_comb", "b6a43b3e260195c5b5fc41c8434b6bceef869a586e65a3bc9bb30351dea8ca5d"),
+    ("sensitive_0f692fb2ef", "156e5da248197c42769b03b38dc649e3f8aa1952ba739440962bdc9011044000"),
+    ("sensitive_432567bdf0", "6c5f071d58174fab1ad3b7da75042d12d754d9266008a47c16778521494b9913"),
+    ("sensitive_comb_12x14", "9e8f67661415046e739e557c06d4ed0197c44648a6897da654dda6eff43c206a"),
+    ("sensitive_f7ecf1b51e", "171e0303da5f0a00f48aeebeeb20e921e1a6f6b78394f353eabb9e8f05d1b712"),
+];
+
+/// SHA-256 over the elites' cells, the first ten digits of their genomes' digests, and the bits of
+/// objectives and displacements.
+const SEQUENTIAL_RUN: &str = "38e9052e5c9f95a3bd20ccd9b52f8b46c803f55a0e0a28dce0adb9538d2ce672";
+const GAITS_RUN: &str = "2294ed6c40f0ef8f35ebfec24a0262a478108f67c2c9dd1aaea820fb75aa856c";
+
+/// The bits of all points before the first control step and after each, until the simulation
+/// becomes unstable.
+fn bits(mut world: World) -> impl Iterator<Item = Vec<u8>> {
+    let mut begun = false;
+    std::iter::from_fn(move || {
+        if std::mem::replace(&mut begun, true) {
+            world.step().ok()?;
+        }
+        Some(world.points().flatten().flat_map(|coordinate| coordinate.to_bits().to_le_bytes()).collect())
+    })
+}
+
+#[test]
+fn every_point_of_the_golden_simulations_has_the_same_bits_after_every_control_step() {
+    let physics = Physics::default();
+    let hash = |rollout: &Reference| {
+        let steps = rollout.control_steps as usize + 1;
+        let all: Vec<u8> = bits(rollout.world(&physics)).take(steps).flatten().collect();
+        (rollout.name.clone(), sha256_hex(&all))
+    };
+    let rollouts: Vec<Reference> = references().into_iter().chain(sensitive()).collect();
+    let found: Vec<_> = rollouts.par_iter().map(hash).collect();
+    let pinned = SIMULATIONS.map(|(name, hash)| (name.to_string(), hash.to_string()));
+    assert_eq!(found, pinned, "these numbers have moved; see the beginning of this file");
+}
+
+/// The constants whose least change no golden simulation feels, with the bits of their defaults.
+const UNFELT: [(&str, u64); 8] = [
+    ("blow_up_extent", 10f64.to_bits()),
+    ("crossing_epsilon", 1e-4f64.to_bits()),
+    ("floor_friction", 2f64.to_bits()),
+    ("floor_slip", 0.2f64.to_bits()),
+    ("floor_stiffness", 1.4e7f64.to_bits()),
+    ("peg_spacing", 6f64.to_bits()),
+    ("target_max", 1.6f64.to_bits()),
+    ("unstable_ratio", 1f64.to_bits()),
+];
+
+/// The physics with one of its constants a little greater: by 1 if it counts, or else by 1e-12 of
+/// itself.
+fn nudged(constants: &Map<String, Value>, name: &str) -> Physics {
+    let mut changed = constants.clone();
+    let value = &mut changed[name];
+    *value = match value.as_u64() {
+        Some(count) => (count + 1).into(),
+        None => (value.as_f64().expect("every constant is a number") * (1.0 + 1e-12)).into(),
+    };
+    serde_json::from_value(Value::Object(changed)).unwrap()
+}
+
+#[test]
+fn the_golden_simulations_feel_the_least_change_of_every_constant_or_its_bits_are_pinned() {
+    let physics = Physics::default();
+    let Value::Object(constants) = serde_json::to_value(&physics).unwrap() else { panic!("not by name") };
+    let rollouts = references();
+    // Within this number of control steps.
+    let steps = 100;
+    let felt = |name: &str| {
+        let changed = nudged(&constants, name);
+        assert_ne!(changed, physics, "{name}");
+        rollouts.iter().any(|rollout| {
+            let ours = bits(rollout.world(&physics)).take(steps);
+            !ours.eq(bits(rollout.world(&changed)).take(steps))
+        })
+    };
+    let names: Vec<&String> = constants.keys().collect();
+    assert!(names.len() > UNFELT.len());
+    for (name, pinned) in UNFELT {
+        let default = constants[name].as_f64().unwrap().to_bits();
+        assert_eq!(default, pinned, "{name}");
+    }
+    let of_others = names.into_par_iter().filter(|name| UNFELT.iter().all(|(unfelt, _)| unfelt != name));
+    let unfelt: Vec<&String> = of_others.filter(|name| !felt(name)).collect();
+    assert!(unfelt.is_empty(), "no golden simulation feels {unfelt:?}: pin the bits of their defaults");
+}
+
+/// A hash of what evolved under a config.
+fn hash_of_run(config: &str) -> String {
+    let sandbox = Sandbox::new();
+    sandbox.write("run.toml", config);
+    sandbox.run("evolve -q -c run.toml -o out").ended(0, &[]);
+    let elites = sandbox.run_file("out").elites;
+    assert!(elites.len() >= 4, "{}", elites.len());
+    let mut text = String::new();
+    for elite in &elites {
+        let displacements: Vec<u64> = elite.displacements.iter().map(|d| d.to_bits()).collect();
+        let objective = elite.objective.to_bits();
+        let digest = &elite.genome.digest()[..10];
+        writeln!(text, "{:?} {digest} {objective:016x} {displacements:016x?}", elite.cell).unwrap();
+    }
+    sha256_hex(text.as_bytes())
+}
+
+#[test]
+fn a_run_by_the_paper_s_protocol_has_the_same_elites_bit_for_bit() {
+    let ours = "rollout = \"fresh\"\ncontrol_steps = 20";
+    let paper = "rollout = \"sequential\"\ncontrol_steps = 500";
+    assert!(TINY.contains(ours));
+    assert_eq!(hash_of_run(&TINY.replace(ours, paper)), SEQUENTIAL_RUN, "see the beginning of this file");
+}
+
+#[test]
+fn a_run_for_gaits_has_the_same_elites_bit_for_bit() {
+    assert_eq!(hash_of_run(&gaits()), GAITS_RUN, "see the beginning of this file");
+}

@@ -1,0 +1,531 @@
+//! The page of `morphcog serve` in a real browser: what is drawn is walked, at every width, without
+//! complaints.
+#![allow(clippy::disallowed_methods)]
+#![cfg(unix)]
+
+use crate::common::browser::{Browser, Tab, found, keep_picture};
+use crate::common::hostile::Dice;
+use crate::common::program::{Sandbox, terminate};
+use crate::common::server::{Proxy, Server};
+use morphcog::analysis::gallery;
+use morphcog::base::shipped::ZERO_ONE;
+use serde_json::Value;
+use std::f64::consts::TAU;
+use std::io::Write;
+use std::time::{Duration, Instant};
+
+/// A browser if there is one; says so past the harness, which keeps the output of passing tests to
+/// itself, if not.
+fn browser(sandbox: &Sandbox) -> Option<Browser> {
+    let program = found();
+    if program.is_none() {
+        let text =
+            "SKIPPED: no Chromium found (MORPHCOG_BROWSER may name one); the page of serve is not tested\n";
+        std::io::stderr().write_all(text.as_bytes()).unwrap();
+    }
+    Some(Browser::start(&program?, sandbox))
+}
+
+fn open(tab: &mut Tab, server: &Server) {
+    tab.open(&server.url());
+    tab.wait("document.documentElement?.dataset.ready === 'yes'");
+}
+
+/// Draws on the pad with the mouse; places in pixels of the drawing.
+fn draw(tab: &mut Tab, line: &[[f64; 2]]) {
+    let on_page = on_pad(tab, line);
+    tab.drag(&on_page);
+}
+
+/// Clears the pad, and says where the places of a drawing are on the page.
+fn on_pad(tab: &mut Tab, line: &[[f64; 2]]) -> Vec<[f64; 2]> {
+    tab.click("#clear");
+    let [x, y, width, height] = tab.place("#pad");
+    line.iter().map(|[c, r]| [x + c / 28.0 * width, y + r / 28.0 * height]).collect()
+}
+
+fn zero() -> Vec<[f64; 2]> {
+    let place = |k: u32| {
+        let angle = TAU * f64::from(k) / 40.0;
+        [14.0 + 5.5 * angle.sin(), 14.0 - 8.5 * angle.cos()]
+    };
+    (0..=40).map(place).collect()
+}
+
+fn one() -> Vec<[f64; 2]> {
+    (0..=12).map(|k| f64::from(k) / 12.0).map(|t| [16.0 - 4.0 * t, 5.0 + 18.0 * t]).collect()
+}
+
+/// The robot that the page begins with.
+fn best() -> String {
+    let trained = gallery::trained(ZERO_ONE).unwrap();
+    trained[0].0.elites[0].id.clone()
+}
+
+/// Simulates without waiting for real time.
+fn as_fast_as_possible(tab: &mut Tab) {
+    tab.eval("(() => { const s = document.getElementById('speed'); s.value = '0'; s.onchange(); })()");
+}
+
+/// A page of its own at the usual size, without waiting for real time.
+fn quick<'a>(browser: &'a mut Browser, server: &Server) -> Tab<'a> {
+    let mut tab = browser.tab(1280, 900, false);
+    open(&mut tab, server);
+    as_fast_as_possible(&mut tab);
+    tab
+}
+
+/// Chooses an archive by its number.
+fn choose(tab: &mut Tab, archive: &str) {
+    let first = tab.text("#who");
+    tab.eval(&format!(
+        "(() => {{ const s = document.getElementById('archive'); s.value = '{archive}'; s.onchange(); }})()"
+    ));
+    tab.wait(&format!("document.getElementById('who').textContent !== '{first}'"));
+}
+
+/// Waits for the end of the simulation under the picture that was chosen last.
+fn at_end(tab: &mut Tab) {
+    tab.wait("document.documentElement.dataset.state === 'over'");
+}
+
+/// What the robot says in the end of the simulation under a drawing.
+fn answer(tab: &mut Tab, line: &[[f64; 2]]) -> (String, String) {
+    draw(tab, line);
+    at_end(tab);
+    (tab.text("#says"), tab.text("#moved"))
+}
+
+#[test]
+fn a_drawn_zero_and_a_drawn_one_are_told_apart_and_the_page_fits_everywhere() {
+    let sandbox = Sandbox::new();
+    let Some(mut browser) = browser(&sandbox) else { return };
+    let server = Server::start(&sandbox, "");
+
+    let mut tab = browser.tab(1280, 900, false);
+    open(&mut tab, &server);
+    // It begins with the best of the trained robots; the published ones are a choice away.
+    assert_eq!(tab.text("#who"), best());
+    choose(&mut tab, "1");
+    assert_eq!(tab.text("#who"), "QMAXD");
+    as_fast_as_possible(&mut tab);
+    // QMAXD walks right under a zero, left under a one.
+    let (says, moved) = answer(&mut tab, &zero());
+    assert!(says == "0" && moved.ends_with("right"), "{says}: {moved}");
+    let (says, moved) = answer(&mut tab, &one());
+    assert!(says == "1" && moved.ends_with("left"), "{says}: {moved}");
+    let spoken = tab.text("#spoken");
+    assert!(spoken.starts_with("QMAXD sees your drawing. It says 1: moved "), "{spoken}");
+
+    // The same without a mouse: the pen is put down, moved and lifted by keys.
+    tab.click("#clear");
+    tab.eval("document.getElementById('pad').focus()");
+    tab.key(" ", " ");
+    (0..6).for_each(|_| tab.key("ArrowDown", ""));
+    tab.key(" ", " ");
+    at_end(&mut tab);
+    let by_keys = tab.text("#spoken");
+    assert!(by_keys.starts_with("QMAXD sees your drawing.") && by_keys != spoken, "{by_keys}");
+
+    // Another robot, a test image of a known class, the editor.
+    tab.click("[data-robot=YJTLA]");
+    assert_eq!(tab.text("#who"), "YJTLA");
+    tab.click("#tab-test");
+    tab.click("#thumbs button");
+    at_end(&mut tab);
+    let judged = tab.eval("document.getElementById('verdict').dataset.state");
+    assert!(["right", "wrong", "none"].contains(&judged.as_str().unwrap()), "{judged}");
+    tab.click("#tab-editor");
+    tab.wait("document.getElementById('checked').dataset.state === 'good'");
+    tab.click("#live");
+    assert_eq!(tab.text("#who"), "Your body");
+    tab.click("#empty");
+    tab.wait("document.getElementById('checked').dataset.state === 'bad' && document.getElementById('live').disabled");
+    tab.click("#unpaint");
+    tab.wait("!document.getElementById('live').disabled");
+    assert_eq!(tab.eval("document.getElementById('error').hidden"), true);
+    assert_eq!(tab.complaints(), Vec::<String>::new());
+    tab.close();
+
+    for (width, height, dark) in [(390, 844, false), (1280, 900, true)] {
+        let mut tab = browser.tab(width, height, dark);
+        open(&mut tab, &server);
+        tab.wait("document.getElementById('moved').textContent.startsWith('moved')");
+        let wide = tab.eval("document.documentElement.scrollWidth").as_u64().unwrap();
+        assert!(wide <= u64::from(width), "{wide} pixels wide");
+        // Nothing that can be used sticks out, and all of it has a name.
+        let nameless = "[...document.querySelectorAll('button, select, input, canvas')].filter((e) => \
+         e.offsetParent && \
+             !(e.textContent.trim() || e.ariaLabel || e.title || e.labels?.length || e.closest('button'))).length";
+        assert_eq!(tab.eval(nameless), 0);
+        let shot = tab.screenshot();
+        assert!(shot.len() > 20_000, "{} bytes", shot.len());
+        keep_picture(&format!("serve-{width}.png"), &shot);
+        assert_eq!(tab.complaints(), Vec::<String>::new());
+        tab.close();
+    }
+}
+
+/// A digit as somebody may draw it: of any size, anywhere on the pad, slanted, with an unsteady hand.
+/// Not the strokes of the built-in digits.
+fn by_hand(digit: u8, dice: &mut Dice) -> Vec<[f64; 2]> {
+    let mut within = |low: f64, high: f64| low + (high - low) * dice.below(1001) as f64 / 1000.0;
+    let (height, slant, wobble) = (within(9.0, 23.0), within(-0.15, 0.4), within(0.0, 0.03));
+    let wave = [within(0.0, TAU), within(2.0, 4.0)];
+    let mut line: Vec<[f64; 2]> = match digit {
+        0 => {
+            // Begun anywhere, in either direction, not quite closed or a little further.
+            let (width, begin, turn) = (within(0.5, 0.95), within(0.0, TAU), within(0.94, 1.06));
+            let way = if within(0.0, 1.0) < 0.5 { 1.0 } else { -1.0 };
+            let at = |k: u32| begin + way * turn * TAU * f64::from(k) / 18.0;
+            (0..=18).map(|k| [0.5 * width * at(k).sin(), -0.5 * at(k).cos()]).collect()
+        }
+        _ => {
+            // With a flag or without.
+            let (flag, bend) = (within(-0.2, 0.25), within(-0.04, 0.04));
+            let stem = (0..=6).map(|k| f64::from(k) / 6.0).map(|t| [bend * (TAU * t / 2.0).sin(), t - 0.5]);
+            let begin = if flag > 0.0 { vec![[-flag, -0.5 + 0.8 * flag]] } else { Vec::new() };
+            begin.into_iter().chain(stem).collect()
+        }
+    };
+    for (k, place) in line.iter_mut().enumerate() {
+        place[0] += wobble * (wave[0] + wave[1] * k as f64 / 3.0).sin() - slant * place[1];
+        *place = place.map(|v| height * v);
+    }
+    // Anywhere, as far as all of it is on the pad.
+    for axis in [0, 1] {
+        let [low, high] =
+            [f64::min, f64::max].map(|of| line.iter().map(|place| place[axis]).reduce(of).unwrap());
+        let shift = within(1.0 - low, 27.0 - high);
+        line.iter_mut().for_each(|place| place[axis] += shift);
+    }
+    line
+}
+
+/// Drawings of a seed, of which a few may be read wrong.
+fn draws_by_hand(seed: u64) {
+    let sandbox = Sandbox::new();
+    let Some(mut browser) = browser(&sandbox) else { return };
+    let server = Server::start(&sandbox, "");
+    let mut tab = quick(&mut browser, &server);
+    let mut wrong = Vec::new();
+    let mut dice = Dice::new(77, seed);
+    for number in 0..40 {
+        let digit = number % 2;
+        tab.pointer = if dice.below(2) == 0 { "mouse" } else { "pen" };
+        let (says, moved) = answer(&mut tab, &by_hand(digit, &mut dice));
+        if says != digit.to_string() {
+            wrong.push(format!("seed {seed}, drawing {number}: a {digit} is {says:?}, {moved}"));
+        }
+    }
+    assert!(wrong.len() <= 2, "{} of 40 wrong:\n{}", wrong.len(), wrong.join("\n"));
+}
+
+// Side by side: most of the time is a browser's.
+#[test]
+fn digits_drawn_in_any_size_place_and_slant_are_read_by_the_robot_that_the_page_begins_with() {
+    draws_by_hand(1);
+}
+
+#[test]
+fn so_they_are_with_another_seed() {
+    draws_by_hand(2);
+}
+
+#[test]
+fn so_they_are_with_a_third_seed() {
+    draws_by_hand(3);
+}
+
+#[test]
+fn a_drawing_is_fitted_unless_that_is_turned_off() {
+    let sandbox = Sandbox::new();
+    let Some(mut browser) = browser(&sandbox) else { return };
+    let server = Server::start(&sandbox, "");
+    let mut tab = quick(&mut browser, &server);
+    answer(&mut tab, &zero());
+    tab.eval("window.scrollTo(0, 0)");
+    keep_picture("serve.png", &tab.screenshot());
+    // As drawn, it is another picture.
+    let small: Vec<[f64; 2]> = zero().iter().map(|place| place.map(|v| 2.0 + v / 4.0)).collect();
+    draw(&mut tab, &small);
+    at_end(&mut tab);
+    let lit = "JSON.stringify([...document.getElementById('stimulus').getContext('2d')\
+               .getImageData(0, 0, 300, 300).data])";
+    let fitted = tab.eval(lit);
+    tab.click("#fit");
+    at_end(&mut tab);
+    assert_ne!(tab.eval(lit), fitted);
+    assert_eq!(tab.complaints(), Vec::<String>::new());
+}
+
+#[test]
+fn a_stroke_goes_on_when_the_browser_takes_the_pointer_away_and_ends_when_it_is_up() {
+    let sandbox = Sandbox::new();
+    let Some(mut browser) = browser(&sandbox) else { return };
+    let server = Server::start(&sandbox, "");
+    let mut tab = quick(&mut browser, &server);
+    let ink = "[...document.getElementById('pad').getContext('2d').getImageData(0, 0, 300, 300).data].join()";
+    draw(&mut tab, &zero());
+    let whole = tab.eval(ink);
+    let line = on_pad(&mut tab, &zero());
+    let (first, rest) = line.split_at(20);
+    tab.press(first[0]);
+    tab.trace(&first[1..]);
+    tab.eval("document.getElementById('pad').releasePointerCapture(1)");
+    tab.trace(rest);
+    tab.release(rest[20]);
+    assert!(tab.eval(ink) == whole, "the stroke ended when the pointer was taken away");
+    // It was lifted where the page does not learn of it: nothing is drawn any more.
+    tab.press(line[0]);
+    tab.eval(
+        "document.getElementById('pad').dispatchEvent(new PointerEvent('pointermove', { pointerId: 1, pointerType: 'mouse' }))",
+    );
+    tab.trace(&[[line[0][0] + 60.0, line[0][1] + 90.0]]);
+    tab.release(line[0]);
+    assert!(tab.eval(ink) == whole, "a pointer that is up draws");
+    assert_eq!(tab.complaints(), Vec::<String>::new());
+}
+
+#[test]
+fn what_was_erased_is_not_seen_at_any_size_of_the_drawing() {
+    let sandbox = Sandbox::new();
+    let Some(mut browser) = browser(&sandbox) else { return };
+    let server = Server::start(&sandbox, "");
+    let mut tab = quick(&mut browser, &server);
+    // A line of ten pixels whose upper part is erased, and one that is erased whole.
+    for (line, erased, rows) in [
+        ("[[14, 6], [14, 16]]", "[[14, 6], [14, 8]]", 19..=22),
+        ("[[2, 14], [26, 14]]", "[[0, 14], [28, 14]]", 0..=0),
+        ("[[1, 14], [27, 14]]", "[[0, 11], [28, 11], [28, 16], [0, 16]]", 0..=28),
+    ] {
+        let seen = tab.eval(&format!(
+            "import('/pad.js').then(({{ Pad }}) => {{
+               const pad = new Pad(document.createElement('canvas'), () => {{}});
+               pad.set([{{ erasing: false, points: {line} }}, {{ erasing: true, points: {erased} }}]);
+               return pad.rows;
+             }})"
+        ));
+        let is_dark = |row: &Value| {
+            row.as_array().unwrap().iter().any(|pixel| pixel.as_f64().expect("a number") > 127.0)
+        };
+        let dark = seen.as_array().unwrap().iter().filter(|row| is_dark(row)).count();
+        assert!(rows.contains(&dark), "{line} without {erased}: {dark} rows");
+    }
+    assert_eq!(tab.complaints(), Vec::<String>::new());
+}
+
+#[test]
+fn a_run_that_begins_while_the_page_is_open_appears_grows_and_ends_on_it() {
+    let sandbox = Sandbox::new();
+    let Some(mut browser) = browser(&sandbox) else { return };
+    let server = Server::start(&sandbox, "");
+    let mut tab = browser.tab(1280, 800, false);
+    open(&mut tab, &server);
+    let mut child = sandbox.endless("runs/live");
+    let text = "document.getElementById('archive').textContent";
+    tab.wait(&format!("{text}.includes('of 10000000')"));
+    choose(&mut tab, "3");
+    tab.wait("!document.getElementById('progress').hidden");
+    tab.wait("document.querySelectorAll('#curves svg').length === 3");
+    tab.wait("document.getElementById('course').textContent.includes('left')");
+    let first = tab.text("#course");
+    tab.wait(&format!("document.getElementById('course').textContent !== '{first}'"));
+    tab.eval("document.getElementById('progress').scrollIntoView()");
+    keep_picture("serve-live.png", &tab.screenshot());
+    terminate(&child);
+    child.wait().unwrap();
+    tab.wait("document.getElementById('course').textContent.includes('not running now')");
+    assert_eq!(tab.complaints(), Vec::<String>::new());
+}
+
+#[test]
+fn below_the_prefix_of_a_proxy_and_by_a_name_that_is_allowed_all_of_the_page_works() {
+    let sandbox = Sandbox::tiny();
+    let Some(mut browser) = browser(&sandbox) else { return };
+    sandbox.run("evolve -q -c tiny.toml -o runs/one").ended(0, &[]);
+    // Browsers take names that end so for this machine; the server does not by itself.
+    let server = Server::start(&sandbox, "--allow-host hub.localhost");
+    let proxy = Proxy::start(&server);
+    for name in ["hub.localhost", "localhost"] {
+        let mut tab = browser.tab(1280, 900, false);
+        tab.open(&format!("http://{name}:{}{}/", proxy.port, Proxy::PREFIX));
+        tab.wait("document.documentElement?.dataset.ready === 'yes'");
+        as_fast_as_possible(&mut tab);
+        let (says, _) = answer(&mut tab, &zero());
+        assert_eq!(says, "0");
+        // What the pad is seen as, a change while it walks, test images, curves, team and editor.
+        tab.click("#tab-test");
+        tab.click("#thumbs button");
+        at_end(&mut tab);
+        choose(&mut tab, "3");
+        tab.wait("document.querySelectorAll('#curves svg').length === 3");
+        tab.click("#tab-team");
+        at_end(&mut tab);
+        assert_eq!(tab.eval("document.images[0].naturalWidth > 0"), true);
+        tab.click("#tab-editor");
+        tab.wait("document.getElementById('checked').dataset.state === 'good'");
+        tab.click("#live");
+        at_end(&mut tab);
+        assert_eq!(tab.eval("document.getElementById('error').hidden"), true);
+        assert_eq!((tab.complaints(), proxy.strays()), (Vec::new(), Vec::new()));
+        tab.close();
+    }
+}
+
+#[test]
+fn an_audit_that_appears_while_the_page_is_open_is_said_and_can_be_chosen_by() {
+    let sandbox = Sandbox::tiny();
+    let Some(mut browser) = browser(&sandbox) else { return };
+    sandbox.run("evolve -q -c tiny.toml -o run").ended(0, &[]);
+    sandbox.run("audit -q -a run -o audit.json").ended(0, &[]);
+    let audit: Value = serde_json::from_str(&sandbox.read("audit.json")).unwrap();
+    // With verdicts of two kinds, and a reason to look for.
+    let with_reason = |reason: &str| {
+        let mut audit = audit.clone();
+        for (number, robot) in audit["robots"].as_array_mut().unwrap().iter_mut().enumerate() {
+            robot["verdict"] = if number % 2 == 0 { "exploits" } else { "fragile" }.into();
+            robot["reason"] = reason.into();
+        }
+        audit.to_string()
+    };
+    let server = Server::start(&sandbox, "--archive run");
+    let mut tab = browser.tab(1280, 900, false);
+    open(&mut tab, &server);
+    choose(&mut tab, "3");
+    let begun = || serde_json::from_str::<Value>(&server.get("/api/status").body).unwrap()["begun"].clone();
+    let (who, before) = (tab.text("#who"), begun());
+    assert_eq!(tab.eval("document.getElementById('audit').hidden"), true);
+    sandbox.write("run/audit.json", with_reason("seen once"));
+    tab.wait("document.getElementById('about').textContent.includes('seen once')");
+    assert_eq!(tab.eval("document.getElementById('audit').hidden"), false);
+    tab.eval("(() => { const s = document.getElementById('audit'); s.value = 'fragile'; s.onchange(); })()");
+    let few = tab.text("#count");
+    assert!(few.contains(" of "), "{few}");
+    // What was chosen stays, the robot walks on, and keys stay where they are.
+    tab.eval("document.querySelector('#cards [data-robot]').focus()");
+    let held = "document.activeElement.dataset.robot";
+    let card = tab.eval(held);
+    sandbox.write("run/audit.json", with_reason("seen once more"));
+    tab.wait("document.getElementById('about').textContent.includes('seen once more')");
+    assert_eq!(
+        (tab.eval("document.getElementById('audit').value"), tab.text("#count")),
+        ("fragile".into(), few)
+    );
+    assert_eq!((tab.text("#who"), begun()), (who, before));
+    assert_eq!((tab.eval(held), card.is_string()), (card, true));
+    assert_eq!(tab.complaints(), Vec::<String>::new());
+}
+
+#[test]
+fn a_body_that_is_built_and_the_robot_it_makes_are_in_sight_together() {
+    let sandbox = Sandbox::new();
+    let Some(mut browser) = browser(&sandbox) else { return };
+    let server = Server::start(&sandbox, "");
+    let mut tab = browser.tab(1280, 800, false);
+    open(&mut tab, &server);
+    as_fast_as_possible(&mut tab);
+    tab.click("#tab-test");
+    tab.click("#thumbs button");
+    at_end(&mut tab);
+    tab.click("#tab-editor");
+    tab.wait("!document.getElementById('editor').hidden");
+    tab.eval("window.scrollTo(0, 0)");
+    // Nothing moves any more, and yet the stage has the size that it has room for.
+    tab.wait(
+        "document.getElementById('world').getBoundingClientRect().bottom <= \
+         document.getElementById('play').getBoundingClientRect().top",
+    );
+    for id in ["grid", "world", "verdict"] {
+        let bottom = tab.eval(&format!("document.getElementById('{id}').getBoundingClientRect().bottom"));
+        assert!((1.0..=800.0).contains(&bottom.as_f64().unwrap()), "{id} ends at {bottom}");
+    }
+    keep_picture("serve-editor.png", &tab.screenshot());
+}
+
+#[test]
+fn the_team_that_ships_reads_a_drawn_zero_and_a_drawn_one() {
+    let sandbox = Sandbox::new();
+    let Some(mut browser) = browser(&sandbox) else { return };
+    let server = Server::start(&sandbox, "");
+    let mut tab = quick(&mut browser, &server);
+    tab.click("#tab-team");
+    for (line, digit) in [(one(), "1"), (zero(), "0")] {
+        draw(&mut tab, &line);
+        tab.wait("document.querySelectorAll('#stages figure').length === 45");
+        at_end(&mut tab);
+        keep_picture("team-ten.png", &tab.screenshot());
+        assert_eq!(tab.text("#says"), digit);
+    }
+    assert_eq!(tab.complaints(), Vec::<String>::new());
+}
+
+#[test]
+fn a_team_walks_on_small_stages_and_its_votes_are_counted() {
+    let sandbox = Sandbox::tiny();
+    let Some(mut browser) = browser(&sandbox) else { return };
+    for (name, groups) in [("a", "[[0],[1]]"), ("b", "[[0],[2]]"), ("c", "[[1],[2]]")] {
+        let options =
+            format!("--set task.groups={groups} --set data.train_images= --set data.images_per_class=1");
+        let longer = "--set protocol.control_steps=200 --set generations=30";
+        sandbox.run(&format!("evolve -q -c tiny.toml {options} {longer} -o {name}")).ended(0, &[]);
+    }
+    let server = Server::start(&sandbox, "--archive a b c");
+    for (width, height, dark) in [(1280, 800, false), (390, 844, true)] {
+        let mut tab = browser.tab(width, height, dark);
+        open(&mut tab, &server);
+        as_fast_as_possible(&mut tab);
+        let alone = tab.text("#who");
+        // All three are called tiny, and have one seed.
+        let names = "new Set([...document.getElementById('archive').options].map((o) => o.textContent)).size";
+        assert_eq!(tab.eval(names), tab.eval("document.getElementById('archive').options.length"));
+        tab.click("#tab-team");
+        assert_eq!(tab.text("#who"), "The team");
+        draw(&mut tab, &zero());
+        tab.wait("document.querySelectorAll('#stages figure').length === 3");
+        at_end(&mut tab);
+        let votes =
+            "[...document.querySelectorAll('#tally span')].reduce((sum, cell) => sum + +cell.textContent, 0)";
+        let turned =
+            "document.querySelectorAll('#stages figure:is([data-way=left], [data-way=right])').length";
+        assert_eq!(tab.eval(votes), tab.eval(turned));
+        let says = tab.text("#says");
+        assert!(["0", "1", "2", "undecided"].contains(&says.as_str()), "{says}");
+        let spoken = tab.text("#spoken");
+        assert!(spoken.starts_with("The team sees your drawing. It says "), "{spoken}");
+        let fits = "document.documentElement.scrollWidth <= window.innerWidth";
+        assert_eq!(tab.eval(fits), true);
+        keep_picture(&format!("team-{width}.png"), &tab.screenshot());
+        // Back to a robot by itself.
+        tab.click("#tab-robots");
+        at_end(&mut tab);
+        assert_eq!(
+            (tab.text("#who"), tab.eval("document.getElementById('together').hidden")),
+            (alone, true.into())
+        );
+        assert_eq!(tab.complaints(), Vec::<String>::new());
+        tab.close();
+    }
+}
+
+#[test]
+fn a_simulation_ends_with_its_tab() {
+    let sandbox = Sandbox::new();
+    let Some(mut browser) = browser(&sandbox) else { return };
+    let server = Server::start(&sandbox, "");
+    let simulations = || -> Value {
+        let status: Value = serde_json::from_str(&server.get("/api/status").body).unwrap();
+        status["simulations"].clone()
+    };
+    let mut tab = browser.tab(800, 600, false);
+    open(&mut tab, &server);
+    tab.wait("document.getElementById('step').textContent.startsWith('step ')");
+    tab.eval("document.getElementById('play').click()");
+    assert_eq!(simulations(), 1);
+    tab.close();
+    let until = Instant::now() + Duration::from_secs(5);
+    while simulations() != 0 {
+        assert!(Instant::now() < until, "{} simulations", simulations());
+        std::thread::sleep(Duration::from_millis(30));
+    }
+}

@@ -1,0 +1,165 @@
+//! `simulate`: one body, one rollout, one trajectory.
+
+use crate::common::program::{Sandbox, said_of};
+use crate::common::reference::{Reference, golden};
+use std::time::Duration;
+
+/// A reference rollout as a scenario file, as it is, results and all.
+pub fn scenario(sandbox: &Sandbox, name: &str) -> Reference {
+    let text: serde_json::Value = golden(name);
+    sandbox.write("scenario.json", serde_json::to_string(&text).unwrap());
+    golden(name)
+}
+
+/// Reads a trajectory; numbers must name the f64 they were.
+fn rows(csv: &str) -> Vec<[f64; 2]> {
+    let mut lines = csv.lines();
+    assert_eq!(lines.next(), Some("step,com_x,com_y"));
+    let row = |(number, line): (usize, &str)| {
+        let fields: Vec<&str> = line.split(',').collect();
+        assert_eq!((fields.len(), fields[0]), (3, number.to_string().as_str()), "{line}");
+        let digits = |text: &str| text.chars().filter(char::is_ascii_digit).count();
+        assert!(fields[1..].iter().all(|text| digits(text) >= 17), "{line}");
+        [fields[1], fields[2]].map(|text| text.parse().unwrap())
+    };
+    lines.enumerate().map(row).collect()
+}
+
+fn agree(ours: &[[f64; 2]], theirs: &[[f64; 2]]) {
+    assert_eq!(ours.len(), theirs.len());
+    for (a, b) in ours.iter().zip(theirs) {
+        assert!((a[0] - b[0]).abs() < 1e-7 && (a[1] - b[1]).abs() < 1e-7, "{a:?} and {b:?}");
+    }
+}
+
+#[test]
+fn simulate_agrees_with_a_reference_trajectory() {
+    let sandbox = Sandbox::new();
+    let rollout = scenario(&sandbox, "disc_5x5_00");
+    let printed = sandbox.run("simulate scenario.json").ended(0, &[]);
+    assert!(printed.err.is_empty(), "{}", printed.err);
+    agree(&rows(&printed.out), &rollout.com);
+    let written = sandbox.run("simulate scenario.json --out traj.csv").ended(0, &[]);
+    assert!(written.out.is_empty());
+    assert_eq!(sandbox.read("traj.csv"), printed.out);
+}
+
+#[test]
+fn simulate_reads_standard_input_and_writes_every_point_and_pixel() {
+    let sandbox = Sandbox::new();
+    let scenario = "{\"body\": [[3, 6], [4, 0]], \"stimuli\": [[[0, 0.5], [0, 0]], [[1, 1], [1, 1]]], \
+     \"switch_every\": 3}";
+    let told =
+        |args: &str, input: &str| said_of(sandbox.command(args.split(' ')), input, Duration::from_secs(60));
+    let printed = told("simulate - --points", scenario).ended(0, &[]);
+    let table: Vec<Vec<&str>> = printed.out.lines().map(|line| line.split(',').collect()).collect();
+    let names = "step,com_x,com_y,x_0,y_0,x_1,y_1,x_2,y_2,x_3,y_3,x_4,y_4,x_5,y_5,x_6,y_6,x_7,y_7,\
+                 pixel_0_0,pixel_0_1,pixel_1_0,pixel_1_1";
+    assert_eq!((table[0].join(",").as_str(), table.len()), (names, 8));
+    for row in &table[1..] {
+        let numbers: Vec<f64> = row.iter().map(|text| text.parse().unwrap()).collect();
+        let mean = |axis: usize| (0..8).map(|point| numbers[3 + 2 * point + axis]).sum::<f64>() / 8.0;
+        assert!((mean(0) - numbers[1]).abs() < 1e-9 && (mean(1) - numbers[2]).abs() < 1e-9, "{row:?}");
+    }
+    let pixels: Vec<String> = table[1..].iter().map(|row| row[19..].join(" ")).collect();
+    assert_eq!(pixels, ["0 0 0 0", "0 0.5 0 0", "0 0.5 0 0", "0 0.5 0 0", "1 1 1 1", "1 1 1 1", "1 1 1 1"]);
+    // The centre is the same without them.
+    sandbox.write("s.json", scenario);
+    let plain = sandbox.run("simulate s.json").ended(0, &[]).out;
+    let centres = table.iter().map(|row| row[..3].join(",") + "\n").collect::<String>();
+    assert_eq!(plain, centres);
+    told("simulate -", "{\"body\": [[9]]}").ended(3, &["standard input", "body"]);
+}
+
+#[test]
+fn an_unstable_rollout_ends_with_4_after_its_rows_and_says_when() {
+    let sandbox = Sandbox::new();
+    let rollout = scenario(&sandbox, "unstable_comb");
+    let said = sandbox.run("simulate scenario.json").ended(4, &[]);
+    agree(&rows(&said.out), &rollout.com);
+    let last = said.err.lines().last().unwrap();
+    assert!(last.contains("unstable in control step 70"), "{last}");
+    sandbox.run("simulate scenario.json -o traj.csv").ended(4, &["control step 70"]);
+    assert_eq!(sandbox.read("traj.csv"), said.out);
+}
+
+#[test]
+fn contacts_without_offset_or_stiffness_blow_nothing_up() {
+    let sandbox = Sandbox::new();
+    for physics in
+        ["\"contact_offset\": 0", "\"contact_stiffness\": 0", "\"contact_damping\": 0, \"friction\": 0"]
+    {
+        let body = "[[3, 3, 6], [4, 2, 5]]";
+        sandbox.write(
+            "s.json",
+            format!("{{\"body\": {body}, \"control_steps\": 3, \"physics\": {{{physics}}}}}"),
+        );
+        sandbox.run("simulate s.json").ended(0, &[]);
+    }
+}
+
+#[test]
+fn simulate_switches_stimuli_and_resets_when_asked() {
+    let sandbox = Sandbox::new();
+    let run = |text: &str| {
+        sandbox.write("s.json", text);
+        rows(&sandbox.run("simulate s.json").ended(0, &[]).out)
+    };
+    let body = r#""body": [[6, 4, 5], [3, 0, 3]]"#;
+    let [a, b] = ["[[1, 0, 0.5], [0, 0, 0]]", "[[0, 1, 1], [0, 0, 0]]"];
+    let alone = |stimulus: &str| run(&format!("{{{body}, \"stimulus\": {stimulus}, \"control_steps\": 9}}"));
+    let fresh =
+        run(&format!("{{{body}, \"stimuli\": [{a}, {b}], \"switch_every\": 9, \"reset_between\": true}}"));
+    let (first, second) = (alone(a), alone(b));
+    assert_eq!((fresh.len(), &fresh[..10], &fresh[10..]), (19, &first[..], &second[1..]));
+    let continuous = run(&format!("{{{body}, \"stimuli\": [{a}, {b}], \"switch_every\": 9}}"));
+    assert_eq!(continuous[..10], first[..]);
+    assert_ne!(continuous[10..], fresh[10..]);
+    let moved = run(&format!("{{{body}, \"stimulus\": {a}, \"control_steps\": 9, \"start_column\": 499}}"));
+    assert!(
+        (moved[9][0] - first[9][0] - 0.6).abs() < 1e-9,
+        "start_column is a voxel's tenth of a world unit"
+    );
+}
+
+#[test]
+fn a_wrong_scenario_is_refused_with_file_line_and_key() {
+    let sandbox = Sandbox::new();
+    for (text, word) in [
+        ("", "s.json"),
+        ("{\n\"body\": [[3]],\n\"bodi\": 1}", "s.json:3"),
+        ("{\"body\": [[3], [3, 3]]}", "row 1"),
+        ("{\"body\": []}", "body"),
+        ("{\"body\": [[7]]}", "body"),
+        ("{\"body\": [[-1]]}", "body"),
+        ("{\"body\": [[3.5]]}", "body"),
+        ("{\"body\": [[0]]}", "body"),
+        ("{\"body\": [[3]], \"stimulus\": [[1e999]]}", "stimulus"),
+        ("{\"body\": [[3]], \"stimulus\": [[-0.1]]}", "stimulus"),
+        ("{\"body\": [[3]], \"stimulus\": [[null]]}", "stimulus"),
+        ("{\"body\": [[3]], \"stimulus\": [[1, 1]]}", "stimulus"),
+        ("{\"body\": [[3]], \"stimuli\": []}", "stimuli"),
+        ("{\"body\": [[3]], \"stimuli\": [[[1]]], \"switch_every\": 0}", "switch_every"),
+        ("{\"body\": [[3]], \"stimuli\": [[[1]]], \"stimulus\": [[1]], \"switch_every\": 1}", "stimuli"),
+        ("{\"body\": [[3]], \"switch_every\": 3}", "switch_every"),
+        ("{\"body\": [[3]], \"reset_between\": true}", "reset_between"),
+        ("{\"body\": [[3]], \"physics\": {\"servo_gain\": 0}}", "servo_gain"),
+        ("{\"body\": [[3]], \"control_steps\": -3}", "control_steps"),
+        ("{\"body\": [[3]], \"control_steps\": 1e3}", "control_steps"),
+        ("{\"body\": [[3]], \"start_column\": 9223372036854775807}", "start_column"),
+        ("{\"body\": [[3]], \"start_column\": -9223372036854775808}", "start_column"),
+        ("{\"body\": [[3]], \"start_row\": 1}", "start_row"),
+        ("{\"body\": [[3]], \"start_row\": -1}", "start_row"),
+        ("{\"body\": [[3]], \"physics\": {\"gravity\": \"x\"}}", "physics.gravity"),
+        ("{\"body\": [[3]], \"physics\": {\"mass\": 0}}", "physics.mass"),
+        ("{\"body\": [[3]], \"physics\": {\"peg_spacing\": 0}}", "physics.peg_spacing"),
+    ] {
+        sandbox.write("s.json", text);
+        let said = sandbox.run("simulate s.json").ended(3, &["s.json", word]);
+        assert!(said.out.is_empty(), "{text}");
+    }
+    sandbox.run("simulate nowhere.json").ended(3, &["nowhere.json"]);
+    let huge = vec![vec![1; 65]; 65];
+    sandbox.write("s.json", format!("{{\"body\": {huge:?}}}"));
+    sandbox.run("simulate s.json").ended(3, &["65", "64"]);
+}

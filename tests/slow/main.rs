@@ -1,0 +1,11 @@
+//! What takes long to prove: the same bits however a run is made, stops at any moment, hostile inputs.
+
+#[path = "../common/mod.rs"]
+mod common;
+
+mod hostile;
+mod keep;
+mod resume;
+mod savings;
+mod stop;
+mod threads;
