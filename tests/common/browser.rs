@@ -1,7 +1,7 @@
 //! A real browser without a window, driven over its debugging pipe: JSON messages that end with a
 //! zero byte.
 
-use super::program::Sandbox;
+use super::program::{Sandbox, skipped};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD as BASE64;
 use serde_json::{Value, json};
@@ -30,8 +30,17 @@ const FLAGS: [&str; 12] = [
     "--remote-debugging-pipe",
 ];
 
-/// Where a Chromium is; what `MORPHCOG_BROWSER` names, or one of the usual names on the path.
+/// Where a Chromium is; says that the test is skipped if there is none.
 pub fn found() -> Option<PathBuf> {
+    let found = named();
+    if found.is_none() {
+        skipped("no Chromium found (MORPHCOG_BROWSER may name one); a page is not tested");
+    }
+    found
+}
+
+/// What `MORPHCOG_BROWSER` names, or one of the usual names on the path.
+fn named() -> Option<PathBuf> {
     if let Some(named) = std::env::var_os("MORPHCOG_BROWSER").filter(|name| !name.is_empty()) {
         return Some(named.into());
     }

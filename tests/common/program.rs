@@ -3,7 +3,7 @@
 
 use morphcog::store::run::RunFile;
 use std::collections::BTreeMap;
-use std::ffi::OsStr;
+use std::ffi::{OsStr, OsString};
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
@@ -226,6 +226,20 @@ pub fn said_of(mut command: Command, input: &str, limit: Duration) -> Said {
     said
 }
 
+/// Says that a test was not made, past the harness, which keeps the output of passing tests to itself.
+pub fn skipped(why: &str) {
+    std::io::stderr().write_all(format!("SKIPPED: {why}\n").as_bytes()).unwrap();
+}
+
+/// The folder with MNIST that `MORPHCOG_DATA` names; says that `what` is not tested if it names none.
+pub fn mnist(what: &str) -> Option<OsString> {
+    let folder = std::env::var_os("MORPHCOG_DATA").filter(|folder| !folder.is_empty());
+    if folder.is_none() {
+        skipped(&format!("MORPHCOG_DATA does not name a folder with MNIST; not tested: {what}"));
+    }
+    folder
+}
+
 /// Asks a program that was started to end, as Slurm does.
 pub fn terminate(child: &Child) {
     let sent = Command::new("kill").args(["-s", "USR1", &child.id().to_string()]).status();
@@ -241,7 +255,7 @@ pub fn is_ignored(signal: u32) -> bool {
     let mask = ignored.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok()).unwrap_or(0);
     let is = mask >> (signal - 1) & 1 == 1;
     if is {
-        eprintln!("skipped: signal {signal} is ignored here");
+        skipped(&format!("signal {signal} is ignored here"));
     }
     is
 }

@@ -191,6 +191,7 @@ fn sources(folder: &Path) -> Vec<PathBuf> {
             _ => {}
         }
     }
+    assert!(!found.is_empty(), "{}", folder.display());
     found
 }
 

@@ -2,9 +2,9 @@
 //! real MNIST.
 #![allow(clippy::disallowed_methods)]
 
+use crate::common::program::mnist;
 use morphcog::data::dataset::{Dataset, Split};
-use morphcog::data::files::{Place, places};
-use std::io::Write;
+use morphcog::data::files::places;
 use std::path::Path;
 
 const SIDE: u32 = 28;
@@ -52,20 +52,10 @@ fn a_whole_set_is_read_as_the_mnist_crate_reads_it() {
     }
 }
 
-/// The folder with the real MNIST, or `None` and a word about it.
-fn real_mnist(test: &str) -> Option<Vec<Place>> {
-    let given = places(None, std::env::var_os("MORPHCOG_DATA"), None);
-    if given.is_empty() {
-        // Not by eprintln!, which the test harness keeps to itself when a test passes.
-        let mut stderr = std::io::stderr();
-        writeln!(stderr, "{test}: skipped: MORPHCOG_DATA does not name a folder with MNIST").unwrap();
-    }
-    (!given.is_empty()).then_some(given)
-}
-
 #[test]
 fn the_real_test_set_has_its_published_class_counts() {
-    let Some(given) = real_mnist("the_real_test_set_has_its_published_class_counts") else { return };
+    let Some(folder) = mnist("class counts of the real one") else { return };
+    let given = places(None, Some(folder), None);
     let data = Dataset::load("mnist", &given, &[Split::Test]).unwrap();
     let counts: Vec<usize> = (0..10).map(|class| data.indices_of(Split::Test, class).len()).collect();
     assert_eq!(counts, [980, 1135, 1032, 1010, 982, 892, 958, 1028, 974, 1009]);
@@ -74,9 +64,8 @@ fn the_real_test_set_has_its_published_class_counts() {
 
 #[test]
 fn the_papers_training_images_are_a_zero_a_one_a_two_and_a_three() {
-    let Some(given) = real_mnist("the_papers_training_images_are_a_zero_a_one_a_two_and_a_three") else {
-        return;
-    };
+    let Some(folder) = mnist("the paper's training images") else { return };
+    let given = places(None, Some(folder), None);
     let data = Dataset::load("mnist", &given, &[Split::Train]).unwrap();
     let labels = [1, 3, 5, 7].map(|index| data.label(Split::Train, index).unwrap());
     assert_eq!(labels, [0, 1, 2, 3]);

@@ -1,16 +1,14 @@
-//! Same numbers: no bit of a simulation or of a run changes unnoticed.
+//! Same numbers: no bit of a simulation changes unnoticed. (Of runs: `tests/slow/pinned_runs.rs`.)
 //!
 //! Where one of these fails and the change is meant, the changelog says so under
 //! "Reproducibility-breaking", and the new hashes, which the failure shows, take the places of the
 //! old ones.
 
-use crate::common::program::{Sandbox, TINY, gaits};
 use crate::common::reference::{Reference, references, sensitive};
 use morphcog::base::hash::sha256_hex;
 use morphcog::sim::{Physics, World};
 use rayon::prelude::*;
 use serde_json::{Map, Value};
-use std::fmt::Write;
 
 /// SHA-256 over the bits of x and y of all points before the first control step and after each, in
 /// little endian.
@@ -37,11 +35,6 @@ const SIMULATIONS: [(&str, &str); 21] = [
     ("sensitive_comb_12x14", "9e8f67661415046e739e557c06d4ed0197c44648a6897da654dda6eff43c206a"),
     ("sensitive_f7ecf1b51e", "171e0303da5f0a00f48aeebeeb20e921e1a6f6b78394f353eabb9e8f05d1b712"),
 ];
-
-/// SHA-256 over the elites' cells, the first ten digits of their genomes' digests, and the bits of
-/// objectives and displacements.
-const SEQUENTIAL_RUN: &str = "38e9052e5c9f95a3bd20ccd9b52f8b46c803f55a0e0a28dce0adb9538d2ce672";
-const GAITS_RUN: &str = "2294ed6c40f0ef8f35ebfec24a0262a478108f67c2c9dd1aaea820fb75aa856c";
 
 /// The bits of all points before the first control step and after each, until the simulation
 /// becomes unstable.
@@ -117,34 +110,4 @@ fn the_golden_simulations_feel_the_least_change_of_every_constant_or_its_bits_ar
     let of_others = names.into_par_iter().filter(|name| UNFELT.iter().all(|(unfelt, _)| unfelt != name));
     let unfelt: Vec<&String> = of_others.filter(|name| !felt(name)).collect();
     assert!(unfelt.is_empty(), "no golden simulation feels {unfelt:?}: pin the bits of their defaults");
-}
-
-/// A hash of what evolved under a config.
-fn hash_of_run(config: &str) -> String {
-    let sandbox = Sandbox::new();
-    sandbox.write("run.toml", config);
-    sandbox.run("evolve -q -c run.toml -o out").ended(0, &[]);
-    let elites = sandbox.run_file("out").elites;
-    assert!(elites.len() >= 4, "{}", elites.len());
-    let mut text = String::new();
-    for elite in &elites {
-        let displacements: Vec<u64> = elite.displacements.iter().map(|d| d.to_bits()).collect();
-        let objective = elite.objective.to_bits();
-        let digest = &elite.genome.digest()[..10];
-        writeln!(text, "{:?} {digest} {objective:016x} {displacements:016x?}", elite.cell).unwrap();
-    }
-    sha256_hex(text.as_bytes())
-}
-
-#[test]
-fn a_run_by_the_paper_s_protocol_has_the_same_elites_bit_for_bit() {
-    let ours = "rollout = \"fresh\"\ncontrol_steps = 20";
-    let paper = "rollout = \"sequential\"\ncontrol_steps = 500";
-    assert!(TINY.contains(ours));
-    assert_eq!(hash_of_run(&TINY.replace(ours, paper)), SEQUENTIAL_RUN, "see the beginning of this file");
-}
-
-#[test]
-fn a_run_for_gaits_has_the_same_elites_bit_for_bit() {
-    assert_eq!(hash_of_run(&gaits()), GAITS_RUN, "see the beginning of this file");
 }

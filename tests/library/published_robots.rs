@@ -1,6 +1,7 @@
 //! Faithful: the robots that the paper's authors published walk as published.
 #![allow(clippy::disallowed_methods)]
 
+use crate::common::program::{Sandbox, mnist, said};
 use crate::common::reference::golden;
 use morphcog::analysis::gallery;
 use morphcog::base::Grid;
@@ -31,19 +32,8 @@ struct Published {
 /// The training images of the published runs: one of each of 0, 1, 2, 3.
 const IMAGES: [usize; 4] = [1, 3, 5, 7];
 
-/// Says so past the harness, which keeps the output of passing tests to itself.
-fn skipped() -> bool {
-    let skipped = std::env::var_os("MORPHCOG_DATA").is_none_or(|value| value.is_empty());
-    if skipped {
-        use std::io::Write;
-        let text = "SKIPPED: MORPHCOG_DATA does not name a folder with MNIST; published robots not tested\n";
-        std::io::stderr().write_all(text.as_bytes()).unwrap();
-    }
-    skipped
-}
-
-fn stimuli() -> Vec<Grid<f64>> {
-    let given = places(None, std::env::var_os("MORPHCOG_DATA"), None);
+fn stimuli() -> Option<Vec<Grid<f64>>> {
+    let given = places(None, Some(mnist("published robots")?), None);
     let mnist = Dataset::load("mnist", &given, &[Split::Train]).unwrap();
     let saturated = StimulusParams {
         reduction: Reduction::Stride,
@@ -54,7 +44,7 @@ fn stimuli() -> Vec<Grid<f64>> {
         assert_eq!(usize::from(mnist.label(Split::Train, index).unwrap()), digit);
         stimulus(&mnist.image(Split::Train, index).unwrap(), 14, 14, &saturated).unwrap()
     };
-    IMAGES.iter().enumerate().map(see).collect()
+    Some(IMAGES.iter().enumerate().map(see).collect())
 }
 
 /// Displacements under the protocol of the robot's task.
@@ -79,10 +69,8 @@ fn displacements(robot: &Published, stimuli: &[Grid<f64>], physics: &Physics) ->
 
 #[test]
 fn every_published_robot_walks_as_evogym_has_it_walk() {
-    if skipped() {
-        return;
-    }
-    let (physics, stimuli) = (Physics::default(), stimuli());
+    let Some(stimuli) = stimuli() else { return };
+    let physics = Physics::default();
     let robots: BTreeMap<String, Published> = golden("published_robots");
     assert!(robots.len() >= 5 && robots.contains_key("XFJPI"));
     let mut wrong = Vec::new();
@@ -105,12 +93,10 @@ fn every_published_robot_walks_as_evogym_has_it_walk() {
 
 #[test]
 fn the_robot_that_starts_clear_of_the_ground_has_its_published_fitness_to_a_millionth() {
-    if skipped() {
-        return;
-    }
+    let Some(stimuli) = stimuli() else { return };
     let robots: BTreeMap<String, Published> = golden("published_robots");
     let robot = &robots["XFJPI"];
-    let walked = displacements(robot, &stimuli(), &Physics::default());
+    let walked = displacements(robot, &stimuli, &Physics::default());
     let fitness = two_group_fitness(&[(A, walked[0]), (B, walked[1])]);
     println!("XFJPI: {fitness}");
     assert!((fitness - 17.316384958834874).abs() < 1e-6, "{fitness}");
@@ -120,7 +106,9 @@ fn the_robot_that_starts_clear_of_the_ground_has_its_published_fitness_to_a_mill
 #[test]
 fn the_built_in_gallery_holds_these_very_robots() {
     let robots: BTreeMap<String, Published> = golden("published_robots");
-    for shipped in gallery::gallery().unwrap() {
+    let gallery = gallery::gallery().unwrap();
+    assert_eq!(gallery.len(), 5);
+    for shipped in gallery {
         let published = &robots[&shipped.name];
         assert_eq!((&shipped.body, shipped.fitness), (&published.body, published.published_fitness));
         assert_eq!(published.task, "zero_one");
@@ -134,16 +122,13 @@ fn the_built_in_gallery_holds_these_very_robots() {
 
 #[test]
 fn the_published_robots_answer_test_images() {
-    if skipped() {
-        return;
-    }
-    let sandbox = crate::common::program::Sandbox::new();
-    let data = std::env::var("MORPHCOG_DATA").unwrap();
+    let Some(data) = mnist("published robots") else { return };
+    let sandbox = Sandbox::new();
     let data = std::fs::canonicalize(data).unwrap();
     let args = ["eval", "-q", "--robots", "qmaxd,YJTLA", "--images", "40", "--data"];
     let mut command = sandbox.command(args);
     command.arg(data);
-    crate::common::program::said(command).ended(0, &[]);
+    said(command).ended(0, &[]);
     let report = EvalFile::read(&sandbox.path("gallery-eval.json")).unwrap();
     let names: Vec<&str> = report.robots.iter().map(|robot| robot.id.as_str()).collect();
     assert_eq!(names, ["QMAXD", "YJTLA"]);

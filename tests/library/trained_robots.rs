@@ -2,7 +2,7 @@
 //! what the documentation says of them.
 #![allow(clippy::disallowed_methods)]
 
-use crate::common::program::{Sandbox, said};
+use crate::common::program::{self, Sandbox, said};
 use morphcog::base::Grid;
 use morphcog::base::stop::NEVER;
 use morphcog::body::Body;
@@ -53,16 +53,10 @@ fn every_trained_robot_is_physical_and_was_tested_on_1000_images() {
     }
 }
 
-/// MNIST if it is there; says so past the harness, which keeps the output of passing tests to itself,
-/// if not.
+/// MNIST if it is there.
 fn mnist() -> Option<Dataset> {
-    let data = std::env::var_os("MORPHCOG_DATA").filter(|value| !value.is_empty());
-    if data.is_none() {
-        use std::io::Write;
-        let text = "SKIPPED: MORPHCOG_DATA does not name a folder with MNIST; trained robots not tested\n";
-        std::io::stderr().write_all(text.as_bytes()).unwrap();
-    }
-    Some(Dataset::load("mnist", &places(None, Some(data?), None), &Split::ALL).unwrap())
+    let data = program::mnist("trained robots")?;
+    Some(Dataset::load("mnist", &places(None, Some(data), None), &Split::ALL).unwrap())
 }
 
 /// How the robot of a run walks under test images, ten cycles each; none where it is unstable.
@@ -102,7 +96,7 @@ fn they_walk_to_the_bit_as_in_their_test() {
 
 #[test]
 fn the_baselines_beside_them_are_those_that_eval_finds_today() {
-    let Some(data) = std::env::var_os("MORPHCOG_DATA").filter(|_| mnist().is_some()) else { return };
+    let Some(data) = program::mnist("the baselines of trained robots") else { return };
     // One of them: the rule is the same for all.
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("data/four_digit/2v013");
     let sandbox = Sandbox::new();

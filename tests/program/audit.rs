@@ -58,7 +58,9 @@ fn verdicts_are_the_same_bytes_on_any_number_of_threads_and_however_often_it_was
     sandbox.run(other).ended(3, &["run/audit.json", "other criteria", "--out"]);
     std::fs::remove_file(sandbox.path("run/audit.json")).unwrap();
     sandbox.run(other).ended(0, &[]);
-    assert!(verdicts(&sandbox).robots.iter().all(|robot| robot.verdict == Verdict::NotAWalker));
+    let robots = verdicts(&sandbox).robots;
+    assert_eq!(robots.len(), run.elites.len());
+    assert!(robots.iter().all(|robot| robot.verdict == Verdict::NotAWalker));
 }
 
 #[test]

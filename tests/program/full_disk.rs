@@ -41,11 +41,8 @@ fn an_evaluation_that_cannot_be_written_is_shown() {
     let before = files(&sandbox.path("run"));
     let eval = "eval --archive run/run.json --images 4 --cycles 1 --robots top:2";
     let said = said_why(without_room(&sandbox, 0, eval), "run/eval.csv");
-    if let Some(elite) =
-        sandbox.run_file("run").elites.iter().max_by(|a, b| a.objective.total_cmp(&b.objective))
-    {
-        assert!(said.out.contains(&elite.id), "{}", said.out);
-    }
+    let run = sandbox.run_file("run");
+    assert!(said.out.contains(&run.best().unwrap().id), "{}", said.out);
     assert!(said.out.contains("mean accuracy %") && said.err.contains("ulimit -f"), "{said:#?}");
     assert_eq!(files(&sandbox.path("run")), before, "nothing half-written is left");
     let json = without_room(&sandbox, 0, &format!("{eval} --json"));

@@ -1,8 +1,8 @@
-//! `fitness = "response"`: the body's probe is measured with random images, the run is the same
-//! bits however it is run, and what reads a run reads this one.
+//! `fitness = "response"`: the body's probe is measured with random images, and what reads a
+//! run reads this one.
 #![allow(clippy::disallowed_methods)]
 
-use crate::common::program::{Sandbox, TINY, without_seconds};
+use crate::common::program::{Sandbox, TINY};
 use morphcog::body::{Body, Material};
 use morphcog::config::Config;
 use morphcog::search::training::Training;
@@ -22,15 +22,15 @@ fn sandbox() -> Sandbox {
     sandbox
 }
 
-fn evolve(sandbox: &Sandbox, out: &str, more: &str) -> RunFile {
-    sandbox.run(&format!("evolve -q -c response.toml -o {out} {more}")).ended(0, &[]);
-    sandbox.run_file(out)
+fn evolve(sandbox: &Sandbox) -> RunFile {
+    sandbox.run("evolve -q -c response.toml -o run").ended(0, &[]);
+    sandbox.run_file("run")
 }
 
 #[test]
 fn a_robot_is_as_fit_as_opposite_images_move_its_probe_apart() {
     let sandbox = sandbox();
-    let run = evolve(&sandbox, "run", "");
+    let run = evolve(&sandbox);
     let training = Training::load(&run.config, None::<&Path>).unwrap();
     let mut moved = 0;
     for robot in &run.elites {
@@ -68,29 +68,9 @@ fn a_robot_is_as_fit_as_opposite_images_move_its_probe_apart() {
 }
 
 #[test]
-fn it_is_the_same_on_threads_without_savings_and_resumed() {
-    let sandbox = sandbox();
-    let read = |out: &str| {
-        (
-            sandbox.read(&format!("{out}/run.json")),
-            without_seconds(&sandbox.read(&format!("{out}/metrics.csv"))),
-        )
-    };
-    let run = evolve(&sandbox, "one", "--threads 1");
-    evolve(&sandbox, "two", "--threads 2");
-    assert_eq!(read("two"), read("one"));
-    let off =
-        "--set savings.early_stop=false --set savings.known_bodies=false --set savings.shared_rollouts=false";
-    assert_eq!(evolve(&sandbox, "slow", off).elites, run.elites);
-    evolve(&sandbox, "again", "--generations 5 --threads 2");
-    evolve(&sandbox, "again", "--generations 12 --resume");
-    assert_eq!(read("again"), read("one"));
-}
-
-#[test]
 fn what_reads_a_run_reads_this_one() {
     let sandbox = sandbox();
-    let run = evolve(&sandbox, "run", "");
+    let run = evolve(&sandbox);
     let best = &run.best().unwrap().id;
     for command in ["eval", "audit"] {
         sandbox.run(&format!("{command} -a run/run.json")).ended(3, &["these are gaits", "morphcog train"]);

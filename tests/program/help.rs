@@ -1,6 +1,6 @@
 //! Help, command lines, completions and the man page.
 
-use crate::common::program::{Sandbox, TINY};
+use crate::common::program::{Sandbox, TINY, skipped};
 use morphcog::commands::plan::PAPER_TOML;
 use morphcog::commands::schema;
 use morphcog::config::BUILT_IN;
@@ -139,12 +139,16 @@ fn the_man_page_renders() {
     let page = Sandbox::new().run("man").ended(0, &[]).out;
     assert!(page.contains(".TH morphcog 1") && page.contains(".SH NAME"), "{page}");
     assert!(page.contains("evolve") && page.contains("Exit codes"));
-    // Where there is a man, it must understand it.
+    // Where there is a man, it understands it.
     let sandbox = Sandbox::new();
     let file = sandbox.write("morphcog.1", &page);
-    if let Ok(shown) = std::process::Command::new("man").arg("-l").arg(file).env("MANPAGER", "cat").output() {
-        let text = String::from_utf8_lossy(&shown.stdout).into_owned();
-        assert!(!shown.status.success() || text.is_empty() || text.contains("morphcog"), "{text}");
+    let mut man = std::process::Command::new("man");
+    match man.arg("-l").arg(file).env("MANPAGER", "cat").output() {
+        Ok(shown) if shown.status.success() && !shown.stdout.is_empty() => {
+            let text = String::from_utf8_lossy(&shown.stdout).into_owned();
+            assert!(text.contains("morphcog"), "{text}");
+        }
+        _ => skipped("no man that reads a file; the page is not shown"),
     }
 }
 

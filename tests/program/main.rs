@@ -11,6 +11,7 @@ mod eval;
 mod full_disk;
 mod gaits;
 mod help;
+mod no_threads;
 mod output;
 mod plot;
 mod replay;

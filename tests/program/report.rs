@@ -28,6 +28,7 @@ fn every_elite_can_be_played_and_nothing_is_loaded() {
     }
     let run = sandbox.run_file("runs/3");
     let rollouts = between(&page, "data-rollout=\"", "\"");
+    assert!(!run.elites.is_empty());
     for elite in &run.elites {
         let id = format!("rollout-0-{}", elite.id);
         assert!(rollouts.contains(&id.as_str()) && page.contains(&format!("id=\"{id}\"")), "{id}");

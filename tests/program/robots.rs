@@ -117,14 +117,12 @@ fn robots_are_found_by_unique_beginnings_of_their_ids_only() {
     let eval = |robots: &str| sandbox.run(&format!("eval -a run/run.json -n 2 --cycles 1 --robots {robots}"));
     assert!(eval(unique).ended(0, &[]).out.contains(id));
     eval(&format!("{unique},zzz")).ended(3, &["zzz"]);
-    // With more than sixteen robots two ids must begin alike.
+    // Of more than sixteen robots two ids begin alike.
     let twice = ids.iter().find_map(|id| {
         let begin = &id[..1];
         (ids.iter().filter(|other| other.starts_with(begin)).count() > 1).then_some(begin)
     });
-    if let Some(begin) = twice {
-        eval(begin).ended(3, &["begin with", "hint:", "more digits"]);
-    }
+    eval(twice.expect("more than sixteen robots")).ended(3, &["begin with", "hint:", "more digits"]);
 }
 
 #[test]

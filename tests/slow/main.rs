@@ -4,8 +4,6 @@
 mod common;
 
 mod hostile;
-mod keep;
+mod pinned_runs;
 mod resume;
-mod savings;
 mod stop;
-mod threads;
