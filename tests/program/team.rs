@@ -155,7 +155,7 @@ fn eval_shows_robots_of_several_tasks_the_same_images_if_these_split_the_same_cl
     let tasks: Vec<&str> = together.means.keys().map(String::as_str).collect();
     assert_eq!(tasks, ["0|14", "1|04", "4|01"]);
     for (file, run) in [(&zero, 0), (&four, 1), (&all, 2)] {
-        assert_eq!(file.robots.len(), 1);
+        assert!(!file.robots.is_empty());
         for alone in &file.robots {
             let same = together.robots.iter().find(|robot| robot.run == run && robot.id == alone.id);
             let same = same.unwrap_or_else(|| panic!("{}: not tested", alone.id));
