@@ -30,7 +30,7 @@ use crate::config;
 use crate::config::Config;
 use crate::data::catalogue::Catalogue;
 use crate::data::dataset::{BUILTIN, Dataset, DatasetError, Split};
-use crate::data::fetch::{FetchError, FetchOptions, fetch};
+use crate::data::fetch::{FetchError, FetchOptions, Program, fetch};
 use crate::data::files::{FilesError, places};
 use crate::search::evolve;
 use crate::sim::{FloatEnvironment, InstructionSet};
@@ -360,18 +360,24 @@ fn run_data(command: DataCommand, console: &Console) -> Result<(), Error> {
         DataCommand::Fetch { dataset, to, mirror, force } => {
             let catalogue = Catalogue::named(&dataset).map_err(|error| Error::usage(error.to_string()))?;
             let options = FetchOptions { to, mirror, force };
-            let fetched = fetch(&catalogue, &options, &Reporter::new(console));
+            let stop = signals::stop_flag()?;
+            let fetched = fetch(&catalogue, &options, &Program::ALL, &stop, &Reporter::new(console));
             let failed = |error: FetchError| {
                 match &error {
                 FetchError::Disk { path, source } if error::is_full(source) => Error::writing(path, source),
-                FetchError::Mirrors { .. } => Error::other(error.to_string()).hint(
+                FetchError::Mirrors { .. } | FetchError::NoProgram { .. } => Error::other(error.to_string()).hint(
                     "if you have the files, name their folder with --data; the digits that the program draws \
                      need none (dataset builtin)"
                         .to_string(),
                 ),
-                _ => Error::other(error.to_string()),
+                FetchError::Stopped(_) => Error::stopped(error.to_string()),
+                FetchError::Differs { .. } | FetchError::Disk { .. } => Error::other(error.to_string()),
             }
             };
+            if matches!(fetched, Err(FetchError::Stopped(_))) {
+                // Whole files stay, and there is nothing else to save.
+                stop.end_process();
+            }
             summary::fetched(console, &fetched.map_err(failed)?);
         }
         DataCommand::Info(DatasetArgs { dataset, data, transpose }) => {

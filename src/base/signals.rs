@@ -5,7 +5,7 @@ use crate::base::error::Error;
 use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::flag;
 use std::ops::Deref;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, OnceLock};
 
 /// Exit code after a second SIGINT: the shell's for a process that SIGINT ended.
@@ -18,8 +18,22 @@ static UNUSED: OnceLock<Arc<AtomicBool>> = OnceLock::new();
 #[derive(Debug)]
 pub struct StopFlag {
     stop: Arc<AtomicBool>,
+    /// The signal that set it last.
+    signal: Arc<AtomicUsize>,
     /// Whether another flag watched signals before.
     were_unused: bool,
+}
+
+impl StopFlag {
+    /// Ends the process by the signal that set the flag, as is usual; nothing if none did.
+    pub fn end_process(self) {
+        let signal = self.signal.load(Ordering::Relaxed);
+        drop(self);
+        if let Some(signal) = i32::try_from(signal).ok().filter(|signal| *signal > 0) {
+            // It was watched a moment ago: it can be sent.
+            let _ = signal_hook::low_level::raise(signal);
+        }
+    }
 }
 
 impl Deref for StopFlag {
@@ -69,11 +83,14 @@ pub fn stop_flag() -> Result<StopFlag, Error> {
     let interrupted = Arc::new(AtomicBool::new(false));
     flag::register_conditional_shutdown(SIGINT, AT_ONCE, Arc::clone(&interrupted)).map_err(failed)?;
     flag::register(SIGINT, interrupted).map_err(failed)?;
+    let by = Arc::new(AtomicUsize::new(0));
     for signal in signals {
+        let number = usize::try_from(signal).expect("signals are positive");
+        flag::register_usize(signal, Arc::clone(&by), number).map_err(failed)?;
         flag::register(signal, Arc::clone(&stop)).map_err(failed)?;
     }
     let were_unused = unused.swap(false, Ordering::Relaxed);
-    Ok(StopFlag { stop, were_unused })
+    Ok(StopFlag { stop, signal: by, were_unused })
 }
 
 /// The signals that ask a command to stop.

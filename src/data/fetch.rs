@@ -1,16 +1,77 @@
 //! `morphcog data fetch`: downloads the files of a dataset and lets none in that is not the
-//! published one.
+//! published one. A program of the system downloads them, curl or wget: it knows the user's proxies
+//! and certificates, and what it brings is checked in any case.
 
 use crate::base::files::{read_bytes, write_atomically};
 use crate::base::hash::sha256_hex;
 use crate::base::observer::{Observer, Work};
+use crate::base::stop::{self, Stopped};
 use crate::data::catalogue::{Catalogue, RemoteFile};
 use crate::data::files::default_folder;
 use crate::data::idx;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
-use std::time::Duration;
-use ureq::Agent;
+use std::process::{Child, Command, Stdio};
+use std::sync::atomic::AtomicBool;
+use std::sync::mpsc::{self, Receiver, RecvTimeoutError};
+use std::time::{Duration, Instant};
+
+/// Longest time for one file.
+const LONGEST: Duration = Duration::from_secs(1800);
+
+/// How often a download looks whether to stop.
+const LOOK: Duration = Duration::from_millis(50);
+
+/// Most bytes that are read of what a program says about its failure.
+const MOST_SAID: u64 = 1 << 14;
+
+/// A program that downloads.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Program {
+    /// Part of macOS, of Windows and of most Linux systems.
+    Curl,
+    /// Part of many Linux systems.
+    Wget,
+}
+
+impl Program {
+    /// All of them, the preferred one first.
+    pub const ALL: [Program; 2] = [Program::Curl, Program::Wget];
+
+    /// Its name as a command.
+    pub fn name(self) -> &'static str {
+        match self {
+            Program::Curl => "curl",
+            Program::Wget => "wget",
+        }
+    }
+
+    /// Whether it is on the PATH.
+    pub fn is_installed(self) -> bool {
+        let mut command = Command::new(self.name());
+        command.arg("--version").stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
+        command.status().is_ok()
+    }
+
+    /// The command that writes a file to its standard output. Its limits are for a slow line, not for
+    /// patience: it gives up a mirror that is dead or says nothing.
+    fn command(self, url: &str) -> Command {
+        let agent = concat!("morphcog/", env!("CARGO_PKG_VERSION"));
+        let mut command = Command::new(self.name());
+        match self {
+            // -q comes first: a user's .curlrc may turn anything into something else.
+            Program::Curl => command
+                .args(["-q", "--silent", "--show-error", "--fail", "--location", "--globoff"])
+                .args(["--proto", "=http,https", "--proto-redir", "=http,https", "--max-redirs", "10"])
+                .args(["--connect-timeout", "15", "--speed-limit", "1", "--speed-time", "30"])
+                .args(["--user-agent", agent, "--url", url]),
+            // In their short forms, options are the same in all programs of this name.
+            Program::Wget => command.args(["-nv", "-O", "-", "-t", "1", "-T", "20", "-U", agent, "--", url]),
+        };
+        command.env("LC_ALL", "C").stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
+        command
+    }
+}
 
 /// What the user may choose about a download.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -26,12 +87,17 @@ pub struct FetchOptions {
 /// Why one attempt to download a file failed.
 #[derive(Debug, thiserror::Error)]
 pub enum AttemptError {
-    /// No (good) answer: address, connection, status, time.
-    #[error("{0}")]
-    Http(Box<ureq::Error>),
-    /// The connection broke off while reading.
-    #[error("{0}")]
-    Read(io::Error),
+    /// No (good) answer, or the connection broke off: what the program says.
+    #[error("{}: {text}", program.name())]
+    Failed {
+        /// The program.
+        program: Program,
+        /// One line of it.
+        text: String,
+    },
+    /// The address is not one of the web.
+    #[error("expected an address that begins with http:// or https://")]
+    Address,
     /// More or fewer bytes than the published file has; at most one byte more is read.
     #[error("expected {expected} bytes, found {}",
         if found > expected { "more".to_string() } else { found.to_string() })]
@@ -112,6 +178,20 @@ pub enum FetchError {
         /// What was tried, in order.
         attempts: Vec<Attempt>,
     },
+    /// No program that downloads is installed.
+    #[error(
+        "neither curl nor wget, which download files, is on the PATH: install one of them, or put these files \
+         into {} yourself: {}", folder.display(), urls.join(", ")
+    )]
+    NoProgram {
+        /// Where the files should have gone.
+        folder: PathBuf,
+        /// Their addresses.
+        urls: Vec<String>,
+    },
+    /// Stopped.
+    #[error(transparent)]
+    Stopped(#[from] Stopped),
 }
 
 /// How a file came to be there.
@@ -134,14 +214,16 @@ pub struct Fetched {
 
 /// Brings all files of a dataset to disk. Each is checked against its published size and SHA-256
 /// before anything is written, and then written atomically; files that are there and right, however
-/// they are packed, are kept.
+/// they are packed, are kept. Of these programs the first that is installed downloads.
 ///
 /// # Errors
 /// [`FetchError`]. If any file that is there differs from the published one (and `force` is off),
-/// nothing is done. No empty folder is left.
+/// nothing is done. No empty folder is left, nor a process.
 pub fn fetch(
     catalogue: &Catalogue,
     options: &FetchOptions,
+    programs: &[Program],
+    stop: &AtomicBool,
     observer: &dyn Observer,
 ) -> Result<Vec<Fetched>, FetchError> {
     let folder = options.to.clone().unwrap_or_else(|| default_folder(&catalogue.name));
@@ -150,13 +232,20 @@ pub fn fetch(
     for remote in &catalogue.files {
         kept.push(if options.force { None } else { found(&folder, remote)? });
     }
+    let missing = catalogue.files.iter().zip(&kept).filter(|(_, kept)| kept.is_none());
+    let missing: Vec<&RemoteFile> = missing.map(|(remote, _)| remote).collect();
+    let program = programs.iter().copied().find(|program| !missing.is_empty() && program.is_installed());
+    if program.is_none() && !missing.is_empty() {
+        let of_first = |remote: &&RemoteFile| mirrors.first().map(|mirror| address(mirror, remote));
+        return Err(FetchError::NoProgram { folder, urls: missing.iter().filter_map(of_first).collect() });
+    }
     let is_new = |folder: &&Path| !folder.as_os_str().is_empty() && !folder.exists();
     let made: Vec<PathBuf> = folder.ancestors().take_while(is_new).map(Path::to_path_buf).collect();
     let disk = |path: &Path, source| FetchError::Disk { path: path.to_path_buf(), source };
     std::fs::create_dir_all(&folder).map_err(|source| disk(&folder, source))?;
-    let agent = agent();
     let bring = |remote: &RemoteFile| -> Result<Fetched, FetchError> {
-        let (url, bytes) = from_any(&agent, mirrors, remote, observer).map_err(|attempts| {
+        let program = program.expect("without one, nothing is missing");
+        let (url, bytes) = from_any(program, mirrors, remote, stop, observer)?.map_err(|attempts| {
             FetchError::Mirrors { file: remote.name.clone(), folder: folder.clone(), attempts }
         })?;
         let file = folder.join(&remote.name);
@@ -208,76 +297,136 @@ fn found(folder: &Path, remote: &RemoteFile) -> Result<Option<PathBuf>, FetchErr
     Ok(right)
 }
 
-/// The client. Limits are for a slow line, not for patience: a mirror that is dead is given up in
-/// 15 s.
-fn agent() -> Agent {
-    let seconds = |s| Some(Duration::from_secs(s));
-    Agent::config_builder()
-        // None for names: they would be resolved in a thread that the client takes for granted. The
-        // system's resolver has limits of its own.
-        .timeout_connect(seconds(15))
-        .timeout_recv_response(seconds(30))
-        .timeout_per_read(seconds(30))
-        .timeout_recv_body(seconds(1800))
-        // The files are gzip files; a server must not pack them once more, nor the client unpack
-        // them.
-        .accept_encoding("identity")
-        .user_agent(concat!("morphcog/", env!("CARGO_PKG_VERSION")))
-        .build()
-        .new_agent()
+/// The address of a file on a mirror.
+fn address(mirror: &str, remote: &RemoteFile) -> String {
+    format!("{}/{}", mirror.trim_end_matches('/'), remote.name)
 }
 
-/// The file from the first mirror that has it right, and its address there.
+/// An address and what is there, or what was tried.
+type Downloaded = Result<(String, Vec<u8>), Vec<Attempt>>;
+
+/// The file from the first mirror that has it right, and its address there; otherwise what was tried.
 fn from_any(
-    agent: &Agent,
+    program: Program,
     mirrors: &[String],
     remote: &RemoteFile,
+    stop: &AtomicBool,
     observer: &dyn Observer,
-) -> Result<(String, Vec<u8>), Vec<Attempt>> {
+) -> Result<Downloaded, Stopped> {
     let mut attempts = Vec::new();
     for mirror in mirrors {
-        let url = format!("{}/{}", mirror.trim_end_matches('/'), remote.name);
+        let url = address(mirror, remote);
         observer.begins(&Work::new(remote.name.clone(), remote.bytes, "bytes"));
-        match download(agent, &url, remote, observer) {
+        let downloaded = download(program, &url, remote, stop, observer);
+        // A signal from the keyboard ends the program, too.
+        stop::check(stop)?;
+        match downloaded {
             Ok(bytes) => {
                 if !attempts.is_empty() {
                     observer.warning(&format!("{}: {}", remote.name, tried(&attempts)));
                 }
-                return Ok((url, bytes));
+                return Ok(Ok((url, bytes)));
             }
             Err(error) => attempts.push(Attempt { url, error }),
         }
     }
-    Err(attempts)
+    Ok(Err(attempts))
 }
 
+/// A process that is ended when this goes.
+struct Running(Child);
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        // One that has ended cannot be ended; neither can be helped.
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+/// What a program brings. If it is to stop before its end, it brings less, and its failure is told.
 fn download(
-    agent: &Agent,
+    program: Program,
     url: &str,
     remote: &RemoteFile,
+    stop: &AtomicBool,
     observer: &dyn Observer,
 ) -> Result<Vec<u8>, AttemptError> {
-    let response = agent.get(url).call().map_err(|e| AttemptError::Http(Box::new(e)))?;
+    let scheme = url.split("://").next().unwrap_or_default().to_ascii_lowercase();
+    if !["http", "https"].contains(&scheme.as_str()) {
+        return Err(AttemptError::Address);
+    }
+    let failed = |text: String| AttemptError::Failed { program, text };
+    let io = |error: io::Error| failed(error.to_string());
+    let mut running = Running(program.command(url).spawn().map_err(io)?);
+    let output = running.0.stdout.take().expect("piped");
     // One byte more than expected is enough to know that it is too long.
-    let mut body = response.into_body().into_reader().take(remote.bytes + 1);
+    let pieces = pieces(output.take(remote.bytes + 1)).map_err(io)?;
     let mut bytes = Vec::new();
-    let mut piece = vec![0; 1 << 16];
+    let begin = Instant::now();
     loop {
-        match body.read(&mut piece) {
-            Ok(0) => break,
-            Ok(n) => bytes.extend_from_slice(&piece[..n]),
-            Err(error) if error.kind() == io::ErrorKind::Interrupted => continue,
-            Err(error) => return Err(AttemptError::Read(error)),
+        match pieces.recv_timeout(LOOK) {
+            Ok(piece) => bytes.extend(piece.map_err(io)?),
+            Err(RecvTimeoutError::Timeout) => (),
+            Err(RecvTimeoutError::Disconnected) => break,
         }
         observer.progress(bytes.len() as u64);
+        if stop::check(stop).is_err() {
+            return Err(failed(Stopped.to_string()));
+        }
+        if begin.elapsed() > LONGEST {
+            return Err(failed(format!("took longer than {} s", LONGEST.as_secs())));
+        }
     }
-    let found = bytes.len() as u64;
-    if found != remote.bytes {
-        return Err(AttemptError::Size { expected: remote.bytes, found });
+    let (expected, found) = (remote.bytes, bytes.len() as u64);
+    if found <= expected {
+        let mut said = Vec::new();
+        let errors = running.0.stderr.take().expect("piped");
+        errors.take(MOST_SAID).read_to_end(&mut said).map_err(io)?;
+        let status = running.0.wait().map_err(io)?;
+        let text = last_line(program, &String::from_utf8_lossy(&said));
+        match (status.success(), text) {
+            (false, Some(text)) => return Err(failed(text)),
+            (false, None) if found == 0 || found == expected => return Err(failed(status.to_string())),
+            _ => (),
+        }
+    }
+    if found != expected {
+        return Err(AttemptError::Size { expected, found });
     }
     let (expected, found) = (remote.sha256.clone(), sha256_hex(&bytes));
     if expected != found {
         return Err(AttemptError::Checksum { expected, found });
     }
     Ok(bytes)
+}
+
+/// What a program writes, piece by piece, until it ends.
+fn pieces(mut output: impl Read + Send + 'static) -> io::Result<Receiver<io::Result<Vec<u8>>>> {
+    let (sender, receiver) = mpsc::sync_channel(4);
+    let read = move || {
+        let mut piece = vec![0; 1 << 16];
+        loop {
+            let read = match output.read(&mut piece) {
+                Ok(0) => break,
+                Ok(n) => Ok(piece[..n].to_vec()),
+                Err(error) if error.kind() == io::ErrorKind::Interrupted => continue,
+                Err(error) => Err(error),
+            };
+            let is_error = read.is_err();
+            if sender.send(read).is_err() || is_error {
+                break;
+            }
+        }
+    };
+    std::thread::Builder::new().spawn(read)?;
+    Ok(receiver)
+}
+
+/// The last line that a program says, without its name, and the address and time before an error.
+fn last_line(program: Program, said: &str) -> Option<String> {
+    let line = said.lines().map(str::trim).rfind(|line| !line.is_empty())?;
+    let line = line.strip_prefix(program.name()).and_then(|line| line.strip_prefix(": ")).unwrap_or(line);
+    let line = line.split_once(" ERROR ").map_or(line, |(_, error)| error);
+    Some(line.trim_end_matches('.').to_string())
 }

@@ -4,7 +4,6 @@
 pub mod builtin;
 pub mod catalogue;
 pub mod dataset;
-#[cfg(feature = "fetch")]
 pub mod fetch;
 pub mod files;
 pub mod idx;
