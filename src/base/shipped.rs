@@ -1,5 +1,6 @@
 //! Runs that ship with the program. A path that begins with [`PREFIX`] names them: `gallery:zero_one-1`
 //! one, `gallery:zero_one` all of a set. Their files are read as if they lay in a folder of that name.
+//! They are there with the feature `gallery`.
 
 use std::path::PathBuf;
 
@@ -25,6 +26,7 @@ type Run = (&'static str, &'static [(&'static str, &'static str)]);
 type Set = (&'static str, &'static [Run]);
 
 /// The files of a run in a folder of `data/`.
+#[cfg(feature = "gallery")]
 macro_rules! run {
     ($name:expr, $folder:expr) => {
         (
@@ -39,13 +41,19 @@ macro_rules! run {
 }
 
 /// Runs that are named after their digits, in a folder of `data/`.
+#[cfg(feature = "gallery")]
 macro_rules! tasks {
     ($folder:literal: $($task:literal)*) => {
         &[$(run!(concat!("gallery:", $folder, "-", $task), concat!($folder, "/", $task))),*]
     };
 }
 
+/// None: this build is without them.
+#[cfg(not(feature = "gallery"))]
+const SETS: &[Set] = &[];
+
 /// All of them. The runs of a set are numbered by their seeds, or named after their digits.
+#[cfg(feature = "gallery")]
 const SETS: &[Set] = &[
     (
         ZERO_ONE,
@@ -91,23 +99,32 @@ pub fn text(name: &str, file: &str) -> Option<&'static str> {
 /// # Errors
 /// What there is, if there is no run of that name.
 pub fn runs(name: &str) -> Result<Vec<PathBuf>, String> {
+    runs_of(SETS, name)
+}
+
+fn runs_of(sets: &[Set], name: &str) -> Result<Vec<PathBuf>, String> {
+    if sets.is_empty() {
+        return Err(format!(
+            "{name} is not in this build of morphcog: build it with the feature `gallery`, or name a run.json by its path"
+        ));
+    }
     let of_set = |(set, runs): &Set| {
         let is_whole = *set == name || name == ALL && *set != GAITS;
         runs.iter().map(|(run, _)| *run).filter(|run| is_whole || *run == name).collect::<Vec<&str>>()
     };
     let found: Vec<PathBuf> =
-        SETS.iter().flat_map(of_set).map(|run| PathBuf::from(format!("{run}/run.json"))).collect();
+        sets.iter().flat_map(of_set).map(|run| PathBuf::from(format!("{run}/run.json"))).collect();
     match found.is_empty() {
         true => {
             // Of each set also one run, as an example.
-            let names: Vec<String> = SETS.iter().map(|(set, runs)| format!("{set}, {}", runs[0].0)).collect();
+            let names: Vec<String> = sets.iter().map(|(set, runs)| format!("{set}, {}", runs[0].0)).collect();
             Err(format!("there is no {name}: expected {ALL}, {}", names.join(", ")))
         }
         false => Ok(found),
     }
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "gallery"))]
 mod tests {
     use super::*;
 
@@ -129,5 +146,11 @@ mod tests {
             "{error}"
         );
         assert_eq!(runs(TEAM).unwrap().len(), 45);
+    }
+
+    #[test]
+    fn a_build_without_runs_says_so() {
+        let error = runs_of(&[], "gallery:zero_one").unwrap_err();
+        assert!(error.starts_with("gallery:zero_one") && error.contains("feature `gallery`"), "{error}");
     }
 }
