@@ -306,7 +306,7 @@ mod tests {
     fn images() -> Vec<Grid<f64>> {
         let rng = &mut stream(5, Purpose::Networks, 0, 0);
         let pixel = |row: usize, column: usize, rng: &mut Stream| {
-            if (row + column) % 3 == 0 { 0.0 } else { rng.uniform(0.0, 1.0) }
+            if (row + column).is_multiple_of(3) { 0.0 } else { rng.uniform(0.0, 1.0) }
         };
         (0..3).map(|_| Grid::from_fn(IMAGE.0, IMAGE.1, |row, column| pixel(row, column, rng))).collect()
     }
