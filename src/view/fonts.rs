@@ -3,43 +3,112 @@
 //! An SVG names a list of families as wide as the embedded one or a little narrower: with any of
 //! them the words fit.
 
-use resvg::usvg::fontdb::Database;
-use skrifa::prelude::{LocationRef, Size};
-use skrifa::{FontRef, MetadataProvider};
-use std::sync::{Arc, LazyLock};
+use std::sync::LazyLock;
+use tiny_skia::{Path, PathBuilder};
+use ttf_parser::gpos::{PairAdjustment, PositioningSubtable};
+use ttf_parser::{Face, GlyphId, OutlineBuilder};
 
 const REGULAR: &[u8] = include_bytes!("assets/DejaVuSansCondensed-subset.ttf");
 const BOLD: &[u8] = include_bytes!("assets/DejaVuSansCondensed-Bold-subset.ttf");
-const FAMILY: &str = "DejaVu Sans Condensed";
 
 /// What the figures' SVG asks for.
 pub const FAMILIES: &str = "'DejaVu Sans Condensed', Arial, Helvetica, 'Liberation Sans', sans-serif";
 
 /// An embedded font.
-pub fn font(bold: bool) -> FontRef<'static> {
-    FontRef::new(if bold { BOLD } else { REGULAR }).expect("the embedded fonts are fonts: a test reads them")
-}
-
-/// The embedded fonts and no others.
-pub fn database() -> Arc<Database> {
-    static DATABASE: LazyLock<Arc<Database>> = LazyLock::new(|| {
-        let mut database = Database::new();
-        database.load_font_data(REGULAR.to_vec());
-        database.load_font_data(BOLD.to_vec());
-        database.set_sans_serif_family(FAMILY);
-        Arc::new(database)
+fn font(bold: bool) -> &'static Face<'static> {
+    static FONTS: LazyLock<[Face; 2]> = LazyLock::new(|| {
+        [REGULAR, BOLD]
+            .map(|file| Face::parse(file, 0).expect("the embedded fonts are fonts: a test reads them"))
     });
-    DATABASE.clone()
+    &FONTS[usize::from(bold)]
 }
 
-/// Width of a text in points at a font size.
+/// The letter of a font; what the font lacks is its empty box.
+fn glyph(font: &Face, letter: char) -> GlyphId {
+    font.glyph_index(letter).unwrap_or_default()
+}
+
+/// Width of a letter, font units.
+fn advance(font: &Face, glyph: GlyphId) -> u16 {
+    font.glyph_hor_advance(glyph).unwrap_or(0)
+}
+
+/// Width of a text in points at a font size, unkerned: there is room for it in any of the families.
 pub fn width(text: &str, size: f64, bold: bool) -> f64 {
     let font = font(bold);
-    let metrics = font.glyph_metrics(Size::new(size as f32), LocationRef::default());
-    let charmap = font.charmap();
-    let advance =
-        |letter: char| metrics.advance_width(charmap.map(letter).unwrap_or_default()).unwrap_or(0.0);
-    text.chars().map(|letter| f64::from(advance(letter))).sum()
+    let units: u32 = text.chars().map(|letter| u32::from(advance(font, glyph(font, letter)))).sum();
+    // Of sizes font engines know 64ths.
+    (64.0 * size).floor() / 64.0 * f64::from(units) / f64::from(font.units_per_em())
+}
+
+/// The kerned outlines of a text that begins at the origin, y down, none of blanks; and its width.
+pub fn letters(text: &str, size: f64, bold: bool) -> (Option<Path>, f32) {
+    let font = font(bold);
+    let scale = size as f32 / f32::from(font.units_per_em());
+    let mut outlines = Outlines { path: PathBuilder::new(), scale, x: 0.0 };
+    let mut before = None;
+    for letter in text.chars() {
+        let glyph = glyph(font, letter);
+        outlines.x += scale * f32::from(before.map_or(0, |before| kerning(font, before, glyph)));
+        // Blanks have none.
+        let _ = font.outline_glyph(glyph, &mut outlines);
+        outlines.x += scale * f32::from(advance(font, glyph));
+        before = Some(glyph);
+    }
+    (outlines.path.finish(), outlines.x)
+}
+
+/// How much farther from another letter a letter stands than their widths say, font units. The
+/// embedded fonts have one table of pairs of classes.
+fn kerning(font: &Face, before: GlyphId, glyph: GlyphId) -> i16 {
+    let table = font.tables().gpos.and_then(|gpos| gpos.lookups.get(0)?.subtables.get(0));
+    match table {
+        Some(PositioningSubtable::Pair(PairAdjustment::Format2 { coverage, classes, matrix }))
+            if coverage.contains(before) =>
+        {
+            matrix.get((classes.0.get(before), classes.1.get(glyph))).map_or(0, |(first, _)| first.x_advance)
+        }
+        _ => 0,
+    }
+}
+
+/// Takes a letter's outline, in font units and with y up, to its place in a text.
+struct Outlines {
+    path: PathBuilder,
+    scale: f32,
+    x: f32,
+}
+
+impl Outlines {
+    fn place(&self, x: f32, y: f32) -> [f32; 2] {
+        [self.x + self.scale * x, -self.scale * y]
+    }
+}
+
+impl OutlineBuilder for Outlines {
+    fn move_to(&mut self, x: f32, y: f32) {
+        let [x, y] = self.place(x, y);
+        self.path.move_to(x, y);
+    }
+
+    fn line_to(&mut self, x: f32, y: f32) {
+        let [x, y] = self.place(x, y);
+        self.path.line_to(x, y);
+    }
+
+    fn quad_to(&mut self, ax: f32, ay: f32, x: f32, y: f32) {
+        let ([ax, ay], [x, y]) = (self.place(ax, ay), self.place(x, y));
+        self.path.quad_to(ax, ay, x, y);
+    }
+
+    fn curve_to(&mut self, ax: f32, ay: f32, bx: f32, by: f32, x: f32, y: f32) {
+        let ([ax, ay], [bx, by], [x, y]) = (self.place(ax, ay), self.place(bx, by), self.place(x, y));
+        self.path.cubic_to(ax, ay, bx, by, x, y);
+    }
+
+    fn close(&mut self) {
+        self.path.close();
+    }
 }
 
 /// A text no wider than `most` points: cut, with an ellipsis, if it has to be.
@@ -85,6 +154,18 @@ mod tests {
     }
 
     #[test]
+    fn letters_fill_their_width_kerned_and_what_the_font_lacks_is_a_box() {
+        let drawn = |text: &str| letters(text, 64.0, false);
+        assert!(f64::from((drawn("robot").1) - width("robot", 64.0, false) as f32).abs() < 1e-3);
+        for pair in ["Te", "AV", "r,"] {
+            assert!(drawn(pair).1 + 2.0 < width(pair, 64.0, false) as f32, "{pair}");
+        }
+        let bounds = drawn("漢").0.unwrap().bounds();
+        assert!(bounds.width() > 20.0 && bounds.height() > 40.0 && bounds.top() < -40.0, "{bounds:?}");
+        assert_eq!(drawn(" ").0, None);
+    }
+
+    #[test]
     fn texts_are_cut_to_fit() {
         assert_eq!(fitted("short", 8.0, false, 100.0), "short");
         let cut = fitted("a very long name of a very long run", 8.0, false, 60.0);
@@ -117,9 +198,8 @@ mod tests {
     fn the_fonts_have_every_letter_that_figures_use() {
         for font in [font(false), font(true)] {
             for letter in "aäßéŁΔσ0–—−×·±²→←≥≤…%|'“”°µ".chars() {
-                assert!(font.charmap().map(letter).is_some(), "{letter}");
+                assert!(font.glyph_index(letter).is_some(), "{letter}");
             }
         }
-        assert_eq!(database().len(), 2);
     }
 }

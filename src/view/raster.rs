@@ -6,9 +6,6 @@ use crate::view::scene::Primitive;
 use crate::view::stage::Stage;
 use crate::view::walk::Walk;
 use crate::view::{fonts, panel, scene};
-use skrifa::MetadataProvider;
-use skrifa::instance::{LocationRef, Size};
-use skrifa::outline::{DrawSettings, OutlinePen};
 use std::path::Path;
 use tiny_skia::{FillRule, LineCap, LineJoin, Paint, PathBuilder, Pixmap, Stroke, Transform};
 
@@ -48,9 +45,10 @@ pub fn draw(
                 }
             }
             Primitive::Text { text, at, size, bold, colour } => {
-                if let Some(path) = letters(text, place(at), *size as f32, *bold) {
-                    let paint = paint(*colour, true);
-                    pixmap.fill_path(&path, &paint, FillRule::Winding, Transform::identity(), None);
+                if let (Some(path), _) = fonts::letters(text, *size, *bold) {
+                    let [x, y] = place(at);
+                    let (paint, there) = (paint(*colour, true), Transform::from_translate(x, y));
+                    pixmap.fill_path(&path, &paint, FillRule::Winding, there, None);
                 }
             }
             Primitive::Line { points, width, colour, smooth } => {
@@ -79,55 +77,8 @@ fn polyline(points: impl Iterator<Item = [f32; 2]>, closed: bool) -> Option<tiny
     builder.finish()
 }
 
-/// The outlines of words that begin at a point of their base line, y down; none of blanks.
-fn letters(text: &str, [x, y]: [f32; 2], size: f32, bold: bool) -> Option<tiny_skia::Path> {
-    let font = fonts::font(bold);
-    let (charmap, outlines) = (font.charmap(), font.outline_glyphs());
-    let metrics = font.glyph_metrics(Size::new(size), LocationRef::default());
-    let mut pen = Pen { path: PathBuilder::new(), x, y };
-    for letter in text.chars() {
-        // What the font lacks is its empty box.
-        let glyph = charmap.map(letter).unwrap_or_default();
-        if let Some(outline) = outlines.get(glyph) {
-            let settings = DrawSettings::unhinted(Size::new(size), LocationRef::default());
-            outline.draw(settings, &mut pen).expect("the embedded fonts have whole outlines");
-        }
-        pen.x += metrics.advance_width(glyph).unwrap_or(0.0);
-    }
-    pen.path.finish()
-}
-
-/// Draws a letter's outline, whose y is up, at a place.
-struct Pen {
-    path: PathBuilder,
-    x: f32,
-    y: f32,
-}
-
-impl OutlinePen for Pen {
-    fn move_to(&mut self, x: f32, y: f32) {
-        self.path.move_to(self.x + x, self.y - y);
-    }
-
-    fn line_to(&mut self, x: f32, y: f32) {
-        self.path.line_to(self.x + x, self.y - y);
-    }
-
-    fn quad_to(&mut self, cx: f32, cy: f32, x: f32, y: f32) {
-        self.path.quad_to(self.x + cx, self.y - cy, self.x + x, self.y - y);
-    }
-
-    fn curve_to(&mut self, ax: f32, ay: f32, bx: f32, by: f32, x: f32, y: f32) {
-        let [left, up] = [self.x, self.y];
-        self.path.cubic_to(left + ax, up - ay, left + bx, up - by, left + x, up - y);
-    }
-
-    fn close(&mut self) {
-        self.path.close();
-    }
-}
-
-fn paint(colour: Colour, smooth: bool) -> Paint<'static> {
+/// What a colour is drawn with.
+pub fn paint(colour: Colour, smooth: bool) -> Paint<'static> {
     let mut paint = Paint { anti_alias: smooth, ..Paint::default() };
     let [r, g, b] = colour.rgb;
     paint.set_color_rgba8(r, g, b, colour.opacity);

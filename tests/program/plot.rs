@@ -2,7 +2,7 @@
 //! what it cannot show.
 
 use crate::common::program::{Sandbox, TINY, files};
-use resvg::usvg::roxmltree::{Document, Node};
+use roxmltree::{Document, Node};
 use std::collections::BTreeMap;
 use std::sync::OnceLock;
 

@@ -58,7 +58,7 @@ pub fn accuracy(report: &EvalFile) -> Figure {
     plot.lower_axis(&mut canvas, Some(&name));
     let below = top + all + AXIS + 4.0;
     let height = legend(&mut canvas, report, below) + MARGIN;
-    Figure::new(&format!("Accuracy: {of}"), [COLUMN, height], canvas.finish())
+    Figure::new(&format!("Accuracy: {of}"), [COLUMN, height], canvas)
 }
 
 /// The runs in words: name and seeds, or how many they are if they have several names.

@@ -9,8 +9,9 @@ use crate::store::run::RunFile;
 use crate::view::colour;
 use crate::view::colour::Colour;
 use crate::view::plot::axes::{Axis, MARGIN, colour_bar, heading};
-use crate::view::plot::canvas::{Canvas, Pen, TEXT, Words, number, path};
+use crate::view::plot::canvas::{Canvas, Pen, Piece, TEXT, Words};
 use crate::view::plot::figure::{COLUMN, Figure, PAGE};
+use crate::view::plot::svg::number;
 use crate::view::plot::{robot, scales};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -73,7 +74,7 @@ pub fn archive(run: &RunFile) -> Figure {
         legend(&mut canvas, [MARGIN + LEFT, maps + 12.0], side, &scale, false);
         maps + 78.0
     };
-    Figure::new(&format!("Archive: {of}"), [width, height + MARGIN], canvas.finish())
+    Figure::new(&format!("Archive: {of}"), [width, height + MARGIN], canvas)
 }
 
 /// From fitness to colour: what is right on the training images is coloured, what is not is gray.
@@ -121,37 +122,31 @@ fn map(
     let gap = 0.08 * step;
     let strip = (step - gap) / COUNT_BINS as f64;
     let (mut frames, mut strokes, mut paths) =
-        (String::new(), String::new(), BTreeMap::<[u8; 3], String>::new());
+        (Vec::new(), Vec::new(), BTreeMap::<[u8; 3], Vec<Piece>>::new());
     for muscle in 0..COUNT_BINS {
         for sensor in 0..COUNT_BINS {
             let left = x + muscle as f64 * step + gap / 2.0;
             let top = y + side - (sensor + 1) as f64 * step + gap / 2.0;
             for total in 0..COUNT_BINS {
                 let Some(elite) = cell([muscle, sensor, total]) else { continue };
-                let (wide, high) = (number(strip), number(step - gap));
-                let data = format!(
-                    "M{} {}h{wide}v{high}h-{wide}z",
-                    number(left + total as f64 * strip),
-                    number(top)
-                );
-                frames += &data;
+                let (at, size) = ([left + total as f64 * strip, top], [strip, step - gap]);
+                frames.push(Piece::Rectangle { at, size });
                 if let Some(fitness) = elite {
-                    paths.entry(scale.colour(fitness).rgb).or_default().push_str(&data);
+                    paths.entry(scale.colour(fitness).rgb).or_default().push(Piece::Rectangle { at, size });
                     if fitness < 0.0 {
-                        let corner = [left + total as f64 * strip, top];
-                        strokes += &stroke(corner, [strip, step - gap]);
+                        strokes.push(stroke(at, size));
                     }
                 }
             }
         }
     }
-    canvas.area(&frames, colour::PAPER);
-    for (rgb, data) in paths {
-        canvas.area(&data, Colour { rgb, opacity: 255 });
+    canvas.area(frames.clone(), colour::PAPER);
+    for (rgb, squares) in paths {
+        canvas.area(squares, Colour { rgb, opacity: 255 });
     }
-    canvas.path(&frames, Pen::new(scales::CELL, 0.3));
+    canvas.path(frames, Pen::new(scales::CELL, 0.3));
     if !strokes.is_empty() {
-        canvas.path(&strokes, STROKE);
+        canvas.path(strokes, STROKE);
     }
 }
 
@@ -159,8 +154,8 @@ fn map(
 const STROKE: Pen = Pen { colour: colour::INK, width: 0.5, dashes: None };
 
 /// The diagonal of a cell.
-fn stroke([x, y]: [f64; 2], [width, height]: [f64; 2]) -> String {
-    path(&[[x, y + height], [x + width, y]], false)
+fn stroke([x, y]: [f64; 2], [width, height]: [f64; 2]) -> Piece {
+    Piece::Line(vec![[x, y + height], [x + width, y]])
 }
 
 /// Numbers of voxels at which bins begin.
@@ -205,7 +200,7 @@ fn legend(canvas: &mut Canvas, [x, y]: [f64; 2], width: f64, scale: &Scale, is_a
     let lines = lines.iter().map(|(fill, text)| (Material::Empty, *fill, text.as_str()));
     let below = robot::legend(canvas, [x, y + 26.0], lines, width);
     if scale.lowest.is_some() {
-        canvas.path(&stroke([x, y + 26.0], [7.0, 7.0]), STROKE);
+        canvas.path(vec![stroke([x, y + 26.0], [7.0, 7.0])], STROKE);
     }
     if !is_above {
         for (k, text) in STRIPS.into_iter().enumerate() {

@@ -52,7 +52,7 @@ pub fn body(body: &Body, of: &str) -> Figure {
         canvas.text([x, below + 11.0 + 10.0 * k as f64], note, faint);
     }
     let height = (top + size[1]).max(below + 45.0) + MARGIN + 1.0;
-    Figure::new(&format!("Body: {of}"), [COLUMN, height], canvas.finish())
+    Figure::new(&format!("Body: {of}"), [COLUMN, height], canvas)
 }
 
 #[cfg(test)]

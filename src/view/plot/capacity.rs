@@ -38,7 +38,7 @@ pub fn capacity(file: &CapacityFile) -> Figure {
     }
     let below = top + panels.len().div_ceil(columns) as f64 * high;
     let height = legend(&mut canvas, file.trainings, [MARGIN + 4.0, below], width) + MARGIN;
-    Figure::new(&format!("Morphological cognition capacity: {of}"), [width, height], canvas.finish())
+    Figure::new(&format!("Morphological cognition capacity: {of}"), [width, height], canvas)
 }
 
 /// One axis for all panels, so that they can be compared.

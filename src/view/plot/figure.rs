@@ -3,9 +3,9 @@
 use crate::view::colour;
 use crate::view::error::PictureError;
 use crate::view::fonts;
-use crate::view::plot::canvas::{escape, number};
-use resvg::tiny_skia::{Pixmap, Transform};
-use resvg::usvg::{Options, Tree};
+use crate::view::plot::canvas::Canvas;
+use crate::view::plot::svg::{escape, number};
+use tiny_skia::{Color, Pixmap, Transform};
 
 /// Width of a journal's column: 85 mm in points.
 pub const COLUMN: f64 = 241.0;
@@ -31,14 +31,14 @@ pub enum Background {
 pub struct Figure {
     title: String,
     size: [f64; 2],
-    content: String,
+    content: Canvas,
     background: Background,
 }
 
 impl Figure {
-    /// A figure of a width and height in points; `content` is SVG in points from the top left
+    /// A figure of a width and height in points; `content` is drawn in points from the top left
     /// corner.
-    pub(super) fn new(title: &str, size: [f64; 2], content: String) -> Self {
+    pub(super) fn new(title: &str, size: [f64; 2], content: Canvas) -> Self {
         Figure { title: title.to_string(), size, content, background: Background::Paper }
     }
 
@@ -73,7 +73,7 @@ impl Figure {
              viewBox=\"0 0 {width} {height}\" role=\"img\" aria-label=\"{title}\" font-family=\"{}\">\n\
              <title>{title}</title>\n{paper}{}</svg>\n",
             fonts::FAMILIES,
-            self.content
+            self.content.svg()
         )
     }
 
@@ -104,24 +104,13 @@ impl Figure {
         if !possible(width) || !possible(height) {
             return Err(PictureError::Figure { width, height });
         }
-        let encode = |error: &dyn std::fmt::Display| PictureError::Encode(error.to_string());
-        // A point is a pixel of the tree.
-        let options = Options { dpi: 72.0, fontdb: fonts::database(), ..Options::default() };
-        let tree = Tree::from_str(&self.svg(), &options).map_err(|error| encode(&error))?;
         let mut pixmap =
             Pixmap::new(width as u32, height as u32).ok_or(PictureError::Figure { width, height })?;
-        let transform = Transform::from_scale(scale as f32, scale as f32);
-        resvg::render(&tree, transform, &mut pixmap.as_mut());
         if self.background == Background::Paper {
-            // The last pixels may be cut by a fraction: paper up to the edge.
-            let mut paper =
-                Pixmap::new(width as u32, height as u32).ok_or(PictureError::Figure { width, height })?;
-            paper.fill(resvg::tiny_skia::Color::WHITE);
-            let paint = resvg::tiny_skia::PixmapPaint::default();
-            paper.draw_pixmap(0, 0, pixmap.as_ref(), &paint, Transform::identity(), None);
-            pixmap = paper;
+            pixmap.fill(Color::WHITE);
         }
-        encode_png(&pixmap, scale, self.background).map_err(|error| encode(&error))
+        self.content.draw(&mut pixmap, Transform::from_scale(scale as f32, scale as f32));
+        encode_png(&pixmap, scale, self.background).map_err(|error| PictureError::Encode(error.to_string()))
     }
 }
 
@@ -156,19 +145,19 @@ fn encode_png(pixmap: &Pixmap, scale: f64, background: Background) -> Result<Vec
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::view::plot::canvas::{Canvas, Words};
+    use crate::view::plot::canvas::Words;
 
     fn figure() -> Figure {
         let mut canvas = Canvas::new();
         canvas.rectangle([10.0, 10.0], [20.0, 10.0], colour::INK);
         canvas.text([5.0, 40.0], "a < b & c", Words::default());
-        Figure::new("A \"test\" <1>", [60.0, 50.0], canvas.finish())
+        Figure::new("A \"test\" <1>", [60.0, 50.0], canvas)
     }
 
     #[test]
     fn an_svg_is_well_formed_and_has_nothing_that_could_clash() {
         let svg = figure().svg();
-        let tree = resvg::usvg::roxmltree::Document::parse(&svg).unwrap();
+        let tree = roxmltree::Document::parse(&svg).unwrap();
         for node in tree.descendants() {
             assert!(!node.has_attribute("id") && !node.has_attribute("class"), "{node:?}");
             assert!(node.tag_name().name() != "style");
@@ -196,14 +185,14 @@ mod tests {
     fn a_figure_has_as_many_pixels_as_it_can_have_and_no_more() {
         assert_eq!(figure().fitting(PRINT), PRINT);
         for height in [3839.9, 3840.0, 3840.1, 17_003.25, 720.0, 1e5, 1e9] {
-            let long = Figure::new("long", [60.0, height], String::new());
+            let long = Figure::new("long", [60.0, height], Canvas::new());
             let pixels = |dpi: u32| (height * f64::from(dpi) / 72.0).ceil();
             let dpi = long.fitting(2400);
             assert!(pixels(dpi) <= MOST_PIXELS || dpi == 1, "{height}: {dpi}");
             assert!(pixels(dpi + 1) >= MOST_PIXELS, "{height}: {dpi}");
             assert_eq!(long.fitting(PRINT), dpi.min(PRINT));
         }
-        let long = Figure::new("long", [60.0, 17_000.0], String::new());
+        let long = Figure::new("long", [60.0, 17_000.0], Canvas::new());
         assert_eq!(Pixmap::decode_png(&long.print().unwrap()).unwrap().height(), 15_820);
     }
 }

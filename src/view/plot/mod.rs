@@ -1,7 +1,7 @@
 //! Figures for print and pages: every one a function from what it shows to a [`Figure`].
 //!
-//! `canvas` makes SVG elements, `axes` and `scales` what figures share; `robot` draws bodies. The
-//! sizes are those of a journal's column or page, the words in them at least 7 points high.
+//! `canvas` holds what is drawn, `svg` and `pixels` draw it; `axes` and `scales` are what figures
+//! share; `robot` draws bodies. The sizes are those of a journal's column or page, the words in them at least 7 points high.
 
 mod accuracy;
 mod archive;
@@ -10,12 +10,14 @@ mod body;
 pub(super) mod canvas;
 mod capacity;
 mod figure;
+mod pixels;
 mod progress;
 mod response;
 pub(super) mod robot;
 mod scales;
 mod snapshots;
 mod spacetime;
+mod svg;
 mod sweep;
 mod team;
 

@@ -5,7 +5,7 @@ use crate::store::metrics::Moment;
 use crate::view::colour;
 use crate::view::colour::Colour;
 use crate::view::plot::axes::{AXIS, Axis, MARGIN, Plot, heading, left_space};
-use crate::view::plot::canvas::{Canvas, Pen, TEXT, Words, path};
+use crate::view::plot::canvas::{Canvas, Pen, Piece, TEXT, Words};
 use crate::view::plot::figure::{COLUMN, Figure};
 use crate::view::plot::scales;
 
@@ -78,7 +78,7 @@ pub fn progress(runs: &[Progress]) -> Figure {
     if groups.len() > 1 {
         height = legend(&mut canvas, &groups, height + 2.0) + MARGIN;
     }
-    Figure::new(&format!("Progress: {of}"), [COLUMN, height], canvas.finish())
+    Figure::new(&format!("Progress: {of}"), [COLUMN, height], canvas)
 }
 
 /// Evaluations as far as all runs of a group go.
@@ -173,7 +173,7 @@ fn draw(canvas: &mut Canvas, plot: &Plot, bands: &[Band], pen: Pen, is_band: boo
     if is_band && !bands.is_empty() {
         let mut edge = line(|band| band.low);
         edge.extend(line(|band| band.high).into_iter().rev());
-        canvas.area(&path(&edge, true), pen.colour.with_opacity(46));
+        canvas.area(vec![Piece::Polygon(edge)], pen.colour.with_opacity(46));
     }
     canvas.polyline(&line(|band| band.middle), pen);
 }

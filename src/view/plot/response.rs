@@ -7,7 +7,7 @@ use crate::view::colour;
 use crate::view::colour::Colour;
 use crate::view::panel::present;
 use crate::view::plot::axes::{Axis, MARGIN, colour_bar, heading};
-use crate::view::plot::canvas::{Canvas, Pen, Words, path};
+use crate::view::plot::canvas::{Canvas, Pen, Piece, Words};
 use crate::view::plot::figure::{COLUMN, Figure};
 use crate::view::plot::{robot, scales};
 
@@ -44,15 +44,15 @@ pub fn response(found: &RobotResponse, task: Option<&str>, of: &str) -> Figure {
     });
     let places = found.places.iter().map(|place| ((place.row, place.column), shade(place.slope)));
     robot::squares(&mut canvas, at, cell, seam, places);
-    let crosses: String = found
+    let crosses: Vec<Piece> = found
         .places
         .iter()
         .filter(|place| place.is_uncertain())
-        .map(|place| cross([at[0] + place.column as f64 * cell, at[1] + place.row as f64 * cell], cell))
+        .flat_map(|place| cross([at[0] + place.column as f64 * cell, at[1] + place.row as f64 * cell], cell))
         .collect();
     let uncertain = Pen::new(colour::FAINT, 0.5);
     if !crosses.is_empty() {
-        canvas.path(&crosses, uncertain);
+        canvas.path(crosses, uncertain);
     }
     robot::body_outline(&mut canvas, at, cell, body, Pen::new(colour::INK, 0.8));
 
@@ -63,7 +63,7 @@ pub fn response(found: &RobotResponse, task: Option<&str>, of: &str) -> Figure {
         materials.map(|m| (m, faded(robot::plain(m)), m.name())).collect();
     let mut y = robot::legend(&mut canvas, [x, top], lines, room);
     canvas.frame([x, y], [7.0, 7.0], Pen::new(scales::CELL, 0.4));
-    canvas.path(&cross([x, y], 7.0), uncertain);
+    canvas.path(cross([x, y], 7.0).to_vec(), uncertain);
     canvas.fitted([x + 10.5, y + 6.2], "within 2 errors of 0", room - 10.5, Words::default());
     y += 24.0;
     for note in notes(found, task) {
@@ -76,7 +76,7 @@ pub fn response(found: &RobotResponse, task: Option<&str>, of: &str) -> Figure {
     let name = "displacement per rest width of a place [voxel lengths], right positive";
     let bar = COLUMN - 2.0 * MARGIN - 12.0;
     colour_bar(&mut canvas, [MARGIN + 6.0, below], bar, &axis, name, shade);
-    Figure::new(&format!("Response: {of}"), [COLUMN, below + 19.0 + MARGIN], canvas.finish())
+    Figure::new(&format!("Response: {of}"), [COLUMN, below + 19.0 + MARGIN], canvas)
 }
 
 /// What stands beside the map.
@@ -100,10 +100,12 @@ fn notes(found: &RobotResponse, task: Option<&str>) -> Vec<String> {
 }
 
 /// A diagonal cross in a square.
-fn cross([x, y]: [f64; 2], side: f64) -> String {
+fn cross([x, y]: [f64; 2], side: f64) -> [Piece; 2] {
     let [near, far] = [0.25 * side, 0.75 * side];
-    let line = |from: [f64; 2], to: [f64; 2]| path(&[from, to], false);
-    line([x + near, y + near], [x + far, y + far]) + &line([x + far, y + near], [x + near, y + far])
+    [
+        Piece::Line(vec![[x + near, y + near], [x + far, y + far]]),
+        Piece::Line(vec![[x + far, y + near], [x + near, y + far]]),
+    ]
 }
 
 /// A colour mixed with the paper's.

@@ -4,7 +4,7 @@ use crate::base::Grid;
 use crate::body::{Body, Material};
 use crate::view::colour;
 use crate::view::colour::Colour;
-use crate::view::plot::canvas::{Canvas, Pen, Words, number, path};
+use crate::view::plot::canvas::{Canvas, Pen, Piece, Words};
 use crate::view::plot::scales;
 use crate::view::walk::{Walk, area};
 use std::collections::BTreeMap;
@@ -27,15 +27,14 @@ pub fn squares(
     seam: f64,
     squares: impl Iterator<Item = ((usize, usize), Colour)>,
 ) {
-    let mut paths = BTreeMap::<([u8; 3], u8), String>::new();
+    let mut paths = BTreeMap::<([u8; 3], u8), Vec<Piece>>::new();
     for ((row, column), fill) in squares {
         let (x, y) = (left + column as f64 * cell + seam / 2.0, top + row as f64 * cell + seam / 2.0);
-        let side = number(cell - seam);
-        let square = format!("M{} {}h{side}v{side}h-{side}z", number(x), number(y));
-        paths.entry((fill.rgb, fill.opacity)).or_default().push_str(&square);
+        let square = Piece::Rectangle { at: [x, y], size: [cell - seam; 2] };
+        paths.entry((fill.rgb, fill.opacity)).or_default().push(square);
     }
-    for ((rgb, opacity), data) in paths {
-        canvas.area(&data, Colour { rgb, opacity });
+    for ((rgb, opacity), squares) in paths {
+        canvas.area(squares, Colour { rgb, opacity });
     }
 }
 
@@ -62,17 +61,16 @@ pub fn marks(
 
 /// The marks of voxels, `cell` points wide, as one path for each colour.
 fn stroked(canvas: &mut Canvas, cell: f64, voxels: impl Iterator<Item = (Material, [[f64; 2]; 4], Colour)>) {
-    let mut paths = BTreeMap::<([u8; 3], u8), String>::new();
+    let mut paths = BTreeMap::<([u8; 3], u8), Vec<Piece>>::new();
     for (material, corners, fill) in voxels {
         let colour = Colour { opacity: fill.opacity, ..colour::mark_colour(material, fill) };
-        let data = paths.entry((colour.rgb, colour.opacity)).or_default();
+        let lines = paths.entry((colour.rgb, colour.opacity)).or_default();
         for line in colour::mark(material) {
-            let points: Vec<[f64; 2]> = line.iter().map(|point| colour::placed(*point, corners)).collect();
-            data.push_str(&path(&points, false));
+            lines.push(Piece::Line(line.iter().map(|point| colour::placed(*point, corners)).collect()));
         }
     }
-    for ((rgb, opacity), data) in paths.iter().filter(|(_, data)| !data.is_empty()) {
-        canvas.path(data, Pen::new(Colour { rgb: *rgb, opacity: *opacity }, colour::MARK_WIDTH * cell));
+    for ((rgb, opacity), lines) in paths.into_iter().filter(|(_, lines)| !lines.is_empty()) {
+        canvas.path(lines, Pen::new(Colour { rgb, opacity }, colour::MARK_WIDTH * cell));
     }
 }
 
@@ -85,7 +83,7 @@ pub fn outline(
     holds: impl Fn(isize, isize) -> bool,
     pen: Pen,
 ) {
-    let mut data = String::new();
+    let mut sides = Vec::new();
     for row in 0..height as isize {
         for column in 0..width as isize {
             if !holds(row, column) {
@@ -96,13 +94,13 @@ pub fn outline(
             let beyond = [(-1, 0), (0, 1), (1, 0), (0, -1)];
             for (k, (dr, dc)) in beyond.into_iter().enumerate() {
                 if !holds(row + dr, column + dc) {
-                    data += &path(&[corners[k], corners[(k + 1) % 4]], false);
+                    sides.push(Piece::Line(vec![corners[k], corners[(k + 1) % 4]]));
                 }
             }
         }
     }
-    if !data.is_empty() {
-        canvas.path(&data, pen);
+    if !sides.is_empty() {
+        canvas.path(sides, pen);
     }
 }
 
@@ -130,15 +128,15 @@ pub fn stimulus(canvas: &mut Canvas, at: [f64; 2], side: f64, image: &Grid<f64>)
 /// their outline.
 pub fn pose(canvas: &mut Canvas, walk: &Walk, frame: usize, place: impl Fn([f64; 2]) -> [f64; 2]) {
     let [small, _, large] = colour::TONE_AREAS;
-    let mut paths = BTreeMap::<[u8; 3], String>::new();
+    let mut paths = BTreeMap::<[u8; 3], Vec<Piece>>::new();
     for (material, corners) in walk.voxels(frame) {
         let share = (area(&corners) - small) / (large - small);
         let stepped = small + (share * SHADES).round() / SHADES * (large - small);
         let fill = colour::shade(material, stepped);
-        paths.entry(fill.rgb).or_default().push_str(&quad(corners.map(&place)));
+        paths.entry(fill.rgb).or_default().push(Piece::Polygon(corners.map(&place).to_vec()));
     }
-    for (rgb, data) in paths {
-        canvas.area(&data, Colour { rgb, opacity: 255 });
+    for (rgb, voxels) in paths {
+        canvas.area(voxels, Colour { rgb, opacity: 255 });
     }
     let cell = place([1.0, 0.0])[0] - place([0.0, 0.0])[0];
     if cell >= MARKED {
@@ -148,14 +146,10 @@ pub fn pose(canvas: &mut Canvas, walk: &Walk, frame: usize, place: impl Fn([f64;
         });
         stroked(canvas, cell, on_page);
     }
-    let rim: String = walk.outline(frame).map(|side| path(&side.map(&place), false)).collect();
+    let rim: Vec<Piece> = walk.outline(frame).map(|side| Piece::Line(side.map(&place).to_vec())).collect();
     if !rim.is_empty() {
-        canvas.path(&rim, Pen::new(colour::INK, 0.5));
+        canvas.path(rim, Pen::new(colour::INK, 0.5));
     }
-}
-
-fn quad(corners: [[f64; 2]; 4]) -> String {
-    path(&corners, true)
 }
 
 /// Squares with their meanings, one below the other; the y below the last.

@@ -64,7 +64,7 @@ pub fn snapshots(recording: &Recording, every: usize, of: &str) -> Result<Figure
     let below = top + phases.div_ceil(columns) as f64 * (panel_height + GAP);
     let note = if recording.unstable { "ended early: unstable" } else { "x [voxel lengths] from the start" };
     canvas.text([width / 2.0, below + 2.0], note, Words::middle());
-    Ok(Figure::new(&format!("Snapshots: {of}"), [width, below + 4.0 + MARGIN], canvas.finish()))
+    Ok(Figure::new(&format!("Snapshots: {of}"), [width, below + 4.0 + MARGIN], canvas))
 }
 
 /// As many control steps as take the robot about half its width on, a tenth of the longest phase at

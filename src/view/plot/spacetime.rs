@@ -6,7 +6,7 @@ use crate::view::colour::Colour;
 use crate::view::error::PictureError;
 use crate::view::panel::signed;
 use crate::view::plot::axes::{AXIS, Axis, MARGIN, Plot, heading, left_space};
-use crate::view::plot::canvas::{Canvas, Pen, TEXT, Words, number};
+use crate::view::plot::canvas::{Canvas, Pen, Piece, TEXT, Words};
 use crate::view::plot::figure::{COLUMN, Figure, PAGE};
 use crate::view::plot::robot;
 use crate::view::walk::{Walk, area};
@@ -64,7 +64,7 @@ pub fn spacetime(recording: &Recording, of: &str) -> Result<Figure, PictureError
         axes(&mut canvas, &plot, k % columns == 0);
     }
     let bottom = top + rollouts.len().div_ceil(columns) as f64 * row_height;
-    Ok(Figure::new(&format!("Position over time: {of}"), [width, bottom + MARGIN - 4.0], canvas.finish()))
+    Ok(Figure::new(&format!("Position over time: {of}"), [width, bottom + MARGIN - 4.0], canvas))
 }
 
 /// An axis that holds all rollouts, each counted from its start.
@@ -95,26 +95,26 @@ fn rows(canvas: &mut Canvas, walk: &Walk, rollout: &Range<usize>, plot: &Plot, g
     let cycle = walk.recording().cycle.max(1) as f64;
     let zero = walk.centre(rollout.start)[0];
     let high = moment(plot, every(rollout) as f64 / cycle) - plot.at[1];
-    let mut paths = vec![String::new(); GRAYS];
+    let mut paths = vec![Vec::new(); GRAYS];
     let cell = plot.size[0] / CELLS as f64;
     for frame in rollout.clone().step_by(every(rollout)) {
         let row: Vec<Option<usize>> =
             areas(walk, frame, zero, &plot.x).into_iter().map(|area| Some(gray(area?, grays))).collect();
-        let y = number(moment(plot, (frame - rollout.start) as f64 / cycle) + high / 2.0);
+        let y = moment(plot, (frame - rollout.start) as f64 / cycle) + high / 2.0;
         let mut from = 0;
         for run in row.chunk_by(|a, b| a == b) {
             if let Some(gray) = run[0] {
                 let x = plot.at[0] + cell * from as f64;
-                paths[gray] += &format!("M{} {y}h{}", number(x), number(cell * run.len() as f64));
+                paths[gray].push(Piece::Level { from: [x, y], length: cell * run.len() as f64 });
             }
             from += run.len();
         }
     }
     canvas.clipped(plot.at, plot.size, |canvas| {
-        for (gray, data) in paths.iter().enumerate().filter(|(_, data)| !data.is_empty()) {
+        for (gray, lines) in paths.into_iter().enumerate().filter(|(_, lines)| !lines.is_empty()) {
             let level = DARKEST + (LIGHTEST - DARKEST) * gray as f64 / (GRAYS - 1) as f64;
             // A little higher than a row, so that no light shines through.
-            canvas.path(data, Pen::new(Colour::gray(level), high + 0.12));
+            canvas.path(lines, Pen::new(Colour::gray(level), high + 0.12));
         }
         let centres = rollout.clone().step_by(2).map(|frame| {
             [

@@ -75,7 +75,7 @@ pub fn sweep(name: &str, rows: &[Row]) -> Option<Figure> {
             words,
         );
     }
-    Some(Figure::new(&format!("Accuracy: {name}"), [COLUMN, height], canvas.finish()))
+    Some(Figure::new(&format!("Accuracy: {name}"), [COLUMN, height], canvas))
 }
 
 /// What a run is about, without its seed.

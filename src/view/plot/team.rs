@@ -77,7 +77,7 @@ pub fn confusion(file: &TeamFile) -> Option<Figure> {
         }
     }
     let height = top + side * count as f64 + MARGIN;
-    Some(Figure::new(&format!("Answers: {of}"), [width, height], canvas.finish()))
+    Some(Figure::new(&format!("Answers: {of}"), [width, height], canvas))
 }
 
 /// All bodies, with what each tells apart and how well: where every task is a pair of classes, as a
@@ -121,7 +121,7 @@ pub fn poster(file: &TeamFile) -> Option<Figure> {
         columns > 3 && lines > 3 && places.iter().all(|[column, line]| *column >= 3 || *line < lines - 2);
     let start = if is_free { bottom - 11.0 * names.len() as f64 } else { bottom };
     let below = robot::legend(&mut canvas, [MARGIN, start], names, PAGE / 3.0);
-    Some(Figure::new(&format!("Team: {of}"), [PAGE, bottom.max(below) + MARGIN], canvas.finish()))
+    Some(Figure::new(&format!("Team: {of}"), [PAGE, bottom.max(below) + MARGIN], canvas))
 }
 
 /// Column and line of each robot, if every task is a pair of classes and every pair has one robot.
@@ -214,7 +214,7 @@ mod tests {
         let said = |member: &Member| {
             let mut canvas = Canvas::new();
             caption(&mut canvas, [50.0, 50.0], 110.0, member);
-            canvas.finish()
+            canvas.svg()
         };
         assert!(said(&member).contains(">← 1 2 3 | 0 →<"), "{}", said(&member));
         member.first_group_walks = "left".into();

@@ -7,7 +7,7 @@ use crate::commands::report::Dossier;
 use crate::store::run::Robot;
 use crate::view::colour::{MARK_WIDTH, mark, mark_colour, placed};
 use crate::view::html::escape;
-use crate::view::plot::canvas::path;
+use crate::view::plot::canvas::Piece;
 use crate::view::plot::robot;
 use crate::view::report::maps::Rollouts;
 use std::collections::BTreeSet;
@@ -119,8 +119,8 @@ fn marks(body: &Body, material: Material) -> String {
         let (x, y) = (column as f64, row as f64);
         let corners = [[x, y], [x + 1.0, y], [x + 1.0, y + 1.0], [x, y + 1.0]];
         for line in mark(material) {
-            let points: Vec<[f64; 2]> = line.iter().map(|point| placed(*point, corners)).collect();
-            data += &path(&points, false);
+            let line = Piece::Line(line.iter().map(|point| placed(*point, corners)).collect());
+            data += &line.to_string();
         }
     }
     if data.is_empty() {
