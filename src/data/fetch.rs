@@ -2,10 +2,12 @@
 //! published one. A program of the system downloads them, curl or wget: it knows the user's proxies
 //! and certificates, and what it brings is checked in any case.
 
+use crate::base::error::Error;
 use crate::base::files::{read_bytes, write_atomically};
 use crate::base::hash::sha256_hex;
 use crate::base::observer::{Observer, Work};
 use crate::base::stop::{self, Stopped};
+use crate::base::threads;
 use crate::data::catalogue::{Catalogue, RemoteFile};
 use crate::data::files::default_folder;
 use crate::data::idx;
@@ -361,7 +363,7 @@ fn download(
     let mut running = Running(program.command(url).spawn().map_err(io)?);
     let output = running.0.stdout.take().expect("piped");
     // One byte more than expected is enough to know that it is too long.
-    let pieces = pieces(output.take(remote.bytes + 1)).map_err(io)?;
+    let pieces = pieces(output.take(remote.bytes + 1)).map_err(|error| failed(error.to_string()))?;
     let mut bytes = Vec::new();
     let begin = Instant::now();
     loop {
@@ -402,7 +404,7 @@ fn download(
 }
 
 /// What a program writes, piece by piece, until it ends.
-fn pieces(mut output: impl Read + Send + 'static) -> io::Result<Receiver<io::Result<Vec<u8>>>> {
+fn pieces(mut output: impl Read + Send + 'static) -> Result<Receiver<io::Result<Vec<u8>>>, Error> {
     let (sender, receiver) = mpsc::sync_channel(4);
     let read = move || {
         let mut piece = vec![0; 1 << 16];
@@ -419,7 +421,7 @@ fn pieces(mut output: impl Read + Send + 'static) -> io::Result<Receiver<io::Res
             }
         }
     };
-    std::thread::Builder::new().spawn(read)?;
+    threads::start("download", read)?;
     Ok(receiver)
 }
 

@@ -167,7 +167,7 @@ mod tests {
 <path d="M0 0L1 1" fill="none" stroke="#222428" stroke-opacity="0.2" stroke-width="0.5" stroke-linejoin="round"/>
 <path d="M1 2h3v4h-3zM5 6h7M0 0L1 0L1 1Z" fill="#222428"/>
 <circle cx="1" cy="2" r="3" fill="#222428"/>
-<text x="1" y="2" font-size="7.2" text-anchor="middle" font-weight="bold" transform="rotate(-90 1 2)" fill="#222428">a�&amp;</text>
+<text x="1" y="2" font-size="7.2" text-anchor="middle" font-weight="bold" transform="rotate(-90 1 2)" fill="#222428">a\n&amp;</text>
 <svg x="1" y="2" width="3" height="4" viewBox="1 2 3 4" overflow="hidden">
 <g opacity="0.25">
 <text x="1" y="2" font-size="7.2" text-anchor="end" fill="#222428">b</text>
