@@ -2,9 +2,7 @@
 //! that is installed: what is not exactly the published file never gets to disk, and the next mirror
 //! is tried.
 
-mod common;
-
-use common::program::Sandbox;
+use crate::common::program::{Sandbox, said};
 use flate2::Compression;
 use flate2::write::GzEncoder;
 use morphcog::base::hash::sha256_hex;
@@ -404,7 +402,7 @@ fn without_a_program_for_downloads_what_to_fetch_by_hand_is_said() {
     let sandbox = Sandbox::new();
     let mut command = sandbox.command(["data", "fetch"]);
     command.env("PATH", sandbox.path("nothing"));
-    let said = common::program::said(command).ended(1, &["curl", "wget", "data/mnist yourself", "builtin"]);
+    let said = said(command).ended(1, &["curl", "wget", "data/mnist yourself", "builtin"]);
     for remote in Catalogue::named("mnist").unwrap().files {
         assert!(said.err.contains(&format!("https://ossci-datasets.s3.amazonaws.com/mnist/{}", remote.name)));
     }
@@ -429,6 +427,6 @@ fn settings_of_curl_do_not_send_a_file_elsewhere() {
     let mirror = Mirror::serving(&[("train-images-idx3-ubyte.gz", IMAGES)]);
     let mut command = sandbox.command(["data", "fetch", "--mirror", &mirror.address]);
     command.env("HOME", sandbox.path("")).env("CURL_HOME", sandbox.path(""));
-    common::program::said(command).ended(1, &["expected 9912422 bytes, found 20"]);
+    said(command).ended(1, &["expected 9912422 bytes, found 20"]);
     assert_eq!(names(&sandbox.path("")), [".curlrc"]);
 }
