@@ -23,6 +23,7 @@ mod robots;
 mod serve;
 mod serve_page;
 mod simulate;
+mod snapshots;
 mod sweep;
 mod team;
 mod terminal;
