@@ -157,8 +157,9 @@ mod tests {
     fn letters_fill_their_width_kerned_and_what_the_font_lacks_is_a_box() {
         let drawn = |text: &str| letters(text, 64.0, false);
         assert!((f64::from(drawn("mnmn").1) - width("mnmn", 64.0, false)).abs() < 1e-3);
-        for pair in ["Te", "AV", "r,"] {
-            assert!(drawn(pair).1 + 2.0 < width(pair, 64.0, false) as f32, "{pair}");
+        for pair in ["Te", "AV"] {
+            let (drawn, unkerned) = (drawn(pair).1, width(pair, 64.0, false) as f32);
+            assert!(drawn + 2.0 < unkerned, "{pair}: {drawn} {unkerned}");
         }
         let bounds = drawn("漢").0.unwrap().bounds();
         assert!(bounds.width() > 20.0 && bounds.height() > 40.0 && bounds.top() < -40.0, "{bounds:?}");
