@@ -182,15 +182,18 @@ fn violations(path: &str, source: &str) -> Vec<String> {
 }
 
 fn sources(folder: &Path) -> Vec<PathBuf> {
-    let mut found = Vec::new();
-    for entry in std::fs::read_dir(folder).unwrap() {
-        let path = entry.unwrap().path();
-        match path.extension() {
-            _ if path.is_dir() => found.extend(sources(&path)),
-            Some(ending) if ending == "rs" => found.push(path),
-            _ => {}
+    fn add(folder: &Path, found: &mut Vec<PathBuf>) {
+        for entry in std::fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            match path.extension() {
+                _ if path.is_dir() => add(&path, found),
+                Some(ending) if ending == "rs" => found.push(path),
+                _ => {}
+            }
         }
     }
+    let mut found = Vec::new();
+    add(folder, &mut found);
     assert!(!found.is_empty(), "{}", folder.display());
     found
 }
