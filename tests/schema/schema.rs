@@ -136,6 +136,7 @@ fn what_the_program_refuses_in_a_config_is_invalid() {
 fn written_results_are_valid_and_those_of_another_format_are_not() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("run.toml"), CONFIG).unwrap();
+    std::fs::create_dir(folder.path().join("gallery")).unwrap();
     for command in [
         "evolve -c DIR/run.toml -o DIR/run",
         "eval -a DIR/run --images 20 --cycles 1",
