@@ -59,11 +59,12 @@ EOF
   while read -r command; do bash -c "$command"; done < <(commands Slurm)
   finished 240 || { cat runs/plan/slurm-*.log; exit 1; }
   same "$work/slurm/runs/plan" "Slurm" || { cat runs/plan/slurm-*.log; exit 1; }
-  # The signal before a time limit: of a minute, 45 seconds before its end; a run of more than a minute.
+  # The signal before a time limit of a minute. Slurm looks every 30 seconds, and sends it up to 30 seconds early: 15 to 45
+  # seconds after the start. The run takes longer than that.
   mkdir limit
   plan limit 1500
   morphcog sweep limit/plan.toml --set 'seeds=[1]' --out limit/runs --slurm > limit/job.sh
-  sbatch --time=1 --signal=B:USR1@45 limit/job.sh
+  sbatch --time=1 --signal=B:USR1@15 limit/job.sh
   # A task is killed, and the job is submitted again.
   rm -r runs
   morphcog sweep plan.toml --slurm > job.sh
