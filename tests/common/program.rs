@@ -75,7 +75,8 @@ pub struct Said {
 }
 
 impl Said {
-    /// Checks that it ended with this code; what is in `words` must be in what it said on stderr.
+    /// Checks that it ended with this code; what is in `words` must be in what it said on stderr: files,
+    /// keys, numbers, ids, commands. How it is put is for the snapshots.
     #[track_caller]
     pub fn ended(self, code: i32, words: &[&str]) -> Self {
         assert_eq!(self.code, Some(code), "{self:#?}");

@@ -55,7 +55,7 @@ fn verdicts_are_the_same_bytes_on_any_number_of_threads_and_however_often_it_was
     }
     // Other criteria are another audit, which does not replace the one there is.
     let other = "audit --archive run/run.json --set threshold=1000";
-    sandbox.run(other).ended(3, &["run/audit.json", "other criteria", "--out"]);
+    sandbox.run(other).ended(3, &["run/audit.json", "--out"]);
     std::fs::remove_file(sandbox.path("run/audit.json")).unwrap();
     sandbox.run(other).ended(0, &[]);
     let robots = verdicts(&sandbox).robots;
@@ -70,7 +70,7 @@ fn robots_of_several_runs_are_audited_each_with_its_run_and_a_wrong_id_before_an
     let best = |run: &str| sandbox.run_file(run).best().unwrap().id.clone();
     let both = "audit --archive run/run.json --archive other/run.json";
     let wrong = format!("{both} {MILD} --robots {},{},nobody", best("run"), best("other"));
-    sandbox.run(&wrong).ended(3, &["no robot nobody"]);
+    sandbox.run(&wrong).ended(3, &["nobody"]);
     assert!(!sandbox.path("run/audit.json").exists() && !sandbox.path("other/audit.json").exists());
     sandbox.run(&format!("{both} {MILD} --robots {},{}", best("run"), best("other"))).ended(0, &[]);
     for run in ["run", "other"] {
@@ -111,10 +111,10 @@ fn physical_only_selects_physical_robots_and_nothing_else() {
     let reason = file.robot(other).unwrap().conclusion();
     sandbox
         .run(&format!("eval --archive run/run.json --images 4 --robots {other} --physical-only"))
-        .ended(3, &["not physical", &reason]);
+        .ended(3, &[other, &reason]);
     sandbox
         .run(&format!("replay --archive run/run.json --robot {other} --physical-only -o x.png"))
-        .ended(3, &["not physical", &reason]);
+        .ended(3, &[other, &reason]);
     sandbox.run("replay --archive run/run.json --physical-only -o best.png").ended(0, &[]);
     assert!(sandbox.path("best.png").exists());
     let fittest = sandbox.run_file("run").elites.into_iter().filter(|robot| physical.contains(&robot.id));
@@ -129,15 +129,15 @@ fn without_verdicts_on_this_very_archive_nothing_is_drawn() {
     let draw = |sandbox: &Sandbox| {
         sandbox.run("eval --archive run/run.json --images 4 --cycles 1 --select random:10 --physical-only")
     };
-    draw(&sandbox).ended(3, &["have not been audited", "hint: `morphcog audit --archive run/run.json`"]);
+    draw(&sandbox).ended(3, &["`morphcog audit --archive run/run.json`"]);
     // Of a part of an archive no fair draw is possible.
     audit(&sandbox, "--robots top:2");
-    draw(&sandbox).ended(3, &["has not been audited", "2 of"]);
+    draw(&sandbox).ended(3, &["run/audit.json", "(2 of"]);
     audit(&sandbox, "");
     draw(&sandbox).ended(0, &[]);
     // The run goes on: its verdicts are stale.
     sandbox.run("evolve --config tiny.toml --out run --generations 45 --resume").ended(0, &[]);
-    draw(&sandbox).ended(3, &["audit.json", "stale", "hint: `morphcog audit --archive run/run.json`"]);
+    draw(&sandbox).ended(3, &["run/audit.json", "`morphcog audit --archive run/run.json`"]);
     audit(&sandbox, "");
     draw(&sandbox).ended(0, &[]);
     // Broken files are refused as broken.
@@ -161,7 +161,7 @@ fn the_best_physical_on_validation_needs_no_verdicts_on_those_behind_it() {
         robots.iter().map(|robot| robot["id"].as_str().unwrap().to_string()).collect()
     };
     let best = "best-validation:1 --physical-only";
-    eval(best).ended(3, &["hint: `morphcog audit --archive run/run.json`"]);
+    eval(best).ended(3, &["`morphcog audit --archive run/run.json`"]);
     audit(&sandbox, "");
     let whole = verdicts(&sandbox);
     eval("best-validation:8").ended(0, &[]);
@@ -177,8 +177,7 @@ fn the_best_physical_on_validation_needs_no_verdicts_on_those_behind_it() {
         sandbox.write("run/audit.json", part.to_json());
     };
     known(place);
-    let number = format!("robot {}, number {} of 0|1 on validation images", ranking[place], place + 1);
-    eval(best).ended(3, &[&number, &format!("--robots best-validation:{}", place + 1)]);
+    eval(best).ended(3, &[&ranking[place], &format!("--robots best-validation:{}", place + 1)]);
     known(place + 1);
     eval(best).ended(0, &[]);
     assert_eq!(chosen(), [ranking[place].clone()]);
@@ -191,11 +190,11 @@ fn the_best_physical_on_validation_needs_no_verdicts_on_those_behind_it() {
 #[test]
 fn an_audit_says_what_it_found_in_a_table_and_as_json() {
     let sandbox = evolved();
-    let said =
-        sandbox.run(&format!("audit --archive run/run.json --robots top:3 {MILD}")).ended(0, &["auditing 3"]);
-    for words in ["verdict", "limits/drive", "time step / 2", "3 robots:", "wrote run/audit.json"] {
-        assert!(said.out.contains(words), "{words} in {}", said.out);
+    let said = sandbox.run(&format!("audit --archive run/run.json --robots top:3 {MILD}")).ended(0, &[]);
+    for robot in verdicts(&sandbox).robots {
+        assert!(said.out.contains(&robot.id), "{} in {}", robot.id, said.out);
     }
+    assert!(said.out.contains("run/audit.json"), "{}", said.out);
     let said =
         sandbox.run(&format!("--json audit --archive run/run.json --robots top:3 {MILD}")).ended(0, &[]);
     let last = said.json_lines().pop().unwrap();
@@ -216,12 +215,12 @@ fn what_cannot_be_audited_is_refused_with_what_to_do() {
     audit("--set treshold=1").ended(2, &["treshold"]);
     audit("--set perturbations.time_step=[1]").ended(3, &["perturbations.time_step", "2 to 64"]);
     audit("--criteria none.toml").ended(3, &["none.toml"]);
-    audit("--robots nobody").ended(3, &["no robot nobody"]);
+    audit("--robots nobody").ended(3, &["nobody"]);
     // Verdicts that cannot be read may be those of a newer version: they stay.
     sandbox.write("run/audit.json", "{");
-    audit("--robots top:1").ended(3, &["run/audit.json", "move it away"]);
+    audit("--robots top:1").ended(3, &["run/audit.json"]);
     assert_eq!(sandbox.read("run/audit.json"), "{");
-    audit("-o run/run.json").ended(2, &["overwrite a file of a run"]);
+    audit("-o run/run.json").ended(2, &["--out run/run.json"]);
     sandbox.write("own.toml", "threshold = -1\n");
     audit("--criteria own.toml").ended(3, &["threshold"]);
     sandbox.run("audit --archive none.json").ended(3, &["none.json"]);
@@ -283,16 +282,12 @@ fn known_verdicts_are_said_to_be_known_and_made_again_only_if_asked_for() {
     let mut verdicts: serde_json::Value = serde_json::from_str(&made).unwrap();
     verdicts["robots"][0]["reason"] = "as it was".into();
     sandbox.write("run/audit.json", verdicts.to_string());
-    let said = sandbox
-        .run(&format!("audit -a run {MILD} --robots top:3"))
-        .ended(0, &["3 robots were audited before"]);
-    assert!(said.out.contains("as it was") && said.err.contains("--fresh"), "{said:?}");
-    let said = sandbox
-        .run(&format!("audit -a run {MILD} --robots top:4"))
-        .ended(0, &["3 robots were audited before"]);
+    let said = sandbox.run(&format!("audit -a run {MILD} --robots top:3")).ended(0, &["--fresh"]);
+    assert!(said.out.contains("as it was"), "{said:?}");
+    let said = sandbox.run(&format!("audit -a run {MILD} --robots top:4")).ended(0, &["--fresh"]);
     assert!(said.out.contains("as it was"), "{said:?}");
     let said = sandbox.run(&format!("audit -a run {MILD} --robots top:3 --fresh")).ended(0, &[]);
-    assert!(!said.out.contains("as it was") && !said.err.contains("audited before"), "{said:?}");
+    assert!(!said.out.contains("as it was") && !said.err.contains("--fresh"), "{said:?}");
     // The fourth one's verdict has stayed.
     let now = AuditFile::read(&sandbox.path("run/audit.json")).unwrap();
     let before: AuditFile = serde_json::from_str(&made).unwrap();

