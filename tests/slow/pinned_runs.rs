@@ -114,7 +114,9 @@ fn check(config: &str, images: u64, effective: &[&str], pinned: &str) {
     assert!(all["evaluations"] == none["evaluations"] && all["simulated"] < none["simulated"]);
     // What an instability makes needless counts as stopped early.
     let saved = |counts: &BTreeMap<String, u64>, saving: &str| counts[&format!("saved_{saving}")];
-    assert!(saved(&none, "known_bodies") + saved(&none, "shared_rollouts") == 0, "{none:?}");
+    // A run of gaits never shows a body twice.
+    assert!(saved(&none, "known_bodies") == 0 || config.contains("response"), "{none:?}");
+    assert_eq!(saved(&none, "shared_rollouts"), 0);
     for (bit, saving) in SAVINGS.iter().enumerate().filter(|(_, saving)| effective.contains(saving)) {
         let made = make(&sandbox, &Way { threads: 2, savings: 1 << bit, ..plain() });
         assert!(made.elites == whole.elites, "{saving} alone");
