@@ -1,12 +1,13 @@
 //! Verdicts: deterministic, resumable, never stale; and `--physical-only` means what it says.
 
-use crate::common::program::{Sandbox, TINY};
+use crate::common::program::{Sandbox, TINY, files};
 use morphcog::base::observer::{Observer, Work};
 use morphcog::commands::audit::{Options, Source};
 use morphcog::store::audit::AuditFile;
 use morphcog::store::audit::Verdict;
 use morphcog::store::robots::Selection;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 /// What tiny robots in short rollouts can be held to, so that some are physical and some are not.
@@ -15,9 +16,16 @@ const MILD: &str = "--set threshold=0 --set least_walk=0 --set least_kept=0.5 --
 
 /// A sandbox with a tiny run in `run`, whose rollouts last three cycles.
 fn evolved() -> Sandbox {
-    let sandbox = Sandbox::new();
-    sandbox.write("tiny.toml", TINY.replace("control_steps = 20", "control_steps = 150"));
-    sandbox.run("evolve --config tiny.toml --out run --generations 40").ended(0, &[]);
+    static RUN: OnceLock<BTreeMap<String, Vec<u8>>> = OnceLock::new();
+    let config = TINY.replace("control_steps = 20", "control_steps = 150");
+    let run = RUN.get_or_init(|| {
+        let sandbox = Sandbox::new();
+        sandbox.write("tiny.toml", &config);
+        sandbox.run("evolve --config tiny.toml --out run --generations 40").ended(0, &[]);
+        files(&sandbox.path("run"))
+    });
+    let sandbox = Sandbox::with_run(run);
+    sandbox.write("tiny.toml", config);
     sandbox
 }
 
