@@ -284,7 +284,7 @@ fn the_published_content_is_kept_however_it_is_packed() {
         // One that is not packed and says something else would be as good as the one beside it.
         std::fs::write(folder.path().join("labels"), "my own").unwrap();
         let error = fetch(program, &catalogue(&[&mirror]), &to(folder.path()), &()).unwrap_err().to_string();
-        assert!(error.contains("labels: "), "{error}");
+        assert!(error.contains("labels: is there but is not the published file"), "{error}");
         let forced = FetchOptions { force: true, ..to(folder.path()) };
         fetch(program, &catalogue(&[&mirror]), &forced, &()).unwrap();
         assert_eq!(names(folder.path()), ["images.gz", "labels.gz"]);
@@ -369,7 +369,7 @@ fn a_file_without_end_is_not_read_to_its_end() {
         std::thread::scope(|scope| {
             let server = scope.spawn(|| client_leaves(&listener, &[0; 1 << 16]));
             let error = fetch(program, &catalogue(&[]), &options(folder.path()), &()).unwrap_err();
-            assert!(error.to_string().contains("20 bytes"), "{error}");
+            assert!(error.to_string().contains("expected 20 bytes, found more"), "{error}");
             assert!(server.join().unwrap());
         });
     }
@@ -402,7 +402,7 @@ fn without_a_program_for_downloads_what_to_fetch_by_hand_is_said() {
     let sandbox = Sandbox::new();
     let mut command = sandbox.command(["data", "fetch"]);
     command.env("PATH", sandbox.path("nothing"));
-    let said = said(command).ended(1, &["curl", "wget", "data/mnist", "builtin"]);
+    let said = said(command).ended(1, &["curl", "wget", "data/mnist yourself", "builtin"]);
     for remote in Catalogue::named("mnist").unwrap().files {
         assert!(said.err.contains(&format!("https://ossci-datasets.s3.amazonaws.com/mnist/{}", remote.name)));
     }
@@ -427,6 +427,6 @@ fn settings_of_curl_do_not_send_a_file_elsewhere() {
     let mirror = Mirror::serving(&[("train-images-idx3-ubyte.gz", IMAGES)]);
     let mut command = sandbox.command(["data", "fetch", "--mirror", &mirror.address]);
     command.env("HOME", sandbox.path("")).env("CURL_HOME", sandbox.path(""));
-    said(command).ended(1, &["9912422"]);
+    said(command).ended(1, &["expected 9912422 bytes, found 20"]);
     assert_eq!(names(&sandbox.path("")), [".curlrc"]);
 }
