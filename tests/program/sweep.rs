@@ -5,6 +5,7 @@ use crate::common::program::{PROGRAM, SETTINGS, Sandbox, TINY, files, said};
 use std::collections::BTreeMap;
 use std::io::Read;
 use std::path::Path;
+use std::sync::OnceLock;
 use std::time::{Duration, Instant};
 
 const PLAN: &str = r#"
@@ -20,7 +21,7 @@ threshold = 0.0
 
 [eval]
 robots = "top:2"
-images = 20
+images = 4
 "#;
 
 const TASKS: [&str; 4] =
@@ -29,6 +30,23 @@ const TASKS: [&str; 4] =
 fn sandbox() -> Sandbox {
     let sandbox = Sandbox::tiny();
     sandbox.write("plan.toml", PLAN);
+    sandbox
+}
+
+/// The same with all of the plan done in `all`: two tasks at a time, once for all tests.
+fn swept() -> Sandbox {
+    static SWEPT: OnceLock<BTreeMap<String, Vec<u8>>> = OnceLock::new();
+    let swept = SWEPT.get_or_init(|| {
+        let sandbox = sandbox();
+        sandbox.run("sweep plan.toml --out all --jobs 2 --threads 2").ended(0, &["task 4", "4 of 4"]);
+        let of = |task: &str| {
+            let files = files(&sandbox.path(&format!("all/{task}"))).into_iter();
+            files.map(|(name, content)| (format!("all/{task}/{name}"), content)).collect::<Vec<_>>()
+        };
+        TASKS.iter().flat_map(|task| of(task)).collect()
+    });
+    let sandbox = sandbox();
+    swept.iter().for_each(|(name, content)| _ = sandbox.write(name, content));
     sandbox
 }
 
@@ -53,9 +71,8 @@ fn states(sandbox: &Sandbox, out: &str) -> Vec<String> {
 
 #[test]
 fn every_combination_is_run_and_a_second_call_has_nothing_left_to_do() {
-    let sandbox = sandbox();
-    assert_eq!(states(&sandbox, "all"), ["waiting"; 4]);
-    sandbox.run("sweep plan.toml --out all --jobs 2 --threads 2").ended(0, &["task 4", "4 of 4"]);
+    let sandbox = swept();
+    assert_eq!(states(&sandbox, "none"), ["waiting"; 4]);
     let all = results(&sandbox, "all");
     assert_eq!(all.len(), 4 * 4, "{:?}", all.keys());
     assert_eq!(states(&sandbox, "all"), ["done"; 4]);
@@ -72,8 +89,7 @@ fn every_combination_is_run_and_a_second_call_has_nothing_left_to_do() {
 
 #[test]
 fn tasks_done_one_by_one_or_killed_at_any_moment_make_the_same_bytes() {
-    let sandbox = sandbox();
-    sandbox.run("sweep plan.toml --out all -q").ended(0, &[]);
+    let sandbox = swept();
     let all = results(&sandbox, "all");
     // By number, and by the numbers of engines.
     sandbox.run("sweep plan.toml --out alone --task 2 --threads 1").ended(0, &[]);
@@ -86,7 +102,7 @@ fn tasks_done_one_by_one_or_killed_at_any_moment_make_the_same_bytes() {
     assert_eq!(results(&sandbox, "alone"), all);
     // Killed, again and again.
     let mut pause = Duration::from_millis(20);
-    for _ in 0..8 {
+    for _ in 0..6 {
         let mut child = sandbox.start("sweep plan.toml --out killed -q");
         std::thread::sleep(pause);
         child.kill().unwrap();
@@ -99,8 +115,7 @@ fn tasks_done_one_by_one_or_killed_at_any_moment_make_the_same_bytes() {
 
 #[test]
 fn listed_commands_do_the_tasks_from_any_folder() {
-    let sandbox = sandbox();
-    sandbox.run("sweep plan.toml --out all -q").ended(0, &[]);
+    let sandbox = swept();
     let list = sandbox.run("sweep plan.toml --out elsewhere --list").ended(0, &[]).out;
     assert_eq!(list.lines().count(), 4);
     let away = tempfile::tempdir().unwrap();
@@ -148,8 +163,7 @@ fn what_is_wrong_is_said_all_at_once_before_anything_starts() {
 
 #[test]
 fn a_changed_plan_keeps_what_is_done_and_refuses_other_settings_with_their_keys() {
-    let sandbox = sandbox();
-    sandbox.run("sweep plan.toml --out all -q").ended(0, &[]);
+    let sandbox = swept();
     let before = results(&sandbox, "all");
     // More seeds, and another order: names stay, numbers do not.
     sandbox.write("plan.toml", PLAN.replace("[1, 2]", "[5, 2, 1]").replace("[4, 8]", "[8, 4]"));
@@ -189,7 +203,7 @@ fn a_test_of_physical_robots_is_done_again_if_others_are_physical_now() {
         }
         sandbox.write(path, audit.to_string());
     };
-    sandbox.write("plan.toml", plan.replace("images = 20", "images = 20\nphysical_only = true"));
+    sandbox.write("plan.toml", plan.replace("images = 4", "images = 4\nphysical_only = true"));
     let tested = || {
         sandbox.run("sweep plan.toml --out all -q").ended(0, &[]);
         let text = sandbox.read("all/tiny-parents=4-seed1/eval.json");
@@ -214,9 +228,11 @@ fn a_test_of_physical_robots_is_done_again_if_others_are_physical_now() {
 
 #[test]
 fn a_task_that_fails_does_not_stop_the_others_and_is_tried_again() {
-    let sandbox = sandbox();
+    let sandbox = swept();
     let broken = sandbox.path("all").join(TASKS[1]);
+    TASKS[1..3].iter().for_each(|task| std::fs::remove_dir_all(sandbox.path("all").join(task)).unwrap());
     sandbox.write(&format!("all/{}/run.json", TASKS[1]), "{}");
+    assert_eq!(states(&sandbox, "all")[2..], ["waiting", "done"]);
     let said = sandbox.run("sweep plan.toml --out all").ended(1, &["task 2"]);
     assert!(!said.err.contains("--force"), "hints are those of a sweep: {}", said.err);
     assert_eq!(states(&sandbox, "all"), ["done", "failed", "done", "done"]);
@@ -296,11 +312,13 @@ fn a_task_whose_lock_is_lost_ends_with_an_error_and_leaves_the_folder_alone() {
 
 #[test]
 fn what_was_found_is_collected_in_one_table_and_figures() {
-    let sandbox = sandbox();
-    sandbox.run("sweep plan.toml --out all -q --task 1").ended(0, &[]);
-    let said = sandbox.run("sweep plan.toml --out all --collect").ended(0, &["3 waiting"]);
+    let sandbox = swept();
+    let part = sandbox.path("all").join(TASKS[0]);
+    files(&part).iter().for_each(|(name, content)| {
+        sandbox.write(&format!("part/{}/{name}", TASKS[0]), content);
+    });
+    let said = sandbox.run("sweep plan.toml --out part --collect").ended(0, &["3 waiting"]);
     assert!(said.out.contains("sweep.csv"), "{said:?}");
-    sandbox.run("sweep plan.toml --out all -q").ended(0, &[]);
     let said = sandbox.run("sweep plan.toml --out all --collect").ended(0, &[]);
     assert!(!said.err.contains("warning"), "{}", said.err);
     let table = sandbox.read("all/sweep.csv");
@@ -350,15 +368,15 @@ fn trainings_are_swept_over_pairs_of_classes() {
     sandbox.run("evolve -q -c run.toml -o gaits/walkers").ended(0, &[]);
     let plan = r#"
 archive = "../gaits/walkers"
-robots = "top:3"
+robots = "top:2"
 pairs = [3, 1, 4]
-set = ["train.random_images=40", "train.rounds=1", "train.images=10", "train.final_images=10",
+set = ["train.random_images=20", "train.rounds=1", "train.images=4", "train.final_images=4",
        "train.challengers=2", "validation.images=40"]
 
 [audit]
 
 [eval]
-images = 10
+images = 4
 split = "validation"
 "#;
     sandbox.write("plans/pairs.toml", plan);
@@ -392,8 +410,8 @@ split = "validation"
 #[test]
 fn the_runs_of_a_reproduction_are_tasks_of_the_same_kind() {
     let sandbox = Sandbox::tiny();
-    let plan = "seeds = [1, 2]\nrobots = 3\nimages = 20\n[[experiment]]\nconfig = \"tiny.toml\"\n\
-                [audit]\nleast_walk = 0.0\nthreshold = 0.0\n[capacity]\ntrainings = 2\nsizes = [1, 3]\n";
+    let plan = "seeds = [1, 2]\nrobots = 2\nimages = 4\n[[experiment]]\nconfig = \"tiny.toml\"\n\
+                [audit]\nleast_walk = 0.0\nthreshold = 0.0\n[capacity]\ntrainings = 1\nsizes = [1, 2]\n";
     sandbox.write("paper.toml", plan);
     let reproduce = |more: &str| sandbox.run(&format!("reproduce paper.toml --scale 0.5 {more}"));
     let list = reproduce("--out one --list").ended(0, &[]).out;
@@ -534,11 +552,11 @@ fn a_test_with_other_settings_is_never_taken_for_the_plans_own() {
         ("--cycles 1", "control_steps = 50"),
         ("--threshold 1", "threshold = 1"),
         ("--seed 2", "seed = 2"),
-        ("--images 30", "images = 30"),
+        ("--images 6", "images = 6"),
         ("--robots top:1", "robots = "),
     ] {
         let others = if setting.contains("robots") { "" } else { "--robots top:2" };
-        let images = if setting.contains("images") { "" } else { "--images 20" };
+        let images = if setting.contains("images") { "" } else { "--images 4" };
         let words = format!("eval -a {folder} {others} {images} {setting}");
         sandbox.run(&words).ended(0, &["eval.json"]);
         let row = collected(&sandbox, &["eval.json", key]);
@@ -561,7 +579,7 @@ fn verdicts_and_choices_by_other_settings_are_never_taken_for_the_plans_own() {
     sandbox.run("sweep plan.toml --out all -q").ended(0, &[]);
     let row = collected(&sandbox, &[]);
     assert!(!row["validation_balanced_accuracy"].is_empty() && !row["audited"].is_empty());
-    let chosen = "--robots best-validation:2 --validation 60 --images 20 -o other.json";
+    let chosen = "--robots best-validation:2 --validation 42 --images 4 -o other.json";
     sandbox.run(&format!("eval -q -a {folder} {chosen}")).ended(0, &[]);
     assert_eq!(collected(&sandbox, &[]), row);
     std::fs::remove_file(sandbox.path(&format!("{folder}/audit.json"))).unwrap();

@@ -2,25 +2,41 @@
 //! asked for by name.
 #![allow(clippy::disallowed_methods)]
 
-use crate::common::program::{Sandbox, TINY, mnist, said, write_images};
+use crate::common::program::{Sandbox, TINY, files, mnist, said, write_images};
 use crate::common::server::Server;
 use morphcog::store::eval::EvalFile;
+use std::collections::BTreeMap;
 use std::fs::{remove_dir_all, remove_file, rename};
+use std::sync::OnceLock;
 
 /// Images of 10 × 10 pixels in a folder.
 fn write_dataset(sandbox: &Sandbox, folder: &str, seed: u8) {
     write_images(sandbox, &format!("{folder}/"), [10, 10], seed);
 }
 
-/// A run on `shapes`, which lie in `there`.
+/// A run on `shapes`, which lie in `there`: evolved once, and put into folders of other names.
 fn with_run() -> Sandbox {
+    static RUN: OnceLock<BTreeMap<String, String>> = OnceLock::new();
     let sandbox = Sandbox::new();
     write_dataset(&sandbox, "there", 1);
     let config = TINY.replace("\"builtin\"", "\"shapes\"");
-    sandbox.write("shapes.toml", format!("{config}\n[validation]\nimages = 40\nbest = 1\n"));
-    sandbox.run("evolve -q -c shapes.toml -o runs/one -g 6 --data there").ended(0, &[]);
+    let few = "[validation]\nimages = 40\nbest = 1\n[archive]\nkeep = 3\n";
+    sandbox.write("shapes.toml", format!("{config}\n{few}"));
+    // Where its images are is another place in every sandbox.
+    let here = sandbox.path("there").to_str().unwrap().to_string();
+    let run = RUN.get_or_init(|| {
+        sandbox.run("evolve -q -c shapes.toml -o runs/one -g 6 --data there").ended(0, &[]);
+        let text = |content| String::from_utf8(content).unwrap().replace(&here, "HERE");
+        files(&sandbox.path("runs/one")).into_iter().map(|(name, content)| (name, text(content))).collect()
+    });
+    for (name, content) in run {
+        sandbox.write(&format!("runs/one/{name}"), content.replace("HERE", &here));
+    }
     sandbox
 }
+
+/// Without a look at which of a run's robots are best on other images.
+const UNVALIDATED: &str = "--set validation.best=0";
 
 /// What looks at images of a run.
 const COMMANDS: [&str; 9] = [
@@ -38,7 +54,12 @@ const COMMANDS: [&str; 9] = [
 #[test]
 fn a_run_remembers_where_its_images_were() {
     let sandbox = with_run();
-    let file: serde_json::Value = serde_json::from_str(&sandbox.read("runs/one/data-folder.json")).unwrap();
+    sandbox
+        .run(&format!("evolve -q -c shapes.toml -o runs/new -g 1 --data there {UNVALIDATED}"))
+        .ended(0, &[]);
+    let text = sandbox.read("runs/new/data-folder.json");
+    assert_eq!(sandbox.read("runs/one/data-folder.json"), text);
+    let file: serde_json::Value = serde_json::from_str(&text).unwrap();
     assert_eq!(file["dataset"], "shapes");
     assert_eq!(file["folder"].as_str().unwrap(), sandbox.path("there").to_str().unwrap());
     for command in COMMANDS {
@@ -51,7 +72,11 @@ fn a_run_remembers_where_its_images_were() {
     sandbox
         .run("eval -a runs/one --images 8 -o runs/one/data-folder.json")
         .ended(2, &["--out runs/one/data-folder.json"]);
-    sandbox.run("evolve -q -c shapes.toml --set data.dataset=builtin -o runs/one --force").ended(0, &[]);
+    sandbox
+        .run(&format!(
+            "evolve -q -c shapes.toml --set data.dataset=builtin {UNVALIDATED} -o runs/one --force"
+        ))
+        .ended(0, &[]);
     assert!(!sandbox.path("runs/one/data-folder.json").exists());
 }
 
@@ -61,8 +86,9 @@ fn a_sweep_over_a_run_looks_where_the_run_remembers() {
     sandbox.write(
         "plan.toml",
         "archive = \"runs/one\"\nrobots = \"top:1\"\npairs = [0, 1]\n\
-         set = [\"train.random_images=40\", \"train.rounds=1\", \"train.images=10\", \"train.final_images=10\", \
-         \"train.challengers=1\", \"train.images_per_class=30\", \"validation.images=40\"]\n[eval]\nimages = 8\n",
+         set = [\"train.random_images=20\", \"train.rounds=1\", \"train.images=4\", \"train.final_images=4\", \
+         \"train.challengers=1\", \"train.images_per_class=30\", \"validation.images=40\", \
+         \"validation.best=0\"]\n[eval]\nimages = 4\n",
     );
     sandbox.run("sweep -q plan.toml --out all").ended(0, &[]);
     // Another place is no better than none.
@@ -73,9 +99,9 @@ fn a_sweep_over_a_run_looks_where_the_run_remembers() {
 fn a_training_that_takes_the_place_of_another_takes_nothing_of_it() {
     let sandbox = with_run();
     write_dataset(&sandbox, "elsewhere", 2);
-    let little = "--set train.random_images=40 --set train.rounds=1 --set train.images=10 \
-                  --set train.final_images=10 --set train.challengers=1 --set train.images_per_class=30 \
-                  --set validation.images=40";
+    let little = "--set train.random_images=20 --set train.rounds=1 --set train.images=4 \
+                  --set train.final_images=4 --set train.challengers=1 --set train.images_per_class=30 \
+                  --set validation.images=40 --set validation.best=0";
     let train = format!("train -q -a runs/one --task 0|1 --robots top:1 {little} -o taught");
     sandbox.run(&format!("{train} --data elsewhere")).ended(0, &[]);
     let of = |sandbox: &Sandbox| sandbox.run_file("taught").dataset;
@@ -110,9 +136,8 @@ fn a_folder_that_is_gone_is_one_error_that_says_where_it_was_looked_for() {
     }
     // Named once more when it went on, they are known again.
     sandbox.run(COMMANDS[0]).ended(0, &[]);
+    assert!(sandbox.read("runs/one/data-folder.json").contains("moved"));
     // Where a dataset always lies it is found, too.
-    remove_dir_all(sandbox.path("runs/one")).unwrap();
-    sandbox.run("evolve -q -c shapes.toml -o runs/one -g 6 --data moved").ended(0, &[]);
     std::fs::create_dir(sandbox.path("data")).unwrap();
     rename(sandbox.path("moved"), sandbox.path("data/shapes")).unwrap();
     sandbox.run(COMMANDS[0]).ended(0, &[]);
@@ -248,7 +273,7 @@ fn a_run_is_shown_its_images_the_way_it_was_made_with_them_whatever_their_files_
         sandbox.run(command).ended(0, &[]);
     }
     // A run that is made with them says how they are seen.
-    let evolve = "evolve -c shapes.toml -g 6 --data there -o";
+    let evolve = format!("evolve -c shapes.toml -g 2 --data there {UNVALIDATED} -o");
     sandbox.run(&format!("{evolve} runs/turned")).ended(0, &["data.transpose = false"]);
     let same = sandbox.run(&format!("{evolve} runs/same --set data.transpose=false")).ended(0, &[]);
     assert!(!same.err.contains("data.transpose"), "{}", same.err);
@@ -274,7 +299,7 @@ fn a_tilde_in_a_path_is_the_home_folder() {
         command.env("HOME", sandbox.path(""));
         said(command)
     };
-    let evolve = "evolve -q -c ~/shapes.toml -g 6";
+    let evolve = format!("evolve -q -c ~/shapes.toml -g 1 {UNVALIDATED}");
     at_home(&format!("{evolve} -o runs/two --set data.dir=~/there")).ended(0, &[]);
     assert_eq!(sandbox.read("runs/two/run.json").matches("~/there").count(), 1);
     at_home(&format!("{evolve} -o runs/three --data=~/there")).ended(0, &[]);
