@@ -14,19 +14,41 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 const MILD: &str = "--set threshold=0 --set least_walk=0 --set least_kept=0.5 --set least_distance=0 --set \
  perturbations.time_step=[2] --set perturbations.start=[] --set perturbations.least_sensors=1";
 
-/// A sandbox with a tiny run in `run`, whose rollouts last three cycles.
+/// [`TINY`] with rollouts of three cycles, and few robots.
+fn config() -> String {
+    let config = TINY.replace("control_steps = 20", "control_steps = 150");
+    format!("{config}\n[archive]\nkeep = 8\n[validation]\nimages = 40\n")
+}
+
+/// A sandbox with a run of it in `run`.
 fn evolved() -> Sandbox {
     static RUN: OnceLock<BTreeMap<String, Vec<u8>>> = OnceLock::new();
-    let config = TINY.replace("control_steps = 20", "control_steps = 150");
     let run = RUN.get_or_init(|| {
         let sandbox = Sandbox::new();
-        sandbox.write("tiny.toml", &config);
+        sandbox.write("tiny.toml", config());
         sandbox.run("evolve --config tiny.toml --out run --generations 40").ended(0, &[]);
         files(&sandbox.path("run"))
     });
     let sandbox = Sandbox::with_run(run);
-    sandbox.write("tiny.toml", config);
+    sandbox.write("tiny.toml", config());
     sandbox
+}
+
+/// The same with verdicts on all of its robots, made on one thread.
+fn audited() -> Sandbox {
+    static VERDICTS: OnceLock<[String; 2]> = OnceLock::new();
+    let sandbox = evolved();
+    let [json, csv] = VERDICTS.get_or_init(|| {
+        audit(&sandbox, "--threads 1");
+        written(&sandbox)
+    });
+    sandbox.write("run/audit.json", json);
+    sandbox.write("run/audit.csv", csv);
+    sandbox
+}
+
+fn written(sandbox: &Sandbox) -> [String; 2] {
+    [sandbox.read("run/audit.json"), sandbox.read("run/audit.csv")]
 }
 
 fn audit(sandbox: &Sandbox, more: &str) {
@@ -39,9 +61,7 @@ fn verdicts(sandbox: &Sandbox) -> AuditFile {
 
 #[test]
 fn verdicts_are_the_same_bytes_on_any_number_of_threads_and_however_often_it_was_stopped() {
-    let sandbox = evolved();
-    let written = |sandbox: &Sandbox| [sandbox.read("run/audit.json"), sandbox.read("run/audit.csv")];
-    audit(&sandbox, "--threads 1");
+    let sandbox = audited();
     let alone = written(&sandbox);
     std::fs::remove_file(sandbox.path("run/audit.json")).unwrap();
     audit(&sandbox, "--threads 3 --robots top:2");
@@ -74,7 +94,7 @@ fn verdicts_are_the_same_bytes_on_any_number_of_threads_and_however_often_it_was
 #[test]
 fn robots_of_several_runs_are_audited_each_with_its_run_and_a_wrong_id_before_any() {
     let sandbox = evolved();
-    sandbox.run("evolve --config tiny.toml --out other --generations 40 --seed 9").ended(0, &[]);
+    sandbox.run("evolve --config tiny.toml --out other --generations 5 --seed 9").ended(0, &[]);
     let best = |run: &str| sandbox.run_file(run).best().unwrap().id.clone();
     let both = "audit --archive run/run.json --archive other/run.json";
     let wrong = format!("{both} {MILD} --robots {},{},nobody", best("run"), best("other"));
@@ -93,8 +113,7 @@ fn robots_of_several_runs_are_audited_each_with_its_run_and_a_wrong_id_before_an
 
 #[test]
 fn physical_only_selects_physical_robots_and_nothing_else() {
-    let sandbox = evolved();
-    audit(&sandbox, "");
+    let sandbox = audited();
     let file = verdicts(&sandbox);
     let of = |physical: bool| -> BTreeSet<String> {
         let robots = file.robots.iter().filter(|robot| (robot.verdict == Verdict::Physical) == physical);
@@ -141,7 +160,7 @@ fn without_verdicts_on_this_very_archive_nothing_is_drawn() {
     // Of a part of an archive no fair draw is possible.
     audit(&sandbox, "--robots top:2");
     draw(&sandbox).ended(3, &["run/audit.json", "(2 of"]);
-    audit(&sandbox, "");
+    let sandbox = audited();
     draw(&sandbox).ended(0, &[]);
     // The run goes on: its verdicts are stale.
     sandbox.run("evolve --config tiny.toml --out run --generations 45 --resume").ended(0, &[]);
@@ -157,12 +176,12 @@ fn without_verdicts_on_this_very_archive_nothing_is_drawn() {
 
 #[test]
 fn the_best_physical_on_validation_needs_no_verdicts_on_those_behind_it() {
-    let sandbox = Sandbox::new();
-    let config = TINY.replace("control_steps = 20", "control_steps = 150");
-    sandbox.write("tiny.toml", format!("{config}\n[validation]\nimages = 40\nbest = 8\n"));
-    sandbox.run("evolve --config tiny.toml --out run --generations 40").ended(0, &[]);
-    let eval =
-        |options: &str| sandbox.run(&format!("eval --archive run/run.json --images 4 --robots {options}"));
+    let sandbox = audited();
+    let whole = verdicts(&sandbox);
+    std::fs::remove_file(sandbox.path("run/audit.json")).unwrap();
+    let eval = |options: &str| {
+        sandbox.run(&format!("eval --archive run/run.json --images 4 --cycles 1 --robots {options}"))
+    };
     let chosen = || -> Vec<String> {
         let report: serde_json::Value = serde_json::from_str(&sandbox.read("run/eval.json")).unwrap();
         let robots = report["robots"].as_array().unwrap();
@@ -170,15 +189,13 @@ fn the_best_physical_on_validation_needs_no_verdicts_on_those_behind_it() {
     };
     let best = "best-validation:1 --physical-only";
     eval(best).ended(3, &["`morphcog audit --archive run/run.json`"]);
-    audit(&sandbox, "");
-    let whole = verdicts(&sandbox);
-    eval("best-validation:8").ended(0, &[]);
+    eval("best-validation:7").ended(0, &[]);
     let ranking = chosen();
     let is_physical = |id: &String| whole.robot(id).unwrap().is_physical();
-    let place = ranking.iter().position(is_physical).expect("one of the first eight is physical");
+    let place = ranking.iter().position(is_physical).expect("one of the first seven is physical");
     // Verdicts on the first of the ranking only, without that one and with it.
     let known = |count: usize| {
-        let mut part = verdicts(&sandbox);
+        let mut part = whole.clone();
         part.robots =
             whole.robots.iter().filter(|robot| ranking[..count].contains(&robot.id)).cloned().collect();
         assert!(part.robots.len() == count && count < whole.robots.len());
@@ -255,8 +272,7 @@ impl Observer for Impatient {
 
 #[test]
 fn what_a_stopped_audit_was_done_with_is_kept() {
-    let sandbox = evolved();
-    audit(&sandbox, "");
+    let sandbox = audited();
     let whole = verdicts(&sandbox);
     std::fs::remove_file(sandbox.path("run/audit.json")).unwrap();
     let impatient = Impatient { rollouts: AtomicU64::new(0), stop: AtomicBool::new(false) };

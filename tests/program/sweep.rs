@@ -173,8 +173,8 @@ fn a_changed_plan_keeps_what_is_done_and_refuses_other_settings_with_their_keys(
     // More generations go on; another step is done.
     sandbox.write("plan.toml", PLAN.replace("\nseeds", "\nset = [\"generations=20\"]\nseeds"));
     assert_eq!(states(&sandbox, "all"), ["stopped"; 4]);
-    sandbox.run("sweep plan.toml --out all -q").ended(0, &[]);
-    assert_eq!(sandbox.run_file("all/tiny-parents=8-seed1").generations, 20);
+    sandbox.run("sweep plan.toml --out all -q --task 1").ended(0, &[]);
+    assert_eq!(sandbox.run_file(&format!("all/{}", TASKS[0])).generations, 20);
     // Other bodies are other runs.
     let other = PLAN.replace("\nseeds", "\nset = [\"body.height=4\", \"task.groups=[[0],[7]]\"]\nseeds");
     sandbox.write("plan.toml", other);
@@ -371,7 +371,7 @@ archive = "../gaits/walkers"
 robots = "top:2"
 pairs = [3, 1, 4]
 set = ["train.random_images=20", "train.rounds=1", "train.images=4", "train.final_images=4",
-       "train.challengers=2", "validation.images=40"]
+       "train.challengers=2", "validation.images=40", "validation.best=0"]
 
 [audit]
 
@@ -380,18 +380,23 @@ images = 4
 split = "validation"
 "#;
     sandbox.write("plans/pairs.toml", plan);
+    sandbox.write("plans/validated.toml", plan.replace("validation.best=0", "validation.best=1"));
     sandbox.run("sweep plans/pairs.toml --out pairs").ended(0, &["3 of 3"]);
     for (task, name) in
         [("1|3", "walkers-1v3-seed3"), ("3|4", "walkers-3v4-seed3"), ("1|4", "walkers-1v4-seed3")]
     {
         let run = sandbox.run_file(&format!("pairs/{name}"));
         assert_eq!(run.elites[0].task, task);
-        for file in ["audit.json", "eval-validation.json", "validation.json"] {
+        for file in ["audit.json", "eval-validation.json"] {
             assert!(sandbox.path(&format!("pairs/{name}/{file}")).exists(), "{name}/{file}");
         }
+        assert!(!sandbox.path(&format!("pairs/{name}/validation.json")).exists());
     }
     let said = sandbox.run("sweep plans/pairs.toml --out pairs --collect").ended(0, &[]);
     assert!(said.out.contains("1|3") && said.out.contains("validation"), "{}", said.out);
+    // The robot that a training made is shown other images where the plan says so.
+    sandbox.run("sweep plans/validated.toml --out validated --task 2").ended(0, &[]);
+    assert!(sandbox.path("validated/walkers-1v4-seed3/validation.json").exists());
     // One that is stopped says so, and goes on.
     let one = "sweep plans/pairs.toml --out one --task 1";
     let mut child = sandbox.start(&format!("{one} --set set=[\"train.challengers=1000000\"]"));
@@ -488,7 +493,10 @@ fn a_run_of_another_kind_in_a_tasks_folder_is_a_failure_with_its_reason() {
 #[test]
 fn a_plans_config_is_beside_the_plan_or_built_in_wherever_one_stands() {
     let sandbox = Sandbox::new();
-    sandbox.write("plans/plan.toml", "config = \"quickstart.toml\"\nset = [\"generations=1\"]\n");
+    sandbox.write(
+        "plans/plan.toml",
+        "config = \"quickstart.toml\"\nset = [\"generations=1\", \"map_elites.initial=4\"]\n",
+    );
     sandbox.write("quickstart.toml", TINY);
     sandbox.run("sweep plans/plan.toml --out all -q").ended(0, &[]);
     assert_eq!(sandbox.run_file("all/quickstart-seed1").config.body.height, 7);
@@ -574,7 +582,7 @@ fn a_test_with_other_settings_is_never_taken_for_the_plans_own() {
 #[test]
 fn verdicts_and_choices_by_other_settings_are_never_taken_for_the_plans_own() {
     let (sandbox, folder) = one_task();
-    let validation = "set = [\"validation.best=1\", \"validation.images=40\"]\n[vary]";
+    let validation = "set = [\"archive.keep=3\", \"validation.best=1\", \"validation.images=40\"]\n[vary]";
     sandbox.write("plan.toml", sandbox.read("plan.toml").replace("[vary]", validation));
     sandbox.run("sweep plan.toml --out all -q").ended(0, &[]);
     let row = collected(&sandbox, &[]);

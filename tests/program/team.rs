@@ -1,13 +1,30 @@
 //! A team: robots that tell pairs apart answer together, by rules that a few lines here repeat; it
 //! goes on after a stop, and says clearly who or what is missing.
 
-use crate::common::program::{Sandbox, TINY, files, pairs};
+use crate::common::program::{Sandbox, TINY, files};
 use morphcog::store::eval::EvalFile;
 use morphcog::store::team::TeamFile;
 use morphcog::task::margins::Margins;
 use morphcog::task::stimulus::Reduction;
 use serde_json::Value;
 use std::collections::BTreeMap;
+use std::sync::OnceLock;
+
+/// Runs of all pairs of three digits, in `pairs/`, made once.
+fn pairs() -> Sandbox {
+    static PAIRS: OnceLock<BTreeMap<String, Vec<u8>>> = OnceLock::new();
+    let pairs = PAIRS.get_or_init(|| {
+        let sandbox = crate::common::program::pairs();
+        let of = |run: &str| {
+            let files = files(&sandbox.path(run)).into_iter();
+            files.map(|(name, content)| (format!("{run}/{name}"), content)).collect::<Vec<_>>()
+        };
+        ["pairs/0v1", "pairs/0v4", "pairs/1v4"].into_iter().flat_map(of).collect()
+    });
+    let sandbox = Sandbox::new();
+    pairs.iter().for_each(|(name, content)| _ = sandbox.write(name, content));
+    sandbox
+}
 
 const TEAM: &str = "team --archive pairs/0v1 pairs/0v4 pairs/1v4 --classes 0,1,4";
 
@@ -18,10 +35,10 @@ fn read(sandbox: &Sandbox, name: &str) -> TeamFile {
 #[test]
 fn the_answers_are_those_of_the_rules_in_the_documentation() {
     let sandbox = pairs();
-    sandbox.run(&format!("{TEAM} --images 60")).ended(0, &[]);
+    sandbox.run(&format!("{TEAM} --images 24")).ended(0, &[]);
     let team = read(&sandbox, "pairs/team.json");
     let answers = team.answers.as_ref().unwrap();
-    assert_eq!((team.images.len(), team.members.len(), team.size), (60, 3, 3));
+    assert_eq!((team.images.len(), team.members.len(), team.size), (24, 3, 3));
     for (place, image) in team.images.iter().enumerate() {
         let (mut votes, mut sums) = (BTreeMap::<u8, i32>::new(), BTreeMap::<u8, f64>::new());
         for member in &team.members {
@@ -47,14 +64,14 @@ fn the_answers_are_those_of_the_rules_in_the_documentation() {
     assert_eq!(answers.votes.accuracy.right, right(&answers.votes.answers));
     let diagonal: usize = (0..3).map(|class| answers.votes.confusion[class][class]).sum();
     assert_eq!(answers.votes.accuracy.right, diagonal);
-    assert_eq!(answers.votes.confusion.iter().flatten().sum::<usize>(), 60);
+    assert_eq!(answers.votes.confusion.iter().flatten().sum::<usize>(), 24);
     // What needs no body reads drawn digits well; the table and the pictures are there.
     let baselines = team.baselines.unwrap();
     assert!(
         baselines.linear_pairs.accuracy > 0.9 && baselines.nearest_neighbour.accuracy > 0.9,
         "{baselines:?}"
     );
-    assert_eq!(sandbox.read("pairs/team.csv").lines().count(), 61);
+    assert_eq!(sandbox.read("pairs/team.csv").lines().count(), 25);
     for picture in ["confusion.svg", "confusion.png", "bodies.svg", "bodies.png"] {
         assert!(sandbox.path(&format!("pairs/team-{picture}")).exists(), "{picture}");
     }
@@ -64,7 +81,7 @@ fn the_answers_are_those_of_the_rules_in_the_documentation() {
 fn robots_see_their_own_windows_and_classifiers_what_all_see_together() {
     let sandbox = pairs();
     let tested = |name: &str| {
-        sandbox.run(&format!("{TEAM} -q --images 60 -o {name}.json")).ended(0, &[]);
+        sandbox.run(&format!("{TEAM} -q --images 24 -o {name}.json")).ended(0, &[]);
         read(&sandbox, &format!("{name}.json"))
     };
     let before = tested("before");
@@ -109,7 +126,7 @@ fn eval_shows_robots_of_several_runs_their_own_windows_and_judges_pixels_by_what
     sandbox.write("right/run.json", run.to_json());
     let tested = |archives: &str, count: usize, name: &str| -> EvalFile {
         sandbox
-            .run(&format!("eval -q -a {archives} --robots top:{count} --images 60 -o {name}.json"))
+            .run(&format!("eval -q -a {archives} --robots top:{count} --images 24 -o {name}.json"))
             .ended(0, &[]);
         serde_json::from_str(&sandbox.read(&format!("{name}.json"))).unwrap()
     };
@@ -138,13 +155,13 @@ fn eval_shows_robots_of_several_tasks_the_same_images_if_these_split_the_same_cl
         ("pair", "groups = [[0], [1]]"),
     ] {
         let config = TINY.replace("groups = [[0], [1]]", task).replace("train_images = [0, 1]", "");
-        let config = config.replace("generations = 12", "generations = 3");
+        let config = config.replace("generations = 12", "generations = 3\narchive.keep = 2");
         sandbox.write("run.toml", config);
         sandbox.run(&format!("evolve -q -c run.toml -o {name}")).ended(0, &[]);
     }
     let tested = |archives: &str, robots: &str, name: &str| -> EvalFile {
         let archives = format!("-a {archives} --robots {robots}");
-        sandbox.run(&format!("eval -q {archives} --images 12 -o {name}.json")).ended(0, &[]);
+        sandbox.run(&format!("eval -q {archives} --images 6 -o {name}.json")).ended(0, &[]);
         EvalFile::read(&sandbox.path(&format!("{name}.json"))).unwrap()
     };
     let [zero, four, all] = ["zero", "four", "all"].map(|name| tested(name, "top:1", name));
@@ -182,8 +199,8 @@ fn eval_shows_robots_of_several_tasks_the_same_images_if_these_split_the_same_cl
 #[test]
 fn a_team_shows_the_same_walks_as_eval() {
     let sandbox = pairs();
-    sandbox.run("eval -q -a pairs/0v1 --robots best --images 40 -o eval.json").ended(0, &[]);
-    sandbox.run("team -q --archive pairs/0v1 --classes 0,1 --images 40 -o team.json").ended(0, &[]);
+    sandbox.run("eval -q -a pairs/0v1 --robots best --images 8 -o eval.json").ended(0, &[]);
+    sandbox.run("team -q --archive pairs/0v1 --classes 0,1 --images 8 -o team.json").ended(0, &[]);
     let eval: Value = serde_json::from_str(&sandbox.read("eval.json")).unwrap();
     let member = &read(&sandbox, "team.json").members[0];
     let walks: Vec<Option<f64>> = serde_json::from_value(eval["robots"][0]["displacements"].clone()).unwrap();
@@ -197,25 +214,25 @@ fn a_test_that_was_stopped_goes_on_and_ends_with_the_same_bytes_on_any_threads()
     let sandbox = pairs();
     std::fs::create_dir(sandbox.path("whole")).unwrap();
     std::fs::create_dir(sandbox.path("parts")).unwrap();
-    sandbox.run(&format!("{TEAM} -q --images 30 -o whole/team.json --threads 1")).ended(0, &[]);
+    sandbox.run(&format!("{TEAM} -q --images 6 -o whole/team.json --threads 1")).ended(0, &[]);
     // As if it was stopped after the first robot.
     let mut part = read(&sandbox, "whole/team.json");
     part.members.truncate(1);
     (part.answers, part.baselines) = (None, None);
     part.write(&sandbox.path("parts/team.json")).unwrap();
-    let said = sandbox.run(&format!("{TEAM} --images 30 -o parts/team.json --threads 3")).ended(0, &[]);
+    let said = sandbox.run(&format!("{TEAM} --images 6 -o parts/team.json --threads 3")).ended(0, &[]);
     assert!(said.err.contains("(1 known"), "{}", said.err);
     assert!(files(&sandbox.path("whole")) == files(&sandbox.path("parts")));
     // With a run more, before the others: only its robot is shown the images, and what is known of the
     // others is in the file from then on.
     let fewer = TEAM.replace("pairs/0v1 ", "");
     std::fs::create_dir(sandbox.path("more")).unwrap();
-    sandbox.run(&format!("{fewer} -q --images 30 -o more/team.json")).ended(0, &[]);
-    let said = sandbox.run(&format!("{TEAM} --images 30 -o more/team.json")).ended(0, &[]);
+    sandbox.run(&format!("{fewer} -q --images 6 -o more/team.json")).ended(0, &[]);
+    let said = sandbox.run(&format!("{TEAM} --images 6 -o more/team.json")).ended(0, &[]);
     assert!(said.err.contains("(2 known"), "{}", said.err);
     assert!(files(&sandbox.path("whole")) == files(&sandbox.path("more")));
     // Other images are shown to all.
-    let said = sandbox.run(&format!("{TEAM} --images 30 --seed 2 -o parts/team.json")).ended(0, &[]);
+    let said = sandbox.run(&format!("{TEAM} --images 6 --seed 2 -o parts/team.json")).ended(0, &[]);
     assert!(!said.err.contains(" known"), "{}", said.err);
 }
 
@@ -224,7 +241,7 @@ fn a_file_that_cannot_be_read_is_not_written_over() {
     let sandbox = pairs();
     for content in ["{", "{\"format\": \"morphcog-team\", \"format_version\": 99}", "my notes"] {
         sandbox.write("pairs/team.json", content);
-        let said = sandbox.run(&format!("{TEAM} -q --images 30"));
+        let said = sandbox.run(&format!("{TEAM} -q --images 6"));
         said.ended(3, &["pairs/team.json", "--out"]);
         assert_eq!(sandbox.read("pairs/team.json"), content);
     }
@@ -233,7 +250,7 @@ fn a_file_that_cannot_be_read_is_not_written_over() {
 #[test]
 fn validation_images_are_none_that_a_run_was_trained_on() {
     let sandbox = pairs();
-    sandbox.run(&format!("{TEAM} -q --split validation --images 30")).ended(0, &[]);
+    sandbox.run(&format!("{TEAM} -q --split validation --images 6")).ended(0, &[]);
     let team = read(&sandbox, "pairs/team-validation.json");
     for run in ["pairs/0v1", "pairs/0v4", "pairs/1v4"] {
         let trained = sandbox.run_file(run).training_images;
@@ -266,11 +283,11 @@ fn what_is_missing_or_does_not_go_together_is_said_with_exit_code_3() {
 #[test]
 fn a_second_test_on_other_images_keeps_the_first() {
     let sandbox = pairs();
-    sandbox.run(&format!("{TEAM} -q --images 30")).ended(0, &[]);
+    sandbox.run(&format!("{TEAM} -q --images 6")).ended(0, &[]);
     let first = sandbox.read("pairs/team.json");
-    sandbox.run(&format!("{TEAM} --images 30")).ended(0, &["(3 known", " 0.0 rollouts/s"]);
+    sandbox.run(&format!("{TEAM} --images 6")).ended(0, &["(3 known", " 0.0 rollouts/s"]);
     assert_eq!(sandbox.read("pairs/team.json"), first);
-    sandbox.run(&format!("{TEAM} --images 30 --seed 2")).ended(0, &["pairs/team.json"]);
+    sandbox.run(&format!("{TEAM} --images 6 --seed 2")).ended(0, &["pairs/team.json"]);
     assert_ne!(sandbox.read("pairs/team.json"), first);
     assert!(files(&sandbox.path("pairs")).values().any(|content| content == first.as_bytes()));
 }

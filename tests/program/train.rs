@@ -559,7 +559,7 @@ fn whatever_is_valid_evolves_and_trains_to_runs_that_can_be_read() {
 fn evolve_with_train_ends_with_the_robot_that_train_makes_of_its_gaits() {
     let sandbox = Sandbox::new();
     let little = "[train]\nrandom_images = 24\nrounds = 1\nimages = 8\nfinal_images = 6\nchallengers = 2\n";
-    let validation = "[validation]\nimages = 40\n";
+    let validation = "[validation]\nimages = 40\nbest = 0\n";
     sandbox.write("gaits.toml", format!("{}\n{little}{validation}", gaits()));
     sandbox.write("four.toml", TINY.replace("groups = [[0], [1]]", "splits = [0, 1, 2]"));
     sandbox.run("evolve -q -c four.toml --train -o refused").ended(2, &["--train", "task.groups"]);

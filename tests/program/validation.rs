@@ -1,7 +1,7 @@
 //! Selection on validation images: from the training split, never trained on; the same every time;
 //! kept beside the run.
 
-use crate::common::program::{Sandbox, TINY};
+use crate::common::program::{Sandbox, TINY, files};
 use morphcog::base::observer::{Generation, Observer};
 use morphcog::config::Config;
 use morphcog::data::dataset::Split;
@@ -12,14 +12,37 @@ use morphcog::store::audit::AuditFile;
 use morphcog::store::eval::EvalFile;
 use morphcog::store::folder::IfExists;
 use morphcog::store::images::HeldOut;
+use morphcog::store::run::Robot;
 use morphcog::store::whereabouts::load_dataset;
+use std::collections::BTreeMap;
+use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// A run that is trained on several images of each class.
 fn sandbox() -> Sandbox {
+    static RUN: OnceLock<BTreeMap<String, Vec<u8>>> = OnceLock::new();
+    once(&RUN, &TINY.replace("train_images = [0, 1]", "images_per_class = 3"), &[])
+}
+
+/// A run of few robots that chose the best two of them at its end.
+fn validated() -> Sandbox {
+    static RUN: OnceLock<BTreeMap<String, Vec<u8>>> = OnceLock::new();
+    once(&RUN, &validating(), &["validating"])
+}
+
+fn validating() -> String {
+    format!("{TINY}\n[archive]\nkeep = 4\n[validation]\nimages = 40\nbest = 2\n")
+}
+
+/// A sandbox with `run.toml` and its run, which is made once and says `words`.
+fn once(run: &OnceLock<BTreeMap<String, Vec<u8>>>, config: &str, words: &[&str]) -> Sandbox {
     let sandbox = Sandbox::new();
-    sandbox.write("run.toml", TINY.replace("train_images = [0, 1]", "images_per_class = 3"));
-    sandbox.run("evolve -q -c run.toml -o run").ended(0, &[]);
+    sandbox.write("run.toml", config);
+    let run = run.get_or_init(|| {
+        sandbox.run("evolve -c run.toml -o run").ended(0, words);
+        files(&sandbox.path("run"))
+    });
+    run.iter().for_each(|(name, content)| _ = sandbox.write(&format!("run/{name}"), content));
     sandbox
 }
 
@@ -52,24 +75,24 @@ fn validation_images_are_of_the_training_split_and_were_never_trained_on() {
 #[test]
 fn the_best_on_validation_images_are_found_the_same_every_time_and_kept() {
     let sandbox = sandbox();
-    let first = eval(&sandbox, "--robots best-validation:3 --validation 60 --threads 1");
+    let first = eval(&sandbox, "--robots best-validation:3 --validation 40 --threads 1");
     assert_eq!(first.robots.len(), 3);
     assert!(first.selected.contains("validation"), "{}", first.selected);
     let accuracies: Vec<f64> =
         first.robots.iter().map(|robot| robot.validation.as_ref().unwrap().balanced_accuracy).collect();
     assert!(accuracies.is_sorted_by(|a, b| a >= b), "{accuracies:?}");
-    assert!(first.robots.iter().all(|robot| robot.validation.as_ref().unwrap().images == 60));
+    assert!(first.robots.iter().all(|robot| robot.validation.as_ref().unwrap().images == 40));
     let kept = sandbox.read("run/validation.json");
-    assert_eq!(eval(&sandbox, "--robots best-validation:3 --validation 60 --threads 3"), first);
+    assert_eq!(eval(&sandbox, "--robots best-validation:3 --validation 40 --threads 3"), first);
     // One that cannot be read stays.
     sandbox.write("run/validation.json", "{");
     sandbox
-        .run("eval -q -a run/run.json --images 40 --robots best-validation:3 --validation 60")
+        .run("eval -q -a run/run.json --images 40 --robots best-validation:3 --validation 40")
         .ended(3, &["run/validation.json"]);
     assert_eq!(sandbox.read("run/validation.json"), "{");
     // Another run's is not believed.
     sandbox.write("run/validation.json", kept.replace("\"key\":\"", "\"key\":\"0"));
-    assert_eq!(eval(&sandbox, "--robots best-validation:3 --validation 60"), first);
+    assert_eq!(eval(&sandbox, "--robots best-validation:3 --validation 40"), first);
     // Selected otherwise, a robot has no such figure.
     assert_eq!(
         eval(&sandbox, "--robots top:2").robots.iter().filter(|robot| robot.validation.is_none()).count(),
@@ -84,7 +107,7 @@ fn robots_are_compared_on_validation_images_without_a_look_at_the_test_images() 
     let dataset = load_dataset(&run.config, None, &[Split::Train]).unwrap();
     let command = "eval --archive run/run.json --cycles 1 --split validation";
     let said = sandbox
-        .run(&format!("{command} --images 60 --robots best-validation:3 --validation 60"))
+        .run(&format!("{command} --images 60 --robots best-validation:3 --validation 40"))
         .ended(0, &[]);
     assert!(said.out.contains("60 builtin validation images"), "{}", said.out);
     // An evaluation on test images is not replaced.
@@ -92,7 +115,7 @@ fn robots_are_compared_on_validation_images_without_a_look_at_the_test_images() 
     let report = EvalFile::read(&sandbox.path("run/eval-validation.json")).unwrap();
     assert_eq!(report.split, HeldOut::Validation);
     // By what robots were chosen, they are not compared.
-    let selected = images(&[&run], &dataset, "--images", 60).unwrap();
+    let selected = images(&[&run], &dataset, "--images", 40).unwrap();
     assert!(report.images.len() == 60 && report.images.iter().all(|image| !selected.contains(image)));
     // Nor are others of the run, or robots that are named, afterwards.
     sandbox.run(&format!("{command} --images 60 --robots top:1")).ended(0, &[]);
@@ -128,23 +151,19 @@ fn robots_are_compared_on_validation_images_without_a_look_at_the_test_images() 
 
 #[test]
 fn a_run_that_asks_for_it_chooses_robots_at_its_end() {
-    let sandbox = Sandbox::new();
-    let validation = "\n[validation]\nimages = 60\nbest = 2\n";
-    sandbox.write("run.toml", format!("{TINY}{validation}"));
-    sandbox.run("evolve -c run.toml -o run").ended(0, &["validating"]);
+    let sandbox = validated();
     // What it found is what eval finds, and is not looked for again: eval asks for as many images
     // as the config says.
     let kept = sandbox.read("run/validation.json");
-    let archive = "--archive run/run.json --robots best-validation:2 --images 20";
+    let archive = "--archive run/run.json --robots best-validation:2 --images 4";
     let said = sandbox.run(&format!("eval {archive}")).ended(0, &[]);
     assert!(!said.err.contains("validating"), "{}", said.err);
     assert_eq!(sandbox.read("run/validation.json"), kept);
     let report = EvalFile::read(&sandbox.path("run/eval.json")).unwrap();
     assert_eq!(report.robots.len(), 2);
-    assert!(report.robots.iter().all(|robot| robot.validation.as_ref().unwrap().images == 60));
+    assert!(report.robots.iter().all(|robot| robot.validation.as_ref().unwrap().images == 40));
     // Who asks for fewer gets the first of those.
-    let said =
-        sandbox.run("eval --archive run/run.json --robots best-validation:1 --images 20").ended(0, &[]);
+    let said = sandbox.run("eval --archive run/run.json --robots best-validation:1 --images 4").ended(0, &[]);
     assert!(!said.err.contains("validating"), "{}", said.err);
     assert_eq!(sandbox.read("run/validation.json"), kept);
     let fewer = EvalFile::read(&sandbox.path("run/eval.json")).unwrap().robots;
@@ -173,18 +192,16 @@ fn too_few_or_too_many_validation_images_are_refused() {
     };
     with("--validation 10").ended(2, &["--validation 10", "40"]);
     with("--validation 1000000").ended(3, &["--validation 1000000"]);
-    sandbox.run("eval --archive run/run.json --validation 60").ended(2, &["--validation", "best-validation"]);
+    sandbox.run("eval --archive run/run.json --validation 40").ended(2, &["--validation", "best-validation"]);
 }
 
 #[test]
 fn nothing_is_chosen_by_other_images_of_the_same_number() {
-    let sandbox = Sandbox::new();
-    sandbox.write("run.toml", TINY);
-    sandbox.run("evolve -q -c run.toml -o run").ended(0, &[]);
+    let sandbox = validated();
     let other = sandbox.read("run/run.json");
     let sha256 = &sandbox.run_file("run").dataset.train_sha256;
     sandbox.write("other/run.json", other.replace(sha256.as_str(), &"0".repeat(64)));
-    for options in ["--robots best-validation:1 --validation 60", "--robots top:1 --split validation"] {
+    for options in ["--robots best-validation:1 --validation 40", "--robots top:1 --split validation"] {
         sandbox
             .run(&format!("eval --archive other/run.json --images 20 {options}"))
             .ended(3, &["SHA-256", "--data"]);
@@ -207,7 +224,7 @@ fn a_run_that_will_leave_too_few_of_them_is_refused_before_it_begins() {
     assert!(!sandbox.path("run").exists());
     // One that leaves none has none to be tested on, however many are asked for.
     sandbox.write("all.toml", few.replace("images_per_class = 30", "images_per_class = 40"));
-    sandbox.run("evolve -q -c all.toml -o all").ended(0, &[]);
+    sandbox.run("evolve -q -c all.toml -o all -g 1 --set map_elites.initial=2").ended(0, &[]);
     sandbox.run("eval -a all --split validation --images all").ended(3, &["--images all: ", "class 0"]);
     // Nor is one begun in a folder that is there already.
     std::fs::create_dir(sandbox.path("empty")).unwrap();
@@ -218,15 +235,14 @@ fn a_run_that_will_leave_too_few_of_them_is_refused_before_it_begins() {
 
 #[test]
 fn those_that_are_best_on_validation_images_can_be_audited_by_themselves() {
-    let sandbox = Sandbox::new();
-    sandbox.write("run.toml", format!("{TINY}\n[validation]\nimages = 60\n"));
-    sandbox.run("evolve -q -c run.toml -o run").ended(0, &[]);
+    let sandbox = validated();
+    std::fs::remove_file(sandbox.path("run/validation.json")).unwrap();
     let audit = "audit --archive run/run.json --robots best-validation:2 --set threshold=0";
     sandbox.run(audit).ended(0, &["validating"]);
     // Found before, they are not searched for again; eval finds the same.
     let said = sandbox.run(audit).ended(0, &[]);
     assert!(!said.err.contains("validating"), "{}", said.err);
-    sandbox.run("eval -q --archive run/run.json --images 20 --robots best-validation:2").ended(0, &[]);
+    sandbox.run("eval -q --archive run/run.json --images 4 --robots best-validation:2").ended(0, &[]);
     let best: EvalFile = serde_json::from_str(&sandbox.read("run/eval.json")).unwrap();
     let audit = AuditFile::read(&sandbox.path("run/audit.json")).unwrap();
     let mut audited: Vec<&String> = audit.robots.iter().map(|robot| &robot.id).collect();
@@ -248,9 +264,8 @@ fn evolve_itself_chooses_robots_at_its_end_and_so_whatever_calls_it() {
             panic!("{text}");
         }
     }
-    let sandbox = Sandbox::new();
-    let text = format!("{TINY}\n[validation]\nimages = 60\nbest = 2\n");
-    let config = Config::parse(&text, "run.toml", &[]).unwrap();
+    let sandbox = validated();
+    let config = Config::parse(&validating(), "run.toml", &[]).unwrap();
     let options = |folder: &str| Options {
         config: config.clone(),
         name: "run".to_string(),
@@ -264,11 +279,9 @@ fn evolve_itself_chooses_robots_at_its_end_and_so_whatever_calls_it() {
     assert!(!finished.stopped);
     assert_eq!(finished.validated.len(), 2);
     let first = &finished.validated[0];
-    assert_eq!((first.images, finished.best()), (60, Some(first.id.as_str())));
+    assert_eq!((first.images, finished.best()), (40, Some(first.id.as_str())));
     // The program does the same.
-    sandbox.write("run.toml", text);
-    sandbox.run("evolve -q -c run.toml -o program").ended(0, &[]);
-    assert_eq!(sandbox.read("library/validation.json"), sandbox.read("program/validation.json"));
+    assert_eq!(sandbox.read("library/validation.json"), sandbox.read("run/validation.json"));
     // Stopped before its last generation, a run chooses none.
     let stop = AtomicBool::new(false);
     let stopped = evolve(&options("stopped"), &stop, &Quiet(Some(&stop))).unwrap();
@@ -278,20 +291,20 @@ fn evolve_itself_chooses_robots_at_its_end_and_so_whatever_calls_it() {
 
 #[test]
 fn the_best_robot_is_the_first_on_validation_images_where_the_run_ranked_them_else_the_fittest() {
-    let sandbox = Sandbox::new();
-    sandbox.write("run.toml", format!("{TINY}\n[validation]\nimages = 60\nbest = 1\n"));
-    sandbox.run("evolve -q -c run.toml -o run").ended(0, &[]);
+    let sandbox = validated();
     let run = sandbox.run_file("run");
     let fittest = run.best().unwrap();
-    let first = run.elites.iter().find(|robot| robot.id != fittest.id && robot.task == fittest.task).unwrap();
+    let text = sandbox.read("run/validation.json");
+    let is_other = |robot: &&Robot| robot.id != fittest.id && !text.contains(&robot.id);
+    let first = run.elites.iter().find(is_other).unwrap();
     // Robots of a tiny run are as good as each other on images they have not seen: so that it is
     // not the fittest by chance.
-    let mut ranking: serde_json::Value = serde_json::from_str(&sandbox.read("run/validation.json")).unwrap();
+    let mut ranking: serde_json::Value = serde_json::from_str(&text).unwrap();
     ranking["robots"][0]["id"] = first.id.as_str().into();
     ranking["robots"][0]["task"] = first.task.as_str().into();
     sandbox.write("run/validation.json", ranking.to_string());
     let is_best = |id: &str| {
-        sandbox.run("eval -q -a run/run.json --images 20 --cycles 1 --robots best").ended(0, &[]);
+        sandbox.run("eval -q -a run/run.json --images 4 --cycles 1 --robots best").ended(0, &[]);
         let report = EvalFile::read(&sandbox.path("run/eval.json")).unwrap();
         assert_eq!((report.robots.len(), report.robots[0].id.as_str()), (1, id));
         sandbox.run("audit -q -a run/run.json --robots best -o audit.json").ended(0, &[]);
