@@ -159,7 +159,7 @@ fn the_results_of_one_command_never_overwrite_those_of_another() {
 #[test]
 fn without_a_run_the_best_body_of_the_program_is_shown_on_its_own_digits() {
     let sandbox = Sandbox::new();
-    let said = sandbox.run("replay --format gif").ended(0, &[]);
+    let said = sandbox.run("replay --format gif --every 50").ended(0, &[]);
     assert!(said.err.contains("gallery:zero_one"), "{}", said.err);
     // A zero and a one.
     for seen in [": sees 0", ": sees 1"] {
@@ -182,7 +182,7 @@ fn a_run_may_be_named_by_its_folder() {
     for command in [
         "eval -q -a run -n 2 --cycles 1 --robots best",
         "audit -q -a run --robots top:1",
-        "replay -q -a run --format gif",
+        "replay -q -a run --format png",
         "plot accuracy -q -a run -o accuracy.svg",
         "report -q run --rollouts 0",
     ] {
@@ -221,7 +221,7 @@ fn what_an_evaluation_is_asked_for_must_make_sense() {
 #[test]
 fn a_second_test_with_other_settings_keeps_the_first() {
     let sandbox = with_run();
-    let test = |options: &str| sandbox.run(&format!("eval -a run --images 20 --robots top:2 {options}"));
+    let test = |options: &str| sandbox.run(&format!("eval -a run --images 4 --robots top:2 {options}"));
     test("").ended(0, &[]);
     let first = files(&sandbox.path("run"));
     // The same again is no other test.

@@ -50,17 +50,25 @@ fn where_the_system_has_no_thread_left_every_command_says_so_and_none_panics() {
         ("sweep plan.toml -o sweep", true),
         ("serve --no-open", true),
         ("report run --rollouts 1", true),
-        ("replay -a run -r best --format gif", true),
+        ("replay -a run -r best --format gif --every 20", true),
         ("replay -a run -r best --format html", false),
         ("plot body -a run", false),
         ("simulate scenario.json -o rollout.csv", false),
         ("data info builtin", false),
-        ("bench", false),
+        ("bench --json", false),
     ] {
         let said = limited(&sandbox, "--nproc=1", args);
         match needs_threads {
             true => drop(said.ended(1, &[none_left])),
-            false => drop(said.ended(0, &[])),
+            false => {
+                let said = said.ended(0, &[]);
+                // Speed is measured in processor time.
+                if args.starts_with("bench") {
+                    let clocks: Vec<_> = said.json_lines().iter().map(|line| line["clock"].clone()).collect();
+                    let is_right = clocks.len() >= 5 && clocks.iter().all(|clock| clock == "processor");
+                    assert!(is_right, "{clocks:?}");
+                }
+            }
         }
         // Some are there, but not enough.
         for most in [2, 3].into_iter().filter(|_| needs_threads) {
@@ -70,7 +78,7 @@ fn where_the_system_has_no_thread_left_every_command_says_so_and_none_panics() {
         }
     }
     // Where the address space has no room for more, pictures need none.
-    let gif = "replay -a run -r best --format gif -o run/small.gif";
+    let gif = "replay -a run -r best --format gif --every 20 -o run/small.gif";
     limited(&sandbox, "--nproc=1 --as=90000000", gif).ended(0, &[]);
     // Nothing was half begun.
     assert!(std::fs::read_to_string(sandbox.path("new/.lock")).unwrap_or_default().is_empty());

@@ -36,12 +36,14 @@ fn no_table_shows_a_minus_nothing() {
     }
 }
 
+// On Linux, where no thread is left: see `no_threads`.
+#[cfg(not(target_os = "linux"))]
 #[test]
 fn speed_is_measured_in_processor_time() {
     let sandbox = Sandbox::new();
     let said = sandbox.run("bench --json").ended(0, &[]);
     let clocks: Vec<_> = said.json_lines().iter().map(|line| line["clock"].clone()).collect();
-    let expected = if cfg!(any(target_os = "linux", target_os = "macos")) { "processor" } else { "wall" };
+    let expected = if cfg!(target_os = "macos") { "processor" } else { "wall" };
     assert!(clocks.len() >= 5 && clocks.iter().all(|clock| clock == expected), "{clocks:?}");
 }
 
@@ -51,7 +53,7 @@ fn an_error_about_a_file_names_it_once_whatever_is_wrong_with_it() {
     for command in [
         "eval -q -a run -n 4 --cycles 1 --robots best",
         "audit -q -a run --robots best",
-        "response -q -a run -n 60 --robots all",
+        "response -q -a run -n 60 --robots top:3",
     ] {
         sandbox.run(command).ended(0, &[]);
     }
@@ -185,7 +187,7 @@ fn with_json_every_line_on_stdout_is_json() {
     assert_eq!(evolve.iter().filter(|name| *name == "generation").count(), 13);
     assert_eq!(evolve.last().unwrap(), "finished");
     events("eval -a run/run.json -n 4 --cycles 1", 0);
-    events("replay -a run/run.json", 0);
+    events("replay -a run/run.json --every 20", 0);
     events("replay -a run/run.json --format terminal", 0);
     events("gallery", 0);
     events("config", 0);
@@ -239,10 +241,10 @@ fn every_event_of_json_is_documented_with_its_fields() {
     // Those of quick commands, as they come.
     let sandbox = with_run();
     sandbox.write("plan.toml", "config = \"tiny.toml\"\nseeds = [3]\n");
-    let train = "train -a run --robots all --task 0|1 --out taught --set train.random_images=20 --set \
+    let train = "train -a run --robots top:2 --task 0|1 --out taught --set train.random_images=20 --set \
                  train.windows=4 --set stimulus.reduction=area --set train.rounds=1 --set train.images=4 --set \
                  train.final_images=4 --set train.challengers=1 --set protocol.control_steps=50 --set \
-                 validation.images=40";
+                 validation.images=40 --set validation.best=0";
     let mut seen = BTreeSet::new();
     for args in [
         "evolve -c tiny.toml -o new",
@@ -250,9 +252,9 @@ fn every_event_of_json_is_documented_with_its_fields() {
         "train -a run --robots all --task 0|1 --out own --set train.rounds=0 --set train.random_images=20 \
          --set train.final_images=4 --set train.challengers=1 --set validation.images=40",
         "response -a taught --images 60",
-        "eval -a run -n 20 --cycles 1",
+        "eval -a run -n 4 --cycles 1",
         "capacity --eval run/eval.json --set trainings=2 --set sizes=[1,3]",
-        "team -a run --classes 0,1 --images 20",
+        "team -a run --classes 0,1 --images 4",
         "replay -a run --format png",
         "report run --rollouts 0",
         "data info",
@@ -323,7 +325,7 @@ fn every_column_of_a_test_and_of_an_audit_is_explained() {
 fn rows_of_a_collected_sweep_are_numbers_or_null_for_programs() {
     let sandbox = Sandbox::tiny();
     let plan = "config = \"tiny.toml\"\nseeds = [1, 2]\n[vary]\nmap_elites.parents = [4]\n[eval]\nrobots = \
-                \"top:2\"\nimages = 20\n";
+                \"top:2\"\nimages = 4\n";
     sandbox.write("plan.toml", plan);
     sandbox.run("sweep plan.toml --out all -q --task 1").ended(0, &[]);
     let lines = sandbox.run("sweep plan.toml --out all --collect --json").ended(0, &["not all"]).json_lines();

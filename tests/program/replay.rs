@@ -6,7 +6,7 @@ use crate::with_run;
 #[test]
 fn replay_writes_a_gif_and_a_page_beside_the_run() {
     let sandbox = with_run();
-    let said = sandbox.run("replay --robot best -a run/run.json").ended(0, &[]);
+    let said = sandbox.run("replay --robot best -a run/run.json --every 5").ended(0, &[]);
     let id = &sandbox
         .run_file("run")
         .elites
@@ -55,7 +55,7 @@ fn a_published_robot_replays_on_the_built_in_digits_without_any_run() {
     let sandbox = Sandbox::new();
     let table = sandbox.run("gallery").ended(0, &[]).out;
     assert!(["APUKI", "IHSUJ", "QMAXD", "XFJPI", "YJTLA"].iter().all(|name| table.contains(name)), "{table}");
-    sandbox.run("replay --robot xfjpi --dataset builtin").ended(0, &[]);
+    sandbox.run("replay --robot xfjpi --dataset builtin --every 50").ended(0, &[]);
     assert!(sandbox.path("replay-XFJPI.gif").exists() && sandbox.path("replay-XFJPI.html").exists());
     sandbox.run("replay --robot XFJPI").ended(3, &["mnist", "--dataset builtin"]);
     sandbox.run("replay --robot nobody").ended(3, &["runs/"]);
@@ -70,8 +70,8 @@ fn the_newest_run_is_what_commands_look_at_when_they_are_not_told() {
     assert!(sandbox.path("runs/tiny-seed8/run.json").exists());
     sandbox.run("eval -q -n 2 --cycles 1 --robots best").ended(0, &[]);
     assert!(sandbox.path("runs/tiny-seed8/eval.json").exists());
-    sandbox.run("replay -q").ended(0, &[]);
-    assert!(files(&sandbox.path("runs/tiny-seed8")).keys().any(|name| name.ends_with(".gif")));
+    sandbox.run("replay -q --format png").ended(0, &[]);
+    assert!(files(&sandbox.path("runs/tiny-seed8")).keys().any(|name| name.ends_with(".png")));
 }
 
 #[test]

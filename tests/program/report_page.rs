@@ -104,7 +104,7 @@ fn a_team_walks_on_the_page_and_says_there_what_it_said_in_its_test() {
     let Some(program) = found() else { return };
     let sandbox = pairs();
     let runs = "--archive pairs/0v1 pairs/0v4 pairs/1v4";
-    sandbox.run(&format!("team -q {runs} --classes 0,1,4 --images 30")).ended(0, &[]);
+    sandbox.run(&format!("team -q {runs} --classes 0,1,4 --images 6")).ended(0, &[]);
     sandbox.run(&format!("report -q {runs} --rollouts 3")).ended(0, &[]);
     let team = TeamFile::read(&sandbox.path("pairs/team.json")).unwrap();
     let answers = team.answers.unwrap().votes.answers;
@@ -167,7 +167,7 @@ fn letters() -> Sandbox {
             .replace("dataset = \"builtin\"", "dataset = \"letters\"")
             .replace("train_images = [0, 1]", "images_per_class = 1");
         sandbox.write("run.toml", config);
-        sandbox.run(&format!("evolve -q -c run.toml --data letters -o runs/{number}")).ended(0, &[]);
+        sandbox.run(&format!("evolve -q -c run.toml -g 3 --data letters -o runs/{number}")).ended(0, &[]);
     }
     sandbox
 }

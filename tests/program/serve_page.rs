@@ -8,7 +8,7 @@ use crate::common::hostile::Dice;
 use crate::common::program::{Sandbox, terminate};
 use crate::common::server::{Proxy, Server};
 use morphcog::analysis::gallery;
-use morphcog::base::shipped::ZERO_ONE;
+use morphcog::base::shipped::{TEAM, ZERO_ONE};
 use serde_json::Value;
 use std::f64::consts::TAU;
 use std::time::{Duration, Instant};
@@ -202,7 +202,7 @@ fn digits_drawn_in_any_size_place_and_slant_are_read_by_the_robot_that_the_page_
     let mut tab = quick(&mut browser, &server);
     let mut wrong = Vec::new();
     let mut dice = Dice::new(77, 1);
-    for number in 0..24 {
+    for number in 0..8 {
         let digit = number % 2;
         tab.pointer = if dice.below(2) == 0 { "mouse" } else { "pen" };
         let (says, moved) = answer(&mut tab, &by_hand(digit, &mut dice));
@@ -210,41 +210,43 @@ fn digits_drawn_in_any_size_place_and_slant_are_read_by_the_robot_that_the_page_
             wrong.push(format!("drawing {number}: a {digit} is {says:?}, {moved}"));
         }
     }
-    assert!(wrong.len() <= 1, "{} of 24 wrong:\n{}", wrong.len(), wrong.join("\n"));
+    assert!(wrong.is_empty(), "{} of 8 wrong:\n{}", wrong.len(), wrong.join("\n"));
 }
 
 #[test]
-fn a_drawing_is_fitted_unless_that_is_turned_off() {
+fn strokes_go_on_are_fitted_and_erased_as_the_hand_meant_them() {
     let sandbox = Sandbox::new();
     let Some(mut browser) = browser(&sandbox) else { return };
     let server = Server::start(&sandbox, "");
     let mut tab = quick(&mut browser, &server);
-    answer(&mut tab, &zero());
+    a_drawing_is_fitted_unless_that_is_turned_off(&mut tab);
+    a_stroke_goes_on_when_the_pointer_is_taken_away_and_ends_when_it_is_up(&mut tab);
+    what_was_erased_is_not_seen_at_any_size_of_the_drawing(&mut tab);
+    assert_eq!(tab.complaints(), Vec::<String>::new());
+}
+
+fn a_drawing_is_fitted_unless_that_is_turned_off(tab: &mut Tab) {
+    answer(tab, &zero());
     tab.eval("window.scrollTo(0, 0)");
     keep_picture("serve.png", &tab.screenshot());
     // As drawn, it is another picture.
     let small: Vec<[f64; 2]> = zero().iter().map(|place| place.map(|v| 2.0 + v / 4.0)).collect();
-    draw(&mut tab, &small);
-    at_end(&mut tab);
+    draw(tab, &small);
+    at_end(tab);
     let lit = "JSON.stringify([...document.getElementById('stimulus').getContext('2d')\
                .getImageData(0, 0, 300, 300).data])";
     let fitted = tab.eval(lit);
     tab.click("#fit");
-    at_end(&mut tab);
+    at_end(tab);
     assert_ne!(tab.eval(lit), fitted);
-    assert_eq!(tab.complaints(), Vec::<String>::new());
+    tab.click("#fit");
 }
 
-#[test]
-fn a_stroke_goes_on_when_the_browser_takes_the_pointer_away_and_ends_when_it_is_up() {
-    let sandbox = Sandbox::new();
-    let Some(mut browser) = browser(&sandbox) else { return };
-    let server = Server::start(&sandbox, "");
-    let mut tab = quick(&mut browser, &server);
+fn a_stroke_goes_on_when_the_pointer_is_taken_away_and_ends_when_it_is_up(tab: &mut Tab) {
     let ink = "[...document.getElementById('pad').getContext('2d').getImageData(0, 0, 300, 300).data].join()";
-    draw(&mut tab, &zero());
+    draw(tab, &zero());
     let whole = tab.eval(ink);
-    let line = on_pad(&mut tab, &zero());
+    let line = on_pad(tab, &zero());
     let (first, rest) = line.split_at(20);
     tab.press(first[0]);
     tab.trace(&first[1..]);
@@ -260,15 +262,9 @@ fn a_stroke_goes_on_when_the_browser_takes_the_pointer_away_and_ends_when_it_is_
     tab.trace(&[[line[0][0] + 60.0, line[0][1] + 90.0]]);
     tab.release(line[0]);
     assert!(tab.eval(ink) == whole, "a pointer that is up draws");
-    assert_eq!(tab.complaints(), Vec::<String>::new());
 }
 
-#[test]
-fn what_was_erased_is_not_seen_at_any_size_of_the_drawing() {
-    let sandbox = Sandbox::new();
-    let Some(mut browser) = browser(&sandbox) else { return };
-    let server = Server::start(&sandbox, "");
-    let mut tab = quick(&mut browser, &server);
+fn what_was_erased_is_not_seen_at_any_size_of_the_drawing(tab: &mut Tab) {
     // A line of ten pixels whose upper part is erased, and one that is erased whole.
     for (line, erased, rows) in [
         ("[[14, 6], [14, 16]]", "[[14, 6], [14, 8]]", 19..=22),
@@ -288,7 +284,6 @@ fn what_was_erased_is_not_seen_at_any_size_of_the_drawing() {
         let dark = seen.as_array().unwrap().iter().filter(|row| is_dark(row)).count();
         assert!(rows.contains(&dark), "{line} without {erased}: {dark} rows");
     }
-    assert_eq!(tab.complaints(), Vec::<String>::new());
 }
 
 #[test]
@@ -319,9 +314,17 @@ fn a_run_that_begins_while_the_page_is_open_appears_grows_and_ends_on_it() {
 fn below_the_prefix_of_a_proxy_and_by_a_name_that_is_allowed_all_of_the_page_works() {
     let sandbox = Sandbox::tiny();
     let Some(mut browser) = browser(&sandbox) else { return };
-    sandbox.run("evolve -q -c tiny.toml -o runs/one").ended(0, &[]);
+    // Two tasks are a team.
+    let other = "--set task.groups=[[0],[2]] --set data.train_images= --set data.images_per_class=1";
+    for (name, task) in [("one", ""), ("two", other)] {
+        sandbox
+            .run(&format!(
+                "evolve -q -c tiny.toml -g 3 --set protocol.control_steps=100 {task} -o runs/{name}"
+            ))
+            .ended(0, &[]);
+    }
     // Browsers take names that end so for this machine; the server does not by itself.
-    let server = Server::start(&sandbox, "--allow-host hub.localhost");
+    let server = Server::start(&sandbox, "--allow-host hub.localhost --archive runs/one runs/two");
     let proxy = Proxy::start(&server);
     let mut tab = browser.tab(1280, 900, false);
     tab.open(&format!("http://hub.localhost:{}{}/", proxy.port, Proxy::PREFIX));
@@ -336,6 +339,7 @@ fn below_the_prefix_of_a_proxy_and_by_a_name_that_is_allowed_all_of_the_page_wor
     choose(&mut tab, "3");
     tab.wait("document.querySelectorAll('#curves svg').length === 3");
     tab.click("#tab-team");
+    tab.wait("document.querySelectorAll('#stages figure').length === 2");
     at_end(&mut tab);
     assert_eq!(tab.eval("document.images[0].naturalWidth > 0"), true);
     tab.click("#tab-editor");
@@ -391,7 +395,7 @@ fn an_audit_that_appears_while_the_page_is_open_is_said_and_can_be_chosen_by() {
 }
 
 #[test]
-fn a_body_that_is_built_and_the_robot_it_makes_are_in_sight_together() {
+fn a_body_that_is_built_and_its_robot_are_in_sight_together_and_the_simulation_ends_with_its_tab() {
     let sandbox = Sandbox::new();
     let Some(mut browser) = browser(&sandbox) else { return };
     let server = Server::start(&sandbox, "");
@@ -414,6 +418,27 @@ fn a_body_that_is_built_and_the_robot_it_makes_are_in_sight_together() {
         assert!((1.0..=800.0).contains(&bottom.as_f64().unwrap()), "{id} ends at {bottom}");
     }
     keep_picture("serve-editor.png", &tab.screenshot());
+
+    let simulations = || -> Value {
+        let status: Value = serde_json::from_str(&server.get("/api/status").body).unwrap();
+        status["simulations"].clone()
+    };
+    let none_soon = || {
+        let until = Instant::now() + Duration::from_secs(5);
+        while simulations() != 0 {
+            assert!(Instant::now() < until, "{} simulations", simulations());
+            std::thread::sleep(Duration::from_millis(30));
+        }
+    };
+    tab.close();
+    none_soon();
+    let mut tab = browser.tab(800, 600, false);
+    open(&mut tab, &server);
+    tab.wait("document.getElementById('step').textContent.startsWith('step ')");
+    tab.eval("document.getElementById('play').click()");
+    assert_eq!(simulations(), 1);
+    tab.close();
+    none_soon();
 }
 
 #[test]
@@ -433,13 +458,13 @@ fn the_team_that_ships_reads_a_drawn_one() {
 
 #[test]
 fn a_team_walks_on_small_stages_and_its_votes_are_counted() {
-    let sandbox = Sandbox::tiny();
+    let sandbox = Sandbox::new();
     let Some(mut browser) = browser(&sandbox) else { return };
-    for (name, groups) in [("a", "[[0],[1]]"), ("b", "[[0],[2]]"), ("c", "[[1],[2]]")] {
-        let options =
-            format!("--set task.groups={groups} --set data.train_images= --set data.images_per_class=1");
-        let longer = "--set protocol.control_steps=200 --set generations=30";
-        sandbox.run(&format!("evolve -q -c tiny.toml {options} {longer} -o {name}")).ended(0, &[]);
+    // All three are called tiny, and have one seed.
+    for (name, pair) in [("a", "0v1"), ("b", "0v2"), ("c", "1v2")] {
+        let (mut run, _) = gallery::trained(&format!("{TEAM}-{pair}")).unwrap().remove(0);
+        (run.name, run.config.seed) = ("tiny".to_string(), 3);
+        sandbox.write(&format!("{name}/run.json"), run.to_json());
     }
     let server = Server::start(&sandbox, "--archive a b c");
     for (width, height, dark) in [(1280, 800, false), (390, 844, true)] {
@@ -447,25 +472,33 @@ fn a_team_walks_on_small_stages_and_its_votes_are_counted() {
         open(&mut tab, &server);
         as_fast_as_possible(&mut tab);
         let alone = tab.text("#who");
-        // All three are called tiny, and have one seed.
         let names = "new Set([...document.getElementById('archive').options].map((o) => o.textContent)).size";
         assert_eq!(tab.eval(names), tab.eval("document.getElementById('archive').options.length"));
         tab.click("#tab-team");
         assert_eq!(tab.text("#who"), "The team");
-        draw(&mut tab, &zero());
         tab.wait("document.querySelectorAll('#stages figure').length === 3");
+        let fits = "document.documentElement.scrollWidth <= window.innerWidth";
+        assert_eq!(tab.eval(fits), true);
+        if dark {
+            // Another way to see what has been seen.
+            keep_picture(&format!("team-{width}.png"), &tab.screenshot());
+            assert_eq!(tab.complaints(), Vec::<String>::new());
+            tab.close();
+            continue;
+        }
+        draw(&mut tab, &zero());
         at_end(&mut tab);
+        assert_eq!(tab.eval(fits), true);
         let votes =
             "[...document.querySelectorAll('#tally span')].reduce((sum, cell) => sum + +cell.textContent, 0)";
         let turned =
             "document.querySelectorAll('#stages figure:is([data-way=left], [data-way=right])').length";
-        assert_eq!(tab.eval(votes), tab.eval(turned));
-        let says = tab.text("#says");
-        assert!(["0", "1", "2", "undecided"].contains(&says.as_str()), "{says}");
+        let counted = tab.eval(votes);
+        assert_eq!(counted, tab.eval(turned));
+        assert!(counted.as_u64() > Some(0), "nobody votes");
+        assert_eq!(tab.text("#says"), "0");
         let spoken = tab.text("#spoken");
         assert!(spoken.starts_with("The team sees your drawing. It says "), "{spoken}");
-        let fits = "document.documentElement.scrollWidth <= window.innerWidth";
-        assert_eq!(tab.eval(fits), true);
         keep_picture(&format!("team-{width}.png"), &tab.screenshot());
         // Back to a robot by itself.
         tab.click("#tab-robots");
@@ -476,27 +509,5 @@ fn a_team_walks_on_small_stages_and_its_votes_are_counted() {
         );
         assert_eq!(tab.complaints(), Vec::<String>::new());
         tab.close();
-    }
-}
-
-#[test]
-fn a_simulation_ends_with_its_tab() {
-    let sandbox = Sandbox::new();
-    let Some(mut browser) = browser(&sandbox) else { return };
-    let server = Server::start(&sandbox, "");
-    let simulations = || -> Value {
-        let status: Value = serde_json::from_str(&server.get("/api/status").body).unwrap();
-        status["simulations"].clone()
-    };
-    let mut tab = browser.tab(800, 600, false);
-    open(&mut tab, &server);
-    tab.wait("document.getElementById('step').textContent.startsWith('step ')");
-    tab.eval("document.getElementById('play').click()");
-    assert_eq!(simulations(), 1);
-    tab.close();
-    let until = Instant::now() + Duration::from_secs(5);
-    while simulations() != 0 {
-        assert!(Instant::now() < until, "{} simulations", simulations());
-        std::thread::sleep(Duration::from_millis(30));
     }
 }
