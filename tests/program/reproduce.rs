@@ -93,7 +93,8 @@ fn what_cannot_be_is_refused_before_anything_is_done() {
 #[test]
 fn a_run_chooses_robots_at_its_end_if_its_config_says_so() {
     let sandbox = sandbox();
-    let set = "config = \"tiny.toml\"\nset = [\"validation.best=2\", \"validation.images=40\"]";
+    let set =
+        "config = \"tiny.toml\"\nset = [\"archive.keep=3\", \"validation.best=2\", \"validation.images=40\"]";
     sandbox.write("plan.toml", PLAN.replace("config = \"tiny.toml\"", set));
     let reproduce = "reproduce plan.toml --set seeds=[1] --scale 0.5 --out small";
     let said = sandbox.run(reproduce).ended(0, &["task 1"]);

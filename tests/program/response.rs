@@ -91,7 +91,7 @@ fn slopes_predict_other_rollouts_of_a_real_body_as_well_as_is_said() {
 
 #[test]
 fn another_seed_draws_other_images_and_a_task_is_kept_with_how_well_it_could_be_taught() {
-    let sandbox = run_with(&[WALKER], 150);
+    let sandbox = run_with(&[WALKER], 100);
     for seed in [1, 2] {
         let line = format!("response -q -a run --task 3|14 -n 60 --seed {seed} -o {seed}.json");
         sandbox.run(&line).ended(0, &[]);

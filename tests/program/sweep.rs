@@ -395,8 +395,8 @@ split = "validation"
     let said = sandbox.run("sweep plans/pairs.toml --out pairs --collect").ended(0, &[]);
     assert!(said.out.contains("1|3") && said.out.contains("validation"), "{}", said.out);
     // The robot that a training made is shown other images where the plan says so.
-    sandbox.run("sweep plans/validated.toml --out validated --task 2").ended(0, &[]);
-    assert!(sandbox.path("validated/walkers-1v4-seed3/validation.json").exists());
+    sandbox.run("sweep plans/validated.toml --out validated --task 1").ended(0, &[]);
+    assert!(sandbox.path("validated/walkers-1v3-seed3/validation.json").exists());
     // One that is stopped says so, and goes on.
     let one = "sweep plans/pairs.toml --out one --task 1";
     let mut child = sandbox.start(&format!("{one} --set set=[\"train.challengers=1000000\"]"));
