@@ -477,36 +477,33 @@ fn a_team_walks_on_small_stages_and_its_votes_are_counted() {
         tab.click("#tab-team");
         assert_eq!(tab.text("#who"), "The team");
         tab.wait("document.querySelectorAll('#stages figure').length === 3");
-        let fits = "document.documentElement.scrollWidth <= window.innerWidth";
-        assert_eq!(tab.eval(fits), true);
-        if dark {
-            // Another way to see what has been seen.
-            keep_picture(&format!("team-{width}.png"), &tab.screenshot());
-            assert_eq!(tab.complaints(), Vec::<String>::new());
-            tab.close();
-            continue;
+        // Narrow and dark, it walks under the picture that is there.
+        if !dark {
+            draw(&mut tab, &zero());
         }
-        draw(&mut tab, &zero());
         at_end(&mut tab);
-        assert_eq!(tab.eval(fits), true);
         let votes =
             "[...document.querySelectorAll('#tally span')].reduce((sum, cell) => sum + +cell.textContent, 0)";
         let turned =
             "document.querySelectorAll('#stages figure:is([data-way=left], [data-way=right])').length";
         let counted = tab.eval(votes);
         assert_eq!(counted, tab.eval(turned));
-        assert!(counted.as_u64() > Some(0), "nobody votes");
-        assert_eq!(tab.text("#says"), "0");
-        let spoken = tab.text("#spoken");
-        assert!(spoken.starts_with("The team sees your drawing. It says "), "{spoken}");
+        let fits = "document.documentElement.scrollWidth <= window.innerWidth";
+        assert_eq!(tab.eval(fits), true);
         keep_picture(&format!("team-{width}.png"), &tab.screenshot());
-        // Back to a robot by itself.
-        tab.click("#tab-robots");
-        at_end(&mut tab);
-        assert_eq!(
-            (tab.text("#who"), tab.eval("document.getElementById('together').hidden")),
-            (alone, true.into())
-        );
+        if !dark {
+            assert!(counted.as_u64() > Some(0), "nobody votes");
+            assert_eq!(tab.text("#says"), "0");
+            let spoken = tab.text("#spoken");
+            assert!(spoken.starts_with("The team sees your drawing. It says "), "{spoken}");
+            // Back to a robot by itself.
+            tab.click("#tab-robots");
+            at_end(&mut tab);
+            assert_eq!(
+                (tab.text("#who"), tab.eval("document.getElementById('together').hidden")),
+                (alone, true.into())
+            );
+        }
         assert_eq!(tab.complaints(), Vec::<String>::new());
         tab.close();
     }
