@@ -9,15 +9,29 @@ use nalgebra::{DVector, DVectorView};
 use std::ops::Range;
 
 impl Activation {
-    fn apply(self, x: f64) -> f64 {
+    /// Applies it to each of some numbers.
+    fn apply(self, numbers: &mut [f64]) {
         match self {
-            Activation::Relu => x.max(0.0),
-            Activation::Tanh => libm::tanh(x),
-            Activation::Sigmoid => 1.0 / (1.0 + libm::exp(-x)),
+            Activation::Relu => {
+                for x in numbers {
+                    *x = if *x > 0.0 { *x } else { 0.0 };
+                }
+            }
+            Activation::Tanh => {
+                for x in numbers {
+                    *x = libm::tanh(*x);
+                }
+            }
+            Activation::Sigmoid => {
+                for x in numbers {
+                    *x = 1.0 / (1.0 + libm::exp(-*x));
+                }
+            }
         }
     }
 
     /// The derivative where the activation has this value.
+    #[inline]
     fn slope(self, value: f64) -> f64 {
         match self {
             Activation::Relu => f64::from(u8::from(value > 0.0)),
@@ -206,29 +220,16 @@ impl Network {
         let [hidden, biases, _, output_biases] = self.shape.layout();
         let hidden = &self.parameters.as_slice()[hidden];
         let biases = &self.parameters.as_slice()[biases];
-        for (place, units) in self.units.chunks_exact_mut(size).enumerate() {
-            units.copy_from_slice(biases);
-            for &(pixel, value) in image.at(place) {
-                add_scaled(units, value, &hidden[pixel * size..][..size]);
-            }
-            units.iter_mut().for_each(|unit| *unit = activation.apply(*unit));
+        for place in 0..self.units.len() / size {
+            let units = &mut self.units[place * size..][..size];
+            add_weighted(units, biases, image.at(place), hidden);
         }
+        activation.apply(&mut self.units);
         let (within, _) = self.shape.places();
-        let pooled = self.features.as_mut_slice().chunks_exact_mut(size);
-        for (features, units) in pooled.zip(self.units.chunks_exact(within * size)) {
-            features.copy_from_slice(&units[..size]);
-            for other in units.chunks_exact(size).skip(1) {
-                for (feature, unit) in features.iter_mut().zip(other) {
-                    *feature = if self.shape.pooling == Pooling::Mean {
-                        *feature + unit
-                    } else {
-                        feature.max(*unit)
-                    };
-                }
-            }
-            if self.shape.pooling == Pooling::Mean {
-                features.iter_mut().for_each(|feature| *feature /= within as f64);
-            }
+        let features = self.features.as_mut_slice();
+        for first in (0..features.len()).step_by(size) {
+            let units = &self.units[first * within..][..size * within];
+            pool(&mut features[first..][..size], units, self.shape.pooling);
         }
         let output = |output: usize| {
             self.output_weights(output).dot(&self.features) + self.parameters[output_biases.start + output]
@@ -278,10 +279,81 @@ impl Network {
     }
 }
 
+/// Computes units from their biases and the values of pixels; `weights` by pixel, then by unit.
+fn add_weighted(units: &mut [f64], biases: &[f64], pixels: &[(usize, f64)], weights: &[f64]) {
+    let mut first = 0;
+    while units.len() - first >= 8 {
+        add_weighted_to::<8>(units, biases, pixels, weights, first);
+        first += 8;
+    }
+    if units.len() - first >= 4 {
+        add_weighted_to::<4>(units, biases, pixels, weights, first);
+        first += 4;
+    }
+    while first < units.len() {
+        add_weighted_to::<1>(units, biases, pixels, weights, first);
+        first += 1;
+    }
+}
+
+/// The same for the `N` units from the `first`, which stay in registers.
+#[inline]
+#[expect(clippy::manual_memcpy, reason = "so few numbers are not worth a call")]
+fn add_weighted_to<const N: usize>(
+    units: &mut [f64],
+    biases: &[f64],
+    pixels: &[(usize, f64)],
+    weights: &[f64],
+    first: usize,
+) {
+    let size = units.len();
+    let biases = &biases[first..][..N];
+    let mut sums = [0.0; N];
+    for i in 0..N {
+        sums[i] = biases[i];
+    }
+    for &(pixel, value) in pixels {
+        let weights = &weights[pixel * size + first..][..N];
+        for i in 0..N {
+            sums[i] += value * weights[i];
+        }
+    }
+    let units = &mut units[first..][..N];
+    for i in 0..N {
+        units[i] = sums[i];
+    }
+}
+
+/// Reduces the units of some places, place by place, to one feature a unit.
+fn pool(features: &mut [f64], units: &[f64], pooling: Pooling) {
+    let size = features.len();
+    let within = units.len() / size;
+    features.copy_from_slice(&units[..size]);
+    for place in 1..within {
+        let units = &units[place * size..][..size];
+        if pooling == Pooling::Mean {
+            for i in 0..size {
+                features[i] += units[i];
+            }
+        } else {
+            for i in 0..size {
+                features[i] = if units[i] > features[i] { units[i] } else { features[i] };
+            }
+        }
+    }
+    if pooling == Pooling::Mean {
+        for feature in features {
+            *feature /= within as f64;
+        }
+    }
+}
+
 /// Adds a multiple of some numbers to as many others.
+#[inline]
 fn add_scaled(sums: &mut [f64], factor: f64, terms: &[f64]) {
-    for (sum, term) in sums.iter_mut().zip(terms) {
-        *sum += factor * term;
+    let terms = &terms[..sums.len()];
+    for i in 0..sums.len() {
+        sums[i] += factor * terms[i];
     }
 }
 

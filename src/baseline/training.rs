@@ -94,12 +94,12 @@ impl Adam {
         let [beta1, beta2] = Self::BETAS;
         self.powers = [self.powers[0] * beta1, self.powers[1] * beta2];
         let scales = self.powers.map(|power| 1.0 / (1.0 - power));
-        let [first, second] = &mut self.moments;
-        let moments = first.iter_mut().zip(second.iter_mut());
-        for ((parameter, g), (m, v)) in parameters.iter_mut().zip(gradient).zip(moments) {
-            *m = beta1 * *m + (1.0 - beta1) * g;
-            *v = beta2 * *v + (1.0 - beta2) * g * g;
-            *parameter -= self.rate * (*m * scales[0]) / ((*v * scales[1]).sqrt() + Self::EPSILON);
+        let [m, v] = self.moments.each_mut().map(DVector::as_mut_slice);
+        let (parameters, gradient) = (parameters.as_mut_slice(), &gradient.as_slice()[..m.len()]);
+        for (i, g) in gradient.iter().enumerate() {
+            m[i] = beta1 * m[i] + (1.0 - beta1) * g;
+            v[i] = beta2 * v[i] + (1.0 - beta2) * g * g;
+            parameters[i] -= self.rate * (m[i] * scales[0]) / ((v[i] * scales[1]).sqrt() + Self::EPSILON);
         }
     }
 }
