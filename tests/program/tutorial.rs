@@ -43,10 +43,20 @@ fn words(line: &str) -> Vec<String> {
     words
 }
 
+/// The same command with less to do: a twentieth of the generations, a tenth of the images.
+fn in_small(mut command: Vec<String>) -> Vec<String> {
+    for (flag, parts) in [("--generations", 20), ("--images", 10)] {
+        let Some(at) = command.iter().position(|word| word == flag) else { continue };
+        let number: u32 = command[at + 1].parse().expect("the flag takes a number");
+        command[at + 1] = number.div_ceil(parts).to_string();
+    }
+    command
+}
+
 fn all_work(page: &str, sandbox: &Sandbox) {
     let commands = commands(page);
     assert!(commands.len() >= 3, "{page}: {commands:?}");
-    for command in commands {
+    for command in commands.into_iter().map(in_small) {
         let said = said(sandbox.command(&command));
         assert_eq!(said.code, Some(0), "{page}: {command:?}: {said:#?}");
     }
@@ -76,7 +86,7 @@ fn the_program_understands_every_command_of_every_page() {
 }
 
 #[test]
-fn every_command_of_the_tutorial_works() {
+fn every_command_of_the_tutorial_works_in_small() {
     let sandbox = Sandbox::new();
     all_work("tutorial.md", &sandbox);
     for file in
@@ -84,11 +94,11 @@ fn every_command_of_the_tutorial_works() {
     {
         assert!(sandbox.path(file).exists(), "{file}");
     }
-    assert_eq!(sandbox.run_file("runs/quickstart-seed1").generations, 80);
+    assert_eq!(sandbox.run_file("runs/quickstart-seed1").generations, 4);
 }
 
 #[test]
-fn every_command_of_the_page_on_own_images_works_with_images_of_one_s_own() {
+fn every_command_of_the_page_on_own_images_works_in_small_with_images_of_one_s_own() {
     let sandbox = Sandbox::new();
     // Crosses, bars and so on: ten images of each of five classes, 14 × 14 pixels.
     let (count, side) = (50_u32, 14_u32);
