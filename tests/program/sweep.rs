@@ -399,7 +399,8 @@ split = "validation"
     assert!(sandbox.path("validated/walkers-1v3-seed3/validation.json").exists());
     // One that is stopped says so, and goes on.
     let one = "sweep plans/pairs.toml --out one --task 1";
-    let mut child = sandbox.start(&format!("{one} --set set=[\"train.challengers=1000000\"]"));
+    let mut child =
+        sandbox.start(&format!("{one} --set set=[\"train.random_images=20\",\"train.challengers=1000000\"]"));
     wait_for(&sandbox.path("one/walkers-1v3-seed3/training.json"));
     crate::common::program::terminate(&child);
     assert_eq!(child.wait().unwrap().code(), Some(75));
