@@ -146,14 +146,14 @@ fn images_that_do_not_fit_into_memory_are_an_error_and_no_abort() {
         let path = sandbox.write(name, header);
         std::fs::File::options().write(true).open(path).unwrap().set_len(length).unwrap();
     };
-    // 700 MB of black, which take no space on the disk.
+    // 280 MB of black, which take no space on the disk.
     write(
         "own/train-images-idx3-ubyte",
-        &[0, 0, 8, 3, 0, 0, 0x2b, 0xc0, 0, 0, 1, 0, 0, 0, 0, 250],
-        16 + 716_800_000,
+        &[0, 0, 8, 3, 0, 0, 0x11, 0x80, 0, 0, 1, 0, 0, 0, 0, 250],
+        16 + 286_720_000,
     );
-    write("own/train-labels-idx1-ubyte", &[0, 0, 8, 1, 0, 0, 0x2b, 0xc0], 8 + 11_200);
-    for limit in [400_000, 1_100_000] {
+    write("own/train-labels-idx1-ubyte", &[0, 0, 8, 1, 0, 0, 0x11, 0x80], 8 + 4_480);
+    for limit in [250_000, 500_000] {
         let mut shell = std::process::Command::new("sh");
         let line = format!("ulimit -v {limit}; exec {PROGRAM} data info own --data own");
         let output = shell.args(["-c", &line]).current_dir(sandbox.path("")).output().unwrap();

@@ -43,13 +43,16 @@ fn words(line: &str) -> Vec<String> {
     words
 }
 
-/// The same command with less to do: a twentieth of the generations, a tenth of the images, and a training
-/// on few random images.
+/// The same command with less to do: a twentieth of the generations, a tenth of the images, a training
+/// on few random images, a film of few frames.
 fn in_small(mut command: Vec<String>) -> Vec<String> {
     for (flag, parts) in [("--generations", 20), ("--images", 10)] {
         let Some(at) = command.iter().position(|word| word == flag) else { continue };
         let number: u32 = command[at + 1].parse().expect("the flag takes a number");
         command[at + 1] = number.div_ceil(parts).to_string();
+    }
+    if command[0] == "replay" {
+        command.extend(["--every", "20"].map(str::to_string));
     }
     if command[0] == "train" {
         let settings = ["train.images_per_class=20", "train.random_images=60", "train.final_images=10"];

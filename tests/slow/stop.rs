@@ -19,7 +19,7 @@ const LONG: &str = "--set protocol.control_steps=1000000";
 /// It takes some hundredths of a second; the rest is for machines that have other things to do.
 const SOON: Duration = Duration::from_secs(6);
 /// Processor time that no program needs to begin.
-const WORK: Duration = Duration::from_millis(200);
+const WORK: Duration = Duration::from_millis(120);
 
 /// Waits until a program is at its work: it has used more processor time than it needs to begin, however
 /// busy the machine is.

@@ -15,7 +15,7 @@ fn whole_simulations_are_bitwise_equal_on_every_instruction_set() {
         let end = |set| {
             let mut world = world.clone().with_instructions(set);
             // A bit that differs spreads to all others within a few steps, and never comes back.
-            let outcome = (0..reference.control_steps.min(100)).try_for_each(|_| world.step());
+            let outcome = (0..reference.control_steps.min(50)).try_for_each(|_| world.step());
             (outcome, world.points().map(|p| p.map(f64::to_bits)).collect::<Vec<_>>())
         };
         let first = end(sets[0]);
