@@ -279,6 +279,9 @@ impl Network {
     }
 }
 
+// Most of a training is spent in the loops below. They are plain, because the standard library's iterators
+// are not always inlined where the parts of a crate are compiled apart.
+
 /// Computes units from their biases and the values of pixels; `weights` by pixel, then by unit.
 fn add_weighted(units: &mut [f64], biases: &[f64], pixels: &[(usize, f64)], weights: &[f64]) {
     let mut first = 0;
