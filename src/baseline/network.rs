@@ -222,7 +222,7 @@ impl Network {
         let biases = &self.parameters.as_slice()[biases];
         for place in 0..self.units.len() / size {
             let units = &mut self.units[place * size..][..size];
-            add_weighted(units, biases, image.at(place), hidden);
+            weighted_sums(units, biases, image.at(place), hidden);
         }
         activation.apply(&mut self.units);
         let (within, _) = self.shape.places();
@@ -283,26 +283,26 @@ impl Network {
 // are not always inlined where the parts of a crate are compiled apart.
 
 /// Computes units from their biases and the values of pixels; `weights` by pixel, then by unit.
-fn add_weighted(units: &mut [f64], biases: &[f64], pixels: &[(usize, f64)], weights: &[f64]) {
+fn weighted_sums(units: &mut [f64], biases: &[f64], pixels: &[(usize, f64)], weights: &[f64]) {
     let mut first = 0;
     while units.len() - first >= 8 {
-        add_weighted_to::<8>(units, biases, pixels, weights, first);
+        weighted_sums_of::<8>(units, biases, pixels, weights, first);
         first += 8;
     }
     if units.len() - first >= 4 {
-        add_weighted_to::<4>(units, biases, pixels, weights, first);
+        weighted_sums_of::<4>(units, biases, pixels, weights, first);
         first += 4;
     }
     while first < units.len() {
-        add_weighted_to::<1>(units, biases, pixels, weights, first);
+        weighted_sums_of::<1>(units, biases, pixels, weights, first);
         first += 1;
     }
 }
 
-/// The same for the `N` units from the `first`, which stay in registers.
+/// Computes the `N` units from the `first`, which stay in registers meanwhile.
 #[inline]
 #[expect(clippy::manual_memcpy, reason = "so few numbers are not worth a call")]
-fn add_weighted_to<const N: usize>(
+fn weighted_sums_of<const N: usize>(
     units: &mut [f64],
     biases: &[f64],
     pixels: &[(usize, f64)],

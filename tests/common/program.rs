@@ -7,6 +7,7 @@ use std::ffi::{OsStr, OsString};
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
+use std::sync::OnceLock;
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
 
@@ -97,6 +98,22 @@ impl Said {
 /// A folder in which commands run; gone at the end.
 pub struct Sandbox(TempDir);
 
+/// What [`Sandbox::once`] copies.
+pub type Made = BTreeMap<String, Vec<u8>>;
+
+/// All files below a folder by their paths from it.
+fn tree(folder: &Path, prefix: &str) -> Made {
+    let mut files = Made::new();
+    for entry in std::fs::read_dir(folder).unwrap().map(Result::unwrap) {
+        let name = format!("{prefix}{}", entry.file_name().to_str().unwrap());
+        match entry.path().is_dir() {
+            true => files.extend(tree(&entry.path(), &format!("{name}/"))),
+            false => _ = files.insert(name, std::fs::read(entry.path()).unwrap()),
+        }
+    }
+    files
+}
+
 impl Sandbox {
     pub fn new() -> Self {
         Sandbox(tempfile::tempdir().unwrap())
@@ -109,12 +126,15 @@ impl Sandbox {
         sandbox
     }
 
-    /// The same with these files in `run`.
-    pub fn with_run(run: &BTreeMap<String, Vec<u8>>) -> Self {
-        let sandbox = Sandbox::tiny();
-        run.iter().for_each(|(name, content)| {
-            sandbox.write(&format!("run/{name}"), content);
+    /// A sandbox as `make` leaves it. That happens once; every other one is a copy.
+    pub fn once(made: &OnceLock<Made>, make: impl FnOnce(&Sandbox)) -> Self {
+        let files = made.get_or_init(|| {
+            let sandbox = Sandbox::new();
+            make(&sandbox);
+            tree(&sandbox.path(""), "")
         });
+        let sandbox = Sandbox::new();
+        files.iter().for_each(|(name, content)| _ = sandbox.write(name, content));
         sandbox
     }
 
@@ -279,12 +299,13 @@ pub fn without_seconds(metrics: &str) -> Vec<String> {
 
 /// Runs of all pairs of three digits, in `pairs/`.
 pub fn pairs() -> Sandbox {
-    let sandbox = Sandbox::new();
-    for [a, b] in [[0, 1], [0, 4], [1, 4]] {
-        let task = format!("groups = [[{a}], [{b}]]");
-        let config = TINY.replace("groups = [[0], [1]]", &task).replace("train_images = [0, 1]", "");
-        sandbox.write("run.toml", config);
-        sandbox.run(&format!("evolve -q -c run.toml -o pairs/{a}v{b}")).ended(0, &[]);
-    }
-    sandbox
+    static PAIRS: OnceLock<Made> = OnceLock::new();
+    Sandbox::once(&PAIRS, |sandbox| {
+        for [a, b] in [[0, 1], [0, 4], [1, 4]] {
+            let task = format!("groups = [[{a}], [{b}]]");
+            let config = TINY.replace("groups = [[0], [1]]", &task).replace("train_images = [0, 1]", "");
+            sandbox.write("run.toml", config);
+            sandbox.run(&format!("evolve -q -c run.toml -o pairs/{a}v{b}")).ended(0, &[]);
+        }
+    })
 }

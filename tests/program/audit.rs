@@ -1,12 +1,12 @@
 //! Verdicts: deterministic, resumable, never stale; and `--physical-only` means what it says.
 
-use crate::common::program::{Sandbox, TINY, files};
+use crate::common::program::{Made, Sandbox, TINY};
 use morphcog::base::observer::{Observer, Work};
 use morphcog::commands::audit::{Options, Source};
 use morphcog::store::audit::AuditFile;
 use morphcog::store::audit::Verdict;
 use morphcog::store::robots::Selection;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
@@ -22,29 +22,21 @@ fn config() -> String {
 
 /// A sandbox with a run of it in `run`.
 fn evolved() -> Sandbox {
-    static RUN: OnceLock<BTreeMap<String, Vec<u8>>> = OnceLock::new();
-    let run = RUN.get_or_init(|| {
-        let sandbox = Sandbox::new();
+    static RUN: OnceLock<Made> = OnceLock::new();
+    Sandbox::once(&RUN, |sandbox| {
         sandbox.write("tiny.toml", config());
         sandbox.run("evolve --config tiny.toml --out run --generations 40").ended(0, &[]);
-        files(&sandbox.path("run"))
-    });
-    let sandbox = Sandbox::with_run(run);
-    sandbox.write("tiny.toml", config());
-    sandbox
+    })
 }
 
 /// The same with verdicts on all of its robots, made on one thread.
 fn audited() -> Sandbox {
-    static VERDICTS: OnceLock<[String; 2]> = OnceLock::new();
-    let sandbox = evolved();
-    let [json, csv] = VERDICTS.get_or_init(|| {
-        audit(&sandbox, "--threads 1");
-        written(&sandbox)
-    });
-    sandbox.write("run/audit.json", json);
-    sandbox.write("run/audit.csv", csv);
-    sandbox
+    static VERDICTS: OnceLock<Made> = OnceLock::new();
+    Sandbox::once(&VERDICTS, |sandbox| {
+        sandbox.write("tiny.toml", config());
+        sandbox.run("evolve --config tiny.toml --out run --generations 40").ended(0, &[]);
+        audit(sandbox, "--threads 1");
+    })
 }
 
 fn written(sandbox: &Sandbox) -> [String; 2] {

@@ -1,36 +1,27 @@
 //! What robots are worth in networks: trained on the robots' images, kept, the same however it is
 //! stopped or spread.
 
-use crate::common::program::{Sandbox, files};
+use crate::common::program::{Made, Sandbox, TINY};
 use morphcog::commands::capacity::Options;
 use morphcog::config::capacity::CapacityConfig;
 use morphcog::store::capacity::CapacityFile;
 use morphcog::store::eval::EvalFile;
-use std::collections::BTreeMap;
 use std::sync::OnceLock;
 use std::sync::atomic::AtomicBool;
 
 const FEW: &str = "--set trainings=3 --set sizes=[1,4]";
 
-/// Two runs of different seeds, evaluated together, made once.
+/// Two runs of different seeds, evaluated together.
 fn sandbox() -> Sandbox {
-    static RUNS: OnceLock<BTreeMap<String, Vec<u8>>> = OnceLock::new();
-    let sandbox = Sandbox::tiny();
-    let runs = RUNS.get_or_init(|| {
+    static RUNS: OnceLock<Made> = OnceLock::new();
+    Sandbox::once(&RUNS, |sandbox| {
+        sandbox.write("tiny.toml", TINY);
         for seed in [3, 4] {
             sandbox.run(&format!("evolve -q -c tiny.toml --seed {seed} -o runs/{seed}")).ended(0, &[]);
         }
         let archives = "--archive runs/3/run.json runs/4/run.json";
         sandbox.run(&format!("eval -q {archives} --images 40 --cycles 1 --robots top:4")).ended(0, &[]);
-        let of = |folder: &str| {
-            let files = files(&sandbox.path(folder)).into_iter();
-            files.map(|(name, content)| (format!("{folder}/{name}"), content)).collect::<Vec<_>>()
-        };
-        let evaluated = of("runs").into_iter().filter(|(name, _)| name.contains("eval."));
-        evaluated.chain(of("runs/3")).chain(of("runs/4")).collect()
-    });
-    runs.iter().for_each(|(name, content)| _ = sandbox.write(name, content));
-    sandbox
+    })
 }
 
 fn capacity(sandbox: &Sandbox, options: &str) -> CapacityFile {

@@ -33,21 +33,14 @@ mod validation;
 mod watching;
 mod whereabouts;
 
-use crate::common::program::{Sandbox, files};
-use std::collections::BTreeMap;
+use crate::common::program::{Made, Sandbox, TINY};
 use std::sync::OnceLock;
 
-/// A finished tiny run and what belongs to it, made once; copy it with [`with_run`].
-fn run_once() -> &'static BTreeMap<String, Vec<u8>> {
-    static RUN: OnceLock<BTreeMap<String, Vec<u8>>> = OnceLock::new();
-    RUN.get_or_init(|| {
-        let sandbox = Sandbox::tiny();
-        sandbox.run("evolve -q -c tiny.toml -o run").ended(0, &[]);
-        files(&sandbox.path("run"))
-    })
-}
-
-/// A sandbox with a finished run in `run`.
+/// A sandbox with a finished tiny run in `run`.
 fn with_run() -> Sandbox {
-    Sandbox::with_run(run_once())
+    static RUN: OnceLock<Made> = OnceLock::new();
+    Sandbox::once(&RUN, |sandbox| {
+        sandbox.write("tiny.toml", TINY);
+        sandbox.run("evolve -q -c tiny.toml -o run").ended(0, &[]);
+    })
 }

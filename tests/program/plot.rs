@@ -1,9 +1,8 @@
 //! `morphcog plot`: every kind of figure is made, well-formed, the same every time, and refuses
 //! what it cannot show.
 
-use crate::common::program::{Sandbox, TINY, files};
+use crate::common::program::{Made, Sandbox, TINY};
 use roxmltree::{Document, Node};
-use std::collections::BTreeMap;
 use std::sync::OnceLock;
 
 const CAPACITY: &str = r#"{
@@ -20,11 +19,11 @@ const CAPACITY: &str = r#"{
 const OF_ROBOTS: [&str; 3] = ["body", "spacetime", "snapshots"];
 const OF_RUNS: [&str; 4] = ["archive", "progress", "accuracy", "capacity"];
 
-/// A finished tiny run with all that figures are made of, made once.
-fn run_once() -> &'static BTreeMap<String, Vec<u8>> {
-    static RUN: OnceLock<BTreeMap<String, Vec<u8>>> = OnceLock::new();
-    RUN.get_or_init(|| {
-        let sandbox = Sandbox::tiny();
+/// A sandbox with a finished tiny run in `run`, with all that figures are made of.
+fn with_run() -> Sandbox {
+    static RUN: OnceLock<Made> = OnceLock::new();
+    Sandbox::once(&RUN, |sandbox| {
+        sandbox.write("tiny.toml", TINY);
         sandbox.run("evolve -q -c tiny.toml -o run").ended(0, &[]);
         sandbox.run("eval -q -a run/run.json -n 10 -r top:3 --cycles 1").ended(0, &[]);
         // Of the robots that were evaluated.
@@ -35,13 +34,7 @@ fn run_once() -> &'static BTreeMap<String, Vec<u8>> {
             capacity["tasks"][0][key] = eval["means"]["0|1"][key].clone();
         }
         sandbox.write("run/capacity.json", capacity.to_string());
-        files(&sandbox.path("run"))
     })
-}
-
-/// A sandbox with a finished run in `run`.
-fn with_run() -> Sandbox {
-    Sandbox::with_run(run_once())
 }
 
 /// Width and height that a PNG says it has.

@@ -1,7 +1,7 @@
 //! Sweeps: every combination once, the same bytes however and wherever its tasks are done, and clear
 //! words on what is wrong.
 
-use crate::common::program::{PROGRAM, SETTINGS, Sandbox, TINY, files, said};
+use crate::common::program::{Made, PROGRAM, SETTINGS, Sandbox, TINY, files, said};
 use std::collections::BTreeMap;
 use std::io::Read;
 use std::path::Path;
@@ -33,21 +33,14 @@ fn sandbox() -> Sandbox {
     sandbox
 }
 
-/// The same with all of the plan done in `all`: two tasks at a time, once for all tests.
+/// The same with all of the plan done in `all`, two tasks at a time.
 fn swept() -> Sandbox {
-    static SWEPT: OnceLock<BTreeMap<String, Vec<u8>>> = OnceLock::new();
-    let swept = SWEPT.get_or_init(|| {
-        let sandbox = sandbox();
+    static SWEPT: OnceLock<Made> = OnceLock::new();
+    Sandbox::once(&SWEPT, |sandbox| {
+        sandbox.write("tiny.toml", TINY);
+        sandbox.write("plan.toml", PLAN);
         sandbox.run("sweep plan.toml --out all --jobs 2 --threads 2").ended(0, &["task 4", "4 of 4"]);
-        let of = |task: &str| {
-            let files = files(&sandbox.path(&format!("all/{task}"))).into_iter();
-            files.map(|(name, content)| (format!("all/{task}/{name}"), content)).collect::<Vec<_>>()
-        };
-        TASKS.iter().flat_map(|task| of(task)).collect()
-    });
-    let sandbox = sandbox();
-    swept.iter().for_each(|(name, content)| _ = sandbox.write(name, content));
-    sandbox
+    })
 }
 
 /// What does not depend on the clock, of every task.

@@ -1,30 +1,13 @@
 //! A team: robots that tell pairs apart answer together, by rules that a few lines here repeat; it
 //! goes on after a stop, and says clearly who or what is missing.
 
-use crate::common::program::{Sandbox, TINY, files};
+use crate::common::program::{Sandbox, TINY, files, pairs};
 use morphcog::store::eval::EvalFile;
 use morphcog::store::team::TeamFile;
 use morphcog::task::margins::Margins;
 use morphcog::task::stimulus::Reduction;
 use serde_json::Value;
 use std::collections::BTreeMap;
-use std::sync::OnceLock;
-
-/// Runs of all pairs of three digits, in `pairs/`, made once.
-fn pairs() -> Sandbox {
-    static PAIRS: OnceLock<BTreeMap<String, Vec<u8>>> = OnceLock::new();
-    let pairs = PAIRS.get_or_init(|| {
-        let sandbox = crate::common::program::pairs();
-        let of = |run: &str| {
-            let files = files(&sandbox.path(run)).into_iter();
-            files.map(|(name, content)| (format!("{run}/{name}"), content)).collect::<Vec<_>>()
-        };
-        ["pairs/0v1", "pairs/0v4", "pairs/1v4"].into_iter().flat_map(of).collect()
-    });
-    let sandbox = Sandbox::new();
-    pairs.iter().for_each(|(name, content)| _ = sandbox.write(name, content));
-    sandbox
-}
 
 const TEAM: &str = "team --archive pairs/0v1 pairs/0v4 pairs/1v4 --classes 0,1,4";
 

@@ -1,7 +1,7 @@
 //! Training of gaits: a run like any other, the same bits on any threads, exact after a stop, clear
 //! errors.
 
-use crate::common::program::{Sandbox, TINY, files, gaits, write_images};
+use crate::common::program::{Made, Sandbox, TINY, files, gaits, write_images};
 use morphcog::base::ranks::Ranks;
 use morphcog::base::stop::NEVER;
 use morphcog::config::Config;
@@ -16,7 +16,7 @@ use morphcog::store::whereabouts::load_dataset;
 use morphcog::task::gait::Gait;
 use proptest::prelude::*;
 use proptest::test_runner::{RngAlgorithm, TestRng, TestRunner};
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -26,17 +26,13 @@ const LITTLE: &str = "--set train.random_images=20 --set train.rounds=2 --set tr
 --set train.final_images=10 --set train.challengers=4 --set validation.images=40 --set validation.best=0";
 const VALIDATED: &str = "--set validation.best=1";
 
-/// A run whose robots walk a little, made once for all tests.
+/// A run whose robots walk a little.
 fn sandbox() -> Sandbox {
-    static WALKERS: OnceLock<BTreeMap<String, Vec<u8>>> = OnceLock::new();
-    let sandbox = Sandbox::new();
-    sandbox.write("run.toml", TINY);
-    let walkers = WALKERS.get_or_init(|| {
+    static WALKERS: OnceLock<Made> = OnceLock::new();
+    Sandbox::once(&WALKERS, |sandbox| {
+        sandbox.write("run.toml", TINY);
         sandbox.run("evolve -q -c run.toml -o walkers").ended(0, &[]);
-        files(&sandbox.path("walkers"))
-    });
-    walkers.iter().for_each(|(name, content)| _ = sandbox.write(&format!("walkers/{name}"), content));
-    sandbox
+    })
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! Selection on validation images: from the training split, never trained on; the same every time;
 //! kept beside the run.
 
-use crate::common::program::{Sandbox, TINY, files};
+use crate::common::program::{Made, Sandbox, TINY};
 use morphcog::base::observer::{Generation, Observer};
 use morphcog::config::Config;
 use morphcog::data::dataset::Split;
@@ -14,19 +14,18 @@ use morphcog::store::folder::IfExists;
 use morphcog::store::images::HeldOut;
 use morphcog::store::run::Robot;
 use morphcog::store::whereabouts::load_dataset;
-use std::collections::BTreeMap;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// A run that is trained on several images of each class.
 fn sandbox() -> Sandbox {
-    static RUN: OnceLock<BTreeMap<String, Vec<u8>>> = OnceLock::new();
+    static RUN: OnceLock<Made> = OnceLock::new();
     once(&RUN, &TINY.replace("train_images = [0, 1]", "images_per_class = 3"), &[])
 }
 
 /// A run of few robots that chose the best two of them at its end.
 fn validated() -> Sandbox {
-    static RUN: OnceLock<BTreeMap<String, Vec<u8>>> = OnceLock::new();
+    static RUN: OnceLock<Made> = OnceLock::new();
     once(&RUN, &validating(), &["validating"])
 }
 
@@ -35,15 +34,11 @@ fn validating() -> String {
 }
 
 /// A sandbox with `run.toml` and its run, which is made once and says `words`.
-fn once(run: &OnceLock<BTreeMap<String, Vec<u8>>>, config: &str, words: &[&str]) -> Sandbox {
-    let sandbox = Sandbox::new();
-    sandbox.write("run.toml", config);
-    let run = run.get_or_init(|| {
+fn once(run: &OnceLock<Made>, config: &str, words: &[&str]) -> Sandbox {
+    Sandbox::once(run, |sandbox| {
+        sandbox.write("run.toml", config);
         sandbox.run("evolve -c run.toml -o run").ended(0, words);
-        files(&sandbox.path("run"))
-    });
-    run.iter().for_each(|(name, content)| _ = sandbox.write(&format!("run/{name}"), content));
-    sandbox
+    })
 }
 
 fn eval(sandbox: &Sandbox, options: &str) -> EvalFile {
