@@ -5,6 +5,8 @@ mod audit;
 mod capacity;
 mod choice;
 mod demo;
+pub mod explain;
+pub mod output;
 mod plot;
 mod process;
 mod report;
@@ -20,8 +22,13 @@ mod values;
 use crate::analysis::gallery;
 use crate::base::error::{Error, ErrorKind};
 use crate::base::ranks::Ranks;
+use crate::base::remedy::Remedy;
 use crate::base::text::counted;
-use crate::base::{error, shipped, signals, threads};
+use crate::base::{shipped, signals, threads};
+use crate::cli::output::console::Console;
+use crate::cli::output::pictures::Format;
+use crate::cli::output::reporters::Reporter;
+use crate::cli::output::{pictures, summary};
 use crate::commands::one_by_one::Named;
 use crate::commands::plan::{PAPER_TOML, Plan};
 use crate::commands::schema::{self, Schema};
@@ -39,11 +46,8 @@ use crate::store::folder;
 use crate::store::folder::IfExists;
 use crate::store::names::RUN_JSON;
 use crate::store::robots::{BEST, Selection};
-use crate::view::console::Console;
-use crate::view::pictures::Format;
-use crate::view::reporters::Reporter;
+use crate::view::sheet;
 use crate::view::sheet::SheetError;
-use crate::view::{pictures, sheet, summary};
 pub use args::Cli;
 use args::{Command, DataCommand, DatasetArgs, EvalArgs, EvolveArgs, ReplayArgs, SimulateArgs};
 use choice::{Runs, selected};
@@ -58,7 +62,7 @@ use std::sync::atomic::AtomicBool;
 /// What went wrong; its kind has the exit code.
 pub fn run(cli: Cli, console: &Console, ranks: Ranks) -> Result<(), Error> {
     let _environment = FloatEnvironment::standard();
-    InstructionSet::asked().map_err(|text| Error::usage(text).hint("or leave it unset".to_string()))?;
+    InstructionSet::asked().map_err(|text| Error::usage(text).advice("or leave it unset"))?;
     threads::check_environment()?;
     if cli.quiet && cli.json {
         // clap sees it only where both are on the same side of the command's name.
@@ -67,7 +71,7 @@ pub fn run(cli: Cli, console: &Console, ranks: Ranks) -> Result<(), Error> {
     let is_shared = matches!(cli.command, Command::Evolve(_) | Command::Eval(_) | Command::Audit(_));
     if ranks.size() > 1 && !is_shared {
         let text = "MPI: expected evolve, eval or audit: several processes can share only these";
-        return Err(Error::usage(text.to_string()).hint("start it without mpirun".to_string()));
+        return Err(Error::usage(text.to_string()).advice("start it without mpirun"));
     }
     match cli.command {
         Command::Demo(args) => demo::run(args, console),
@@ -170,7 +174,7 @@ fn run_evolve(args: EvolveArgs, console: &Console, ranks: Ranks) -> Result<(), E
             true => format!("stopped after generation {done}; the run is saved"),
             false => "stopped while validating; the run is saved".to_string(),
         };
-        return Err(Error::stopped(text).hint("the same command with --resume goes on".to_string()));
+        return Err(Error::stopped(text).remedy(Remedy::RepeatResuming));
     }
     if finished.run.elites.is_empty() {
         return Ok(());
@@ -201,7 +205,7 @@ fn run_eval(args: EvalArgs, console: &Console, ranks: Ranks) -> Result<(), Error
     let of_gallery = archives.is_empty() && gallery::is_meant(&robots)?;
     if of_gallery && args.physical_only {
         let text = "--physical-only: expected robots of an archive, not published ones";
-        return Err(Error::usage(text.to_string()).hint("morphcog audit --robots gallery".to_string()));
+        return Err(gallery::not_audited(text));
     }
     let archives = match archives.is_empty() {
         true if of_gallery => Vec::new(),
@@ -306,7 +310,7 @@ fn show(path: &Path) -> Result<(), Error> {
     // Why not is the business of programs that nobody here has asked for.
     open::that(path).map_err(|_| {
         let text = format!("{}: no program could be started to show it", path.display());
-        Error::other(text).hint("the file is written: open it yourself".to_string())
+        Error::other(text).advice("the file is written: open it yourself")
     })
 }
 
@@ -315,8 +319,8 @@ fn the_one(search: &one_by_one::Options, console: &Console) -> Result<Named, Err
     // What is more than one for certain needs no search.
     let many = |these: String, first: &str| {
         let text = format!("--robot: expected one robot to watch, these are {these}");
-        let hint = format!("name one, as in --robot {first}; morphcog plot and report show several");
-        Err(Error::usage(text).hint(hint))
+        let error = Error::usage(text).advice(format!("name one, as in --robot {first}"));
+        Err(error.advice("show several with morphcog plot or report"))
     };
     if let Some(count) = search.robots.validated().filter(|&count| count > 1) {
         return many(format!("up to {count} of each task"), "best-validation:1");
@@ -362,27 +366,15 @@ fn run_data(command: DataCommand, console: &Console) -> Result<(), Error> {
             let options = FetchOptions { to, mirror, force };
             let stop = signals::stop_flag()?;
             let fetched = fetch(&catalogue, &options, &Program::ALL, &stop, &Reporter::new(console));
-            let failed = |error: FetchError| {
-                match &error {
-                FetchError::Disk { path, source } if error::is_full(source) => Error::writing(path, source),
-                FetchError::Mirrors { .. } | FetchError::NoProgram { .. } => Error::other(error.to_string()).hint(
-                    "if you have the files, name their folder with --data; the digits that the program draws \
-                     need none (dataset builtin)"
-                        .to_string(),
-                ),
-                FetchError::Stopped(_) => Error::stopped(error.to_string()),
-                FetchError::Differs { .. } | FetchError::Disk { .. } => Error::other(error.to_string()),
-            }
-            };
             if matches!(fetched, Err(FetchError::Stopped(_))) {
                 // Whole files stay, and there is nothing else to save.
                 stop.end_process();
             }
-            summary::fetched(console, &fetched.map_err(failed)?);
+            summary::fetched(console, &fetched?);
         }
         DataCommand::Info(DatasetArgs { dataset, data, transpose }) => {
             let found = data::info(&dataset, &given(data.as_deref()), transpose);
-            let mut found = found.map_err(|error| Error::input(error.to_string()))?;
+            let mut found = found?;
             // A split that is not there is said; one that cannot be used is an error.
             let is_there = |(_, problem): &(Split, DatasetError)| {
                 !matches!(problem, DatasetError::Files(FilesError::Missing { content: "images", .. }))
@@ -400,7 +392,7 @@ fn run_data(command: DataCommand, console: &Console) -> Result<(), Error> {
             }
             let split = if test { Split::Test } else { Split::Train };
             let dataset = Dataset::oriented(&dataset, &given(data.as_deref()), &[split], transpose);
-            let dataset = dataset.map_err(|error| Error::input(error.to_string()))?;
+            let dataset = dataset?;
             if dataset.is_transposed() && transpose.is_none() {
                 console.info("these files are EMNIST's, mirrored and turned: the images are transposed");
             }

@@ -24,9 +24,9 @@
 //! | 6 | [`search`] | evolution, training, choice on validation images | [`search::evolve`] |
 //! | 7 | [`analysis`] | responses, verdicts, the published robots and numbers | [`analysis::measure`] |
 //! | 8 | [`commands`] | what the commands do, one file a command: options in, result out | [`commands::eval`] |
-//! | 9 | [`view`] | pictures, figures, reports, the terminal | [`view::pictures`] |
+//! | 9 | [`view`] | pictures, figures, reports | [`view::Walk`] |
 //! | 10 | [`serve`] | the page on which one draws a digit, over HTTP | [`serve::Service`] |
-//! | 11 | [`cli`] | the command line | [`cli::Cli`] |
+//! | 11 | [`cli`] | the command line, and what it shows on a terminal | [`cli::Cli`] |
 //!
 //! # A rollout
 //!

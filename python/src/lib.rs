@@ -1,5 +1,7 @@
 //! The Python module `morphcog._morphcog`; what users import stands in `morphcog/__init__.py`.
 
+mod remedies;
+
 use exceptions::{Error as MorphcogError, Unstable};
 use morphcog::base::error::{Error, ErrorKind};
 use morphcog::base::hash::sha256_hex;
@@ -62,10 +64,9 @@ const WATCH: Duration = Duration::from_millis(50);
 /// Control steps of a world from one look for Ctrl-C to the next.
 const STEPS: u64 = 20;
 
-/// An error with what to do about it.
+/// An error and what to do about it, in Python's words.
 fn raised(error: &Error) -> PyErr {
-    let hint = error.hint.as_ref().map_or(String::new(), |hint| format!("; {hint}"));
-    let text = as_keywords(&format!("{error}{hint}"));
+    let text = remedies::explained(error);
     match error.kind {
         ErrorKind::Unstable => Unstable::new_err(text),
         _ => MorphcogError::new_err(text),
@@ -81,41 +82,6 @@ fn refused(text: impl Into<String>) -> PyErr {
 fn entered() -> PyResult<FloatEnvironment> {
     InstructionSet::asked().map_err(refused)?;
     Ok(FloatEnvironment::standard())
-}
-
-/// Options of the command line in an error as this module calls them; commands for a shell stay as
-/// they are.
-fn as_keywords(text: &str) -> String {
-    const KEYWORDS: [&str; 9] =
-        ["out", "data", "robots", "images", "split", "seed", "threads", "generations", "config"];
-    let mut out = String::new();
-    let mut is_of_command = false;
-    for word in text.split_inclusive(' ') {
-        let bare = word.trim_end();
-        let lead = bare.len() - bare.trim_start_matches(['`', '(']).len();
-        let (lead, inner) = bare.split_at(lead);
-        is_of_command |= inner == "morphcog";
-        let option = inner.strip_prefix("--").filter(|_| !is_of_command);
-        is_of_command &= !bare.ends_with([',', ';', ':', '`']);
-        let end = |option: &str| option.find(|c: char| !c.is_ascii_lowercase()).unwrap_or(option.len());
-        let keyword = match option.map(|option| option.split_at(end(option))) {
-            // The changes themselves say what they set.
-            Some(("set", "")) => continue,
-            Some((flag @ ("resume" | "force"), rest)) => format!("{flag}=True{rest}"),
-            Some((keyword, rest)) if KEYWORDS.contains(&keyword) => match rest {
-                rest if rest.starts_with([':', ')']) => format!("{keyword}{rest}"),
-                // At the beginning its value follows.
-                "" if out.is_empty() => {
-                    out += &format!("{keyword}=");
-                    continue;
-                }
-                rest => format!("{keyword}={rest}"),
-            },
-            _ => inner.to_string(),
-        };
-        out += &format!("{lead}{keyword}{}", &word[bare.len()..]);
-    }
-    out
 }
 
 fn no_memory(what: &str) -> PyErr {
@@ -387,7 +353,7 @@ impl RunData {
         let of_name = path.display().to_string();
         let paths = folder::run_json(path).map_err(|text| raised(&Error::input(text)))?;
         let [path] = &paths[..] else {
-            let names: Vec<String> = paths.iter().map(|path| folder::archive(path)).collect();
+            let names: Vec<String> = paths.iter().map(|path| folder::name(path)).collect();
             let text = format!("{of_name}: expected one run, these are {}", names.len());
             return Err(refused(format!("{text}: {}", names.join(", "))));
         };
@@ -667,7 +633,7 @@ fn images<'py>(
         other => return Err(refused(format!("split={other:?}: expected \"train\" or \"test\""))),
     };
     let places = places(data.as_deref(), std::env::var_os("MORPHCOG_DATA"), None);
-    let failed = |error: DatasetError| raised(&Error::input(error.to_string()));
+    let failed = |error: DatasetError| raised(&Error::from(error));
     let (pixels, labels, [height, width]) = watched(py, |stop| -> PyResult<_> {
         let loaded = Dataset::load(dataset, &places, &[split]).map_err(failed)?;
         let count = loaded.len(split);

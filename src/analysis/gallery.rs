@@ -2,6 +2,7 @@
 //! trained here.
 
 use crate::base::error::Error;
+use crate::base::remedy::{Invocation, Remedy};
 use crate::base::shipped;
 use crate::body::Body;
 use crate::config::{BUILT_IN, Config};
@@ -114,10 +115,23 @@ pub fn is_meant(selection: &Selection) -> Result<bool, Error> {
     match published.iter().zip(ids).find(|(is_published, _)| !**is_published) {
         Some((_, other)) if published.contains(&true) => {
             let text = format!("there is no published robot {other}");
-            Err(Error::input(text).hint("morphcog gallery lists them".to_string()))
+            Err(Error::input(text).remedy(Remedy::Run(Invocation::new("gallery"), "lists them")))
         }
         other => Ok(other.is_none()),
     }
+}
+
+/// The error where only physical robots are wanted of the published ones; `text` says what was expected.
+pub(crate) fn not_audited(text: &str) -> Error {
+    let audit = Invocation::new("audit").option("robots", ALL);
+    let error = Error::usage(text.to_string()).about("physical_only");
+    error.remedy(Remedy::Run(audit, "audits those"))
+}
+
+/// Adds what to do where the images of the published robots are missing.
+pub(crate) fn without_mnist(error: Error) -> Error {
+    let fetch = Invocation::new("data fetch").value("mnist");
+    error.remedy(Remedy::Run(fetch, "downloads them")).remedy(Remedy::UseBuiltin)
 }
 
 /// The published robots as a run, for a test. Their genomes were not published: each has the empty
@@ -137,9 +151,7 @@ pub fn source(data: Option<&Path>, dataset: Option<&str>) -> Result<Source, Erro
             (DatasetRef { name: config.data.dataset.clone(), train_sha256 }, images.collect())
         }
         false => {
-            let hint = "morphcog data fetch mnist, or --dataset builtin for digits the program draws";
-            let hint = |error: Error| error.hint(hint.to_string());
-            let training = Training::load(&config, data).map_err(hint)?;
+            let training = Training::load(&config, data).map_err(without_mnist)?;
             (training.dataset, training.images)
         }
     };

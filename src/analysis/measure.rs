@@ -6,6 +6,7 @@ use crate::base::Grid;
 use crate::base::error::{Error, ErrorKind};
 use crate::base::hash::sha256_hex;
 use crate::base::observer::{Observer, Work};
+use crate::base::remedy::Remedy;
 use crate::base::stop::check;
 use crate::base::text::counted;
 use crate::base::threads::pool;
@@ -159,9 +160,8 @@ pub fn measure(options: &Options, stop: &AtomicBool, observer: &dyn Observer) ->
             path.display(),
             before.setting.seed
         );
-        return Err(
-            Error::input(text).hint("write elsewhere with --out, or measure with that --seed".to_string())
-        );
+        let error = Error::input(text).remedy(Remedy::ChooseOut);
+        return Err(error.remedy(Remedy::MeasureWithSeed(before.setting.seed)));
     }
     let measuring =
         Measuring { options, config, probing, task, earlier, run_sha256: &provenance.sha256, seed, stop };
@@ -206,20 +206,19 @@ pub fn measure(options: &Options, stop: &AtomicBool, observer: &dyn Observer) ->
             let outdated = asked.iter().zip(&drawn).filter(|(id, _)| is_new(id));
             let outdated: Vec<[PathBuf; 2]> = outdated.map(|(_, files)| files.clone()).collect();
             let written = whole.and_then(|whole| whole.write(&options.out, &outdated));
-            unwritten.tried(written, |text| observer.warning(text))?;
+            unwritten.tried(written, observer)?;
         }
         if stopped {
             break;
         }
     }
     if file.robots.is_empty() && !stopped {
-        let choose = || "choose others with --robots".to_string();
         return Err(match refused.as_slice() {
-            [one] => one.clone().hint(choose()),
+            [one] => one.clone().remedy(Remedy::ChooseRobots(None)),
             several => {
                 let text =
                     format!("none of the {} chosen robots can be measured: {}", several.len(), several[0]);
-                Error::input(text).hint(choose())
+                Error::input(text).remedy(Remedy::ChooseRobots(None))
             }
         });
     }
@@ -232,14 +231,14 @@ pub fn measure(options: &Options, stop: &AtomicBool, observer: &dyn Observer) ->
 fn check_numbers(options: &Options) -> Result<(), Error> {
     let Options { images, error, seed, .. } = options;
     if !(BATCH..=MOST_RANDOM_IMAGES).contains(images) {
-        let text = format!("--images {images}: expected {BATCH} to {MOST_RANDOM_IMAGES} random images");
-        return Err(Error::usage(text).hint("with fewer, no slope is known".to_string()));
+        let text = format!("expected {BATCH} to {MOST_RANDOM_IMAGES} random images");
+        return Err(Error::argument("images", images, text).advice("with fewer, no slope is known"));
     }
     if !(0.0..1.0).contains(error) {
-        return Err(Error::usage(format!("--error {error}: expected 0 or more, and below 1")));
+        return Err(Error::argument("error", error, "expected 0 or more, and below 1"));
     }
     if let Some(seed) = seed.filter(|seed| *seed > MAX_NUMBER) {
-        return Err(Error::usage(format!("--seed {seed}: expected at most {MAX_NUMBER}")));
+        return Err(Error::argument("seed", seed, format!("expected at most {MAX_NUMBER}")));
     }
     Ok(())
 }
@@ -249,8 +248,8 @@ fn check_names(options: &Options, subjects: &[Subject]) -> Result<(), Error> {
     let out = &options.out;
     check_out(out, options.archive.as_deref().unwrap_or(Path::new("")), RESPONSE_JSON)?;
     if PICTURES.iter().any(|ending| out.with_extension(ending) == *out) {
-        let text = format!("--out {}: expected another ending", out.display());
-        return Err(Error::usage(format!("{text}: the picture beside the results has that name")));
+        let text = "expected another ending: the picture beside the results has that name";
+        return Err(Error::argument("out", out.display(), text));
     }
     let ids: Vec<&str> = subjects.iter().map(|subject| subject.id.as_str()).collect();
     pictures(out, &ids).iter().flatten().try_for_each(|picture| writable(picture))
@@ -359,9 +358,9 @@ fn same_walks(of_run: &Config, training: &Config) -> Result<(), Error> {
     match differing.into_iter().find(|(_, differs)| *differs) {
         None => Ok(()),
         Some((section, _)) => {
-            let text = format!("--set {section}: expected keys that say what robots see");
-            Err(Error::usage(text)
-                .hint("rollouts are those of the run: no other can be measured here".to_string()))
+            let text = "expected keys that say what robots see";
+            Err(Error::argument("set", section, text)
+                .advice("rollouts are those of the run: no other can be measured here"))
         }
     }
 }

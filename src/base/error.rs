@@ -1,6 +1,7 @@
 //! [`Error`]: what a command fails with, and the exit code it means.
 
 use crate::base::ownership::{self, Lost};
+use crate::base::remedy::Remedy;
 use crate::base::stop::Stopped;
 use crate::base::text::one_line;
 use std::fmt;
@@ -40,23 +41,38 @@ impl ErrorKind {
     }
 }
 
-/// What went wrong, where, what was expected; and in `hint`, what to do.
+/// What went wrong, where, what was expected, and what to do about it.
+///
+/// An error knows the field of a command's options that it is about, and how it can be remedied, but no
+/// option of the command line: whoever shows it spells both in the words of its users.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Error {
-    /// What kind of failure it is.
+    /// The kind of failure.
     pub kind: ErrorKind,
-    /// One line for the user, whatever the files and names in it hold (see [`one_line`]).
+    /// One line for the user, whatever the files and names in it hold (see [`one_line`]); without
+    /// the argument.
     pub message: String,
-    /// What to do about it.
-    pub hint: Option<String>,
+    /// The argument that it is about, if it is about one.
+    pub argument: Option<Argument>,
+    /// What the user can do: alternatives, the most likely one first.
+    pub remedies: Vec<Remedy>,
     /// The key that it is about, if it is about one of a config: its path in dots, items of lists
     /// by their number from 1.
     pub key: Option<String>,
 }
 
+/// A field of a command's options.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Argument {
+    /// Its name, as "control_steps".
+    pub name: &'static str,
+    /// The value that was given, on one line, if the error is about the value.
+    pub value: Option<String>,
+}
+
 impl Error {
     fn new(kind: ErrorKind, message: String) -> Self {
-        Error { kind, message: one_line(&message), hint: None, key: None }
+        Error { kind, message: one_line(&message), argument: None, remedies: Vec::new(), key: None }
     }
 
     /// A file the user gave is wrong.
@@ -66,12 +82,18 @@ impl Error {
 
     /// A key of a config has a value that cannot be.
     pub fn value(key: &str, found: impl fmt::Display, expected: &str) -> Self {
-        Error::input(format!("{key} = {found}: expected {expected}")).of(key)
+        Error::input(format!("{key} = {found}: expected {expected}")).with_key(key)
     }
 
     /// Something is wrong about a key of a config.
-    pub fn at(key: &str, text: impl fmt::Display) -> Self {
-        Error::input(format!("{key}: {text}")).of(key)
+    pub fn at_key(key: &str, text: impl fmt::Display) -> Self {
+        Error::input(format!("{key}: {text}")).with_key(key)
+    }
+
+    /// An argument of a command has a value that cannot be; `text` says what was expected.
+    pub fn argument(name: &'static str, value: impl fmt::Display, text: impl Into<String>) -> Self {
+        let value = Some(one_line(&value.to_string()));
+        Error { argument: Some(Argument { name, value }), ..Error::usage(text.into()) }
     }
 
     /// The command line is wrong.
@@ -104,20 +126,20 @@ impl Error {
         Error::input(format!("{}: cannot be read: {error}", path.display()))
     }
 
-    /// The same, and where there is no such file, what makes one or is meant instead.
-    pub fn reading_or(path: &Path, error: &io::Error, hint: &str) -> Self {
+    /// [`Error::reading`], with a remedy where there is no such file.
+    pub fn reading_or(path: &Path, error: &io::Error, remedy: Remedy) -> Self {
         let text = Error::reading(path, error);
-        if error.kind() == io::ErrorKind::NotFound { text.hint(hint.to_string()) } else { text }
+        if error.kind() == io::ErrorKind::NotFound { text.remedy(remedy) } else { text }
     }
 
     /// A file is not written any more: its folder is another process's, or anybody's.
     fn lost(path: &Path, lost: &Lost) -> Self {
-        let hint = match lost {
+        let advice = match lost {
             Lost::Taken { .. } => "let that one end, or start this command again in another folder",
             Lost::Removed { .. } => "start the command again, and leave the folder to it as long as it runs",
         };
         let text = format!("{}: not written: {lost}", path.display());
-        Error::new(ErrorKind::Lost, text).hint(hint.to_string())
+        Error::new(ErrorKind::Lost, text).advice(advice)
     }
 
     /// A file cannot be written; if there is no room for it, or the lock of its folder is lost, with
@@ -132,30 +154,49 @@ impl Error {
             Some(folder) if !folder.as_os_str().is_empty() => folder,
             _ => Path::new("."),
         };
-        let full = match error.kind() {
-            io::ErrorKind::FileTooLarge => "raise the limit for the size of files (ulimit -f)".to_string(),
-            _ => format!("make space on the disk that {} is on", place.display()),
-        };
         let text = Error::other(format!("{}: cannot be written: {error}", path.display()));
-        if is_full(error) { text.hint(format!("{full}, or write elsewhere with --out")) } else { text }
+        match error.kind() {
+            io::ErrorKind::FileTooLarge => {
+                text.advice("raise the limit for the size of files (ulimit -f)").remedy(Remedy::ChooseOut)
+            }
+            _ if is_full(error) => {
+                text.remedy(Remedy::FreeSpace(place.to_path_buf())).remedy(Remedy::ChooseOut)
+            }
+            _ => text,
+        }
     }
 
-    /// The same with what to do.
+    /// Adds a remedy, after those there are.
     #[must_use]
-    pub fn hint(mut self, hint: String) -> Self {
-        self.hint = Some(one_line(&hint));
+    pub fn remedy(mut self, remedy: Remedy) -> Self {
+        self.remedies.push(match remedy {
+            Remedy::Advice(text) => Remedy::Advice(one_line(&text)),
+            remedy => remedy,
+        });
         self
+    }
+
+    /// Adds advice in plain words, which name no option and no command.
+    #[must_use]
+    pub fn advice(self, text: impl Into<String>) -> Self {
+        self.remedy(Remedy::advice(text))
+    }
+
+    /// Names the argument that the error is about.
+    #[must_use]
+    pub fn about(self, name: &'static str) -> Self {
+        Error { argument: Some(Argument { name, value: None }), ..self }
     }
 
     /// The same about a key.
     #[must_use]
-    pub fn of(self, key: &str) -> Self {
+    pub fn with_key(self, key: &str) -> Self {
         Error { key: Some(key.to_string()), ..self }
     }
 
     /// The same with where it is, unless it says that already.
     #[must_use]
-    pub fn within(mut self, place: &str) -> Self {
+    pub fn in_place(mut self, place: &str) -> Self {
         let place = one_line(place);
         let is_said = self.message.strip_prefix(&place).is_some_and(|rest| rest.starts_with(':'));
         if !is_said {
@@ -180,7 +221,11 @@ impl From<Stopped> for Error {
 
 impl fmt::Display for Error {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.message)
+        match &self.argument {
+            Some(Argument { name, value: Some(value) }) => write!(f, "{name} {value}: {}", self.message),
+            Some(Argument { name, value: None }) => write!(f, "{name}: {}", self.message),
+            None => f.write_str(&self.message),
+        }
     }
 }
 

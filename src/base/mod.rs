@@ -13,6 +13,7 @@ pub mod ownership;
 pub mod random;
 pub(crate) mod ranges;
 pub mod ranks;
+pub mod remedy;
 pub mod shell;
 pub mod shipped;
 pub mod signals;

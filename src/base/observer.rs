@@ -1,5 +1,6 @@
 //! [`Observer`]: what is told how a command goes on. Commands report through it and never print.
 
+use crate::base::error::Error;
 use serde::Serialize;
 
 /// What is told how a command goes on; from several threads at once. Every method may be left out.
@@ -19,6 +20,8 @@ pub trait Observer: Sync {
     fn finding(&self, _kind: &str, _fields: &serde_json::Value) {}
     /// Something that the user should know.
     fn warning(&self, _text: &str) {}
+    /// Something failed without ending the command; `then` says how it goes on, if that is not plain.
+    fn failed(&self, _error: &Error, _then: &str) {}
 }
 
 /// Ignores everything.

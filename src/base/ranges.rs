@@ -121,7 +121,7 @@ fn read<'de, D: Deserializer<'de>, T: Numbers + Deserialize<'de>>(
 pub(crate) fn check(key: &str, number: f64) -> Result<(), Error> {
     match number.outside(&NUMBER) {
         None => Ok(()),
-        Some(number) => Err(Error::at(key, refusal(number, &NUMBER))),
+        Some(number) => Err(Error::at_key(key, refusal(number, &NUMBER))),
     }
 }
 

@@ -73,6 +73,28 @@ impl Ranks {
         all.iter().map(|bytes| serde_json::from_slice(bytes).expect(WHY)).collect()
     }
 
+    /// Divides jobs among the ranks by their sizes; each rank does its own with `work`, and learns the
+    /// results of all, in the jobs' order. `None` where one rank gave up: then all do. All ranks must
+    /// call it with the same jobs.
+    pub fn scatter_gather<J, R: Serialize + DeserializeOwned>(
+        self,
+        jobs: Vec<J>,
+        sizes: &[u64],
+        work: impl FnOnce(&[J]) -> Option<Vec<R>>,
+    ) -> Option<Vec<R>> {
+        let owners = self.owners(sizes);
+        let own: Vec<J> = jobs
+            .into_iter()
+            .zip(&owners)
+            .filter(|(_, owner)| **owner == self.rank)
+            .map(|(job, _)| job)
+            .collect();
+        let shares: Option<Vec<Vec<R>>> = self.share(work(&own)).into_iter().collect();
+        let mut shares: Vec<_> = shares?.into_iter().map(Vec::into_iter).collect();
+        let next = |owner: &usize| shares[*owner].next().expect("a rank does all of its jobs");
+        Some(owners.iter().map(next).collect())
+    }
+
     /// Whether it is so for every rank: also where one was stopped, none waits for it. All ranks must
     /// call it.
     pub fn all(self, own: bool) -> bool {
@@ -163,8 +185,8 @@ mod world {
         match launched {
             Some(size) if size > 1 => {
                 let text = format!("MPI started {size} processes, and this morphcog is built without MPI");
-                let hint = "build it with --features mpi, or start it once".to_string();
-                Err(Error::usage(text).hint(hint))
+                let error = Error::usage(text).advice("build it with the feature mpi");
+                Err(error.advice("start it once"))
             }
             _ => Ok((Ranks::ALONE, Guard {})),
         }

@@ -17,10 +17,14 @@ pub fn one_line(text: &str) -> String {
 /// [`one_line`], cut to about this number of characters.
 pub fn shortened(text: &str, most: usize) -> String {
     let begin: String = text.chars().take(most + 1).map(written).collect();
-    let is_whole = text.chars().nth(most).is_none();
-    // Of what was shortened before, no second piece is taken out.
-    if is_whole && begin.chars().count() <= most || text.contains(CUT) && text.chars().count() <= most + 99 {
-        return text.chars().map(written).collect();
+    let whole = || text.chars().map(written).collect();
+    // It is short enough, also as it is written.
+    if text.chars().nth(most).is_none() && begin.chars().count() <= most {
+        return whole();
+    }
+    // It was shortened before: no second piece is taken out.
+    if text.contains(CUT) && text.chars().count() <= most + 99 {
+        return whole();
     }
     let half = most / 2;
     let mut last: Vec<char> = text.chars().rev().take(half).collect();

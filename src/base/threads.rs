@@ -97,9 +97,9 @@ pub fn at_once(threads: usize, work: impl Fn() + Sync) -> Result<(), Error> {
 }
 
 fn none_left(error: impl Display) -> Error {
-    let hint = "raise the limit for processes and threads (ulimit -u, pids.max of a container) or for \
+    let advice = "raise the limit for processes and threads (ulimit -u, pids.max of a container) or for \
                 memory, or use fewer threads";
-    Error::other(format!("a thread cannot be started: {error}")).hint(hint.to_string())
+    Error::other(format!("a thread cannot be started: {error}")).advice(advice)
 }
 
 #[cfg(test)]

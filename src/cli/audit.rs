@@ -3,10 +3,14 @@
 use crate::analysis::gallery;
 use crate::base::error::Error;
 use crate::base::ranks::Ranks;
+use crate::base::remedy::Remedy;
 use crate::base::signals;
 use crate::base::text::counted;
 use crate::cli::choice;
 use crate::cli::choice::{Archives, ROBOTS, selected};
+use crate::cli::output::console::Console;
+use crate::cli::output::reporters::Reporter;
+use crate::cli::output::verdicts;
 use crate::cli::values::{seed, threads};
 use crate::commands::audit;
 use crate::commands::audit::{Finished, Options, Source};
@@ -16,9 +20,6 @@ use crate::store::names::AUDIT_JSON;
 use crate::store::robots::Selection;
 use crate::store::run::different;
 use crate::store::{folder, robots};
-use crate::view::console::Console;
-use crate::view::reporters::Reporter;
-use crate::view::verdicts;
 use clap::Args;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
@@ -133,7 +134,7 @@ pub(super) fn run(args: AuditArgs, console: &Console, ranks: Ranks) -> Result<()
                     format!("stopped; {} audited and saved", counted(audited, "robot is", "robots are"))
                 }
             };
-            return Err(Error::stopped(text).hint("the same command goes on".to_string()));
+            return Err(Error::stopped(text).remedy(Remedy::Repeat));
         }
     }
     Ok(())
@@ -171,7 +172,7 @@ fn validated(
     let all_know = ranks.all(found.is_some());
     let Some(found) = found.filter(|_| all_know) else {
         let text = "stopped before the robots were chosen; nothing is audited";
-        return Err(Error::stopped(text.to_string()).hint("the same command goes on".to_string()));
+        return Err(Error::stopped(text.to_string()).remedy(Remedy::Repeat));
     };
     Ok(Selection::Ids(found.into_iter().map(|robot| robot.id).collect()))
 }

@@ -1,7 +1,11 @@
 //! `morphcog capacity`: its words, and what it calls.
 
 use crate::base::error::Error;
+use crate::base::remedy::Remedy;
 use crate::base::signals;
+use crate::cli::output::console::Console;
+use crate::cli::output::networks;
+use crate::cli::output::reporters::Reporter;
 use crate::cli::values::threads;
 use crate::commands::capacity;
 use crate::commands::capacity::Options;
@@ -9,9 +13,6 @@ use crate::config::capacity::CapacityConfig;
 use crate::store::capacity::CapacityFile;
 use crate::store::folder;
 use crate::store::names::EVAL_JSON;
-use crate::view::console::Console;
-use crate::view::networks;
-use crate::view::reporters::Reporter;
 use clap::Args;
 use std::path::PathBuf;
 
@@ -86,7 +87,7 @@ pub(super) fn run(args: CapacityArgs, console: &Console) -> Result<(), Error> {
     }
     if file.stopped {
         let text = "stopped; the trainings done so far are kept".to_string();
-        return Err(Error::stopped(text).hint("the same command goes on".to_string()));
+        return Err(Error::stopped(text).remedy(Remedy::Repeat));
     }
     Ok(())
 }

@@ -2,7 +2,11 @@
 
 use crate::base::error::{Error, ErrorKind};
 use crate::base::ranks::Ranks;
+use crate::base::remedy::Remedy;
 use crate::base::{shipped, signals};
+use crate::cli::output::console::Console;
+use crate::cli::output::reporters::Reporter;
+use crate::cli::output::summary;
 use crate::cli::values::{seed, threads};
 use crate::cli::{replay_best, test};
 use crate::commands::replay::Shown;
@@ -17,9 +21,6 @@ use crate::store::images::{HeldOut, HowMany};
 use crate::store::names::{EVAL_JSON, RUN_JSON};
 use crate::store::robots::{BEST, Selection};
 use crate::task::direction::THRESHOLD;
-use crate::view::console::Console;
-use crate::view::reporters::Reporter;
-use crate::view::summary;
 use clap::Args;
 use std::path::PathBuf;
 
@@ -88,7 +89,7 @@ pub(super) fn run(args: DemoArgs, console: &Console) -> Result<(), Error> {
     let stop = signals::stop_flag()?;
     let finished =
         train::train(&options, &stop, &Reporter::new(console)).map_err(|error| match error.kind {
-            ErrorKind::Stopped => error.hint("the same command goes on".to_string()),
+            ErrorKind::Stopped => error.remedy(Remedy::Repeat),
             _ => error,
         })?;
     summary::training(console, &finished, &options.out);

@@ -3,14 +3,14 @@
 use crate::base::error::Error;
 use crate::cli::choice;
 use crate::cli::choice::{Archives, ROBOTS, selected};
+use crate::cli::output::console::Console;
+use crate::cli::output::figures;
+use crate::cli::output::figures::{Kind, Wanted};
 use crate::cli::values::{MOST, offering, seed, whole};
 use crate::commands::one_by_one;
 use crate::commands::one_by_one::Named;
 use crate::commands::replay::{Options, Shown};
 use crate::store::robots::{BEST, Selection};
-use crate::view::console::Console;
-use crate::view::figures;
-use crate::view::figures::{Kind, Wanted};
 use crate::view::plot::Background;
 use clap::Args;
 use std::path::PathBuf;

@@ -4,9 +4,10 @@ use crate::base::error::{Error, ErrorKind};
 use crate::base::ranks::Ranks;
 use crate::base::signals;
 use crate::base::text::is_unseen;
+use crate::cli::explain::{Explained, explain};
+use crate::cli::output::console::{Console, Mode};
 use crate::cli::values::with_negative_numbers;
 use crate::cli::{Cli, run};
-use crate::view::console::{Console, Mode};
 use clap::{CommandFactory, FromArgMatches};
 use std::ffi::OsString;
 use std::io;
@@ -48,7 +49,7 @@ pub fn main(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     let (ranks, _guard) = match joined {
         Ok(joined) => joined,
         Err(error) => {
-            Console::new(cli.mode()).error(&error, error.hint.as_deref());
+            Console::new(cli.mode()).failed(&error);
             return error.kind.exit_code();
         }
     };
@@ -61,10 +62,10 @@ pub fn main(arguments: impl IntoIterator<Item = OsString>) -> u8 {
         Err(error) => {
             // To stop is what the user asked for, and no error.
             if error.kind == ErrorKind::Stopped {
-                let next = error.hint.as_ref().map_or(String::new(), |hint| format!("; {hint}"));
-                console.info(&format!("{}{next}", error.message));
+                let Explained { message, hint } = explain(&error);
+                console.info(&hint.map_or(message.clone(), |hint| format!("{message}; {hint}")));
             } else {
-                console.error(&error, error.hint.as_deref());
+                console.failed(&error);
                 if ranks.size() > 1 {
                     failed_among(ranks, &error);
                 }
@@ -78,7 +79,8 @@ pub fn main(arguments: impl IntoIterator<Item = OsString>) -> u8 {
 fn failed_among(ranks: Ranks, error: &Error) -> ! {
     if !ranks.leads() {
         std::thread::sleep(LEAD_SPEAKS);
-        Console::new(Mode::Human).error(&error.clone().within(&format!("rank {}", ranks.rank())), None);
+        let error = error.clone().in_place(&format!("rank {}", ranks.rank()));
+        Console::new(Mode::Human).failed(&Error { remedies: Vec::new(), ..error });
     }
     ranks.abort(error.kind.exit_code())
 }

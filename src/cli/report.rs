@@ -4,10 +4,11 @@ use crate::base::error::Error;
 use crate::base::number;
 use crate::cli::choice;
 use crate::cli::choice::{Archives, Runs, run_jsons};
+use crate::cli::explain::spell;
+use crate::cli::output::console::Console;
 use crate::cli::values::{MOST, whole};
 use crate::commands::report;
 use crate::store::folder;
-use crate::view::console::Console;
 use crate::view::error::write_whole;
 use crate::view::report::Content;
 use clap::Args;
@@ -61,7 +62,7 @@ pub(super) fn run(args: ReportArgs, console: &Console) -> Result<(), Error> {
     let gathered =
         report::gather(&archives, args.data.as_deref(), args.rollouts > 0, &|text| console.warning(text))?;
     let rollouts = args.rollouts.div_ceil(archives.len());
-    let content = Content { gathered: &gathered, rollouts };
+    let content = Content { gathered: &gathered, rollouts, spell: &spell };
     let page = {
         let counter = console.counter("simulating for the page:", content.count() as u64, "rollouts");
         content.page(&|simulated| counter.update(simulated))

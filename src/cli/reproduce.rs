@@ -1,16 +1,17 @@
 //! `morphcog reproduce`: its words, and what it calls.
 
 use crate::base::error::Error;
+use crate::base::remedy::Remedy;
 use crate::base::shell::quoted;
 use crate::base::signals;
+use crate::cli::output::console::Console;
+use crate::cli::output::networks;
+use crate::cli::output::reporters::Reporter;
 use crate::cli::tasks::{Command, What, Where, asked, ended};
 use crate::cli::values::decimal;
 use crate::commands::plan::{PAPER_TOML, Plan};
 use crate::commands::reproduce;
 use crate::commands::reproduce::Options;
-use crate::view::console::Console;
-use crate::view::networks;
-use crate::view::reporters::Reporter;
 use clap::Args;
 use std::path::{Path, PathBuf};
 
@@ -74,7 +75,7 @@ pub(super) fn run(args: ReproduceArgs, console: &Console) -> Result<(), Error> {
     ended(&finished.runs, tasks.len())?;
     if finished.stopped {
         let text = "stopped; what is done so far is kept".to_string();
-        return Err(Error::stopped(text).hint("the same command goes on".to_string()));
+        return Err(Error::stopped(text).remedy(Remedy::Repeat));
     }
     networks::table(console, &finished);
     if let Some(error) = finished.unwritten {

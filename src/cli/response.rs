@@ -7,6 +7,9 @@ use crate::base::signals;
 use crate::base::text::counted;
 use crate::cli::choice;
 use crate::cli::choice::{ROBOTS, run_json, selected};
+use crate::cli::output::console::Console;
+use crate::cli::output::reporters::Reporter;
+use crate::cli::output::responses;
 use crate::cli::values::{MOST, decimal, seed, threads, whole};
 use crate::commands::one_by_one;
 use crate::commands::one_by_one::Named;
@@ -14,9 +17,6 @@ use crate::store::folder;
 use crate::store::names::RESPONSE_JSON;
 use crate::store::robots::{BEST, Selection};
 use crate::task::grouping::Groups;
-use crate::view::console::Console;
-use crate::view::reporters::Reporter;
-use crate::view::responses;
 use clap::Args;
 use std::path::{Path, PathBuf};
 
@@ -90,7 +90,7 @@ pub(super) fn run(args: ResponseArgs, console: &Console) -> Result<(), Error> {
     };
     if archive.is_none() && args.physical_only {
         let text = "--physical-only: expected robots of an archive, not published ones";
-        return Err(Error::usage(text.to_string()).hint("morphcog audit --robots gallery".to_string()));
+        return Err(gallery::not_audited(text));
     }
     let search = one_by_one::Options {
         robots,

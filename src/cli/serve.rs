@@ -4,12 +4,12 @@ use crate::base::error::Error;
 use crate::base::signals;
 use crate::cli::choice;
 use crate::cli::choice::Archives;
+use crate::cli::output::console::Console;
 use crate::cli::values::whole;
 use crate::serve::hosts::{HostName, Hosts};
 use crate::serve::server::Server;
 use crate::serve::{Options, Service};
 use crate::store::folder;
-use crate::view::console::Console;
 use clap::Args;
 use std::path::PathBuf;
 

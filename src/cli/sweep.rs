@@ -4,13 +4,13 @@ use crate::base::error::Error;
 use crate::base::shell::{in_shell, quoted};
 use crate::base::signals;
 use crate::base::text::counted;
+use crate::cli::output::console::Console;
+use crate::cli::output::reporters::Reporter;
+use crate::cli::output::sweeps;
 use crate::cli::tasks::{Command, What, Where, asked, ended, refused, warn_of_gaits};
 use crate::commands::sweep::SweepPlan;
 use crate::commands::{collect, tasks};
 use crate::store::folder;
-use crate::view::console::Console;
-use crate::view::reporters::Reporter;
-use crate::view::sweeps;
 use clap::Args;
 use std::path::{Path, PathBuf};
 

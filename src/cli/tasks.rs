@@ -1,15 +1,16 @@
 //! What `sweep` and `reproduce` have in common: one task, all of them, lists, how far they are.
 
 use crate::base::error::Error;
+use crate::base::remedy::Remedy;
 use crate::base::shell::{in_shell, quoted};
 use crate::base::{atlas, signals};
+use crate::cli::output::console::Console;
+use crate::cli::output::reporters::Reporter;
+use crate::cli::output::sweeps;
 use crate::cli::values::{MOST, threads, whole};
 use crate::cli::{choice, process};
 use crate::commands::tasks;
 use crate::commands::tasks::{Place, Run, Summary, Task};
-use crate::view::console::Console;
-use crate::view::reporters::Reporter;
-use crate::view::sweeps;
 use clap::Args;
 use std::path::{Path, PathBuf};
 
@@ -127,7 +128,7 @@ impl Command<'_> {
         // Slurm reads its own lines, and no shell's escapes.
         if [name.as_str(), &in_shell(&log)].iter().any(|word| word.starts_with('$')) {
             let text = format!("--slurm: {}: expected names of plan and folder that are text", log.display());
-            return Err(Error::usage(text).hint("rename them, or use --list".to_string()));
+            return Err(Error::usage(text).advice("rename them, or use --list"));
         }
         let first = count.min(MOST_OF_AN_ARRAY);
         if count > first {
@@ -182,7 +183,7 @@ exit "$code"
 /// Says every error but the last; the last one is for `main`.
 pub(super) fn refused(mut errors: Vec<Error>, console: &Console) -> Error {
     let last = errors.pop().expect("something is refused, and it is said what");
-    errors.iter().for_each(|error| console.error(error, error.hint.as_deref()));
+    errors.iter().for_each(|error| console.failed(error));
     last
 }
 
@@ -212,7 +213,7 @@ pub(super) fn asked(
         tasks::check_data(std::iter::once((number, task)), place)?;
         warn_of_gaits(std::slice::from_ref(task), console);
         let stop = signals::stop_flag()?;
-        tasks::run(task, place, &stop, &Reporter::new(console)).map_err(goes_on)?;
+        tasks::run(task, place, &stop, &Reporter::new(console))?;
         console.line(&format!("task {number} ({}): done", task.name));
     } else if what.list {
         command.list(tasks.len(), console)?;
@@ -237,14 +238,6 @@ fn from_engine() -> Result<usize, Error> {
     value.trim().parse().map_err(|_| Error::usage(format!("{name}={value}: expected the number of a task")))
 }
 
-/// What a stopped task says.
-fn goes_on(error: Error) -> Error {
-    match error.kind {
-        crate::base::error::ErrorKind::Stopped => error.hint("the same command goes on".to_string()),
-        _ => error,
-    }
-}
-
 /// Says how all tasks ended.
 ///
 /// # Errors
@@ -256,11 +249,11 @@ pub(super) fn ended(summary: &Summary, count: usize) -> Result<(), Error> {
         let (count_failed, numbers) = (failed.len(), numbers.join(", "));
         let text =
             format!("{count_failed} of {count} tasks failed: {numbers}; {done} are done, {open} are open");
-        return Err(Error::other(text).hint("the same command tries them again".to_string()));
+        return Err(Error::other(text).advice("the same command tries them again"));
     }
     if *open == 0 && *elsewhere > 0 {
         let text = format!("{done} of {count} tasks are done; other processes are at {elsewhere}");
-        return Err(Error::occupied(text).hint("the same command does what they leave".to_string()));
+        return Err(Error::occupied(text).advice("the same command does what they leave"));
     }
     if *open > 0 {
         let at = if *elsewhere > 0 {
@@ -269,7 +262,7 @@ pub(super) fn ended(summary: &Summary, count: usize) -> Result<(), Error> {
             String::new()
         };
         let text = format!("stopped; {done} of {count} tasks are done{at}");
-        return Err(Error::stopped(text).hint("the same command goes on".to_string()));
+        return Err(Error::stopped(text).remedy(Remedy::Repeat));
     }
     Ok(())
 }

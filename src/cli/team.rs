@@ -1,19 +1,20 @@
 //! `morphcog team`: its words, and what it calls.
 
 use crate::base::error::Error;
+use crate::base::remedy::Remedy;
 use crate::base::text::counted;
 use crate::base::{shipped, signals};
 use crate::cli::choice;
 use crate::cli::choice::{Archives, selected};
+use crate::cli::output::console::Console;
+use crate::cli::output::reporters::Reporter;
+use crate::cli::output::teams;
 use crate::cli::values::{held_out, seed, threads};
 use crate::commands::team;
 use crate::commands::team::Options;
 use crate::store::folder;
 use crate::store::images::{HeldOut, HowMany};
 use crate::store::robots::{BEST, Selection};
-use crate::view::console::Console;
-use crate::view::reporters::Reporter;
-use crate::view::teams;
 use clap::Args;
 use std::path::PathBuf;
 
@@ -99,7 +100,7 @@ pub(super) fn run(args: TeamArgs, console: &Console) -> Result<(), Error> {
     if file.answers.is_none() {
         let (shown, all) = (file.members.len(), counted(file.size, "robot", "robots"));
         let text = format!("stopped after {shown} of {all}; what is done is saved");
-        return Err(Error::stopped(text).hint("the same command goes on".to_string()));
+        return Err(Error::stopped(text).remedy(Remedy::Repeat));
     }
     Ok(())
 }

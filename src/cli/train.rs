@@ -3,10 +3,14 @@
 use crate::base::error::Error;
 use crate::base::named;
 use crate::base::ranks::Ranks;
+use crate::base::remedy::Remedy;
 use crate::base::shell::in_shell;
 use crate::base::signals;
 use crate::cli::choice;
 use crate::cli::choice::{ROBOTS, run_json, selected};
+use crate::cli::output::console::Console;
+use crate::cli::output::reporters::Reporter;
+use crate::cli::output::{summary, verdicts};
 use crate::cli::values::{seed, threads};
 use crate::commands::audit;
 use crate::config::audit::Criteria;
@@ -18,9 +22,6 @@ use crate::store::names::{AUDIT_JSON, RUN_JSON};
 use crate::store::robots::Selection;
 use crate::store::whereabouts::Whereabouts;
 use crate::task::grouping::{Groups, groups_text};
-use crate::view::console::Console;
-use crate::view::reporters::Reporter;
-use crate::view::{summary, verdicts};
 use clap::Args;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
@@ -130,11 +131,11 @@ pub(super) fn after_evolution(evolution: &evolve::Options) -> Result<Options, Er
     let evolve::Options { config, out, if_exists, data, threads, ranks, .. } = evolution;
     if ranks.size() > 1 {
         let text = "--train: expected one process: several cannot share a training".to_string();
-        return Err(Error::usage(text).hint("evolve first, then morphcog train without mpirun".to_string()));
+        return Err(Error::usage(text).advice("evolve first, then morphcog train without mpirun"));
     }
     let Some(groups) = &config.task.groups else {
         let text = "--train: expected a config with task.groups, two groups of classes".to_string();
-        return Err(Error::usage(text).hint("evolve first, then morphcog train --task".to_string()));
+        return Err(Error::usage(text).advice("evolve first, then morphcog train --task"));
     };
     let archive = out.join(RUN_JSON);
     let name = name(&archive, groups, None);
@@ -165,10 +166,9 @@ pub(super) fn trained(options: &Options, stop: &AtomicBool, console: &Console) -
     let finished = train::train(options, stop, &Reporter::new(console))?;
     let Finished { validated, .. } = &finished;
     summary::training(console, &finished, &options.out);
-    let goes_on = || "the same command with --resume goes on".to_string();
     let Some(validated) = validated else {
         let text = "stopped while validating; the run is saved".to_string();
-        return Err(Error::stopped(text).hint(goes_on()));
+        return Err(Error::stopped(text).remedy(Remedy::RepeatResuming));
     };
     if !validated.is_empty() {
         summary::validation(console, validated);
@@ -191,7 +191,8 @@ pub(super) fn trained(options: &Options, stop: &AtomicBool, console: &Console) -
         return Err(error);
     }
     if audited.stopped {
-        return Err(Error::stopped("stopped while auditing; the run is saved".to_string()).hint(goes_on()));
+        return Err(Error::stopped("stopped while auditing; the run is saved".to_string())
+            .remedy(Remedy::RepeatResuming));
     }
     console.suggest("next:", &format!("morphcog eval --archive {}", in_shell(&archive)));
     Ok(())

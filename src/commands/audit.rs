@@ -5,6 +5,7 @@ use crate::analysis::verdict::Behaviour;
 use crate::base::error::Error;
 use crate::base::observer::{Observer, Work};
 use crate::base::ranks::Ranks;
+use crate::base::remedy::Remedy;
 use crate::base::stop::Stopped;
 use crate::base::text::counted;
 use crate::base::threads::pool;
@@ -13,7 +14,7 @@ use crate::config::Config;
 use crate::config::audit::Criteria;
 use crate::data::dataset::Split;
 use crate::search::training::Training;
-use crate::sim::{Energy, System};
+use crate::sim::{Energy, StepError, System};
 use crate::store::audit::{AuditFile, PerturbedRollout, RobotAudit};
 use crate::store::folder;
 use crate::store::folder::check_out;
@@ -114,7 +115,7 @@ struct Trial {
 /// # Errors
 /// What is wrong with archive, data, selection or criteria.
 pub fn audit(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Result<Finished, Error> {
-    let (config, fitness, training, subjects, order, mut file) = open(options)?;
+    let Opened { config, fitness, training, subjects, order, mut file } = open(options)?;
     let grouping = config.grouping()?.with_fitness(fitness);
     let trial = Trial { grouping, training, criteria: options.criteria.clone(), config };
     if let Some(earlier) = replaced::<AuditFile>(&options.out)?
@@ -123,8 +124,7 @@ pub fn audit(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> R
     {
         let count = counted(earlier.robots.len(), "robot of this run is", "robots of this run are");
         let text = format!("{}: {count} audited by other criteria", options.out.display());
-        let hint = "write elsewhere with --out, or move that file away".to_string();
-        return Err(Error::input(text).hint(hint));
+        return Err(Error::input(text).remedy(Remedy::ChooseOut).remedy(Remedy::MoveAway));
     }
     file.add_known(&options.out);
     let mut shipped = None;
@@ -172,22 +172,31 @@ pub fn audit(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> R
         file.add_known(&options.out);
         file.robots.sort_by_key(|robot| order.iter().position(|id| *id == robot.id));
         if ranks.leads() && !file.robots.is_empty() {
-            unwritten.tried(file.write(&options.out), |text| observer.warning(text))?;
+            unwritten.tried(file.write(&options.out), observer)?;
         }
         if stopped {
             return Ok(Finished { file, asked, known, shipped, stopped, unwritten: unwritten.error() });
         }
     }
     if ranks.leads() {
-        unwritten.tried(file.write(&options.out), |text| observer.warning(text))?;
+        unwritten.tried(file.write(&options.out), observer)?;
     }
     Ok(Finished { file, asked, known, shipped, stopped: false, unwritten: unwritten.error() })
 }
 
-type Opened = (Config, Fitness, Training, Vec<Subject>, Vec<String>, AuditFile);
+/// What an audit begins with.
+struct Opened {
+    config: Config,
+    fitness: Fitness,
+    training: Training,
+    /// The robots to audit.
+    subjects: Vec<Subject>,
+    /// The ids of all robots of the run, in order.
+    order: Vec<String>,
+    /// Without verdicts yet.
+    file: AuditFile,
+}
 
-/// Config, fitness, images, the robots asked for, the ids of all there are in order, and an empty
-/// file.
 fn open(options: &Options) -> Result<Opened, Error> {
     let data = options.data.as_deref();
     match &options.source {
@@ -212,7 +221,7 @@ fn open(options: &Options) -> Result<Opened, Error> {
             };
             let subjects = all.into_iter().filter(|robot| is_asked(&robot.name)).map(subject).collect();
             let file = AuditFile::new("gallery", source.run.fingerprint(), order.len(), &options.criteria);
-            Ok((config, Fitness::Min, training, subjects, order, file))
+            Ok(Opened { config, fitness: Fitness::Min, training, subjects, order, file })
         }
         Source::Archive(path) => {
             let source = robots::Source::read(path)?;
@@ -238,7 +247,8 @@ fn open(options: &Options) -> Result<Opened, Error> {
             }
             let order: Vec<String> = run.elites.iter().map(|robot| robot.id.clone()).collect();
             let file = AuditFile::new(&run.name, run.fingerprint(), order.len(), &options.criteria);
-            Ok((run.config.clone(), run.fitness(), training, subjects, order, file))
+            let (config, fitness) = (run.config.clone(), run.fitness());
+            Ok(Opened { config, fitness, training, subjects, order, file })
         }
     }
 }
@@ -256,7 +266,7 @@ fn training_of(run: &RunFile, path: &Path, whereabouts: &Whereabouts) -> Result<
     });
     let see = |image: &crate::store::images::ImageRef| {
         let seen = see(&run.config, &dataset, Split::Train, image.index);
-        seen.map_err(|error| error.within("training_images").within(&path.display().to_string()))
+        seen.map_err(|error| error.in_place("training_images").in_place(&path.display().to_string()))
     };
     let (dataset, stimuli) = (run.dataset.clone(), images.iter().map(see).collect::<Result<Vec<_>, Error>>());
     // As in a test, every rollout has the same conditions, however the robot was trained.
@@ -287,7 +297,8 @@ impl Trial {
             stimuli: self.training.stimuli.clone(),
         };
         let system = Arc::new(System::new(&setting.body, setting.physics.clone()));
-        let plain = walk(&system, &setting.protocol, &setting.stimuli, true, stop).ok()?.ok();
+        let plain =
+            StepError::outcome(walk(&system, &setting.protocol, &setting.stimuli, true, stop)).ok()?.ok();
         count(1);
         let (displacements, energy) = plain.map_or((None, Energy::default()), |(d, e)| (Some(d), e));
         let classes: Vec<u8> = self.training.images.iter().map(|image| image.label).collect();
@@ -305,7 +316,7 @@ impl Trial {
             let walked = displacements_in(&perturbation.apply(&setting), stop).ok()?;
             let walked = walked.map(|displacements| perturbation.undo(displacements));
             count(1);
-            Some(behaviour.compare(perturbation.name(), perturbation.kind, walked))
+            Some(behaviour.compare(perturbation.name(), perturbation.kind(), walked))
         };
         let perturbations = self.perturbations(subject);
         let rollouts: Vec<PerturbedRollout> = match behaviour.is_walker() {
@@ -348,7 +359,8 @@ fn displacements_in(setting: &Setting, stop: &AtomicBool) -> Result<Option<Vec<f
         return Ok(found.into_iter().map(Result::ok).collect());
     }
     let system = Arc::new(System::new(body, physics.clone()));
-    Ok(walk(&system, protocol, stimuli, false, stop)?.ok().map(|(displacements, _)| displacements))
+    let walked = StepError::outcome(walk(&system, protocol, stimuli, false, stop))?;
+    Ok(walked.ok().map(|(displacements, _)| displacements))
 }
 
 #[cfg(test)]
@@ -433,7 +445,7 @@ mod tests {
         let setting = Setting { body, physics: config.physics, protocol: config.protocol, stimuli };
         let displacements = displacements_in(&setting, &NEVER).unwrap().unwrap();
         let system = Arc::new(System::new(&setting.body, setting.physics.clone()));
-        let (all, _) = walk(&system, &setting.protocol, &setting.stimuli, true, &NEVER).unwrap().unwrap();
+        let (all, _) = walk(&system, &setting.protocol, &setting.stimuli, true, &NEVER).unwrap();
         assert_eq!(displacements, all);
         assert_ne!(all[0], all[1], "it sees something");
         let sequential = Setting {

@@ -5,6 +5,7 @@ use crate::analysis::gallery;
 use crate::base::error::{Error, ErrorKind};
 use crate::base::hash::sha256_hex;
 use crate::base::observer::{Observer, Work};
+use crate::base::remedy::{Invocation, Remedy};
 use crate::base::statistics::standard_deviation;
 use crate::base::text::counted;
 use crate::base::threads::pool;
@@ -68,8 +69,8 @@ pub fn capacity(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -
     kernel_fits(config, setting)?;
     check_out(&options.out, &options.eval, CAPACITY_JSON)?;
     if FIGURES.iter().any(|ending| options.out.with_extension(ending) == options.out) {
-        let text = format!("--out {}: expected another ending", options.out.display());
-        return Err(Error::usage(format!("{text}: the figure beside the results has that name")));
+        let text = "expected another ending: the figure beside the results has that name";
+        return Err(Error::argument("out", options.out.display(), text));
     }
     replaced::<CapacityFile>(&options.out)?;
     let robots = robots(&report, options)?;
@@ -120,11 +121,11 @@ pub fn capacity(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -
             accuracy,
             curves,
         });
-        unwritten.tried(write(options, &file), |text| observer.warning(text))?;
+        unwritten.tried(write(options, &file), observer)?;
     }
     // What was found before it was stopped is better than nothing.
     if file.stopped && !file.tasks.is_empty() {
-        unwritten.tried(write(options, &file), |text| observer.warning(text))?;
+        unwritten.tried(write(options, &file), observer)?;
     }
     Ok(Finished { file, unwritten: unwritten.error().or(networks.unkept.error()) })
 }
@@ -138,12 +139,13 @@ fn comparable<'a>(
     let name = options.eval.display();
     let Some(setting) = &report.setting else {
         let text = format!("{name}: expected \"setting\": an earlier version wrote it");
-        return Err(Error::input(text).hint("run morphcog eval again".to_string()));
+        return Err(Error::input(text).remedy(Remedy::Run(Invocation::new("eval"), "makes a new one")));
     };
     if report.split != HeldOut::Test {
         let text =
             format!("{name}: expected an evaluation on test images, found one on {} images", report.split);
-        return Err(Error::input(text).hint("morphcog eval --split test".to_string()));
+        return Err(Error::input(text)
+            .remedy(Remedy::Run(Invocation::new("eval").option("split", "test"), "makes such a one")));
     }
     if let Some(own) = &report.trained_on {
         let text = format!(
@@ -151,11 +153,12 @@ fn comparable<'a>(
              on {}",
             own.name, report.dataset
         );
-        return Err(Error::input(text).hint("morphcog eval without --dataset".to_string()));
+        return Err(Error::input(text)
+            .remedy(Remedy::Run(Invocation::new("eval"), "shows those, if it names no dataset")));
     }
     if report.runs.is_empty() {
         let text = format!("{name}: runs: expected one or more, whose training images networks learn from");
-        return Err(Error::input(text).hint("run morphcog eval again".to_string()));
+        return Err(Error::input(text).remedy(Remedy::Run(Invocation::new("eval"), "makes a new one")));
     }
     if let [of] = report.runs.as_slice()
         && let Ok(run) = RunFile::read(&options.eval.with_file_name(RUN_JSON))
@@ -271,7 +274,7 @@ impl Networks<'_> {
         }
         if !finished.is_empty() {
             self.known.extend(key, size, &finished);
-            self.unkept.tried(self.known.write(), |text| self.observer.warning(text))?;
+            self.unkept.tried(self.known.write(), self.observer)?;
         }
         Ok(goes_on)
     }
@@ -311,8 +314,8 @@ fn robots<'a>(report: &'a EvalFile, options: &Options) -> Result<Vec<&'a RobotRe
         return Ok(report.robots.iter().collect());
     }
     if report.runs.iter().any(|run| run.name == gallery::ALL) {
-        let text = "--physical-only: expected an evaluation of robots of an archive, not of published ones";
-        return Err(Error::usage(text.to_string()).hint("morphcog audit --robots gallery".to_string()));
+        let text = "expected an evaluation of robots of an archive, not of published ones";
+        return Err(gallery::not_audited(text));
     }
     let folder = options.eval.parent().unwrap_or(Path::new(""));
     let audit = |run: &RunRef| match &run.archive {
@@ -328,8 +331,9 @@ fn robots<'a>(report: &'a EvalFile, options: &Options) -> Result<Vec<&'a RobotRe
             Some(_) => {}
             None => {
                 let text = format!("{name}: robot {} has not been audited", robot.id);
-                return Err(Error::input(text)
-                    .hint("morphcog audit goes on with the robots that are missing".to_string()));
+                let audit = Invocation::new("audit");
+                let remedy = Remedy::Run(audit, "goes on with the robots that are missing");
+                return Err(Error::input(text).remedy(remedy));
             }
         }
     }

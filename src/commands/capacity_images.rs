@@ -4,6 +4,7 @@ use crate::base::Grid;
 use crate::base::error::Error;
 use crate::base::hash::sha256_hex;
 use crate::base::random::{Purpose, stream};
+use crate::base::remedy::Remedy;
 use crate::baseline::{Kind, Samples, Trained, train};
 use crate::commands::capacity::Options;
 use crate::config::capacity::CapacityConfig;
@@ -43,7 +44,7 @@ impl Images {
                 dataset.place(),
                 options.eval.display()
             );
-            return Err(Error::input(text).hint("name their folder with --data".to_string()));
+            return Err(Error::input(text).remedy(Remedy::NameData));
         }
         let see = |split: Split, images: &[ImageRef]| -> Result<Vec<Seen>, Error> {
             let one = |image: &ImageRef| {
@@ -100,11 +101,11 @@ fn waiting(
             let found = free.len();
             let text =
                 format!("capacity: waiting_images: expected {per_class} of class {label}, found {found}");
-            let hint = match found * classes.len() {
+            let advice = match found * classes.len() {
                 0 => "clean = false needs none".to_string(),
                 most => format!("ask for at most {most}"),
             };
-            return Err(Error::input(text).hint(hint));
+            return Err(Error::input(text).advice(advice));
         }
         let rng = &mut stream(options.config.seed, Purpose::Waiting, 0, u64::from(label));
         all.extend(rng.sample(free.len(), per_class).into_iter().map(|i| ImageRef { index: free[i], label }));

@@ -5,13 +5,14 @@ use crate::base::error::Error;
 use crate::base::observer::{Observer, Work};
 use crate::base::ranges::MOST;
 use crate::base::ranks::Ranks;
+use crate::base::remedy::Remedy;
 use crate::base::text::counted;
 use crate::base::threads::pool;
 use crate::commands::eval_images::HeldOutImages;
-use crate::config::validation::{IMAGES_KEY, LEAST};
+use crate::config::validation::LEAST;
 use crate::config::{Config, TaskConfig};
 use crate::data::dataset::{Dataset, Split};
-use crate::search::showing::{Walker, control_steps, task_of};
+use crate::search::showing::{HeldOutRun, control_steps, task_of};
 use crate::search::validation;
 use crate::store::audit::{AuditFile, RobotAudit};
 use crate::store::eval::{EvalFile, RobotReport, Trial};
@@ -94,7 +95,7 @@ pub fn eval(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Re
     report.baselines = shown.baselines(sources, tasks)?;
     let pool = pool(options.threads)?;
     let walker =
-        || Walker { config, control_steps: *steps, pool: &pool, stop, observer, done: AtomicU64::new(0) };
+        || HeldOutRun { config, control_steps: *steps, pool: &pool, stop, observer, done: AtomicU64::new(0) };
     let (robots, scores): (Vec<Chosen>, Vec<Validated>) = match wanted {
         None => (robots, Vec::new()),
         Some(wanted) => {
@@ -251,16 +252,15 @@ impl<'o> Opened<'o> {
     fn new(options: &'o Options) -> Result<Self, Error> {
         let threshold = options.threshold;
         if !(0.0..=MOST).contains(&threshold) {
-            return Err(Error::usage(format!("--threshold {threshold}: expected 0 or more voxel lengths")));
+            return Err(Error::argument("threshold", threshold, "expected 0 or more voxel lengths"));
         }
         let sources = sources(options)?;
         let (config, grouping) = together(&sources)?;
         let wanted = wanted(options, &config)?;
         let other = options.dataset.as_deref().filter(|name| *name != config.data.dataset);
         if other.is_some() && options.split == HeldOut::Validation {
-            let text =
-                "--dataset: expected with --split test only: validation images are of the runs' own data";
-            return Err(Error::usage(text.to_string()));
+            let text = "expected with test images only: validation images are of the runs' own data";
+            return Err(Error::usage(text.to_string()).about("dataset"));
         }
         let mut whereabouts = Whereabouts::given(options.data.as_deref());
         for archive in &options.archives {
@@ -297,8 +297,8 @@ impl<'o> Opened<'o> {
 /// The data of a run, and of those that are tested with it.
 fn own(run: &Source, config: &Config, whereabouts: &Whereabouts, splits: &[Split]) -> Result<Dataset, Error> {
     load_dataset_of(Some(&run.run.dataset), config, whereabouts, splits).map_err(|error| {
-        let hint = error.hint.clone().unwrap_or("name the folder of the run's data with --data".to_string());
-        error.hint(format!("{hint}; robots are shown another dataset's images with --dataset NAME"))
+        let named = if error.remedies.is_empty() { error.remedy(Remedy::NameData) } else { error };
+        named.remedy(Remedy::ShowOtherDataset)
     })
 }
 
@@ -317,7 +317,7 @@ impl Testing<'_> {
         &self,
         robots: &[Chosen],
         scores: Vec<Validated>,
-        walker: &Walker,
+        walker: &HeldOutRun,
         report: &mut EvalFile,
     ) -> Result<Unwritten, Error> {
         let Testing { options, sources, grouping, shown } = self;
@@ -354,7 +354,7 @@ impl Testing<'_> {
             if ranks.leads() && report.robots.len() > before {
                 let written =
                     make_room(options, report, walker.observer).and_then(|()| write(options, report));
-                unwritten.tried(written, |text| walker.observer.warning(text))?;
+                unwritten.tried(written, walker.observer)?;
             }
             if is_stopped {
                 break;
@@ -387,17 +387,17 @@ fn wanted(options: &Options, config: &Config) -> Result<Option<validation::Wante
         return match options.validation {
             None => Ok(None),
             Some(_) => {
-                let text = "--validation: expected with --robots best-validation:N: only those are so chosen";
-                Err(Error::usage(text.to_string()))
+                let text = "expected with robots best-validation:N: only those are so chosen";
+                Err(Error::usage(text.to_string()).about("validation"))
             }
         };
     };
     let images = options.validation.unwrap_or(config.validation.images);
     if images < LEAST {
-        return Err(Error::usage(format!("--validation {images}: expected {LEAST} or more images")));
+        return Err(Error::argument("validation", images, format!("expected {LEAST} or more images")));
     }
-    let asked = if options.validation.is_some() { "--validation" } else { IMAGES_KEY };
-    Ok(Some(validation::Wanted { count, images, asked, threshold: options.threshold }))
+    let argument = options.validation.map(|_| "validation");
+    Ok(Some(validation::Wanted { count, images, argument, threshold: options.threshold }))
 }
 
 /// The robots that have a task; others are left out with a warning.
@@ -447,7 +447,7 @@ fn same_setting(first: &Source, other: &Source) -> Result<(), Error> {
             let (other, first) = (other.path.display(), first.path.display());
             let but = if section == "stimulus" { ", but for margin," } else { "" };
             let text = format!("{other}: expected the same [{section}]{but} in its config as {first}");
-            Err(Error::input(text).hint("evaluate runs of different experiments one by one".to_string()))
+            Err(Error::input(text).advice("evaluate runs of different experiments one by one"))
         }
     }
 }
@@ -470,9 +470,11 @@ fn checked_steps(config: &Config, cycles: u32) -> Result<u32, Error> {
         true => Ok(steps),
         false => {
             let most = MAX_STEPS / config.physics.cycle_steps;
-            Err(Error::usage(format!(
-                "--cycles {cycles}: expected at most {most}, {MAX_STEPS} control steps"
-            )))
+            Err(Error::argument(
+                "cycles",
+                cycles,
+                format!("expected at most {most}, {MAX_STEPS} control steps"),
+            ))
         }
     }
 }

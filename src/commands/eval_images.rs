@@ -47,8 +47,8 @@ impl<'a> HeldOutImages<'a> {
     ) -> Result<Self, Error> {
         let (asked, least) = (options.images, config.classes().len());
         if !asked.has_each(least) {
-            let text = format!("--images {asked}: expected {least} or more, one of each class");
-            return Err(Error::usage(text));
+            let text = format!("expected {least} or more, one of each class");
+            return Err(Error::argument("images", asked, text));
         }
         let classes = config.classes();
         let images = match options.split {
@@ -61,7 +61,7 @@ impl<'a> HeldOutImages<'a> {
                     None => shown_for_validation(source),
                 };
                 let besides = chosen_by(sources, dataset, count)?;
-                images_besides(&besides, &runs, &classes, dataset, "--images", asked)?
+                images_besides(&besides, &runs, &classes, dataset, Some("images"), asked)?
             }
         };
         let split = options.split.split();
@@ -105,7 +105,7 @@ impl<'a> HeldOutImages<'a> {
         let of_runs = sources.iter().map(|source| {
             let path = source.path.display().to_string();
             let own = taught_with(&source.run, self.dataset).and_then(|images| seen(&images));
-            let own = own.map_err(|error| error.within("training_images").within(&path))?;
+            let own = own.map_err(|error| error.in_place("training_images").in_place(&path))?;
             Ok((source.run.config.grouping()?, own))
         });
         let of_runs = is_own.then(|| of_runs.collect::<Result<Vec<_>, Error>>()).transpose()?;
@@ -176,7 +176,7 @@ pub(crate) fn chosen_by(
     let mut all = BTreeSet::new();
     for source in sources {
         if let Some(count) = count(source)? {
-            let of_run = held_out::images(&[&source.run], dataset, "--validation", count)?;
+            let of_run = held_out::images(&[&source.run], dataset, Some("validation"), count)?;
             all.extend(of_run.into_iter().map(|image| image.index));
         }
     }

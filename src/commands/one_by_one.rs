@@ -4,6 +4,7 @@
 use crate::analysis::gallery;
 use crate::base::error::Error;
 use crate::base::observer::Observer;
+use crate::base::remedy::Remedy;
 use crate::search::validation;
 use crate::store::folder;
 use crate::store::robots::{Selection, Source, first_physical};
@@ -91,7 +92,7 @@ fn ranked<'a>(
     };
     let Some(best) = validation::validate(&search, stop, observer)? else {
         let text = "stopped before the robots were chosen; nothing is shown";
-        return Err(Error::stopped(text.to_string()).hint("the same command goes on".to_string()));
+        return Err(Error::stopped(text.to_string()).remedy(Remedy::Repeat));
     };
     let by_id = |validated: Validated| {
         let mut elites = source.run.elites.iter();

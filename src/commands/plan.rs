@@ -85,7 +85,7 @@ impl Plan {
 
     /// Checks what a type cannot.
     fn check(&self) -> Result<(), Error> {
-        let refuse = |key: &str, text: &str| Err(Error::input(text.to_string()).of(key));
+        let refuse = |key: &str, text: &str| Err(Error::input(text.to_string()).with_key(key));
         if self.seeds.is_empty() || self.experiment.is_empty() {
             return refuse("experiment", "seeds, experiment: expected one or more of each");
         }
@@ -95,8 +95,8 @@ impl Plan {
         if self.robots == 0 || self.images == 0 {
             return refuse("images", "robots, images: expected 1 or more");
         }
-        self.audit.check().map_err(|error| error.of("audit"))?;
-        self.capacity.check().map_err(|error| error.of("capacity"))
+        self.audit.check().map_err(|error| error.with_key("audit"))?;
+        self.capacity.check().map_err(|error| error.with_key("capacity"))
     }
 
     /// The experiments: what their runs are called, and their configs.
@@ -107,7 +107,7 @@ impl Plan {
         let mut experiments = Vec::<(String, Config)>::new();
         for (number, experiment) in (1..).zip(&self.experiment) {
             let key = format!("experiment.{number}");
-            let within = |error: Error| error.within(&format!("experiment {number}")).of(&key);
+            let within = |error: Error| error.in_place(&format!("experiment {number}")).with_key(&key);
             let name = folder::name_of(&self.folder.join(&experiment.config).to_string_lossy());
             if experiments.iter().any(|(other, _)| *other == name) {
                 return Err(within(Error::input(format!("config: {name}: expected once"))));
@@ -120,7 +120,7 @@ impl Plan {
                 Config::load_from(&self.folder, &experiment.config, &experiment.set).map_err(within)?;
             for &seed in &self.seeds {
                 let seeded = Config { seed, ..config.clone() };
-                seeded.validate().map_err(|error| error.within("seeds").of("seeds"))?;
+                seeded.validate().map_err(|error| error.in_place("seeds").with_key("seeds"))?;
             }
             let (images, least) = (self.images, config.classes().len());
             if images < least {

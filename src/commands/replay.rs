@@ -3,6 +3,7 @@
 use crate::analysis::gallery;
 use crate::base::error::Error;
 use crate::base::number;
+use crate::base::remedy::{Invocation, Remedy};
 use crate::base::text::counted;
 use crate::body::Body;
 use crate::config::{Config, DataConfig};
@@ -132,8 +133,7 @@ pub fn subject(options: &Options) -> Result<Subject, Error> {
     };
     // Published robots come without images of their own.
     let offer = |error: Error| match found.published {
-        true => error
-            .hint("morphcog data fetch mnist, or --dataset builtin for digits the program draws".to_string()),
+        true => gallery::without_mnist(error),
         false => error,
     };
     let (asks, mut shown) = (!options.images.is_empty(), options.images.clone());
@@ -154,9 +154,8 @@ pub fn subject(options: &Options) -> Result<Subject, Error> {
         shown = some(&all).iter().map(training).collect();
     }
     if shown.len() > MAX_IMAGES {
-        let text =
-            format!("--images: {} images, expected at most {MAX_IMAGES} in one recording", shown.len());
-        return Err(Error::usage(text));
+        let text = format!("{} images, expected at most {MAX_IMAGES} in one recording", shown.len());
+        return Err(Error::usage(text).about("images"));
     }
     let wanted: Vec<Split> =
         Split::ALL.into_iter().filter(|split| shown.iter().any(|image| image.split == *split)).collect();
@@ -165,7 +164,7 @@ pub fn subject(options: &Options) -> Result<Subject, Error> {
     let mut images = Vec::new();
     for Shown { split, index } in shown {
         let label = dataset.label(split, index).map_err(|error| match (&options.archive, asks) {
-            (_, true) => Error::usage(format!("--images: {error}")),
+            (_, true) => Error::usage(error.to_string()).about("images"),
             (Some(path), _) => Error::input(format!("{}: training_images: {error}", path.display())),
             (None, _) => Error::input(format!("training_images: {error}")),
         })?;
@@ -188,7 +187,7 @@ pub(crate) fn check_length(config: &Config, images: usize) -> Result<(), Error> 
             "protocol.control_steps = {steps}: expected at most {most} to record a rollout under {}",
             counted(images, "image", "images")
         ))
-        .hint("show fewer images".to_string())),
+        .advice("show fewer images")),
         false => Ok(()),
     }
 }
@@ -245,8 +244,8 @@ pub fn find(options: &Options) -> Result<Found, Error> {
         && let Some(robot) = gallery::find(&options.robot)?
     {
         if options.physical_only {
-            let text = "--physical-only: expected a robot of an archive, not a published one";
-            return Err(Error::usage(text.to_string()).hint("morphcog audit --robots gallery".to_string()));
+            let text = "expected a robot of an archive, not a published one";
+            return Err(gallery::not_audited(text));
         }
         let about = vec![
             ("Robot".to_string(), robot.name.clone()),
@@ -276,13 +275,12 @@ pub fn find(options: &Options) -> Result<Found, Error> {
     let robots = Selection::Ids(vec![options.robot.clone()]).physical(options.physical_only);
     let robots = robots.of(std::slice::from_ref(&source), 0);
     let robots = robots.map_err(|error| {
-        let error = error.within(&archive.display().to_string());
+        let error = error.in_place(&archive.display().to_string());
         if options.archive.is_some() || options.physical_only {
             return error;
         }
         // Without an archive, the robot may have been meant for a published one.
-        let own = error.hint.clone().map_or(String::new(), |hint| format!("{hint}; "));
-        error.hint(format!("{own}published robots: morphcog gallery"))
+        error.remedy(Remedy::Run(Invocation::new("gallery"), "lists the published robots"))
     })?;
     let (robot, run) = (robots[0].robot, &source.run);
     let about = vec![

@@ -2,6 +2,7 @@
 
 use crate::base::error::Error;
 use crate::base::files::exists;
+use crate::base::remedy::Remedy;
 use crate::commands::plot::Progress;
 use crate::commands::replay;
 use crate::config::Config;
@@ -221,12 +222,12 @@ impl Team {
 
 /// The training images, or one of each class if they are many.
 fn images(run: &RunFile, path: &Path, whereabouts: &Whereabouts) -> Result<Vec<Seen>, Error> {
-    let hint = |error: Error| match &error.hint {
-        None => error.hint("or --rollouts 0 for a report without moving pictures".to_string()),
-        Some(_) => error,
+    let without = |error: Error| match error.remedies.is_empty() {
+        true => error.remedy(Remedy::LeaveOutRollouts),
+        false => error,
     };
     let dataset = load_dataset_of(Some(&run.dataset), &run.config, whereabouts, &[Split::Train]);
-    let dataset = dataset.map_err(hint)?;
+    let dataset = dataset.map_err(without)?;
     let mut shown: Vec<ImageRef> = run.training_images.clone();
     if shown.len() > MOST_IMAGES {
         let mut classes = Vec::new();
@@ -236,11 +237,12 @@ fn images(run: &RunFile, path: &Path, whereabouts: &Whereabouts) -> Result<Vec<S
             is_first
         });
     }
-    replay::check_length(&run.config, shown.len()).map_err(hint)?;
+    replay::check_length(&run.config, shown.len()).map_err(without)?;
     let one = |image: &ImageRef| {
         let label = format!("{} (train {})", image.label, image.index);
         let seen = see(&run.config, &dataset, Split::Train, image.index);
-        let seen = seen.map_err(|error| error.within("training_images").within(&path.display().to_string()));
+        let seen =
+            seen.map_err(|error| error.in_place("training_images").in_place(&path.display().to_string()));
         Ok(Seen { class: image.label, label, stimulus: seen? })
     };
     shown.iter().map(one).collect()

@@ -63,7 +63,7 @@ pub struct Finished {
 /// What is wrong with scale or plan.
 pub fn tasks(plan: &Plan, scale: f64) -> Result<Vec<Task>, Error> {
     if !(scale > 0.0 && scale <= 1.0) {
-        return Err(Error::usage(format!("--scale {scale}: expected more than 0, up to 1")));
+        return Err(Error::argument("scale", scale, "expected more than 0, up to 1"));
     }
     let mut tasks = Vec::new();
     for (name, config) in plan.experiments()? {

@@ -9,15 +9,14 @@ use crate::config::reading;
 use crate::sim::{Physics, Start, System, World};
 use crate::store::folder;
 use crate::task::protocol::{MAX_COLUMN, MAX_ROW, MAX_STEPS};
-use serde::de::{Error as _, IgnoredAny, SeqAccess, Visitor};
+use serde::de::{Error as _, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer};
 use std::fmt;
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
-/// A body, what it sees, and for how long. The keys of a reference trajectory are understood too;
-/// its results are passed over.
+/// A body, what it sees, and for how long.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Scenario {
@@ -43,20 +42,6 @@ pub struct Scenario {
     /// The constants of the simulator, where they differ from the defaults.
     #[serde(default)]
     physics: Physics,
-    #[serde(default, rename = "name")]
-    _name: IgnoredAny,
-    #[serde(default, rename = "world_width")]
-    _world_width: IgnoredAny,
-    #[serde(default, rename = "unstable_at")]
-    _unstable_at: IgnoredAny,
-    #[serde(default, rename = "com")]
-    _com: IgnoredAny,
-    #[serde(default, rename = "points")]
-    _points: IgnoredAny,
-    #[serde(default, rename = "displacement_voxels")]
-    _displacement: IgnoredAny,
-    #[serde(default, rename = "displacement_voxels_shifted_world")]
-    _displacement_shifted: IgnoredAny,
 }
 
 /// Most memory that stimuli may need \[bytes\].
@@ -135,7 +120,7 @@ impl Scenario {
     /// As [`Scenario::read`].
     pub fn parse(text: &str, name: &str) -> Result<Self, Error> {
         let scenario: Scenario = reading::read_json(text, name)?;
-        scenario.check().map_err(|error| error.within(name))?;
+        scenario.check().map_err(|error| error.in_place(name))?;
         Ok(scenario)
     }
 
@@ -278,9 +263,8 @@ pub fn simulate(
 pub fn to_file(from: &Path, points: bool, path: &Path, stop: &AtomicBool) -> Result<(), Error> {
     let scenario = &Scenario::read(from)?;
     if path.exists() && path.canonicalize().ok() == from.canonicalize().ok() {
-        let text =
-            format!("--out {}: expected another name: this would overwrite the scenario", path.display());
-        return Err(Error::usage(text));
+        let text = "expected another name: this would overwrite the scenario";
+        return Err(Error::argument("out", path.display(), text));
     }
     folder::writable(path)?;
     // Line by line: a long simulation with all points has gigabytes.

@@ -5,6 +5,7 @@ use crate::base::error::Error;
 use crate::base::files::{home_expanded, read_given};
 use crate::base::hash::sha256_hex;
 use crate::base::named;
+use crate::base::remedy::{Invocation, Remedy};
 use crate::commands::tasks::task::selection;
 use crate::commands::tasks::{AuditStep, EvalStep, Run, Steps, Task, Training};
 use crate::config::{Config, Settings, flatten, reading};
@@ -83,9 +84,9 @@ impl SweepPlan {
     /// What is wrong with it, with file, line and key.
     pub fn load(path: &Path, overrides: &[String]) -> Result<Self, Error> {
         let text = read_given(path).map_err(|error| {
-            let error = Error::reading(path, &error);
-            error
-                .hint("morphcog schema sweep says what a plan holds; morphcog help sweep has one".to_string())
+            let schema = Remedy::Run(Invocation::new("schema").value("sweep"), "says what a plan holds");
+            let help = Remedy::Run(Invocation::new("help").value("sweep"), "shows one");
+            Error::reading(path, &error).remedy(schema).remedy(help)
         })?;
         let name = path.display().to_string();
         let format = reading::Format::of(path);
@@ -97,12 +98,14 @@ impl SweepPlan {
     /// Checks what a type cannot, and no task.
     fn check(&self) -> Result<(), Error> {
         match (&self.config, &self.archive) {
-            (Some(_), Some(_)) => return Err(Error::at("archive", "expected config or archive, not both")),
+            (Some(_), Some(_)) => {
+                return Err(Error::at_key("archive", "expected config or archive, not both"));
+            }
             (None, None) => {
-                return Err(Error::at("config", "expected config (to evolve) or archive (to train)"));
+                return Err(Error::at_key("config", "expected config (to evolve) or archive (to train)"));
             }
             (Some(_), None) if self.robots.is_some() => {
-                return Err(Error::at("robots", "expected with archive only: these robots are trained"));
+                return Err(Error::at_key("robots", "expected with archive only: these robots are trained"));
             }
             _ => {}
         }
@@ -111,12 +114,12 @@ impl SweepPlan {
         }
         let distinct = |key: &str, all: usize, different: usize| match all == different {
             true => Ok(()),
-            false => Err(Error::at(key, "expected different ones")),
+            false => Err(Error::at_key(key, "expected different ones")),
         };
         distinct("seeds", self.seeds.len(), self.seeds.iter().collect::<BTreeSet<_>>().len())?;
         distinct("pairs", self.pairs.len(), self.pairs.iter().collect::<BTreeSet<_>>().len())?;
         if self.pairs.len() == 1 {
-            return Err(Error::at("pairs", "expected two or more classes"));
+            return Err(Error::at_key("pairs", "expected two or more classes"));
         }
         self.groups()?;
         self.varied()?;
@@ -131,7 +134,9 @@ impl SweepPlan {
     fn groups(&self) -> Result<Vec<Groups>, Error> {
         let mut all: Vec<Groups> = Vec::new();
         for (number, text) in (1..).zip(&self.groups) {
-            all.push(text.parse().map_err(|error: String| Error::at(&format!("groups.{number}"), error))?);
+            all.push(
+                text.parse().map_err(|error: String| Error::at_key(&format!("groups.{number}"), error))?,
+            );
         }
         for (k, &a) in self.pairs.iter().enumerate() {
             all.extend(self.pairs[k + 1..].iter().map(|&b| [vec![a.min(b)], vec![a.max(b)]].into()));
@@ -141,10 +146,10 @@ impl SweepPlan {
             groups.classes().iter().map(|group| group.iter().copied().collect()).collect()
         };
         if all.iter().map(same).collect::<BTreeSet<_>>().len() < all.len() {
-            return Err(Error::at("groups", "expected different ones, also of pairs"));
+            return Err(Error::at_key("groups", "expected different ones, also of pairs"));
         }
         if self.archive.is_some() && all.is_empty() {
-            return Err(Error::at("groups", "expected groups or pairs, which are trained"));
+            return Err(Error::at_key("groups", "expected groups or pairs, which are trained"));
         }
         Ok(all)
     }
@@ -160,10 +165,10 @@ impl SweepPlan {
             let place = format!("vary.{key}");
             let has_own = matches!(key.as_str(), "seed" | "task.groups") || key.starts_with("task.groups.");
             if has_own {
-                return Err(Error::at(&place, "expected in seeds, or in groups and pairs"));
+                return Err(Error::at_key(&place, "expected in seeds, or in groups and pairs"));
             }
             let Some(values) = values.as_array().filter(|values| !values.is_empty()) else {
-                return Err(Error::at(&place, "expected a list of one value or more"));
+                return Err(Error::at_key(&place, "expected a list of one value or more"));
             };
             // Two keys may end in the same word.
             let is_short = flat.keys().filter(|other| short(other) == short(key)).count() == 1;
@@ -175,7 +180,7 @@ impl SweepPlan {
             };
             let settings: Vec<Setting> = values.iter().map(setting).collect();
             if settings.iter().map(|s| &s.word).collect::<BTreeSet<_>>().len() < settings.len() {
-                return Err(Error::at(&place, "expected different values"));
+                return Err(Error::at_key(&place, "expected different values"));
             }
             all.push(settings);
         }
@@ -188,16 +193,16 @@ impl SweepPlan {
     /// # Errors
     /// What is wrong with the plan, or with some of its tasks: all of that at once.
     pub fn tasks(&self, path: &Path) -> Result<Vec<Task>, Vec<Error>> {
-        let one = |error: Error| vec![error.within(&path.display().to_string())];
+        let one = |error: Error| vec![error.in_place(&path.display().to_string())];
         let sets = |wanted: &dyn Fn(&str) -> bool| {
             self.set.iter().any(|set| set.split('=').next().is_some_and(|key| wanted(key.trim())))
         };
         if sets(&|key| key == "seed") {
-            return Err(one(Error::at("set", "seed: expected in seeds")));
+            return Err(one(Error::at_key("set", "seed: expected in seeds")));
         }
         let has_groups = !(self.groups.is_empty() && self.pairs.is_empty());
         if has_groups && sets(&|key| key == "task" || key.starts_with("task.")) {
-            return Err(one(Error::at("set", "task: expected without, since groups or pairs say it")));
+            return Err(one(Error::at_key("set", "task: expected without, since groups or pairs say it")));
         }
         let base = self.base(path).map_err(one)?;
         let (groups, varied) = (self.groups().map_err(one)?, self.varied().map_err(one)?);
@@ -210,7 +215,7 @@ impl SweepPlan {
         if sizes.clone().try_fold(1_usize, usize::checked_mul).is_none_or(|count| count > MOST) {
             let sizes: Vec<String> = sizes.map(|size| size.to_string()).collect();
             let text = format!("{} tasks: expected at most {MOST}", sizes.join(" × "));
-            return Err(one(Error::at("vary", text)));
+            return Err(one(Error::at_key("vary", text)));
         }
         let groups: Vec<Option<&Groups>> =
             if groups.is_empty() { vec![None] } else { groups.iter().map(Some).collect() };
@@ -239,7 +244,7 @@ impl SweepPlan {
         }
         let mut names = BTreeSet::new();
         if let Some(task) = tasks.iter().find(|task| !names.insert(task.name.to_lowercase())) {
-            return Err(one(Error::at("vary", format!("two tasks would be called {}", task.name))));
+            return Err(one(Error::at_key("vary", format!("two tasks would be called {}", task.name))));
         }
         // Two values may be one, such as 1 and 1.0.
         let mut experiments: BTreeMap<String, &str> = BTreeMap::new();
@@ -247,7 +252,7 @@ impl SweepPlan {
             let config = sha256_hex(format!("{:?}", task.run.config()).as_bytes());
             if let Some(other) = experiments.insert(config, &task.name) {
                 let text = format!("{other} and {} are the same: expected different values", task.name);
-                return Err(one(Error::at("vary", text)));
+                return Err(one(Error::at_key("vary", text)));
             }
         }
         Ok(tasks)
@@ -258,8 +263,9 @@ impl SweepPlan {
         if let Some(archive) = &self.archive {
             let is_named = named::is_named(archive);
             let archive = if is_named { archive.clone() } else { folder.join(home_expanded(archive)) };
-            let archive = one_run(archive).map_err(|text| Error::at("archive", text))?;
-            let source = Source::read(&archive).map_err(|error| error.within("archive").of("archive"))?;
+            let archive = one_run(archive).map_err(|text| Error::at_key("archive", text))?;
+            let source =
+                Source::read(&archive).map_err(|error| error.in_place("archive").with_key("archive"))?;
             let archive = match is_named {
                 true => archive,
                 false => std::path::absolute(&archive).map_err(|error| Error::reading(&archive, &error))?,
@@ -269,7 +275,7 @@ impl SweepPlan {
         let config =
             self.config.as_deref().expect("a plan without an archive has a config, which is checked");
         let loaded = Config::load_from(folder, config, &[]);
-        let loaded = loaded.map_err(|error| error.within("config").of("config"))?;
+        let loaded = loaded.map_err(|error| error.in_place("config").with_key("config"))?;
         Ok(Base::Evolve(folder::name_of(&folder.join(config).to_string_lossy()), Box::new(loaded)))
     }
 
@@ -389,7 +395,7 @@ impl Refused {
         let said = |(error, number, name, more): (Error, usize, String, usize)| {
             let others = if more == 0 { String::new() } else { format!(" and {more} more") };
             Error { kind: crate::base::error::ErrorKind::Input, ..error }
-                .within(&format!("task {number} ({name}){others}"))
+                .in_place(&format!("task {number} ({name}){others}"))
         };
         self.by_error.into_iter().map(said).collect()
     }

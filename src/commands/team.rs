@@ -4,6 +4,7 @@
 use crate::base::Grid;
 use crate::base::error::Error;
 use crate::base::observer::{Observer, Work};
+use crate::base::remedy::Remedy;
 use crate::base::text::counted;
 use crate::base::threads::pool;
 use crate::baseline::linear::{Labelled, Linear, Moments};
@@ -12,13 +13,13 @@ use crate::commands::eval_images::chosen_by;
 use crate::config::Config;
 use crate::data::dataset::{Dataset, Split};
 use crate::search::held_out::{images_besides, test_images};
-use crate::search::showing::{CYCLES, Walker, control_steps, task_of};
+use crate::search::showing::{CYCLES, HeldOutRun, control_steps, task_of};
 use crate::store::eval::Trial;
 use crate::store::folder::check_out;
 use crate::store::images::{HeldOut, HowMany, ImageRef};
 use crate::store::names::{TEAM_JSON, TEAM_VALIDATION_JSON};
 use crate::store::results::{self, replaced};
-use crate::store::robots::{BEST, Chosen, Selection, Source};
+use crate::store::robots::{BEST, Chosen, Selection, Source, VALIDATED};
 use crate::store::run::different;
 use crate::store::team::{FORMAT, FORMAT_VERSION, Member, TeamBaselines, TeamFile};
 use crate::store::unwritten::Unwritten;
@@ -75,8 +76,8 @@ pub fn team(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Re
     let archives = options.archives.iter();
     let sources = archives.map(|path| Source::read(path)).collect::<Result<Vec<Source>, Error>>()?;
     let Some(first) = sources.first() else {
-        let text = "--archive: expected the runs whose robots are the team";
-        return Err(Error::input(text.to_string()));
+        let text = "expected the runs whose robots are the team";
+        return Err(Error::input(text.to_string()).about("archive"));
     };
     for source in &sources {
         source.has_task()?;
@@ -151,7 +152,7 @@ pub fn team(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Re
         let stimuli = see_all(&run.config, &dataset, split, &images)?;
         let control_steps = control_steps(&run.config, CYCLES);
         let (config, done_before) = (&run.config, AtomicU64::new(done));
-        let walker = Walker { config, control_steps, pool: &pool, stop, observer, done: done_before };
+        let walker = HeldOutRun { config, control_steps, pool: &pool, stop, observer, done: done_before };
         let Some((displacements, _)) = walker.rollouts(chosen.robot, &stimuli) else {
             file.members = members.into_iter().flatten().collect();
             return Ok(Finished { file, unwritten: unwritten.error() });
@@ -161,12 +162,12 @@ pub fn team(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Re
             Trial { run, robot: chosen.robot, split: of_robot, images: &images, threshold: THRESHOLD };
         members[place] = Some(Member::new(&trial, &hashes[chosen.source], displacements));
         file.members = members.iter().flatten().cloned().collect();
-        unwritten.tried(write(options, &file, observer), |text| observer.warning(text))?;
+        unwritten.tried(write(options, &file, observer), observer)?;
     }
     file.members = members.into_iter().flatten().collect();
     file.baselines = pool.install(|| baselines(&file, (&sources, &robots, &splits), &dataset, split))?;
     file.answers = Some(file.decided());
-    unwritten.tried(write(options, &file, observer), |text| observer.warning(text))?;
+    unwritten.tried(write(options, &file, observer), observer)?;
     Ok(Finished { file, unwritten: unwritten.error() })
 }
 
@@ -178,15 +179,15 @@ fn same_data(first: &Source, other: &Source) -> Result<(), Error> {
     }
     let (path, first) = (other.path.display(), first.path.display());
     let text = format!("{path}: expected robots of the same data ({}) as in {first}", a.dataset.name);
-    Err(Error::input(text).hint(format!("these are of {}: leave them out", b.dataset.name)))
+    Err(Error::input(text).advice(format!("these are of {}: leave them out", b.dataset.name)))
 }
 
 /// The robots of the team: those that are named from all runs together, else of each run by itself.
 fn chosen<'a>(options: &Options, sources: &'a [Source]) -> Result<Vec<Chosen<'a>>, Error> {
     if options.robots.validated().is_some() {
-        let text = "--robots best-validation: expected another selection: a team does not choose by images";
-        return Err(Error::usage(text.to_string())
-            .hint("best is the first on validation images of a run that ranked its robots".to_string()));
+        let text = "expected another selection: a team does not choose by images";
+        return Err(Error::argument("robots", VALIDATED, text)
+            .advice("best is the first on validation images of a run that ranked its robots"));
     }
     if matches!(&options.robots, Selection::Ids(ids) if !ids.iter().any(|id| id == BEST)) {
         return options.robots.of(sources, options.seed);
@@ -194,7 +195,7 @@ fn chosen<'a>(options: &Options, sources: &'a [Source]) -> Result<Vec<Chosen<'a>
     let mut all = Vec::new();
     for (number, source) in sources.iter().enumerate() {
         let of_one = options.robots.of(std::slice::from_ref(source), options.seed);
-        let of_one = of_one.map_err(|error| error.within(&source.path.display().to_string()))?;
+        let of_one = of_one.map_err(|error| error.in_place(&source.path.display().to_string()))?;
         all.extend(of_one.into_iter().map(|chosen| Chosen { source: number, ..chosen }));
     }
     Ok(all)
@@ -207,14 +208,14 @@ fn classes(options: &Options, dataset: &Dataset) -> Result<Vec<u8>, Error> {
     classes.sort_unstable();
     classes.dedup();
     if let Some(class) = classes.iter().find(|class| !all.contains(class)) {
-        return Err(Error::usage(format!("--classes: {} has no class {class}", dataset.name())));
+        return Err(Error::usage(format!("{} has no class {class}", dataset.name())).about("classes"));
     }
     if classes.len() < 2 {
-        return Err(Error::usage("--classes: expected two or more".to_string()));
+        return Err(Error::usage("expected two or more".to_string()).about("classes"));
     }
     if !options.images.has_each(classes.len()) {
         let (asked, least) = (options.images, classes.len());
-        return Err(Error::usage(format!("--images {asked}: expected {least} or more, one of each class")));
+        return Err(Error::argument("images", asked, format!("expected {least} or more, one of each class")));
     }
     Ok(classes)
 }
@@ -233,7 +234,7 @@ fn split_of(source: &Source, chosen: &Chosen) -> Result<grouping::Split, Error> 
     let text =
         || format!("{}: robot {} walks the same way for every class", source.path.display(), chosen.robot.id);
     let of_robot = task_of(&grouping, chosen.robot).cloned();
-    of_robot.ok_or_else(|| Error::input(text()).hint("name others with --robots".to_string()))
+    of_robot.ok_or_else(|| Error::input(text()).remedy(Remedy::ChooseRobots(None)))
 }
 
 /// Whether every class has a robot, and every robot classes of the team.
@@ -242,8 +243,7 @@ fn covered(robots: &[Chosen], splits: &[grouping::Split], classes: &[u8]) -> Res
     let missing: Vec<String> = classes.iter().filter(is_unknown).map(u8::to_string).collect();
     if !missing.is_empty() {
         let text = format!("no robot of the team knows class {}", missing.join(", "));
-        let hint = "add runs whose tasks have it with --archive, or name the classes with --classes";
-        return Err(Error::input(text).hint(hint.to_string()));
+        return Err(Error::input(text).remedy(Remedy::AddRuns).remedy(Remedy::NameClasses));
     }
     let is_foreign = |split: &grouping::Split| {
         [Group::A, Group::B].into_iter().flat_map(|g| split.classes(g)).any(|class| !classes.contains(class))
@@ -253,7 +253,7 @@ fn covered(robots: &[Chosen], splits: &[grouping::Split], classes: &[u8]) -> Res
         Some((chosen, split)) => {
             let (id, task) = (&chosen.robot.id, split.name());
             let text = format!("robot {id} tells {task} apart: expected classes of the team only");
-            Err(Error::input(text).hint("leave it out, or name its classes with --classes".to_string()))
+            Err(Error::input(text).advice("leave it out").remedy(Remedy::NameClasses))
         }
     }
 }
@@ -267,7 +267,7 @@ fn validation_images(
 ) -> Result<Vec<ImageRef>, Error> {
     let besides = chosen_by(sources, dataset, shown_for_validation)?;
     let runs: Vec<_> = sources.iter().map(|source| &source.run).collect();
-    images_besides(&besides, &runs, classes, dataset, "--images", options.images)
+    images_besides(&besides, &runs, classes, dataset, Some("images"), options.images)
 }
 
 /// Whether two tests show the same images in the same way: what one found of a robot holds for the

@@ -60,7 +60,8 @@ impl Criteria {
     pub(crate) fn check(&self) -> Result<(), Error> {
         let Sizes { start, time_step, share, pixels, least_sensors: _, seed } = &self.perturbations;
         let shares = [self.least_answered, self.least_kept, self.least_distance, self.least_robust];
-        let refuse = |key: &str, text: &str| Err(Error::input(format!("audit criteria: {text}")).of(key));
+        let refuse =
+            |key: &str, text: &str| Err(Error::input(format!("audit criteria: {text}")).with_key(key));
         if ![self.threshold, self.least_walk].iter().all(|walk| (0.0..1e9).contains(walk)) {
             return refuse("threshold", "threshold, least_walk: expected 0 or more voxel lengths");
         }

@@ -66,7 +66,7 @@ impl CapacityConfig {
 
     /// Checks what a type cannot.
     pub(crate) fn check(&self) -> Result<(), Error> {
-        let refuse = |key: &str, text: &str| Err(Error::input(format!("capacity: {text}")).of(key));
+        let refuse = |key: &str, text: &str| Err(Error::input(format!("capacity: {text}")).with_key(key));
         let [from, to] = self.sizes;
         if from == 0 || to < from || to > MOST {
             return refuse(
@@ -74,14 +74,18 @@ impl CapacityConfig {
                 &format!("sizes = [{from}, {to}]: expected two sizes from 1 to {MOST}, the smaller first"),
             );
         }
-        if self.trainings > MOST_TRAININGS {
+        if !(1..=MOST_TRAININGS).contains(&self.trainings) {
             return refuse(
                 "trainings",
                 &format!("trainings = {}: expected 1 to {MOST_TRAININGS}", self.trainings),
             );
         }
-        if self.step == 0 || self.trainings == 0 || self.networks.is_empty() || self.waiting_images == 0 {
-            return refuse("step", "step, trainings, networks, waiting_images: expected one or more of each");
+        for (key, count) in
+            [("step", self.step), ("networks", self.networks.len()), ("waiting_images", self.waiting_images)]
+        {
+            if count == 0 {
+                return refuse(key, &format!("{key}: expected one or more"));
+            }
         }
         for (name, hyper) in [("mlp", &self.mlp), ("cnn", &self.cnn)] {
             let rate = hyper.learning_rate;

@@ -93,7 +93,7 @@ impl Config {
             Some((_, key, found, expected)) => {
                 let text =
                     format!("{key} = {found}: with evaluation.fitness = \"response\" expected {expected}");
-                Err(Error::input(text).of(key))
+                Err(Error::input(text).with_key(key))
             }
             None => Ok(()),
         }

@@ -3,6 +3,7 @@
 pub mod audit;
 pub mod capacity;
 pub mod evaluation;
+mod expected;
 pub mod pair;
 pub mod reading;
 pub mod task;
@@ -11,6 +12,7 @@ pub mod validation;
 
 use crate::base::error::Error;
 use crate::base::files::{home_expanded, read_given};
+use crate::base::remedy::{Invocation, Remedy};
 use crate::body::MAX_SIDE;
 use crate::config::evaluation::EvaluationConfig;
 use crate::config::reading::Format;
@@ -282,7 +284,7 @@ impl Config {
                         "{}: there is no such file, and no built-in config of that name",
                         path.display()
                     ))
-                    .hint(format!("the built-in configs are {names}")));
+                    .advice(format!("the built-in configs are {names}")));
                 }
             },
             Err(error) => return Err(Error::reading(&path, &error)),
@@ -298,8 +300,9 @@ impl Config {
         let format = Format::of(Path::new(name));
         let config: Config = reading::read(text, format, name).map_err(|error| {
             let is_lacking = error.message.contains("missing field");
-            let hint = "morphcog config zero_one.toml prints a whole one to start your own from".to_string();
-            if is_lacking { error.hint(hint) } else { error }
+            let config = Invocation::new("config").value("zero_one.toml");
+            let remedy = Remedy::Run(config, "prints a whole one to start your own from");
+            if is_lacking { error.remedy(remedy) } else { error }
         })?;
         reading::changed(config, overrides, Config::validate, |error| {
             reading::placed(error, text, format, name)
@@ -373,12 +376,12 @@ impl Config {
         self.physics
             .validate()
             .map_err(|error| Error::value(&format!("physics.{}", error.name), error.value, error.expected))?;
-        self.stimulus.validate().map_err(|error| Error::at("stimulus", error))?;
-        check_name(&self.data.dataset).map_err(|error| Error::at("data.dataset", error))?;
+        self.stimulus.validate().map_err(|error| Error::at_key("stimulus", error))?;
+        check_name(&self.data.dataset).map_err(|error| Error::at_key("data.dataset", error))?;
         if self.data.dataset == BUILTIN && self.data.transpose == Some(true) {
             return refuse("data.transpose", true.to_string(), "false: the built-in digits stand upright");
         }
-        self.data.builtin.check().map_err(|error| Error::at("data.builtin", error))?;
+        self.data.builtin.check().map_err(|error| Error::at_key("data.builtin", error))?;
         for (key, side) in [("body.height", self.body.height), ("body.width", self.body.width)] {
             if side == 0 || side > MAX_SIDE {
                 return refuse(key, side.to_string(), &format!("1 to {MAX_SIDE}"));

@@ -33,14 +33,14 @@ impl TaskConfig {
             (Some([a, b]), None) if !same_way_bin => Grouping::two_groups(a, b),
             (None, Some(classes)) => Grouping::all_splits(classes, *same_way_bin),
             (Some(_), None) => {
-                return Err(Error::at("task.same_way_bin", "expected only with task.splits"));
+                return Err(Error::at_key("task.same_way_bin", "expected only with task.splits"));
             }
             _ => {
                 let text = "expected either groups, as in groups = [[0], [1]], or splits, as in splits = [0, 1, 2, 3]";
-                return Err(Error::at("task", text));
+                return Err(Error::at_key("task", text));
             }
         };
-        grouping.map_err(|error| Error::at("task", error))
+        grouping.map_err(|error| Error::at_key("task", error))
     }
 
     /// All classes of the task, in its order.

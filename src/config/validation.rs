@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 pub const LEAST: usize = 40;
 
 /// What messages say of the number of images that the section asks for, before it.
-pub(crate) const IMAGES_KEY: &str = "validation.images =";
+pub(crate) const IMAGES_KEY: &str = "validation.images";
 
 /// Validation at a run's end: section `[validation]`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]

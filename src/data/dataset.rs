@@ -1,6 +1,7 @@
 //! Labelled images in two splits: MNIST, look-alikes of it, and the built-in digits.
 
 use crate::base::Grid;
+use crate::base::error::Error;
 use crate::base::random::{Purpose, stream};
 pub use crate::data::builtin::BUILTIN;
 use crate::data::builtin::{BuiltinDigits, BuiltinError};
@@ -67,6 +68,16 @@ pub enum DatasetError {
         /// How many there are.
         found: usize,
     },
+}
+
+impl From<DatasetError> for Error {
+    fn from(error: DatasetError) -> Self {
+        let remedies = match &error {
+            DatasetError::Files(files) => files.remedies().to_vec(),
+            _ => Vec::new(),
+        };
+        Error { remedies, ..Error::input(error.to_string()) }
+    }
 }
 
 /// Labelled images, with one or both splits loaded.

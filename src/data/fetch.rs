@@ -2,10 +2,11 @@
 //! published one. A program of the system downloads them, curl or wget: it knows the user's proxies
 //! and certificates, and what it brings is checked in any case.
 
-use crate::base::error::Error;
+use crate::base::error::{Error, is_full};
 use crate::base::files::{read_bytes, write_atomically};
 use crate::base::hash::sha256_hex;
 use crate::base::observer::{Observer, Work};
+use crate::base::remedy::Remedy;
 use crate::base::stop::{self, Stopped};
 use crate::base::threads;
 use crate::data::catalogue::{Catalogue, RemoteFile};
@@ -168,9 +169,8 @@ pub enum FetchError {
     },
     /// No mirror had the right file.
     #[error(
-        "{file} could not be downloaded; try again later, give another mirror with --mirror, or put the file into \
-         {} yourself; tried: {}", folder.display(),
-         tried(attempts)
+        "{file} could not be downloaded; tried: {}; try again later, or put the file into {} yourself",
+        tried(attempts), folder.display()
     )]
     Mirrors {
         /// Name of the file.
@@ -194,6 +194,24 @@ pub enum FetchError {
     /// Stopped.
     #[error(transparent)]
     Stopped(#[from] Stopped),
+}
+
+impl From<FetchError> for Error {
+    fn from(error: FetchError) -> Self {
+        let text = error.to_string();
+        match error {
+            FetchError::Disk { path, source } if is_full(&source) => Error::writing(&path, &source),
+            FetchError::Mirrors { .. } => {
+                let error = Error::other(text).remedy(Remedy::NameMirror);
+                error.remedy(Remedy::NameData).remedy(Remedy::UseBuiltin)
+            }
+            FetchError::NoProgram { .. } => {
+                Error::other(text).remedy(Remedy::NameData).remedy(Remedy::UseBuiltin)
+            }
+            FetchError::Stopped(stopped) => stopped.into(),
+            FetchError::Differs { .. } | FetchError::Disk { .. } => Error::other(text),
+        }
+    }
 }
 
 /// How a file came to be there.

@@ -2,7 +2,7 @@
 
 use crate::base::files::home_expanded;
 use crate::base::hash::{hex, sha256_hex};
-use crate::base::shell::in_shell;
+use crate::base::remedy::{Invocation, Remedy};
 use crate::data::builtin::{BUILTIN, BuiltinDigits};
 use crate::data::catalogue::FETCHABLE;
 use crate::data::idx;
@@ -23,7 +23,7 @@ pub(crate) fn published_size(name: &str) -> Option<[usize; 2]> {
 /// A folder in which someone says the data are.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Place {
-    /// Who says so, as the user knows it: "--data", "MORPHCOG_DATA", `[data] dir`.
+    /// Who says so, as the user knows it: "as given", "MORPHCOG_DATA", `[data] dir`.
     pub origin: String,
     /// The folder. If it has a subfolder with the dataset's name, that is used, so one folder can
     /// hold several datasets.
@@ -44,7 +44,7 @@ impl fmt::Display for Place {
 pub fn places(option: Option<&Path>, environment: Option<OsString>, config: Option<&Path>) -> Vec<Place> {
     let environment = environment.filter(|value| !value.is_empty()).map(PathBuf::from);
     [
-        ("--data", option.map(Path::to_path_buf)),
+        ("as given", option.map(Path::to_path_buf)),
         ("MORPHCOG_DATA", environment),
         ("[data] dir", config.map(Path::to_path_buf)),
     ]
@@ -59,18 +59,16 @@ pub fn default_folder(name: &str) -> PathBuf {
     Path::new("data").join(name)
 }
 
-/// Why a dataset's files cannot be used. Every message says which file, where, what was expected
-/// and what to do.
+/// Why a dataset's files cannot be used: which file, where, what was expected; [`remedies`] say what to do.
+///
+/// [`remedies`]: FilesError::remedies
 #[derive(Debug, thiserror::Error)]
 pub enum FilesError {
     /// A name that cannot be a folder's name.
-    #[error(
-        "\"{0}\" cannot be the name of a dataset: expected letters, digits, '-', '_' and '.'; \
-         name the folder of your files with --data"
-    )]
+    #[error("\"{0}\" cannot be the name of a dataset: expected letters, digits, '-', '_' and '.'")]
     Name(String),
     /// The folder cannot be listed.
-    #[error("{dataset}: the folder {place} cannot be read: {source}; {advice}")]
+    #[error("{dataset}: the folder {place} cannot be read: {source}")]
     Folder {
         /// Name of the dataset.
         dataset: String,
@@ -79,12 +77,12 @@ pub enum FilesError {
         /// What the system says.
         source: io::Error,
         /// What to do.
-        advice: String,
+        remedies: Vec<Remedy>,
     },
     /// A file is not there.
     #[error(
         "{dataset}: the {split} {content} are missing: expected {expected} (or with .gz, or a name ending so) \
-         in {place}; {advice}"
+         in {place}"
     )]
     Missing {
         /// Name of the dataset.
@@ -98,7 +96,7 @@ pub enum FilesError {
         /// Where it was looked for.
         place: Box<Place>,
         /// What to do.
-        advice: String,
+        remedies: Vec<Remedy>,
     },
     /// Several files could be meant.
     #[error(
@@ -118,16 +116,16 @@ pub enum FilesError {
         found: Vec<String>,
     },
     /// A file is there but not what it should be.
-    #[error("{source}; {advice}")]
+    #[error("{source}")]
     Broken {
         /// What is wrong with which file.
         source: IdxError,
         /// What to do.
-        advice: String,
+        remedies: Vec<Remedy>,
     },
     /// Images and labels do not belong together.
     #[error(
-        "{}: holds {labels} labels, expected {images}, one for each image in {}; {advice}",
+        "{}: holds {labels} labels, expected {images}, one for each image in {}",
         label_file.display(), image_file.display()
     )]
     Count {
@@ -140,8 +138,22 @@ pub enum FilesError {
         /// Number of images in it.
         images: usize,
         /// What to do.
-        advice: String,
+        remedies: Vec<Remedy>,
     },
+}
+
+impl FilesError {
+    /// What the user can do.
+    pub fn remedies(&self) -> &[Remedy] {
+        match self {
+            FilesError::Name(_) => &[Remedy::NameData],
+            FilesError::Folder { remedies, .. }
+            | FilesError::Missing { remedies, .. }
+            | FilesError::Broken { remedies, .. }
+            | FilesError::Count { remedies, .. } => remedies,
+            FilesError::Ambiguous { .. } => &[],
+        }
+    }
 }
 
 /// The images of one split, and where they came from.
@@ -189,7 +201,7 @@ pub(crate) fn load(
     transpose: Option<bool>,
 ) -> Result<(Vec<u8>, StoredSplit), FilesError> {
     let broken =
-        |source: IdxError| FilesError::Broken { advice: advice(name, place, !source.is_io()), source };
+        |source: IdxError| FilesError::Broken { remedies: remedies(name, place, !source.is_io()), source };
     let (image_file, beginning) = find(name, place, split, "images", None)?;
     // Those of another set in the same folder would be as many.
     let (label_file, _) = find(name, place, split, "labels", Some(&beginning))?;
@@ -201,8 +213,8 @@ pub(crate) fn load(
     let labels = idx::read_labels(&label_file).map_err(broken)?;
     let (expected, found) = (images.content.count, labels.content.len());
     if expected != found {
-        let advice = advice(name, place, true);
-        return Err(FilesError::Count { label_file, labels: found, image_file, images: expected, advice });
+        let remedies = remedies(name, place, true);
+        return Err(FilesError::Count { label_file, labels: found, image_file, images: expected, remedies });
     }
     let mut hash = Sha256::new();
     let sizes = [images.content.count, images.content.height, images.content.width].map(|n| n as u32);
@@ -261,8 +273,8 @@ fn find(
     let present = match file_names(&place.path) {
         Ok(present) => present,
         Err(source) => {
-            let advice = advice(name, place, false);
-            return Err(FilesError::Folder { dataset, place: searched, source, advice });
+            let remedies = remedies(name, place, false);
+            return Err(FilesError::Folder { dataset, place: searched, source, remedies });
         }
     };
     let standard = standard_names(split, content);
@@ -285,8 +297,8 @@ fn find(
             Some(beginning) => usual.replacen(begins(usual, content), beginning, 1),
             None => usual.clone(),
         };
-        let advice = advice(name, place, false);
-        return Err(FilesError::Missing { dataset, split, content, expected, place: searched, advice });
+        let remedies = remedies(name, place, false);
+        return Err(FilesError::Missing { dataset, split, content, expected, place: searched, remedies });
     };
     let is_one = is_standard || found.iter().all(|(_, other, _)| other == base);
     let files: Vec<&String> = found.iter().map(|(.., file)| *file).collect();
@@ -311,7 +323,7 @@ fn hold_the_same(name: &str, place: &Place, files: &[&String]) -> Result<bool, F
     let mut sums = BTreeSet::new();
     for file in files {
         let unpacked = idx::unpacked(&place.path.join(file));
-        let broken = |source| FilesError::Broken { advice: advice(name, place, true), source };
+        let broken = |source| FilesError::Broken { remedies: remedies(name, place, true), source };
         sums.insert(sha256_hex(&unpacked.map_err(broken)?));
     }
     Ok(sums.len() == 1)
@@ -336,18 +348,17 @@ fn file_names(folder: &Path) -> io::Result<BTreeSet<String>> {
 }
 
 /// What to do about files that are missing or (`replace`) wrong.
-fn advice(name: &str, place: &Place, replace: bool) -> String {
+fn remedies(name: &str, place: &Place, replace: bool) -> Vec<Remedy> {
     if !FETCHABLE.contains(&name) {
-        return "put its IDX files there or name their folder with --data; dataset \"builtin\" needs no \
-         files"
-            .to_string();
+        let put = Remedy::advice("put its IDX files there");
+        return vec![put, Remedy::NameData, Remedy::UseBuiltin];
     }
-    let to = match place.path == default_folder(name) {
-        true => String::new(),
-        false => format!(" --to {}", in_shell(&place.path)),
+    let fetch = Invocation::new("data fetch").value(name);
+    let fetch = match place.path == default_folder(name) {
+        true => fetch,
+        false => fetch.option("to", place.path.as_path()),
     };
-    let force = if replace { " --force" } else { "" };
-    format!("`morphcog data fetch {name}{to}{force}` downloads it")
+    vec![Remedy::Run(fetch.switch("force", replace), "downloads it")]
 }
 
 #[cfg(test)]
@@ -355,6 +366,7 @@ mod tests {
     //! Contract of the search for a dataset's files.
 
     use super::*;
+    use crate::base::error::Error;
     use crate::data::dataset::{Dataset, DatasetError};
     use std::fs;
 
@@ -374,6 +386,15 @@ mod tests {
 
     fn failure(name: &str, folder: &Path, split: Split) -> String {
         Dataset::load(name, &given(folder), &[split]).unwrap_err().to_string()
+    }
+
+    fn remedies_of(name: &str, folder: &Path, split: Split) -> Vec<Remedy> {
+        Error::from(Dataset::load(name, &given(folder), &[split]).unwrap_err()).remedies
+    }
+
+    /// The command that downloads a dataset into a folder.
+    fn fetching(name: &str, folder: &Path) -> Invocation {
+        Invocation::new("data fetch").value(name).option("to", folder)
     }
 
     #[test]
@@ -405,7 +426,9 @@ mod tests {
         write(folder.path(), "train-images-idx3-ubyte", "train-labels-idx1-ubyte", 3);
         assert!(Dataset::load("mnist", &given(folder.path()), &[Split::Train]).is_ok());
         let message = failure("mnist", folder.path(), Split::Test);
-        for part in ["test images", "t10k-images-idx3-ubyte", "--data", "morphcog data fetch mnist --to"] {
+        let remedies = remedies_of("mnist", folder.path(), Split::Test);
+        assert_eq!(remedies, [Remedy::Run(fetching("mnist", folder.path()), "downloads it")]);
+        for part in ["test images", "t10k-images-idx3-ubyte", "as given"] {
             assert!(message.contains(part), "{part}: {message}");
         }
         assert!(message.contains(folder.path().to_str().unwrap()), "{message}");
@@ -417,7 +440,7 @@ mod tests {
         write(good.path(), "train-images-idx3-ubyte", "train-labels-idx1-ubyte", 3);
         let both = places(Some(empty.path()), Some(good.path().into()), Some(good.path()));
         let origins: Vec<&str> = both.iter().map(|p| p.origin.as_str()).collect();
-        assert_eq!(origins, ["--data", "MORPHCOG_DATA", "[data] dir"]);
+        assert_eq!(origins, ["as given", "MORPHCOG_DATA", "[data] dir"]);
         assert!(Dataset::load("mnist", &both, &[Split::Train]).is_err());
         assert!(Dataset::load("mnist", &both[1..], &[Split::Train]).is_ok());
         assert!(places(None, Some(OsString::new()), None).is_empty());
@@ -445,9 +468,13 @@ mod tests {
         assert!(message.contains("holds 2 labels, expected 3"), "{message}");
         fs::write(&labels, [idx::header(&[3]), vec![1, 2]].concat()).unwrap();
         let message = failure("mnist", folder.path(), Split::Train);
-        assert!(message.contains("too short") && message.contains("--force"), "{message}");
+        assert!(message.contains("too short"), "{message}");
+        let again = fetching("mnist", folder.path()).switch("force", true);
+        let remedies = remedies_of("mnist", folder.path(), Split::Train);
+        assert_eq!(remedies, [Remedy::Run(again, "downloads it")]);
         let message = failure("my-letters", folder.path(), Split::Train);
-        assert!(message.contains("too short") && !message.contains("fetch"), "{message}");
+        assert!(message.contains("too short"), "{message}");
+        assert!(remedies_of("my-letters", folder.path(), Split::Train).contains(&Remedy::NameData));
     }
 
     #[test]
@@ -562,10 +589,10 @@ mod tests {
             assert!(matches!(error, DatasetError::Files(FilesError::Name(_))), "{error}");
         }
         let message = failure("fashion-mnist", Path::new("no/such/folder"), Split::Train);
-        assert!(
-            message.contains("no/such/folder") && message.contains("data fetch fashion-mnist"),
-            "{message}"
-        );
+        assert!(message.contains("no/such/folder"), "{message}");
+        let missing = Path::new("no/such/folder");
+        let remedies = remedies_of("fashion-mnist", missing, Split::Train);
+        assert_eq!(remedies, [Remedy::Run(fetching("fashion-mnist", missing), "downloads it")]);
     }
 
     #[test]

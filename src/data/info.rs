@@ -12,7 +12,7 @@ pub struct DatasetInfo {
     pub name: String,
     /// The folder it was read from, or "builtin".
     pub source: String,
-    /// Who named that folder ("--data", "MORPHCOG_DATA", `[data] dir`, "default"), or "builtin".
+    /// Who named that folder ("as given", "MORPHCOG_DATA", `[data] dir`, "default"), or "builtin".
     pub origin: String,
     /// The splits that were loaded.
     pub splits: BTreeMap<Split, SplitInfo>,

@@ -5,6 +5,7 @@ use crate::base::files::write_atomically;
 use crate::base::observer::{Generation, Observer};
 use crate::base::random::{Purpose, stream};
 use crate::base::ranks::Ranks;
+use crate::base::remedy::{Invocation, Remedy};
 use crate::base::stop::{Stopped, check};
 use crate::base::threads::pool;
 use crate::body::Body;
@@ -92,7 +93,8 @@ pub fn evolve(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> 
     // Load, and check all that can be known before anything is written.
     if resumes && options.out.join(TRAINING_JSON).exists() {
         let text = format!("{}: the run in this folder is a training", options.out.display());
-        return Err(Error::occupied(text).hint("go on with it by morphcog train --resume".to_string()));
+        return Err(Error::occupied(text)
+            .remedy(Remedy::Run(Invocation::new("train").switch("resume", true), "goes on with it")));
     }
     let whereabouts = Whereabouts::given(options.data.as_deref())
         .and_of_resumed(options.if_exists, &options.out.join(RUN_JSON));
@@ -107,7 +109,7 @@ pub fn evolve(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> 
     let ranks = options.ranks;
     let open = || RunFolder::open(&options.out, options.if_exists, stop, observer);
     let opened = first.and_then(|_| ranks.leads().then(open).transpose());
-    // One that was stopped meanwhile is waited for by none.
+    // Every rank must vote, or the others block.
     let is_stopped = matches!(&opened, Err(error) if error.kind == ErrorKind::Stopped);
     if !ranks.all(!is_stopped) {
         return Err(Stopped.into());
@@ -189,14 +191,11 @@ impl Files {
     }
 }
 
-/// An error, if it is one of a full disk, with how to go on when there is space again.
+/// Adds to an error of a full disk how to go on when there is space again.
 fn goes_on(error: Error) -> Error {
-    match &error.hint {
-        Some(hint) if error.kind == ErrorKind::Other => {
-            let hint = format!("{hint}; with --resume the same command goes on from the last checkpoint");
-            error.hint(hint)
-        }
-        _ => error,
+    match error.kind == ErrorKind::Other && !error.remedies.is_empty() {
+        true => error.remedy(Remedy::RepeatResuming),
+        false => error,
     }
 }
 
@@ -354,16 +353,10 @@ impl<'a> Run<'a> {
         let (physics, protocol) = (&config.physics, &config.protocol);
         let ranks = self.options.ranks;
         let sizes: Vec<u64> = jobs.iter().map(|job| job.body.counts().total as u64).collect();
-        let owners = ranks.owners(&sizes);
-        let mut owner = owners.iter();
-        jobs.retain(|_| owner.next().is_some_and(|owner| *owner == ranks.rank()));
-        let own = evaluate(&jobs, stimuli, conditions, physics, protocol, config.savings, stop);
-        let shares = ranks.share(own.ok());
+        let evaluate =
+            |jobs: &[Job]| evaluate(jobs, stimuli, conditions, physics, protocol, config.savings, stop).ok();
         // A generation that one rank drops is dropped by all.
-        let shares: Option<Vec<Vec<Evaluation>>> = shares.into_iter().collect();
-        let mut shares: Vec<_> = shares.ok_or(Stopped)?.into_iter().map(Vec::into_iter).collect();
-        let next = |owner: &usize| shares[*owner].next().expect("a rank evaluates all of its share");
-        Ok(owners.iter().map(next).collect())
+        Ok(ranks.scatter_gather(jobs, &sizes, evaluate).ok_or(Stopped)?)
     }
 
     /// What this rank made, if all ranks made theirs.

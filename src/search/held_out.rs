@@ -2,7 +2,7 @@
 //! latter are those of the training split that a run neither is trained on nor chooses its training
 //! images among, drawn by its seed.
 
-use crate::base::error::Error;
+use crate::base::error::{Error, ErrorKind};
 use crate::base::random::{Purpose, stream};
 use crate::base::text::counted;
 use crate::config::Config;
@@ -33,16 +33,21 @@ fn left(classes: &[u8], seen: &BTreeSet<usize>, dataset: &Dataset) -> Vec<Vec<Im
     classes.iter().map(of_class).collect()
 }
 
+/// The number of images for which one could ask, evenly divided between the classes.
+fn most(left: &[Vec<ImageRef>]) -> usize {
+    left.iter().map(Vec::len).min().unwrap_or(0) * left.len()
+}
+
 /// How many are to be taken of each class, one or more; `asked` says where so many were asked for.
 ///
 /// # Errors
-/// If a class has not as many; for how many in all one could ask.
+/// If a class has not as many.
 fn per_class(
     classes: &[u8],
     left: &[Vec<ImageRef>],
-    asked: &str,
+    argument: Option<&'static str>,
     how_many: HowMany,
-) -> Result<usize, (Error, usize)> {
+) -> Result<usize, Error> {
     let per_class = match how_many {
         HowMany::All => 1,
         HowMany::Evenly(count) => count.div_ceil(left.len().max(1)),
@@ -50,11 +55,15 @@ fn per_class(
     match classes.iter().zip(left).min_by_key(|(_, left)| left.len()) {
         Some((label, scarcest)) if scarcest.len() < per_class => {
             let text = format!(
-                "{asked} {how_many}: expected {} of class {label} that the run is not trained on, found {}",
+                "expected {} of class {label} that the run is not trained on, found {}",
                 counted(per_class, "image", "images"),
                 scarcest.len()
             );
-            Err((Error::input(text), scarcest.len() * left.len()))
+            let error = match argument {
+                Some(name) => Error { kind: ErrorKind::Input, ..Error::argument(name, how_many, text) },
+                None => Error::input(format!("{IMAGES_KEY} = {how_many}: {text}")).with_key(IMAGES_KEY),
+            };
+            Err(error)
         }
         _ => Ok(per_class),
     }
@@ -75,27 +84,28 @@ pub(crate) fn check(config: &Config, before: &[usize], key: &str, dataset: &Data
     seen.extend(before);
     let classes = config.classes();
     let left = left(&classes, &seen, dataset);
-    per_class(&classes, &left, IMAGES_KEY, HowMany::Evenly(images)).map(|_| ()).map_err(|(error, most)| {
+    per_class(&classes, &left, None, HowMany::Evenly(images)).map(|_| ()).map_err(|error| {
+        let most = most(&left);
         let fewer = if most >= LEAST { format!("ask for at most {most}, ") } else { String::new() };
-        error.hint(format!("{fewer}train on fewer ({key}), or choose none (validation.best = 0)"))
+        error.advice(format!("{fewer}train on fewer ({key}), or choose none (validation.best = 0)"))
     })
 }
 
 /// `count` validation images of some runs of one experiment together, evenly divided between the
 /// classes, which take turns: so are the first of them. Of the same runs, in whichever order, they
-/// are always the same, and fewer of them the first of more. `asked` says where this number was
-/// asked for.
+/// are always the same, and fewer of them the first of more. `argument` is the argument that
+/// asks for this number; `None`: the config does.
 ///
 /// # Errors
 /// If there are not enough images.
 pub fn images(
     runs: &[&RunFile],
     dataset: &Dataset,
-    asked: &str,
+    argument: Option<&'static str>,
     count: usize,
 ) -> Result<Vec<ImageRef>, Error> {
     let classes = runs.first().map_or(Vec::new(), |run| run.config.classes());
-    images_besides(&BTreeSet::new(), runs, &classes, dataset, asked, HowMany::Evenly(count))
+    images_besides(&BTreeSet::new(), runs, &classes, dataset, argument, HowMany::Evenly(count))
 }
 
 /// The same of these classes, none of these images among them.
@@ -107,7 +117,7 @@ pub(crate) fn images_besides(
     runs: &[&RunFile],
     classes: &[u8],
     dataset: &Dataset,
-    asked: &str,
+    argument: Option<&'static str>,
     how_many: HowMany,
 ) -> Result<Vec<ImageRef>, Error> {
     let first = runs.iter().map(|run| &run.config).min_by_key(|config| config.seed);
@@ -117,9 +127,9 @@ pub(crate) fn images_besides(
         seen.extend(trained_on(run, dataset)?);
     }
     let left = left(classes, &seen, dataset);
-    let per_class = per_class(classes, &left, asked, how_many).map_err(|(error, most)| match most {
-        0 => error.hint("every image of that class was trained on; show test images".to_string()),
-        _ => error.hint(format!("ask for at most {most}")),
+    let per_class = per_class(classes, &left, argument, how_many).map_err(|error| match most(&left) {
+        0 => error.advice("every image of that class was trained on; show test images"),
+        most => error.advice(format!("ask for at most {most}")),
     })?;
     let HowMany::Evenly(count) = how_many else { return Ok(left.concat()) };
     let draw = |(&label, free): (&u8, Vec<ImageRef>)| -> Vec<ImageRef> {
@@ -147,7 +157,7 @@ pub(crate) fn test_images(
     if let Some(label) = classes.iter().find(|class| count_of(class) == 0) {
         let text = format!("{}: there is no test image of class {label}", dataset.name());
         let there = dataset.classes(Split::Test);
-        return Err(Error::input(text).hint(format!("there are of the classes {there:?}")));
+        return Err(Error::input(text).advice(format!("there are of the classes {there:?}")));
     }
     let HowMany::Evenly(count) = how_many else {
         let of_class = |&label: &u8| {
@@ -161,8 +171,8 @@ pub(crate) fn test_images(
         let drawn = dataset.draw(Split::Test, &[label], share, seed);
         let drawn = drawn.map_err(|error| {
             let most = classes.iter().map(|class| count_of(&class)).min().unwrap_or(0);
-            let hint = format!("ask for at most {} images, or for all", most * classes.len());
-            Error::input(error.to_string()).hint(hint)
+            let advice = format!("ask for at most {} images, or for all", most * classes.len());
+            Error::input(error.to_string()).advice(advice)
         })?;
         images.extend(drawn.into_iter().map(|index| ImageRef { index, label }));
     }

@@ -2,6 +2,7 @@
 //! enough, under the same config, on the same images.
 
 use crate::base::error::Error;
+use crate::base::remedy::Remedy;
 use crate::config::{Config, differing};
 use crate::search::training::Training;
 use crate::store::checkpoint;
@@ -11,8 +12,6 @@ use crate::store::metrics::Totals;
 use crate::store::names::{METRICS, RUN_JSON};
 use crate::store::run::RunFile;
 use std::path::Path;
-
-const ANEW: &str = "start the run anew with --force";
 
 /// What to go on from; `None` if there is no run in the folder yet. A broken newest checkpoint is
 /// passed over, and a `run.json` without checkpoints gone on from; both are said with `warn`.
@@ -34,9 +33,11 @@ pub(crate) fn saved(
     };
     let run_json = folder.path().join(RUN_JSON);
     let checkpoint = checkpoint::read(folder.path(), tell).map_err(|error| {
-        error.hint(match without_checkpoint(&run_json) {
-            Ok(_) => format!("move checkpoint*.json away: the run then goes on from its {RUN_JSON}"),
-            Err(_) => ANEW.to_string(),
+        error.remedy(match without_checkpoint(&run_json) {
+            Ok(_) => Remedy::advice(format!(
+                "move checkpoint*.json away: the run then goes on from its {RUN_JSON}"
+            )),
+            Err(_) => Remedy::Replace,
         })
     })?;
     let has_checkpoint = checkpoint.is_some();
@@ -49,7 +50,7 @@ pub(crate) fn saved(
             without_checkpoint(&run_json)?
         }
     };
-    compatible(&saved, config, training).map_err(|error| error.within(&place))?;
+    compatible(&saved, config, training).map_err(|error| error.in_place(&place))?;
     if is_newest_broken {
         checkpoint::take_back(folder.path())?;
     }
@@ -79,7 +80,7 @@ fn without_checkpoint(path: &Path) -> Result<Checkpoint, Error> {
     };
     if let Some(why) = needs {
         let text = format!("{}: expected a checkpoint beside it: {why}", path.display());
-        return Err(Error::input(text).hint(format!("write elsewhere with --out, or {ANEW}")));
+        return Err(Error::input(text).remedy(Remedy::ChooseOut).remedy(Remedy::Replace));
     }
     let mut known_bodies = KnownBodies::default();
     for robot in &run.elites {
@@ -91,29 +92,33 @@ fn without_checkpoint(path: &Path) -> Result<Checkpoint, Error> {
 /// Whether a saved run can be gone on with under a config: all that its results depend on must be
 /// the same.
 fn compatible(saved: &Checkpoint, config: &Config, training: &Training) -> Result<(), Error> {
-    let hint = || format!("resume with the config it was started with, or {ANEW}");
+    let differs = |text: String| {
+        Error::input(text).advice("resume with the config it was started with").remedy(Remedy::Replace)
+    };
     let (theirs, ours) = (&saved.run.program_version, env!("CARGO_PKG_VERSION"));
     if theirs != ours {
         let text = format!(
             "the run in this folder was made by morphcog {theirs}; this is {ours}, whose numbers may be others"
         );
-        return Err(Error::input(text).hint(format!("go on with morphcog {theirs}, or {ANEW}")));
+        return Err(Error::input(text)
+            .advice(format!("go on with morphcog {theirs}"))
+            .remedy(Remedy::Replace));
     }
     let differing = differing(&saved.run.config.settings(), &config.settings());
     // No evolution depends on how its gaits are trained when it has ended.
     if let Some((key, theirs, ours)) = differing.iter().find(|(key, ..)| !key.starts_with("train.")) {
         let text = format!("the run in this folder has another config: {key} = {theirs} there, {ours} now");
-        return Err(Error::input(text).hint(hint()));
+        return Err(differs(text));
     }
     if saved.run.dataset != training.dataset || saved.run.training_images != training.images {
         let text =
             "data: the run in this folder was made with other images: the dataset has changed".to_string();
-        return Err(Error::input(text).hint(hint()));
+        return Err(differs(text));
     }
     let (done, asked) = (saved.run.generations, config.generations);
     if done > asked {
         let text = format!("generations = {asked}: the run in this folder has {done} already");
-        return Err(Error::input(text).hint(format!("ask for {done} or more, or {ANEW}")));
+        return Err(Error::input(text).advice(format!("ask for {done} or more")).remedy(Remedy::Replace));
     }
     Ok(())
 }

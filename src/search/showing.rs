@@ -24,7 +24,7 @@ pub(crate) fn task_of<'a>(grouping: &'a Grouping, robot: &Robot) -> Option<&'a g
 }
 
 /// Shows images to robots.
-pub(crate) struct Walker<'a> {
+pub(crate) struct HeldOutRun<'a> {
     pub config: &'a Config,
     /// Of one showing.
     pub control_steps: u32,
@@ -35,7 +35,7 @@ pub(crate) struct Walker<'a> {
     pub done: AtomicU64,
 }
 
-impl Walker<'_> {
+impl HeldOutRun<'_> {
     /// A validation begins: number of robots, of images for the best of them, and of simulations in
     /// all.
     pub fn validating(&self, robots: usize, images: usize, showings: u64) {
@@ -51,7 +51,7 @@ impl Walker<'_> {
     /// images that show the sensors the same pixels share a rollout. `None` if stopped before the
     /// end.
     pub fn rollouts(&self, robot: &Robot, stimuli: &[Grid<f64>]) -> Option<(Vec<Option<f64>>, usize)> {
-        let Walker { config, stop, observer, done, .. } = self;
+        let HeldOutRun { config, stop, observer, done, .. } = self;
         let protocol = Protocol {
             rollout: RolloutMode::Fresh,
             control_steps: self.control_steps,

@@ -2,6 +2,7 @@
 
 use crate::base::Grid;
 use crate::base::error::Error;
+use crate::base::remedy::Remedy;
 use crate::config::Config;
 use crate::data::dataset::{Dataset, DatasetError, Split};
 use crate::search::response;
@@ -26,7 +27,7 @@ pub struct Training {
 }
 
 /// The number of training images of the scarcest of some classes, of a task that was asked for by
-/// `--task`.
+/// its name.
 ///
 /// # Errors
 /// If it is less than `least`; which class, and which there are.
@@ -34,10 +35,11 @@ pub(crate) fn scarcest(dataset: &Dataset, classes: &[u8], least: usize) -> Resul
     let counts = classes.iter().map(|class| (dataset.indices_of(Split::Train, *class).len(), *class));
     match counts.min() {
         Some((count, class)) if count < least => {
-            let text =
-                format!("--task: class {class}: expected {least} training images or more, found {count}");
+            let text = format!("class {class}: expected {least} training images or more, found {count}");
             let there = dataset.classes(Split::Train);
-            Err(Error::input(text).hint(format!("{} has the classes {there:?}", dataset.name())))
+            Err(Error::input(text)
+                .about("task")
+                .advice(format!("{} has the classes {there:?}", dataset.name())))
         }
         scarcest => Ok(scarcest.map_or(0, |(count, _)| count)),
     }
@@ -65,7 +67,7 @@ impl Training {
                 .map_err(|error| {
                     let there = dataset.classes(Split::Train);
                     Error::input(format!("data.images_per_class: {error}"))
-                        .hint(format!("{} has the classes {there:?}", dataset.name()))
+                        .advice(format!("{} has the classes {there:?}", dataset.name()))
                 }),
         }
     }
@@ -76,7 +78,6 @@ impl Training {
     /// As [`Training::load`].
     pub(crate) fn images(config: &Config, dataset: &Dataset) -> Result<Vec<ImageRef>, Error> {
         let refuse = |error: DatasetError| Error::input(format!("data.train_images: {error}"));
-        let hint = || "--set data.train_images= draws images of the task's classes by the seed".to_string();
         let classes = config.classes();
         let mut images = Vec::new();
         for index in Training::indices(config, dataset)? {
@@ -84,14 +85,14 @@ impl Training {
             if !classes.contains(&label) {
                 let text =
                     format!("data.train_images: image {index} shows a {label}, expected one of {classes:?}");
-                return Err(Error::input(text).hint(hint()));
+                return Err(Error::input(text).remedy(Remedy::DrawTrainingImages));
             }
             images.push(ImageRef { index, label });
         }
         match classes.iter().find(|&&class| images.iter().all(|image| image.label != class)) {
             Some(class) => {
                 let text = format!("data.train_images: expected an image of class {class}, found none");
-                Err(Error::input(text).hint(hint()))
+                Err(Error::input(text).remedy(Remedy::DrawTrainingImages))
             }
             None => Ok(images),
         }

@@ -10,11 +10,11 @@ use crate::base::hash::sha256_hex;
 use crate::base::observer::Observer;
 use crate::base::threads::pool;
 use crate::config::Config;
-use crate::config::validation::{IMAGES_KEY, ValidationConfig};
+use crate::config::validation::ValidationConfig;
 use crate::data::dataset::{Dataset, Split};
 use crate::search::held_out::images;
 use crate::search::showing;
-use crate::search::showing::Walker;
+use crate::search::showing::HeldOutRun;
 use crate::store::eval::{RobotReport, Trial};
 use crate::store::images::ImageRef;
 use crate::store::names::VALIDATION_JSON;
@@ -30,8 +30,20 @@ use std::mem::replace;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicU64};
 
-/// A round: of the images, and of the robots of each task the share that gets so far.
-const ROUNDS: [(f64, f64); 3] = [(0.1, 1.0), (0.3, 1.0 / 3.0), (1.0, 0.1)];
+/// A round of the choice: robots of a task that are shown more images than before.
+struct Round {
+    /// Share of the images that are shown.
+    image_share: f64,
+    /// Share of the robots of each task that get so far.
+    robot_share: f64,
+}
+
+/// With fewer images in the first round, good robots are lost to chance; with more, the choice takes longer.
+const ROUNDS: [Round; 3] = [
+    Round { image_share: 0.1, robot_share: 1.0 },
+    Round { image_share: 0.3, robot_share: 1.0 / 3.0 },
+    Round { image_share: 1.0, robot_share: 0.1 },
+];
 
 /// How robots are to be chosen.
 #[derive(Clone, Copy, Debug)]
@@ -40,8 +52,8 @@ pub(crate) struct Wanted {
     pub count: usize,
     /// Images in all.
     pub images: usize,
-    /// Where that many were asked for.
-    pub asked: &'static str,
+    /// The argument that asks for that many; `None`: the config does.
+    pub argument: Option<&'static str>,
     /// Displacements up to this count as wrong \[voxel lengths\].
     pub threshold: f64,
 }
@@ -105,12 +117,12 @@ fn ranked(
     let config = &source.run.config;
     let grouping = config.grouping()?;
     let control_steps = showing::control_steps(config, showing::CYCLES);
-    let walker = Walker { config, control_steps, pool, stop, observer, done: AtomicU64::new(0) };
+    let walker = HeldOutRun { config, control_steps, pool, stop, observer, done: AtomicU64::new(0) };
     let chosen = Selection::Validated(count).of(std::slice::from_ref(source), 0)?;
     let skilled = |robot: &&Robot| showing::task_of(&grouping, robot).is_some();
     let robots = chosen.iter().map(|chosen| chosen.robot).filter(skilled).collect();
     let images = config.validation.images;
-    let wanted = Wanted { count, images, asked: IMAGES_KEY, threshold: direction::THRESHOLD };
+    let wanted = Wanted { count, images, argument: None, threshold: direction::THRESHOLD };
     let best = best(source, dataset, &grouping, robots, &wanted, &walker)?;
     Ok(best.map(|best| best.into_iter().map(|(_, validated)| validated).collect()))
 }
@@ -127,7 +139,7 @@ pub(crate) fn chosen<'a>(
     dataset: &Dataset,
     grouping: &Grouping,
     wanted: &Wanted,
-    walker: &impl Fn() -> Walker<'a>,
+    walker: &impl Fn() -> HeldOutRun<'a>,
 ) -> Result<Option<Vec<(Chosen<'a>, Validated)>>, Error> {
     let mut all = Vec::new();
     for (number, source) in sources.iter().enumerate() {
@@ -158,10 +170,10 @@ pub(crate) fn best<'a>(
     grouping: &Grouping,
     robots: Vec<&'a Robot>,
     wanted: &Wanted,
-    walker: &Walker,
+    walker: &HeldOutRun,
 ) -> Result<Option<Vec<(&'a Robot, Validated)>>, Error> {
     let run = &source.run;
-    let images = images(&[run], dataset, wanted.asked, wanted.images)?;
+    let images = images(&[run], dataset, wanted.argument, wanted.images)?;
     // With fewer asked for than the end of the run has found, the first of those.
     let searched = &Wanted { count: wanted.count.max(run.config.validation.best), ..*wanted };
     let shown = (dataset.fingerprint(Split::Train).expect("its images were drawn just now"), &images[..]);
@@ -244,9 +256,9 @@ fn key(
 /// Robots and images of each round, for some robots of a task of which `count` are wanted; of each
 /// class, which take turns, an image or more.
 fn rounds(robots: usize, count: usize, (images, classes): (usize, usize)) -> [(usize, usize); 3] {
-    ROUNDS.map(|(of_images, of_robots)| {
-        let kept = ((robots as f64 * of_robots).ceil() as usize).max(count).min(robots);
-        (kept, ((images as f64 * of_images).ceil() as usize).max(classes).min(images))
+    ROUNDS.map(|Round { image_share, robot_share }| {
+        let kept = ((robots as f64 * robot_share).ceil() as usize).max(count).min(robots);
+        (kept, ((images as f64 * image_share).ceil() as usize).max(classes).min(images))
     })
 }
 
@@ -257,7 +269,7 @@ fn screened(
     robots: &[&Robot],
     &Wanted { count, threshold, .. }: &Wanted,
     images: &[ImageRef],
-    walker: &Walker,
+    walker: &HeldOutRun,
 ) -> Result<Option<Vec<Validated>>, Error> {
     let config: &Config = &run.config;
     let stimuli = see_all(config, dataset, Split::Train, images)?;

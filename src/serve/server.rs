@@ -1,6 +1,7 @@
 //! `morphcog serve`: the page, and what it asks for, over HTTP on this machine only.
 
 use crate::base::error::Error;
+use crate::base::remedy::Remedy;
 use crate::base::threads;
 use crate::serve::catalogue::Who;
 use crate::serve::http::Response;
@@ -36,8 +37,7 @@ impl Server {
     pub fn bind(service: Service, port: u16) -> Result<Self, Error> {
         let refuse = |error: std::io::Error| match error.kind() {
             std::io::ErrorKind::AddrInUse => {
-                Error::occupied(format!("port {port} is taken by another program"))
-                    .hint("name another with --port, or none for one that is free".to_string())
+                Error::occupied(format!("port {port} is taken by another program")).remedy(Remedy::ChoosePort)
             }
             _ => Error::other(format!("port {port} of 127.0.0.1 cannot be used: {error}")),
         };

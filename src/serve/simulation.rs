@@ -2,7 +2,7 @@
 
 use crate::serve::request::{MAX_STEPS, Pace, Plan, Seen};
 use crate::serve::simulations::{Control, Slot};
-use crate::sim::System;
+use crate::sim::{StepError, System};
 use crate::task::judge::{Answer, answer};
 use crate::task::recording::{Frame, VoxelCorners};
 use crate::task::rollout::Rollout;
@@ -108,15 +108,18 @@ pub fn live(slot: &Slot, plan: &Plan, mut tell: impl FnMut(Event) -> Result<(), 
         let begin = Instant::now();
         for _ in 0..due {
             let before = rollout.moved();
-            let Ok(stepped) = rollout.step_unless(&slot.control.over) else {
-                return tell(Event::End { step, answer: answer(judge, before), unstable: None });
-            };
-            if let Err(unstable) = stepped {
-                let answer = answer(judge, before);
-                if !frames.is_empty() {
-                    tell(Event::Moments { step, frames: &frames, answer: answer.clone() })?;
+            match rollout.step_unless(&slot.control.over) {
+                Ok(()) => {}
+                Err(StepError::Stopped(_)) => {
+                    return tell(Event::End { step, answer: answer(judge, before), unstable: None });
                 }
-                return tell(Event::End { step, answer, unstable: Some(unstable.to_string()) });
+                Err(StepError::Unstable(unstable)) => {
+                    let answer = answer(judge, before);
+                    if !frames.is_empty() {
+                        tell(Event::Moments { step, frames: &frames, answer: answer.clone() })?;
+                    }
+                    return tell(Event::End { step, answer, unstable: Some(unstable.to_string()) });
+                }
             }
             step += 1;
             frames.push(rollout.frame());

@@ -7,7 +7,7 @@ use crate::serve::refusal::Refusal;
 use crate::serve::request::{MAX_STEPS, Pace, Seen, Shown};
 use crate::serve::simulation::{Clock, Gone, HEARTBEAT};
 use crate::serve::simulations::Slot;
-use crate::sim::System;
+use crate::sim::{StepError, System};
 use crate::task::direction::THRESHOLD;
 use crate::task::judge::Judge;
 use crate::task::recording::{Frame, VoxelCorners};
@@ -213,10 +213,8 @@ pub fn live(
             let over = &slot.control.over;
             let walks = |walker: &mut Walker| {
                 for _ in 0..due {
-                    match walker.rollout.step_unless(over) {
-                        Ok(Ok(())) => {}
-                        Ok(Err(_)) => walker.is_unstable = true,
-                        Err(_) => {}
+                    if let Err(StepError::Unstable(_)) = walker.rollout.step_unless(over) {
+                        walker.is_unstable = true;
                     }
                     if walker.is_unstable || slot.control.is_over() {
                         return;
@@ -299,7 +297,7 @@ mod tests {
         assert!((step, moments > 3) == (120, true));
         let alone = |(_, who, seen): &(Name, Who, Seen)| {
             let system = Arc::new(System::new(&who.body, who.physics.clone()));
-            fresh_rollout(&system, &who.protocol, &seen.stimulus, &AtomicBool::new(false)).unwrap().ok()
+            fresh_rollout(&system, &who.protocol, &seen.stimulus, &AtomicBool::new(false)).ok()
         };
         let walks: Vec<Option<f64>> = plan.members.iter().map(alone).collect();
         assert_eq!(tally.moved, walks);

@@ -4,6 +4,7 @@ use crate::base::error::Error;
 use crate::base::files::exists;
 use crate::base::hash;
 use crate::base::ranges;
+use crate::base::remedy::{Invocation, Remedy, Value};
 use crate::base::table;
 use crate::config::audit::Criteria;
 use crate::sim::Energy;
@@ -96,7 +97,7 @@ impl Stored for AuditFile {
         for (number, robot) in self.robots.iter().enumerate() {
             let at = |key: &str| format!("robots[{number}].{key}");
             if self.robots[..number].iter().any(|other| other.id == robot.id) {
-                return Err(Error::at(&at("id"), format!("{} is there twice", robot.id)));
+                return Err(Error::at_key(&at("id"), format!("{} is there twice", robot.id)));
             }
             let Energy { drive, limits } = robot.energy_per_cycle;
             ranges::check(&at("energy_per_cycle.drive"), drive)?;
@@ -105,12 +106,12 @@ impl Stored for AuditFile {
             let walked = robot.rollouts.iter().map(|rollout| rollout.displacements.as_ref().map(Vec::len));
             if let Some(place) = walked.clone().position(|found| found.is_some() && found != images) {
                 let text = "expected as many as of the unchanged rollout";
-                return Err(Error::at(&at(&format!("rollouts[{place}].displacements")), text));
+                return Err(Error::at_key(&at(&format!("rollouts[{place}].displacements")), text));
             }
         }
         if self.robots.len() > self.elites {
             let (found, most) = (self.robots.len(), self.elites);
-            return Err(Error::at(
+            return Err(Error::at_key(
                 "robots",
                 format!("expected at most {most}, as elites says, found {found}"),
             ));
@@ -139,7 +140,7 @@ impl AuditFile {
     /// # Errors
     /// What is wrong with the file, with its line and key.
     pub fn read(path: &Path) -> Result<Self, Error> {
-        results::read(path, "morphcog audit makes one")
+        results::read(path, Some("audit"))
     }
 
     /// Reads its text; `name` stands in messages.
@@ -171,11 +172,11 @@ impl AuditFile {
     /// As of [`of_run`](AuditFile::of_run).
     pub(crate) fn of_state(fingerprint: &str, run_json: &Path) -> Result<Self, Error> {
         let path = &AuditFile::path(run_json);
-        let make = format!("`morphcog audit --archive {}`", folder::archive(run_json));
+        let audit = Invocation::new("audit").option("archive", folder::archive(run_json));
         if !exists(path) {
             let text =
                 format!("{}: there is no such file: these robots have not been audited", path.display());
-            return Err(Error::input(text).hint(make));
+            return Err(Error::input(text).remedy(Remedy::Run(audit, "audits them")));
         }
         let file = AuditFile::read(path)?;
         // What ships with a named run knows more than an audit here that was stopped.
@@ -194,7 +195,7 @@ impl AuditFile {
                 hash::short(&file.run_sha256),
                 hash::short(fingerprint)
             );
-            return Err(Error::input(text).hint(format!("{make} audits the run as it is now")));
+            return Err(Error::input(text).remedy(Remedy::Run(audit, "audits the run as it is now")));
         }
         Ok(file)
     }
@@ -231,7 +232,8 @@ impl AuditFile {
             "{}: expected an {AUDIT_JSON} there, or in a folder there, about the run with SHA-256 {short}…",
             here.display()
         );
-        Err(Error::input(text).hint("morphcog audit --archive … makes one beside the run".to_string()))
+        let audit = Invocation::new("audit").option("archive", Value::Placeholder("…"));
+        Err(Error::input(text).remedy(Remedy::Run(audit, "makes one beside the run")))
     }
 
     /// Adds what a file of verdicts on the same run, by the same criteria and version, says of

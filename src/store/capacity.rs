@@ -109,16 +109,19 @@ impl Stored for CapacityFile {
         for (number, task) in self.tasks.iter().enumerate() {
             let at = |key: &str| format!("tasks[{number}].{key}");
             if task.robots == 0 {
-                return Err(Error::at(&at("robots"), "expected one or more"));
+                return Err(Error::at_key(&at("robots"), "expected one or more"));
             }
             if self.tasks[..number].iter().any(|other| other.task == task.task) {
-                return Err(Error::at(&at("task"), format!("{} is there twice", task.task)));
+                return Err(Error::at_key(&at("task"), format!("{} is there twice", task.task)));
             }
             for (number, curve) in task.curves.iter().enumerate() {
                 let at = |key: &str| at(&format!("curves[{number}].{key}"));
                 let sizes = || curve.points.iter().map(|point| point.size);
                 if curve.points.is_empty() || !sizes().is_sorted_by(|a, b| a < b) {
-                    return Err(Error::at(&at("points"), "expected one or more, by size, each size once"));
+                    return Err(Error::at_key(
+                        &at("points"),
+                        "expected one or more, by size, each size once",
+                    ));
                 }
                 let found = match curve.capacity {
                     None => continue,
@@ -127,7 +130,7 @@ impl Stored for CapacityFile {
                 let [least, most] = [sizes().min(), sizes().max()].map(|size| size.unwrap_or(0) as f64);
                 if !(least..=most).contains(&found) {
                     let text = format!("expected a size from {least} to {most}, found {found:e}");
-                    return Err(Error::at(&at("capacity"), text));
+                    return Err(Error::at_key(&at("capacity"), text));
                 }
             }
         }
@@ -141,7 +144,7 @@ impl CapacityFile {
     /// # Errors
     /// What is wrong with the file, with its line and key.
     pub fn read(path: &Path) -> Result<Self, Error> {
-        results::read(path, "morphcog capacity makes one")
+        results::read(path, Some("capacity"))
     }
 
     /// Where the analysis of an evaluation goes if nothing is said: `capacity.json` beside it, or

@@ -30,7 +30,7 @@ pub struct Checkpoint {
 impl Checkpoint {
     /// As strict as a `run.json` is read: what goes on from here becomes one.
     fn check(&self) -> Result<(), Error> {
-        self.run.check().map_err(|error| error.within("run"))?;
+        self.run.check().map_err(|error| error.in_place("run"))?;
         let RunFile { config, elites, .. } = &self.run;
         let key = |robot: &Robot| config.known_key(&robot.body);
         match elites.iter().find(|robot| !self.known_bodies.0.contains(&key(robot))) {
@@ -139,7 +139,7 @@ fn read_one(path: &Path) -> Result<Option<Checkpoint>, Error> {
     let name = path.display().to_string();
     // The checksum is the second line's, the text the file's second.
     let checkpoint: Checkpoint = reading::read_json(&content, &name)?;
-    checkpoint.check().map_err(|error| error.within(&name))?;
+    checkpoint.check().map_err(|error| error.in_place(&name))?;
     Ok(Some(checkpoint))
 }
 

@@ -4,6 +4,7 @@ use crate::base::error::Error;
 use crate::base::hash;
 use crate::base::hash::sha256_hex;
 use crate::base::ranges;
+use crate::base::remedy::{Invocation, Remedy};
 use crate::base::statistics::{bootstrap, standard_deviation, wilson};
 use crate::base::table;
 use crate::config::Config;
@@ -235,13 +236,13 @@ impl Stored for EvalFile {
     fn check(&self) -> Result<(), Error> {
         self.setting.as_ref().map_or(Ok(()), Setting::check)?;
         if self.images.is_empty() {
-            return Err(Error::at("images", "expected one or more"));
+            return Err(Error::at_key("images", "expected one or more"));
         }
         // Earlier versions evaluated one run, and did not list it.
         let runs = self.runs.len().max(1);
         for (number, robot) in self.robots.iter().enumerate() {
             let refuse = |key: &str, expected: String| {
-                Err(Error::at(&format!("robots[{number}].{key}"), format!("expected {expected}")))
+                Err(Error::at_key(&format!("robots[{number}].{key}"), format!("expected {expected}")))
             };
             if robot.run >= runs {
                 return refuse("run", format!("a place among {runs} runs, from 0, found {}", robot.run));
@@ -267,14 +268,14 @@ impl Stored for EvalFile {
                 return refuse("per_class", "the classes of the images".to_string());
             }
             if let Some(validated) = &robot.validation {
-                validated.check().map_err(|error| error.within(&format!("robots[{number}].validation")))?;
+                validated.check().map_err(|error| error.in_place(&format!("robots[{number}].validation")))?;
             }
         }
         for (task, mean) in &self.means {
             let robots = self.robots.iter().filter(|robot| robot.task == *task).count();
             if mean.robots != robots || robots == 0 {
                 let text = format!("expected the {robots} of the task, found {}", mean.robots);
-                return Err(Error::at(&format!("means.{task}.robots"), text));
+                return Err(Error::at_key(&format!("means.{task}.robots"), text));
             }
         }
         Ok(())
@@ -401,7 +402,8 @@ impl EvalFile {
                     run.generations,
                     hash::short(&run.sha256)
                 );
-                Err(Error::input(text).hint("morphcog eval tests the run as it is now".to_string()))
+                Err(Error::input(text)
+                    .remedy(Remedy::Run(Invocation::new("eval"), "tests the run as it is now")))
             }
         }
     }
@@ -411,7 +413,7 @@ impl EvalFile {
     /// # Errors
     /// What is wrong with the file, with its line and key.
     pub fn read(path: &Path) -> Result<Self, Error> {
-        results::read(path, "morphcog eval makes one")
+        results::read(path, Some("eval"))
     }
 
     /// Its text, one line.

@@ -4,7 +4,8 @@ use crate::base::error::Error;
 use crate::base::files::{check_file, check_writable, read_text, remove_half_written, write_atomically};
 use crate::base::named;
 use crate::base::observer::Observer;
-use crate::base::shell::in_shell;
+use crate::base::remedy::Value;
+use crate::base::remedy::{Invocation, Remedy};
 use crate::config::Config;
 use crate::store::lock;
 use crate::store::lock::Lock;
@@ -73,8 +74,8 @@ impl RunFolder {
         observer: &dyn Observer,
     ) -> Result<Self, Error> {
         if named::is_named(path) {
-            let text = format!("--out {}: expected another name", path.display());
-            return Err(Error::usage(format!("{text}: so are runs called that lie elsewhere")));
+            let text = "expected another name: so are runs called that lie elsewhere";
+            return Err(Error::argument("out", path.display(), text));
         }
         std::fs::create_dir_all(path).map_err(|error| Error::writing(path, &error))?;
         for name in RunFolder::files().into_iter().chain([LOCK]) {
@@ -89,7 +90,7 @@ impl RunFolder {
         let lock = path.join(LOCK);
         let lock = Lock::take(&lock, stop, observer).map_err(|refusal| {
             let held = format!("{}: another morphcog is using this run folder", path.display());
-            refusal.into_error(&lock, &held, "wait for it to end, or write elsewhere with --out")
+            refusal.into_error(&lock, &held, "wait for it to end").remedy(Remedy::ChooseOut)
         })?;
         // Another process may have left its run while this one waited for the lock.
         refuse_run()?;
@@ -131,8 +132,8 @@ impl RunFolder {
         let is_written = || there.is_some_and(|there| text == Some(there.to_toml()));
         if !self.replaces && path.exists() && vacant(&self.path).is_ok() && !is_written() {
             let text = format!("{}: there is a file of that name that says something else", path.display());
-            let hint = "move it away, write elsewhere with --out, or replace it by --force";
-            return Err(Error::occupied(text).hint(hint.to_string()));
+            let error = Error::occupied(text).remedy(Remedy::MoveAway);
+            return Err(error.remedy(Remedy::ChooseOut).remedy(Remedy::Replace));
         }
         write_atomically(&path, config.to_toml().as_bytes()).map_err(|error| Error::writing(&path, &error))
     }
@@ -154,8 +155,8 @@ pub fn vacant(folder: &Path) -> Result<(), Error> {
         return Ok(());
     }
     let text = format!("{}: there is a run in this folder already", folder.display());
-    let hint = "go on with it by --resume, write elsewhere with --out, or replace it by --force";
-    Err(Error::occupied(text).hint(hint.to_string()))
+    let error = Error::occupied(text).remedy(Remedy::Resume);
+    Err(error.remedy(Remedy::ChooseOut).remedy(Remedy::Replace))
 }
 
 /// What a run of a config is called: the config's name without folder and ending.
@@ -182,7 +183,7 @@ pub fn name_of(config: &str) -> String {
 /// If not.
 pub(crate) fn check_out(out: &Path, of: &Path, own: &str) -> Result<(), Error> {
     of_file(out)?;
-    let refuse = |text: &str| Err(Error::usage(format!("--out {}: {text}", out.display())));
+    let refuse = |text: &str| Err(Error::argument("out", out.display(), text));
     let csv = out.with_extension("csv");
     if csv == *out {
         return refuse("expected another ending: the CSV beside the results has that name");
@@ -266,7 +267,7 @@ pub fn of_file(path: &Path) -> Result<(), Error> {
     let last = path.as_os_str().as_encoded_bytes().last();
     let ends_open = last.is_some_and(|&byte| std::path::is_separator(byte.into()));
     match ends_open || path.file_name().is_none() {
-        true => Err(Error::usage(format!("--out {}: expected a file, this is a folder", path.display()))),
+        true => Err(Error::argument("out", path.display(), "expected a file, this is a folder")),
         false => Ok(()),
     }
 }
@@ -281,14 +282,16 @@ fn before_dot(name: &OsStr) -> Option<&[u8]> {
 /// # Errors
 /// If none that ships with the program has that name; if it is another kind of file.
 pub fn run_json(path: PathBuf) -> Result<Vec<PathBuf>, String> {
-    match () {
-        () if named::is_named(&path) => named::runs(&path),
-        () if path.is_dir() => Ok(vec![path.join(RUN_JSON)]),
-        () if path.is_file() && path.extension().is_none_or(|ending| ending != "json") => {
-            let text = "expected a run.json, or its folder (runs/pairs/*/, with a slash at the end, means folders only)";
-            Err(text.to_string())
-        }
-        () => Ok(vec![path]),
+    if named::is_named(&path) {
+        named::runs(&path)
+    } else if path.is_dir() {
+        Ok(vec![path.join(RUN_JSON)])
+    } else if path.is_file() && path.extension().is_none_or(|ending| ending != "json") {
+        let text =
+            "expected a run.json, or its folder (runs/pairs/*/, with a slash at the end, means folders only)";
+        Err(text.to_string())
+    } else {
+        Ok(vec![path])
     }
 }
 
@@ -301,7 +304,7 @@ pub fn one_run(path: PathBuf) -> Result<PathBuf, String> {
     match runs.as_slice() {
         [] | [_] => Ok(runs.pop().expect("a path means at least one run")),
         several => {
-            let (count, first) = (several.len(), archive(&several[0]));
+            let (count, first) = (several.len(), name(&several[0]));
             Err(format!("expected one run, these are {count}; name one, such as {first}"))
         }
     }
@@ -315,12 +318,22 @@ pub fn first_run(path: PathBuf) -> Result<PathBuf, String> {
     Ok(run_json(path)?.into_iter().next().expect("a path means at least one run"))
 }
 
-/// What `--archive` names a run by: its run.json; a named one by its name.
-pub fn archive(run_json: &Path) -> String {
-    match named::name(run_json) {
-        Some((of, run)) => format!("{of}:{run}"),
-        None => in_shell(run_json),
+/// Names a run for a command's `archive`: by its name if it has one, else by its run.json.
+pub fn archive(run_json: &Path) -> Value {
+    match full_name(run_json) {
+        Some(name) => Value::Word(name),
+        None => Value::Path(run_json.to_path_buf()),
     }
+}
+
+/// The name of a run that is named, as "gallery:zero_one-1".
+pub(crate) fn full_name(run_json: &Path) -> Option<String> {
+    named::name(run_json).map(|(of, run)| format!("{of}:{run}"))
+}
+
+/// What a run is called in a message: its name if it has one, else its run.json.
+pub fn name(run_json: &Path) -> String {
+    full_name(run_json).unwrap_or_else(|| run_json.display().to_string())
 }
 
 /// Where results of a run go if nothing is said: beside its run.json; those of a named one to the
@@ -368,7 +381,8 @@ pub fn newest_run() -> Result<PathBuf, Error> {
     let found = found.filter(|(about, _)| about.is_file());
     let dated = found.filter_map(|(about, file)| Some((about.modified().ok()?, file)));
     dated.max().map(|(_, file)| file).ok_or_else(|| {
-        let hint = "name one with --archive, or make one: morphcog evolve --config quickstart.toml";
-        Error::input("there is no run under runs/".to_string()).hint(hint.to_string())
+        let make = Invocation::new("evolve").option("config", "quickstart.toml");
+        let error = Error::input("there is no run under runs/".to_string()).remedy(Remedy::NameRun);
+        error.remedy(Remedy::Run(make, "makes one"))
     })
 }

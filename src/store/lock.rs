@@ -99,12 +99,12 @@ impl From<Stopped> for Refusal {
 }
 
 impl Refusal {
-    /// The error for the user, if `held` says what another process does, and `hint` what to do.
-    pub fn into_error(self, path: &Path, held: &str, hint: &str) -> Error {
+    /// The error for the user: `held` says what another process does, `advice` what to do.
+    pub fn into_error(self, path: &Path, held: &str, advice: &str) -> Error {
         match self {
             Refusal::Held(holder) => {
                 let by = holder.map_or(String::new(), |holder| format!(" ({holder})"));
-                Error::occupied(format!("{held}{by}")).hint(hint.to_string())
+                Error::occupied(format!("{held}{by}")).advice(advice)
             }
             Refusal::Stopped => Stopped.into(),
             Refusal::Io(error) => Error::writing(path, &error),
@@ -115,7 +115,7 @@ impl Refusal {
 
 /// How locks are taken: the system's, and how long a heart may be silent.
 #[derive(Clone, Copy, Debug)]
-struct Manner {
+struct LockPolicy {
     /// Whether the file system's own locks are tried.
     by_system: bool,
     /// Whether others may have taken the system's lock elsewhere at the same time.
@@ -124,7 +124,8 @@ struct Manner {
     dead_after: Duration,
 }
 
-const USUAL: Manner = Manner { by_system: true, is_contended: false, beat: BEAT, dead_after: DEAD_AFTER };
+const DEFAULT: LockPolicy =
+    LockPolicy { by_system: true, is_contended: false, beat: BEAT, dead_after: DEAD_AFTER };
 
 /// A taken lock; let go when it is dropped. As long as it is there, this process writes to the folder
 /// only what it may: see [`Ownership`].
@@ -144,7 +145,7 @@ impl Lock {
     /// # Errors
     /// If another process has it; if it is stopped while it waits; what the system says.
     pub fn take(path: &Path, stop: &AtomicBool, observer: &dyn Observer) -> Result<Self, Refusal> {
-        Lock::take_in(path, USUAL, stop, observer)
+        Lock::take_in(path, DEFAULT, stop, observer)
     }
 
     /// The same of a lock that processes on several machines want at once, as those of a cluster's
@@ -154,33 +155,33 @@ impl Lock {
     /// # Errors
     /// As [`Lock::take`].
     pub fn take_contended(path: &Path, stop: &AtomicBool, observer: &dyn Observer) -> Result<Self, Refusal> {
-        Lock::take_in(path, Manner { is_contended: true, ..USUAL }, stop, observer)
+        Lock::take_in(path, LockPolicy { is_contended: true, ..DEFAULT }, stop, observer)
     }
 
     fn take_in(
         path: &Path,
-        manner: Manner,
+        policy: LockPolicy,
         stop: &AtomicBool,
         observer: &dyn Observer,
     ) -> Result<Self, Refusal> {
         let file = File::options().create(true).truncate(false).read(true).write(true).open(path)?;
-        let is_locked = lock(&file, manner)?;
+        let is_locked = lock(&file, policy)?;
         let host = gethostname().to_string_lossy().into_owned();
         if let Some(before) = read(path)? {
             // What was on this machine and has no lock any more has ended.
             let has_ended = is_locked && before.host == host;
             if !has_ended {
-                let seconds = manner.dead_after.as_secs_f64().ceil();
+                let seconds = policy.dead_after.as_secs_f64().ceil();
                 let text = format!("{before} was at work here: waiting up to {seconds} s for a sign of life");
                 observer.note(&format!("{}: {text}", path.display()));
-                if is_alive(path, &before, manner.dead_after, stop)? {
+                if is_alive(path, &before, policy.dead_after, stop)? {
                     return Err(Refusal::Held(read(path)?));
                 }
             }
         }
         let own = Holder { host, process: std::process::id(), beats: now() };
         write(path, &own)?;
-        if !is_locked || manner.is_contended {
+        if !is_locked || policy.is_contended {
             // Two that found it free at once: the one whose name stays has it.
             std::thread::sleep(LOOK);
             if read(path)?.as_ref() != Some(&own) {
@@ -193,7 +194,7 @@ impl Lock {
             move || own.check()
         });
         let mut lock = Lock { own: Arc::clone(&own), heart: None, _ownership: ownership, _file: file };
-        let heart = threads::start("heartbeat", move || own.beat(manner.beat));
+        let heart = threads::start("heartbeat", move || own.beat(policy.beat));
         lock.heart = Some(heart.map_err(Refusal::NoThread)?);
         Ok(lock)
     }
@@ -346,8 +347,8 @@ pub fn state(path: &Path) -> io::Result<State> {
 }
 
 /// Takes the system's lock; whether the system has locks.
-fn lock(file: &File, manner: Manner) -> Result<bool, Refusal> {
-    if !manner.by_system {
+fn lock(file: &File, policy: LockPolicy) -> Result<bool, Refusal> {
+    if !policy.by_system {
         return Ok(false);
     }
     for _ in 0..TRIES {
@@ -403,7 +404,7 @@ mod tests {
     use crate::base::stop::NEVER;
 
     /// No locks of the system, and a quick heart.
-    const WITHOUT: Manner = Manner {
+    const WITHOUT: LockPolicy = LockPolicy {
         by_system: false,
         is_contended: false,
         beat: Duration::from_millis(40),
@@ -430,16 +431,16 @@ mod tests {
     fn a_held_lock_is_refused_with_its_holder_and_free_again_when_dropped() {
         let folder = tempfile::tempdir().unwrap();
         let path = path(&folder);
-        for manner in [USUAL, WITHOUT] {
+        for policy in [DEFAULT, WITHOUT] {
             assert_eq!(read(&path).ok().flatten(), None);
-            let lock = Lock::take_in(&path, manner, &NEVER, &()).unwrap();
-            let Err(Refusal::Held(Some(holder))) = Lock::take_in(&path, manner, &NEVER, &()) else {
-                panic!("{manner:?}: taken twice")
+            let lock = Lock::take_in(&path, policy, &NEVER, &()).unwrap();
+            let Err(Refusal::Held(Some(holder))) = Lock::take_in(&path, policy, &NEVER, &()) else {
+                panic!("{policy:?}: taken twice")
             };
             assert_eq!((holder.process, &holder.host), (std::process::id(), &lock.own.host));
             drop(lock);
             assert_eq!(state(&path).unwrap(), State::Free);
-            drop(Lock::take_in(&path, manner, &NEVER, &()).unwrap());
+            drop(Lock::take_in(&path, policy, &NEVER, &()).unwrap());
         }
     }
 
@@ -567,7 +568,7 @@ mod tests {
             assert_eq!((error.kind, error.kind.exit_code()), (ErrorKind::Lost, 5));
             let holder = read(&path).unwrap().unwrap().to_string();
             assert!(error.message.contains("run.json: not written") && error.message.contains(&holder));
-            assert!(error.hint.is_some());
+            assert!(!error.remedies.is_empty());
             drop(lock);
             assert_eq!(std::fs::read(&path).unwrap(), before, "the other's name stays");
             assert_eq!(std::fs::read(&result).unwrap(), b"ours");

@@ -4,6 +4,7 @@ use crate::base::error::Error;
 use crate::base::files::{read_bytes, read_text, write_atomically};
 use crate::base::ownership;
 use crate::base::ranges;
+use crate::base::remedy::{Invocation, Remedy};
 use crate::qd::ArchiveStats;
 use crate::store::names::METRICS;
 use crate::store::run::RunFile;
@@ -149,7 +150,7 @@ pub fn moments(archive: &Path) -> Result<Vec<Moment>, Error> {
     let text = read_text(&path).map_err(|error| Error::reading(&path, &error))?;
     // A run under way may be writing the last line.
     let whole = text.rfind('\n').map_or(text.as_str(), |end| &text[..=end]);
-    parsed(whole).map_err(|error| error.within(&path.display().to_string()))
+    parsed(whole).map_err(|error| error.in_place(&path.display().to_string()))
 }
 
 /// Reads the metrics.csv of a run: the line of the generation that its run.json holds has the
@@ -179,20 +180,20 @@ pub fn moments_of(run: &RunFile, archive: &Path) -> Result<Vec<Moment>, Error> {
 }
 
 fn parsed(text: &str) -> Result<Vec<Moment>, Error> {
-    let hint = || "morphcog evolve writes this file beside run.json".to_string();
+    let evolve = || Remedy::Run(Invocation::new("evolve"), "writes this file beside run.json");
     let mut moments = Vec::new();
     for line in csv::Reader::from_reader(text.as_bytes()).deserialize() {
-        let moment: Moment = line.map_err(|error| Error::input(error.to_string()).hint(hint()))?;
+        let moment: Moment = line.map_err(|error| Error::input(error.to_string()).remedy(evolve()))?;
         if let Some(before) = moments.last().filter(|before: &&Moment| before.generation >= moment.generation)
         {
             let (before, found) = (before.generation, moment.generation);
             let text = format!("generation {found} after {before}: expected a line per generation, in order");
-            return Err(Error::input(text).hint(hint()));
+            return Err(Error::input(text).remedy(evolve()));
         }
         moments.push(moment);
     }
     match moments.is_empty() {
-        true => Err(Error::input("expected a line per generation, found none".to_string()).hint(hint())),
+        true => Err(Error::input("expected a line per generation, found none".to_string()).remedy(evolve())),
         false => Ok(moments),
     }
 }

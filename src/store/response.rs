@@ -265,11 +265,11 @@ impl Stored for ResponseFile {
 
     fn check(&self) -> Result<(), Error> {
         if self.setting.conditions.is_empty() {
-            return Err(Error::at("setting.conditions", "expected one or more"));
+            return Err(Error::at_key("setting.conditions", "expected one or more"));
         }
         for (number, robot) in self.robots.iter().enumerate() {
             let refuse = |key: &str, expected: &str| {
-                Err(Error::at(&format!("robots[{number}].{key}"), format!("expected {expected}")))
+                Err(Error::at_key(&format!("robots[{number}].{key}"), format!("expected {expected}")))
             };
             if self.robots[..number].iter().any(|other| other.id == robot.id) {
                 return refuse("id", "each robot once");
@@ -299,7 +299,7 @@ impl ResponseFile {
     /// # Errors
     /// What is wrong with the file, with its line and key.
     pub fn read(path: &Path) -> Result<Self, Error> {
-        results::read(path, "morphcog response makes one")
+        results::read(path, Some("response"))
     }
 
     /// The file at a path, if there is one. One that cannot be read is told, and left aside.

@@ -6,6 +6,7 @@ use crate::base::files::{read_bytes, read_text, write_atomically};
 use crate::base::hash::{sha256_hex, short};
 use crate::base::observer::Observer;
 use crate::base::ownership;
+use crate::base::remedy::{Invocation, Remedy};
 use crate::config::reading;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -27,12 +28,15 @@ pub(crate) trait Stored: DeserializeOwned {
     fn check(&self) -> Result<(), Error>;
 }
 
-/// Reads a file; `maker` says what makes one if there is none.
+/// Reads a file; `maker` is the command that makes one if there is none.
 ///
 /// # Errors
 /// What is wrong with the file, with its line or key.
-pub(crate) fn read<T: Stored>(path: &Path, maker: &str) -> Result<T, Error> {
-    let text = read_text(path).map_err(|error| Error::reading_or(path, &error, maker))?;
+pub(crate) fn read<T: Stored>(path: &Path, maker: Option<&'static str>) -> Result<T, Error> {
+    let text = read_text(path).map_err(|error| match maker {
+        Some(command) => Error::reading_or(path, &error, Remedy::Run(Invocation::new(command), "makes one")),
+        None => Error::reading(path, &error),
+    })?;
     parse(&text, &path.display().to_string())
 }
 
@@ -42,7 +46,7 @@ pub(crate) fn read<T: Stored>(path: &Path, maker: &str) -> Result<T, Error> {
 /// As of [`read`].
 pub(crate) fn parse<T: Stored>(text: &str, name: &str) -> Result<T, Error> {
     let file: T = reading::read_versioned(text, name, T::FORMAT.0, T::FORMAT.1)?;
-    file.check().map(|()| file).map_err(|error| error.within(name))
+    file.check().map(|()| file).map_err(|error| error.in_place(name))
 }
 
 /// Reads what results are about to replace, if it is there.
@@ -54,8 +58,8 @@ pub(crate) fn replaced<T: Stored>(path: &Path) -> Result<Option<T>, Error> {
     if !path.is_file() {
         return Ok(None);
     }
-    let hint = "it would be written over: move it away, or write elsewhere with --out";
-    read(path, "").map(Some).map_err(|error| error.hint(hint.to_string()))
+    let refuse = |error: Error| error.advice("move it away: it would be written over");
+    read(path, None).map(Some).map_err(|error| refuse(error).remedy(Remedy::ChooseOut))
 }
 
 /// The text of an object whose last key is a list: the head on one line, with an empty list there,

@@ -2,6 +2,7 @@
 
 use crate::base::error::Error;
 use crate::base::random::{Purpose, stream};
+use crate::base::remedy::{Invocation, Remedy};
 use crate::base::text::counted;
 use crate::store::audit::AuditFile;
 use crate::store::folder;
@@ -40,9 +41,8 @@ impl Source {
             return Ok(());
         }
         let text = format!("{}: these are gaits, which tell no images apart yet", self.path.display());
-        let hint =
-            format!("`morphcog train --archive {} --task \"4|9\"` teaches one", folder::archive(&self.path));
-        Err(Error::input(text).hint(hint))
+        let train = Invocation::new("train").option("archive", folder::archive(&self.path));
+        Err(Error::input(text).remedy(Remedy::Run(train.option("task", "4|9"), "trains one")))
     }
 }
 
@@ -69,7 +69,8 @@ pub enum Selection {
     /// Those with these ids, or unique beginnings of ids; "best" is the first on validation images
     /// if the runs ranked their robots by those (validation.json), else the fittest.
     Ids(Vec<String>),
-    /// These, by the place of their run and by id, and how they were come by.
+    /// These, by the place of their run and by id, with a description of how they were
+    /// chosen.
     Drawn {
         /// The robots.
         robots: Vec<(usize, String)>,
@@ -79,6 +80,9 @@ pub enum Selection {
     /// So selected, but from those robots only that an audit found physical.
     Physical(Box<Selection>),
 }
+
+/// Selects the best robots on validation images.
+pub(crate) const VALIDATED: &str = "best-validation";
 
 /// What can be read as a selection.
 const EXPECTED: &str = "expected all, top:N, random:N, best-validation:N, or, separated by commas, ids or their \
@@ -96,8 +100,8 @@ impl FromStr for Selection {
             None if text == "all" => Ok(Selection::All),
             Some(("top", digits)) => count(digits).map(Selection::Top),
             Some(("random", digits)) => count(digits).map(Selection::Random),
-            Some(("best-validation", digits)) => count(digits).map(Selection::Validated),
-            None if text == "best-validation" => Ok(Selection::Validated(1)),
+            Some((VALIDATED, digits)) => count(digits).map(Selection::Validated),
+            None if text == VALIDATED => Ok(Selection::Validated(1)),
             Some(_) => Err(EXPECTED.to_string()),
             None => Ok(Selection::Ids(text.split(',').map(|id| id.trim().to_string()).collect())),
         }
@@ -274,12 +278,12 @@ pub(crate) fn by_id<'a>(robots: &[Chosen<'a>], id: &str) -> Result<Vec<Chosen<'a
         [first, others @ ..] if others.iter().all(|other| other.robot.id == first.robot.id) => Ok(found),
         [] => {
             let there = counted(robots.len(), "robot; the fittest is", "robots; the fittest are");
-            let hint = format!("the archive has {there} {}", list(robots));
-            Err(Error::input(format!("there is no robot {id}")).hint(hint))
+            let advice = format!("the archive has {there} {}", list(robots));
+            Err(Error::input(format!("there is no robot {id}")).advice(advice))
         }
         several => {
             let text = format!("{} robots have ids that begin with {id}: {}", several.len(), list(several));
-            Err(Error::input(text).hint("give more digits".to_string()))
+            Err(Error::input(text).advice("give more digits"))
         }
     }
 }
@@ -311,7 +315,6 @@ pub(crate) fn physical<'a>(
     let audits = audits(sources)?;
     let name = |chosen: &Chosen| path(&sources[chosen.source]).display().to_string();
     let found = |chosen: &Chosen| audits[chosen.source].robot(&chosen.robot.id);
-    let hint = "morphcog audit goes on with the robots that are missing; give it the same --archive";
     let mut named = Vec::new();
     if let Selection::Ids(ids) = selection {
         for id in ids.iter().filter(|id| *id != BEST) {
@@ -327,16 +330,17 @@ pub(crate) fn physical<'a>(
             let (name, known, all) = (name(chosen), audit.robots.len(), audit.elites);
             let id = &chosen.robot.id;
             let text = format!("{name}: robot {id} has not been audited ({known} of {all} have)");
-            return Err(Error::input(text).hint(hint.to_string()));
+            let archive = folder::archive(&sources[chosen.source].path);
+            let audit = Invocation::new("audit").option("archive", archive);
+            let remedy = Remedy::Run(audit, "goes on with the robots that are missing");
+            return Err(Error::input(text).remedy(remedy));
         }
     }
     for chosen in &named {
         if let Some(found) = found(chosen).filter(|found| !found.is_physical()) {
             let text =
                 format!("{}: robot {} is not physical: {}", name(chosen), found.id, found.conclusion());
-            return Err(
-                Error::input(text).hint("leave --physical-only away to take it all the same".to_string())
-            );
+            return Err(Error::input(text).remedy(Remedy::TakeUnphysical));
         }
     }
     let physical: Vec<Chosen> =
@@ -364,7 +368,8 @@ pub(crate) fn first_physical<'a>(
 ) -> Result<Vec<(&'a Robot, Validated)>, Error> {
     let path = path(source);
     let audit = AuditFile::of_run(&source.run, &source.path)?;
-    let (name, archive) = (path.display(), folder::archive(&source.path));
+    let name = path.display();
+    let audit_again = || Invocation::new("audit").option("archive", folder::archive(&source.path));
     let mut chosen = Vec::new();
     for task in &source.run.dimensions.tasks {
         let of_task: Vec<_> = ranked.iter().filter(|(robot, _)| robot.task == *task).collect();
@@ -378,8 +383,8 @@ pub(crate) fn first_physical<'a>(
                 let text = format!(
                     "{name}: robot {id}, number {place} of {task} on validation images, has not been audited"
                 );
-                let hint = format!("`morphcog audit --archive {archive} --robots best-validation:{place}`");
-                return Err(Error::input(text).hint(hint));
+                let audit = audit_again().option("robots", format!("best-validation:{place}"));
+                return Err(Error::input(text).remedy(Remedy::Run(audit, "audits them")));
             };
             if found.is_physical() {
                 physical += 1;
@@ -389,8 +394,9 @@ pub(crate) fn first_physical<'a>(
         if physical == 0 && !of_task.is_empty() {
             let best = counted(of_task.len(), "robot", "robots");
             let text = format!("{name}: of {best} that validation images chose for {task}, none is physical");
-            let hint = format!("`morphcog audit --archive {archive}` makes all its robots eligible");
-            return Err(Error::input(text).hint(hint));
+            return Err(
+                Error::input(text).remedy(Remedy::Run(audit_again(), "makes all its robots eligible"))
+            );
         }
     }
     Ok(chosen)
@@ -488,11 +494,14 @@ mod tests {
         assert_eq!(selected("c, aa,best,B3F", 1).unwrap(), ["c400", "aa10", "ab20", "b3ff"]);
         let error = selected("aa,b3", 1).unwrap_err();
         assert!(error.message.contains("2 robots") && error.message.contains("b3ff, b300"), "{error}");
-        assert!(error.hint.is_some());
+        assert!(!error.remedies.is_empty());
         for none in ["d", "aa100", "aa,,c", "aa 10"] {
             let error = selected(none, 1).unwrap_err();
             assert!(error.message.contains("no robot"), "{error}");
-            assert!(error.hint.is_some_and(|hint| hint.contains("ab20")), "the fittest are offered");
+            assert!(
+                matches!(&error.remedies[..], [Remedy::Advice(text)] if text.contains("ab20")),
+                "the fittest are offered"
+            );
         }
     }
 

@@ -6,6 +6,7 @@ use crate::base::files::read_text;
 use crate::base::hash::sha256_hex;
 use crate::base::number;
 use crate::base::ranges;
+use crate::base::remedy::Remedy;
 use crate::base::table;
 use crate::body::{Body, VoxelCounts};
 use crate::config::Config;
@@ -29,7 +30,7 @@ pub const FORMAT: &str = "morphcog-run";
 /// Version of its schema; a reader refuses newer ones.
 pub const FORMAT_VERSION: u32 = 1;
 
-/// What stands for a run on the command line.
+/// What stands for a run.
 const WHAT_RUNS: &str = "expected a run.json, its folder, or runs that ship, such as gallery:zero_one";
 
 /// A robot: a genome, its body, and what it did on the training images.
@@ -201,7 +202,7 @@ impl Stored for RunFile {
         let stats = self.archive()?.stats(self.dimensions.possible_cells, self.config.archive.qd_offset);
         match stats == self.stats {
             true => Ok(()),
-            false => Err(Error::at("stats", "expected the figures of the elites")),
+            false => Err(Error::at_key("stats", "expected the figures of the elites")),
         }
     }
 }
@@ -212,7 +213,8 @@ impl RunFile {
     /// # Errors
     /// What is wrong with the file, with its line and key.
     pub fn read(path: &Path) -> Result<Self, Error> {
-        let text = read_text(path).map_err(|error| Error::reading_or(path, &error, WHAT_RUNS))?;
+        let text =
+            read_text(path).map_err(|error| Error::reading_or(path, &error, Remedy::advice(WHAT_RUNS)))?;
         RunFile::parse(&text, &path.display().to_string())
     }
 
@@ -269,7 +271,7 @@ impl RunFile {
 
     /// Whether both are of one run, however far it had got: the same config and seed make the same
     /// robots. Trainings have gaits of their own besides.
-    fn is_one_with(&self, other: &RunFile) -> bool {
+    fn is_same_run(&self, other: &RunFile) -> bool {
         let essence = |run: &RunFile| (run.config.essence(), run.dataset.clone());
         let are_evolved = self.origin.is_none() && other.origin.is_none();
         self.fingerprint() == other.fingerprint() || are_evolved && essence(self) == essence(other)
@@ -368,7 +370,7 @@ impl RunFile {
 pub fn different<'a>(runs: impl IntoIterator<Item = (&'a Path, &'a RunFile)>) -> Result<(), Error> {
     let mut known: Vec<(&Path, &RunFile)> = Vec::new();
     for (path, run) in runs {
-        if let Some((first, other)) = known.iter().find(|(_, other)| other.is_one_with(run)) {
+        if let Some((first, other)) = known.iter().find(|(_, other)| other.is_same_run(run)) {
             let (first, path) = (first.display(), path.display());
             let these = match other.generations == run.generations {
                 true => "these are the same",

@@ -1,7 +1,6 @@
 //! What evaluations say of the runs they are of: enough to show others the same images.
 
 use crate::base::error::Error;
-use crate::base::named;
 use crate::config::evaluation::EvaluationConfig;
 use crate::config::train::TrainConfig;
 use crate::config::validation::ValidationConfig;
@@ -61,7 +60,7 @@ impl RunRef {
             generations: run.generations,
             training_images: run.training_images.clone(),
             sha256: run.fingerprint(),
-            archive: named::is_named(&source.path).then(|| folder::archive(&source.path)),
+            archive: folder::full_name(&source.path),
         }
     }
 }
@@ -97,6 +96,6 @@ impl Setting {
             validation: ValidationConfig::default(),
             physics: Physics::default(),
         };
-        config.validate().map_err(|error| error.within("setting"))
+        config.validate().map_err(|error| error.in_place("setting"))
     }
 }

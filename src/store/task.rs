@@ -95,7 +95,7 @@ impl TaskFile {
         let name = path.display().to_string();
         reading::read_versioned(&text, &name, FORMAT, FORMAT_VERSION)
             .map(Some)
-            .map_err(|error| error.hint("delete it: its task goes on from its run".to_string()))
+            .map_err(|error| error.advice("delete it: its task goes on from its run"))
     }
 
     /// Writes it.

@@ -165,7 +165,7 @@ impl Stored for TeamFile {
 
     fn check(&self) -> Result<(), Error> {
         let (classes, images) = (self.classes.len(), self.images.len());
-        let refuse = |key: &str, expected: String| Err(Error::at(key, format!("expected {expected}")));
+        let refuse = |key: &str, expected: String| Err(Error::at_key(key, format!("expected {expected}")));
         let mut different = self.classes.clone();
         different.sort_unstable();
         different.dedup();
@@ -202,10 +202,10 @@ impl Stored for TeamFile {
             if member.displacements.len() != images {
                 return refuse(&of("displacements"), format!("one for each of {images} images"));
             }
-            member.own.check(images).map_err(|error| error.within(&of("own")))?;
+            member.own.check(images).map_err(|error| error.in_place(&of("own")))?;
         }
         for decoded in self.answers.iter().flat_map(|answers| [&answers.votes, &answers.walks]) {
-            decoded.accuracy.check(images).map_err(|error| error.within("accuracy"))?;
+            decoded.accuracy.check(images).map_err(|error| error.in_place("accuracy"))?;
             if decoded.answers.len() != images {
                 return refuse("answers", format!("one for each of {images} images"));
             }
@@ -232,7 +232,7 @@ impl Stored for TeamFile {
                 ("nearest_neighbour", nearest_neighbour),
                 ("best_body", best_body),
             ] {
-                accuracy.check(images).map_err(|error| error.within(&format!("baselines.{key}")))?;
+                accuracy.check(images).map_err(|error| error.in_place(&format!("baselines.{key}")))?;
             }
         }
         Ok(())
@@ -354,7 +354,7 @@ impl TeamFile {
     /// # Errors
     /// What is wrong with it.
     pub fn read(path: &Path) -> Result<Self, Error> {
-        results::read(path, "morphcog team makes one")
+        results::read(path, Some("team"))
     }
 
     /// Writes it, and its table beside it.

@@ -119,7 +119,7 @@ impl Stored for File {
         match &self.checksum {
             None if self.format_version == 1 => Ok(()),
             Some(checksum) if *checksum == self.sum() => Ok(()),
-            _ => Err(Error::at(
+            _ => Err(Error::at_key(
                 "checksum",
                 "it is not that of the rollouts: the file is damaged or was edited",
             )),

@@ -36,7 +36,7 @@ impl Stored for Content {
             for (size, trained) in sizes {
                 if !trained.iter().all(|(accuracy, _)| (0.0..=1.0).contains(accuracy)) {
                     let text = "expected accuracies from 0 to 1";
-                    return Err(Error::at(&format!("trainings.{key}.{size}"), text));
+                    return Err(Error::at_key(&format!("trainings.{key}.{size}"), text));
                 }
             }
         }
@@ -56,7 +56,7 @@ impl Trainings {
             || Content { format: FORMAT.0.to_string(), format_version: FORMAT.1, ..Content::default() };
         let anew = "move it away, and networks are trained anew";
         let content = match exists(&path) {
-            true => results::read(&path, "").map_err(|error| error.hint(anew.to_string()))?,
+            true => results::read(&path, None).map_err(|error| error.advice(anew))?,
             false => empty(),
         };
         Ok(Trainings { path, content })

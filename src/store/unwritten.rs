@@ -2,23 +2,23 @@
 //! shown, and perhaps be written later.
 
 use crate::base::error::{Error, ErrorKind};
+use crate::base::observer::Observer;
 
 /// How writing the results went the last time.
 #[derive(Debug, Default)]
 pub(crate) struct Unwritten(Option<Error>);
 
 impl Unwritten {
-    /// Notes how writing went; when it begins to fail, says so with `warn`.
+    /// Notes how writing went; when it begins to fail, warns.
     ///
     /// # Errors
     /// If the folder is no longer this process's: to try again would not help.
-    pub fn tried(&mut self, outcome: Result<(), Error>, warn: impl FnOnce(&str)) -> Result<(), Error> {
+    pub fn tried(&mut self, outcome: Result<(), Error>, observer: &dyn Observer) -> Result<(), Error> {
         if matches!(&outcome, Err(error) if error.kind == ErrorKind::Lost) {
             return outcome;
         }
         if let (Err(error), None) = (&outcome, &self.0) {
-            let hint = error.hint.as_ref().map_or(String::new(), |hint| format!(" ({hint})"));
-            warn(&format!("{error}{hint}; the work goes on, and it is tried again"));
+            observer.failed(error, "the work goes on, and it is tried again");
         }
         self.0 = outcome.err();
         Ok(())
@@ -33,16 +33,24 @@ impl Unwritten {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::sync::atomic::{AtomicU32, Ordering};
 
     #[test]
     fn a_failure_is_told_once_and_forgotten_when_writing_succeeds() {
-        let mut told = 0;
+        /// Counts warnings.
+        struct Counting(AtomicU32);
+        impl Observer for Counting {
+            fn failed(&self, _: &Error, _: &str) {
+                self.0.fetch_add(1, Ordering::Relaxed);
+            }
+        }
+        let counting = Counting(AtomicU32::new(0));
         let mut unwritten = Unwritten::default();
         let full = || Err(Error::other("full".to_string()));
         for (outcome, warnings) in [(Ok(()), 0), (full(), 1), (full(), 1), (Ok(()), 1), (full(), 2)] {
             let is_full = outcome.is_err();
-            unwritten.tried(outcome, |_| told += 1).unwrap();
-            assert_eq!((told, unwritten.0.is_some()), (warnings, is_full));
+            unwritten.tried(outcome, &counting).unwrap();
+            assert_eq!((counting.0.load(Ordering::Relaxed), unwritten.0.is_some()), (warnings, is_full));
         }
         assert_eq!(unwritten.error().map(|error| error.message), Some("full".to_string()));
     }

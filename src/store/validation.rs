@@ -3,6 +3,7 @@
 use crate::base::error::Error;
 use crate::base::files::exists;
 use crate::base::ranges;
+use crate::base::remedy::{Invocation, Remedy};
 use crate::config::validation::ValidationConfig;
 use crate::store::names::VALIDATION_JSON;
 use crate::store::results::{self, Stored};
@@ -64,7 +65,7 @@ impl Validated {
     pub(crate) fn check(&self) -> Result<(), Error> {
         match self.right <= self.images && self.images > 0 {
             true => Ok(()),
-            false => Err(Error::at("right", format!("expected at most images, {}", self.images))),
+            false => Err(Error::at_key("right", format!("expected at most images, {}", self.images))),
         }
     }
 }
@@ -72,11 +73,11 @@ impl Validated {
 /// Checks that robots are there once for a task, and their counts go together.
 fn check_robots(robots: &[Validated]) -> Result<(), Error> {
     for (number, robot) in robots.iter().enumerate() {
-        robot.check().map_err(|error| error.within(&format!("robots[{number}]")))?;
+        robot.check().map_err(|error| error.in_place(&format!("robots[{number}]")))?;
         let is_it = |other: &Validated| (&other.id, &other.task) == (&robot.id, &robot.task);
         if robots[..number].iter().any(is_it) {
             let text = format!("{} is there twice for {}", robot.id, robot.task);
-            return Err(Error::at(&format!("robots[{number}].id"), text));
+            return Err(Error::at_key(&format!("robots[{number}].id"), text));
         }
     }
     Ok(())
@@ -89,7 +90,7 @@ impl Stored for ValidationFile {
         check_robots(&self.robots)?;
         let others = self.others.iter().enumerate();
         for (number, Ranking { robots, .. }) in others {
-            check_robots(robots).map_err(|error| error.within(&format!("others[{number}]")))?;
+            check_robots(robots).map_err(|error| error.in_place(&format!("others[{number}]")))?;
         }
         Ok(())
     }
@@ -112,8 +113,9 @@ impl ValidationFile {
         if !exists(path) {
             return Ok(None);
         }
-        let hint = "delete it: morphcog eval --robots best-validation:1 chooses robots anew";
-        results::read(path, "").map(Some).map_err(|error| error.hint(hint.to_string()))
+        let anew = Invocation::new("eval").option("robots", "best-validation:1");
+        let remedy = Remedy::Run(anew, "chooses robots anew once the file is deleted");
+        results::read(path, None).map(Some).map_err(|error| error.remedy(remedy))
     }
 }
 

@@ -5,8 +5,9 @@ use crate::base::Grid;
 use crate::base::error::Error;
 use crate::base::files::{home_expanded, read_text, write_atomically};
 use crate::base::observer::Observer;
+use crate::base::remedy::Remedy;
 use crate::config::{BodyConfig, Config, DataConfig, reading};
-use crate::data::dataset::{BUILTIN, Dataset, DatasetError, Split};
+use crate::data::dataset::{BUILTIN, Dataset, Split};
 use crate::data::files;
 use crate::data::files::{Place, default_folder, places};
 use crate::store::folder::{IfExists, RunFolder};
@@ -68,7 +69,7 @@ impl Whereabouts {
     /// An error about the images that a run asks for, with the file that does.
     pub(crate) fn asked_by(&self, error: Error) -> Error {
         match &self.run_json {
-            Some(path) => error.within(&path.display().to_string()),
+            Some(path) => error.in_place(&path.display().to_string()),
             None => error,
         }
     }
@@ -78,9 +79,8 @@ impl Whereabouts {
     /// # Errors
     /// What is missing or broken, where it was looked for and what to do.
     pub fn load(&self, config: &DataConfig, wanted: &[Split]) -> Result<Dataset, Error> {
-        let refuse = |error: DatasetError| Error::input(error.to_string());
         if config.dataset == BUILTIN {
-            return Dataset::builtin(config.builtin.clone(), wanted).map_err(refuse);
+            return Dataset::builtin(config.builtin.clone(), wanted).map_err(Error::from);
         }
         let mut given = places(self.data.as_deref(), std::env::var_os("MORPHCOG_DATA"), None);
         let (there, gone) = match given.is_empty() {
@@ -90,10 +90,10 @@ impl Whereabouts {
         given.extend(there);
         given.extend(places(None, None, config.dir.as_deref()));
         Dataset::oriented(&config.dataset, &given, wanted, config.transpose).map_err(|error| match gone {
-            Some(gone) => refuse(error).hint(format!(
-                "the images of this run were in {gone}, which is not there any more; name their folder with --data"
-            )),
-            None => refuse(error),
+            Some(gone) => Error::from(error)
+                .advice(format!("the images of this run were in {gone}, which is not there any more"))
+                .remedy(Remedy::NameData),
+            None => Error::from(error),
         })
     }
 
@@ -133,7 +133,7 @@ impl Whereabouts {
             "{}: the training images here are not those the run was made with (another SHA-256)",
             loaded.place()
         );
-        Err(self.asked_by(Error::input(text)).hint("name their folder with --data".to_string()))
+        Err(self.asked_by(Error::input(text)).remedy(Remedy::NameData))
     }
 
     /// The folder in which a dataset is looked for if neither the command line nor a run says where
@@ -156,7 +156,7 @@ impl Whereabouts {
             let text = read_text(path).map_err(|error| Error::reading(path, &error))?;
             let name = path.display().to_string();
             let found: DataFolder = reading::read_versioned(&text, &name, FORMAT.0, FORMAT.1)
-                .map_err(|error| error.hint("delete it, and name the folder with --data".to_string()))?;
+                .map_err(|error| error.advice("delete it").remedy(Remedy::NameData))?;
             if found.dataset != dataset {
                 continue;
             }

@@ -4,7 +4,7 @@
 use crate::base::Grid;
 use crate::base::stop::{Stopped, check};
 use crate::body::Body;
-use crate::sim::{Physics, System, Unstable, Worlds};
+use crate::sim::{Physics, StepError, System, Unstable, Worlds};
 use crate::task::perturbation::{Condition, Kind, Perturbation};
 use crate::task::protocol::{Protocol, RolloutMode};
 use crate::task::rollout::{Rollout, fresh_rollout, fresh_rollouts_of, same_to_sensors};
@@ -86,9 +86,8 @@ pub struct Job<'a> {
     /// Whether it may still get into the archive, given some of its displacements; asked with early
     /// stopping only.
     pub may_win: Box<MayWin<'a>>,
-    /// Whether it is given up, going by the images in some order up to the first whose displacement
-    /// is not known, and no others: so that it does not matter which are shown first, or share a
-    /// rollout.
+    /// Stops the evaluation early. Sees only the known prefix in a fixed order, so the result does not
+    /// depend on scheduling.
     pub given_up: Option<Box<MayWin<'a>>>,
 }
 
@@ -133,10 +132,11 @@ pub fn evaluate(
     Ok(candidates.iter().map(Candidate::evaluation).collect())
 }
 
-/// Fresh rollouts of a body, one under each image and its condition (the default where one is
-/// missing): displacements in voxel lengths, in the images' order. Images that show its sensors the
-/// same pixels under the same condition are one rollout. With how many were simulated; `told` is
-/// told after each for how many images it stands.
+/// Simulates a fresh rollout of a body under each image and its condition (the default where one is
+/// missing). Images that show its sensors the same pixels under the same condition share a rollout.
+///
+/// Returns the displacements in voxel lengths, in the images' order, and the number of rollouts
+/// simulated. `progress` is called after each with the number of images it covers.
 ///
 /// # Errors
 /// [`Stopped`] if `stop` was set meanwhile; within, [`Unstable`] for a rollout that ended early.
@@ -145,10 +145,10 @@ pub fn fresh_rollouts(
     images: &[Grid<f64>],
     conditions: &[Condition],
     setting: (&Physics, &Protocol),
-    told: &(dyn Fn(u64) + Sync),
+    progress: &(dyn Fn(u64) + Sync),
     stop: &AtomicBool,
 ) -> Result<(Vec<Result<f64, Unstable>>, usize), Stopped> {
-    let (found, simulated, ended) = fresh_rollouts_so_far(body, images, conditions, setting, told, stop);
+    let (found, simulated, ended) = fresh_rollouts_so_far(body, images, conditions, setting, progress, stop);
     ended.map(|()| (found, simulated))
 }
 
@@ -160,7 +160,7 @@ pub fn fresh_rollouts_so_far(
     images: &[Grid<f64>],
     conditions: &[Condition],
     setting: (&Physics, &Protocol),
-    told: &(dyn Fn(u64) + Sync),
+    progress: &(dyn Fn(u64) + Sync),
     stop: &AtomicBool,
 ) -> (Vec<Result<f64, Unstable>>, usize, Result<(), Stopped>) {
     let setup = Setup::new(images, conditions, setting, stop);
@@ -176,7 +176,7 @@ pub fn fresh_rollouts_so_far(
         let mut own = Vec::new();
         while let Some((number, images)) = parts.get(next.fetch_add(1, Ordering::Relaxed)) {
             let Ok(rolled) = setup.side_by_side(body, &systems[*number], images) else { break };
-            images.iter().for_each(|image| told(shared[image]));
+            images.iter().for_each(|image| progress(shared[image]));
             own.extend(images.iter().copied().zip(rolled));
         }
         own
@@ -293,7 +293,7 @@ impl<'a> Setup<'a> {
         let of = |(image, same): (usize, usize)| {
             let condition = self.condition_of[image];
             // An inverted pixel is another one in each image.
-            let is_drawn = self.conditions[condition].iter().any(|change| change.kind == Kind::Pixel);
+            let is_drawn = self.conditions[condition].iter().any(|change| change.kind() == Kind::Pixel);
             *first.entry((same, condition, is_drawn.then_some(image))).or_insert(image)
         };
         same.into_iter().enumerate().map(of).collect()
@@ -308,8 +308,8 @@ impl<'a> Setup<'a> {
     ) -> Result<Result<f64, Unstable>, Stopped> {
         let number = self.condition_of[image];
         let stimulus = self.stimulus(body, image);
-        let displacement = fresh_rollout(&systems[number], &self.protocols[number], &stimulus, self.stop)?;
-        Ok(self.undone(displacement, number))
+        let rollout = fresh_rollout(&systems[number], &self.protocols[number], &stimulus, self.stop);
+        Ok(self.in_unperturbed_frame(StepError::outcome(rollout)?, number))
     }
 
     /// Fresh rollouts under images of the same condition, at most [`Worlds::MOST`]; the same bits as
@@ -323,7 +323,7 @@ impl<'a> Setup<'a> {
         let number = images.first().map_or(0, |image| self.condition_of[*image]);
         let stimuli: Vec<Grid<f64>> = images.iter().map(|image| self.stimulus(body, *image)).collect();
         let found = fresh_rollouts_of(system, &self.protocols[number], &stimuli, self.stop)?;
-        Ok(found.into_iter().map(|displacement| self.undone(displacement, number)).collect())
+        Ok(found.into_iter().map(|displacement| self.in_unperturbed_frame(displacement, number)).collect())
     }
 
     /// Images in parts that are shown side by side, each with the number of its condition: of bodies
@@ -350,8 +350,13 @@ impl<'a> Setup<'a> {
         condition.iter().fold(self.images[image].clone(), see)
     }
 
-    /// A displacement under a condition as it counts.
-    fn undone(&self, displacement: Result<f64, Unstable>, condition: usize) -> Result<f64, Unstable> {
+    /// The displacement that the unperturbed world would show: a mirrored walk is mirrored back, and an
+    /// instability that a condition excuses is standing still.
+    fn in_unperturbed_frame(
+        &self,
+        displacement: Result<f64, Unstable>,
+        condition: usize,
+    ) -> Result<f64, Unstable> {
         let condition = &self.conditions[condition];
         let undo = |d: f64, change: &Perturbation| change.undo(vec![d])[0];
         let displacement = displacement.map(|d| condition.iter().fold(d, undo));
@@ -436,7 +441,7 @@ impl<'a> Candidate<'a> {
             RolloutMode::Sequential => {
                 let mut rollout = Rollout::new(&self.systems[0], self.setup.protocol());
                 for image in self.setup.images {
-                    shown.add(rollout.show_unless(image, self.setup.stop)?);
+                    shown.add(StepError::outcome(rollout.show_unless(image, self.setup.stop))?);
                     if shown.unstable.is_some() || self.outcome(&shown.displacements).is_some() {
                         break;
                     }
@@ -684,7 +689,7 @@ mod tests {
         let system = Arc::new(System::new(&body, physics.clone()));
         let live = |image: usize, rows: u32| {
             let raised = Protocol { start_row: protocol.start_row + rows, ..protocol.clone() };
-            fresh_rollout(&system, &raised, &images[image], &NEVER).unwrap().unwrap()
+            fresh_rollout(&system, &raised, &images[image], &NEVER).unwrap()
         };
         // Images 1 and 3, and 0 and 4, show the sensors the same; of the last pair, the start is,
         // too.
@@ -723,7 +728,7 @@ mod tests {
         let tight = Physics { limit_high: 1.02, limit_low: 0.98, ..physics() };
         let expected = |physics: &Physics, image: usize| {
             let system = Arc::new(System::new(&body(), physics.clone()));
-            fresh_rollout(&system, &protocol, &images[image], &NEVER).unwrap()
+            StepError::outcome(fresh_rollout(&system, &protocol, &images[image], &NEVER)).unwrap()
         };
         let calm = Physics { blow_up_extent: 1.0, ..tight.clone() };
         let mixed = [true, false, false, true, true];
@@ -761,8 +766,7 @@ mod tests {
             };
             let changed = perturbation.apply(&setting);
             let system = Arc::new(System::new(&changed.body, changed.physics));
-            let live =
-                |stimulus| fresh_rollout(&system, &changed.protocol, stimulus, &NEVER).unwrap().unwrap();
+            let live = |stimulus| fresh_rollout(&system, &changed.protocol, stimulus, &NEVER).unwrap();
             let expected = perturbation.undo(changed.stimuli.iter().map(live).collect());
             let conditions = vec![vec![perturbation]; images.len()];
             let setting = (&physics, &protocol);

@@ -29,15 +29,17 @@ pub enum Fitness {
     Min,
     /// The mean of the margins, each divided by ten voxel lengths and clipped to −1 … 1.
     MeanClipped,
-    /// How strongly a gait responds to what its voxels see, whatever its task \[voxel lengths\].
-    /// Images are shown in pairs, an image and its opposite. Half the difference of the two
-    /// displacements is what is linear in the widths of the voxels, half the sum is what is not,
-    /// and where the body walks anyway. Fitness is the root of the mean square of the one, less the
-    /// variance of the other within [the conditions](crate::task::perturbation::of_response) that
-    /// pairs are shown under by turns: so chance, which is in both, adds nothing on average. An
-    /// eighth of the distance that the body walks anyway is subtracted: sensors have to make up for
-    /// it. A run measures it on the body's [probe](crate::body::Body::probe), and multiplies it by
-    /// the root of the number of the probe's sensors. Both ways to assign sides are worth the same.
+    /// How strongly a gait responds to what its voxels see, whatever its task \[voxel lengths\]:
+    /// `√(mean(o²) − var(e)) − |mean(e)| / 8`, where each image is shown as it is and inverted, and
+    ///
+    /// - `o` is half the difference of the two displacements: what is linear in the widths of the voxels;
+    /// - `e` is half their sum: what is not linear, and how far the body walks anyway;
+    /// - `var(e)` is the variance within each of [the conditions](crate::task::perturbation::of_response)
+    ///   that pairs are shown under by turns. Chance is in both terms, and adds nothing on average.
+    ///
+    /// The sensors have to make up for an eighth of the distance that the body walks anyway. A run
+    /// measures the response of the body's [probe](crate::body::Body::probe) and multiplies it by the
+    /// root of the number of the probe's sensors. Both ways to assign sides are worth the same.
     Response,
 }
 
@@ -55,9 +57,11 @@ impl Fitness {
 pub(super) type Assignments = (f64, f64);
 
 impl Fitness {
-    /// Fitness under both assignments, of answers by group and displacement in the images' order;
-    /// if some are still to come (`None`), upper bounds of it. Infinite without any image; not a
-    /// number if an answer is none.
+    /// Fitness under both assignments, of answers by group and displacement in the images' order:
+    ///
+    /// - if some are still to come (`None`): upper bounds;
+    /// - without any image: infinite;
+    /// - if an answer is not a number: not a number.
     pub(super) fn of_assignments(
         self,
         answers: impl Iterator<Item = (Group, Option<f64>)> + Clone,

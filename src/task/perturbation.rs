@@ -121,10 +121,6 @@ pub struct Setting {
     pub stimuli: Vec<Grid<f64>>,
 }
 
-/// How fast length limits work: half as fast, or, as they are out of reach, not at all.
-const HALF_AS_FAST: f64 = 0.5;
-const OUT_OF_REACH: f64 = 0.0;
-
 /// Under what the images of a training are shown by turns; keys of `train.perturbations`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
@@ -178,18 +174,67 @@ pub fn of_response() -> [Condition; CONDITIONS_OF_RESPONSE] {
 
 /// A start raised by this number of rows, with or without length limits.
 pub(crate) fn condition(rows: u32, without_limits: bool) -> Condition {
-    let of = |kind, amount| Perturbation { kind, amount, seed: 0 };
-    let start = (rows > 0).then(|| of(Kind::Start, f64::from(rows)));
-    start.into_iter().chain(without_limits.then(|| of(Kind::LengthLimits, OUT_OF_REACH))).collect()
+    let start = (rows > 0).then_some(Perturbation::Start { rows });
+    start.into_iter().chain(without_limits.then_some(Perturbation::NoLengthLimits)).collect()
 }
 
 /// One change.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(try_from = "Stored", into = "Stored")]
+pub enum Perturbation {
+    /// The start is raised by this number of rows, and moved as many columns.
+    Start {
+        /// Rows \[voxels\].
+        rows: u32,
+    },
+    /// Robot and images are mirrored.
+    Mirror,
+    /// The time step is divided by a whole number.
+    TimeStep {
+        /// 1 or more.
+        divisor: u32,
+    },
+    /// The length limits remove an excess half as fast.
+    SlowLengthLimits,
+    /// The length limits are beyond every goal.
+    NoLengthLimits,
+    /// A contact of the robot with itself counts once instead of twice.
+    SelfContact,
+    /// The images come in reverse order.
+    Order,
+    /// The stiffness of all springs is multiplied.
+    Stiffness {
+        /// More than 0.
+        factor: f64,
+    },
+    /// The friction of contacts is multiplied.
+    Friction {
+        /// More than 0.
+        factor: f64,
+    },
+    /// Gravity is multiplied.
+    Gravity {
+        /// More than 0.
+        factor: f64,
+    },
+    /// A pixel that a sensor sees is inverted in each image.
+    Pixel {
+        /// The number of the draw.
+        draw: u32,
+        /// Its seed.
+        seed: u64,
+    },
+}
+
+/// A perturbation as files have it.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Perturbation {
+#[schemars(rename = "Perturbation")]
+struct Stored {
     /// What is changed.
-    pub kind: Kind,
-    /// Rows, divisor of the time step, factor, speed, or number of the draw; unused elsewhere.
+    kind: Kind,
+    /// Rows, divisor of the time step, factor, speed of the limits (0: none), or number of the draw;
+    /// 0.5 elsewhere.
     amount: f64,
     /// Seed of the draw; 0 where nothing is drawn.
     #[serde(default, skip_serializing_if = "is_zero")]
@@ -200,51 +245,120 @@ fn is_zero(seed: &u64) -> bool {
     *seed == 0
 }
 
+impl From<Perturbation> for Stored {
+    fn from(perturbation: Perturbation) -> Self {
+        let (amount, seed) = match perturbation {
+            Perturbation::Start { rows } => (f64::from(rows), 0),
+            Perturbation::TimeStep { divisor } => (f64::from(divisor), 0),
+            Perturbation::Stiffness { factor }
+            | Perturbation::Friction { factor }
+            | Perturbation::Gravity { factor } => (factor, 0),
+            Perturbation::Pixel { draw, seed } => (f64::from(draw), seed),
+            Perturbation::NoLengthLimits => (0.0, 0),
+            Perturbation::Mirror
+            | Perturbation::SlowLengthLimits
+            | Perturbation::SelfContact
+            | Perturbation::Order => (0.5, 0),
+        };
+        Stored { kind: perturbation.kind(), amount, seed }
+    }
+}
+
+impl TryFrom<Stored> for Perturbation {
+    type Error = String;
+
+    fn try_from(Stored { kind, amount, seed }: Stored) -> Result<Self, String> {
+        let is_whole = amount.fract() == 0.0 && (0.0..=f64::from(u32::MAX)).contains(&amount);
+        let whole = || match is_whole {
+            true => Ok(amount as u32),
+            false => Err(format!("amount {amount}: expected a whole number of {}", kind.name())),
+        };
+        Ok(match kind {
+            Kind::Start => Perturbation::Start { rows: whole()? },
+            Kind::Mirror => Perturbation::Mirror,
+            Kind::TimeStep => Perturbation::TimeStep { divisor: whole()? },
+            Kind::LengthLimits if amount == 0.0 => Perturbation::NoLengthLimits,
+            Kind::LengthLimits => Perturbation::SlowLengthLimits,
+            Kind::SelfContact => Perturbation::SelfContact,
+            Kind::Order => Perturbation::Order,
+            Kind::Stiffness => Perturbation::Stiffness { factor: amount },
+            Kind::Friction => Perturbation::Friction { factor: amount },
+            Kind::Gravity => Perturbation::Gravity { factor: amount },
+            Kind::Pixel => Perturbation::Pixel { draw: whole()?, seed },
+        })
+    }
+}
+
 impl Perturbation {
     /// All changes of these sizes that mean something to a body under a protocol, in the order of a
     /// report.
     pub fn all(sizes: &Sizes, body: &Body, rollout: RolloutMode) -> Vec<Self> {
         let sees = body.counts().sensor >= sizes.least_sensors;
-        let amounts = |kind| match kind {
-            Kind::Start => sizes.start.iter().map(|&rows| f64::from(rows)).collect(),
-            Kind::TimeStep => sizes.time_step.iter().map(|&by| f64::from(by)).collect(),
-            Kind::Stiffness | Kind::Friction | Kind::Gravity => vec![1.0 - sizes.share, 1.0 + sizes.share],
-            Kind::Order if rollout == RolloutMode::Fresh => Vec::new(),
-            Kind::Pixel if !sees => Vec::new(),
-            Kind::Pixel => (1..=sizes.pixels).map(f64::from).collect(),
-            Kind::LengthLimits => vec![HALF_AS_FAST, OUT_OF_REACH],
-            Kind::Mirror | Kind::SelfContact | Kind::Order => vec![0.5],
-        };
-        let of = |kind| {
-            let seed = if kind == Kind::Pixel { sizes.seed } else { 0 };
-            amounts(kind).into_iter().map(move |amount| Perturbation { kind, amount, seed })
+        let factors = [1.0 - sizes.share, 1.0 + sizes.share];
+        let of = |kind| -> Vec<Self> {
+            match kind {
+                Kind::Start => sizes.start.iter().map(|&rows| Perturbation::Start { rows }).collect(),
+                Kind::Mirror => vec![Perturbation::Mirror],
+                Kind::TimeStep => {
+                    sizes.time_step.iter().map(|&divisor| Perturbation::TimeStep { divisor }).collect()
+                }
+                Kind::LengthLimits => vec![Perturbation::SlowLengthLimits, Perturbation::NoLengthLimits],
+                Kind::SelfContact => vec![Perturbation::SelfContact],
+                Kind::Order if rollout == RolloutMode::Fresh => Vec::new(),
+                Kind::Order => vec![Perturbation::Order],
+                Kind::Stiffness => factors.map(|factor| Perturbation::Stiffness { factor }).to_vec(),
+                Kind::Friction => factors.map(|factor| Perturbation::Friction { factor }).to_vec(),
+                Kind::Gravity => factors.map(|factor| Perturbation::Gravity { factor }).to_vec(),
+                Kind::Pixel if !sees => Vec::new(),
+                Kind::Pixel => {
+                    (1..=sizes.pixels).map(|draw| Perturbation::Pixel { draw, seed: sizes.seed }).collect()
+                }
+            }
         };
         Kind::ALL.into_iter().flat_map(of).collect()
     }
 
-    /// For people: "time step / 4".
-    pub fn name(&self) -> String {
-        let (kind, amount) = (self.kind.name(), self.amount);
-        match self.kind {
-            Kind::Start => format!("{kind} raised by {amount}"),
-            Kind::Mirror => kind.to_string(),
-            Kind::Order => format!("{kind} reversed"),
-            Kind::TimeStep => format!("{kind} / {amount}"),
-            Kind::LengthLimits if amount == OUT_OF_REACH => format!("{kind} beyond all goals"),
-            Kind::LengthLimits => format!("{kind} half as fast"),
-            Kind::SelfContact => format!("{kind} counted once"),
-            Kind::Stiffness | Kind::Friction | Kind::Gravity => {
-                let change = number::signed(100.0 * (amount - 1.0), 3);
-                format!("{kind} {} %", change.strip_suffix(".000").unwrap_or(&change))
-            }
-            Kind::Pixel => format!("{kind} {amount}"),
+    /// What is changed.
+    pub fn kind(&self) -> Kind {
+        match self {
+            Perturbation::Start { .. } => Kind::Start,
+            Perturbation::Mirror => Kind::Mirror,
+            Perturbation::TimeStep { .. } => Kind::TimeStep,
+            Perturbation::SlowLengthLimits | Perturbation::NoLengthLimits => Kind::LengthLimits,
+            Perturbation::SelfContact => Kind::SelfContact,
+            Perturbation::Order => Kind::Order,
+            Perturbation::Stiffness { .. } => Kind::Stiffness,
+            Perturbation::Friction { .. } => Kind::Friction,
+            Perturbation::Gravity { .. } => Kind::Gravity,
+            Perturbation::Pixel { .. } => Kind::Pixel,
         }
     }
 
-    /// Whether instability counts against the robot. Not without limits: every material has a
-    /// limit, and a body that needs one does not exploit it.
+    /// For people: "time step / 4".
+    pub fn name(&self) -> String {
+        let kind = self.kind().name();
+        match self {
+            Perturbation::Start { rows } => format!("{kind} raised by {rows}"),
+            Perturbation::Mirror => kind.to_string(),
+            Perturbation::Order => format!("{kind} reversed"),
+            Perturbation::TimeStep { divisor } => format!("{kind} / {divisor}"),
+            Perturbation::NoLengthLimits => format!("{kind} beyond all goals"),
+            Perturbation::SlowLengthLimits => format!("{kind} half as fast"),
+            Perturbation::SelfContact => format!("{kind} counted once"),
+            Perturbation::Stiffness { factor }
+            | Perturbation::Friction { factor }
+            | Perturbation::Gravity { factor } => {
+                let change = number::signed(100.0 * (factor - 1.0), 3);
+                format!("{kind} {} %", change.strip_suffix(".000").unwrap_or(&change))
+            }
+            Perturbation::Pixel { draw, .. } => format!("{kind} {draw}"),
+        }
+    }
+
+    /// Returns false if instability does not count against the robot: without limits. Every material
+    /// has a limit, and a body that needs one does not exploit it.
     pub fn counts_if_unstable(&self) -> bool {
-        (self.kind, self.amount) != (Kind::LengthLimits, OUT_OF_REACH)
+        *self != Perturbation::NoLengthLimits
     }
 
     /// The changed setting. Displacements under it are to be compared after [`Perturbation::undo`].
@@ -252,7 +366,7 @@ impl Perturbation {
         let Setting { body, physics, protocol, stimuli } = setting;
         let stimulus = |(image, stimulus)| self.stimulus(body, stimulus, image as u64);
         let mut stimuli: Vec<Grid<f64>> = stimuli.iter().enumerate().map(stimulus).collect();
-        if self.kind == Kind::Order {
+        if *self == Perturbation::Order {
             stimuli.reverse();
         }
         Setting {
@@ -265,45 +379,49 @@ impl Perturbation {
 
     /// The changed body.
     pub fn body(&self, body: &Body) -> Body {
-        if self.kind == Kind::Mirror { body.mirrored() } else { body.clone() }
+        if *self == Perturbation::Mirror { body.mirrored() } else { body.clone() }
     }
 
     /// The changed constants of the simulator.
     pub fn physics(&self, physics: &Physics) -> Physics {
-        match self.kind {
-            Kind::TimeStep => physics.refined(self.amount as u32),
-            Kind::LengthLimits if self.amount == OUT_OF_REACH => physics.without_limits(),
-            Kind::LengthLimits => physics.with_slower_limits(1.0 / self.amount),
-            Kind::SelfContact => {
-                Physics { self_contact_weight: physics.self_contact_weight * self.amount, ..physics.clone() }
+        match *self {
+            Perturbation::TimeStep { divisor } => physics.refined(divisor),
+            Perturbation::NoLengthLimits => physics.without_limits(),
+            Perturbation::SlowLengthLimits => physics.with_slower_limits(2.0),
+            Perturbation::SelfContact => {
+                Physics { self_contact_weight: physics.self_contact_weight * 0.5, ..physics.clone() }
             }
-            Kind::Stiffness => physics.with_stiffness(self.amount),
-            Kind::Friction => Physics { friction: physics.friction * self.amount, ..physics.clone() },
-            Kind::Gravity => Physics { gravity: physics.gravity * self.amount, ..physics.clone() },
-            Kind::Start | Kind::Mirror | Kind::Order | Kind::Pixel => physics.clone(),
+            Perturbation::Stiffness { factor } => physics.with_stiffness(factor),
+            Perturbation::Friction { factor } => {
+                Physics { friction: physics.friction * factor, ..physics.clone() }
+            }
+            Perturbation::Gravity { factor } => {
+                Physics { gravity: physics.gravity * factor, ..physics.clone() }
+            }
+            Perturbation::Start { .. }
+            | Perturbation::Mirror
+            | Perturbation::Order
+            | Perturbation::Pixel { .. } => physics.clone(),
         }
     }
 
     /// The changed way in which images are shown.
     pub fn protocol(&self, protocol: &Protocol) -> Protocol {
-        match self.kind {
-            Kind::Start => {
-                let rows = self.amount as u32;
-                Protocol {
-                    start_row: protocol.start_row.saturating_add(rows),
-                    start_column: protocol.start_column - i64::from(rows),
-                    ..protocol.clone()
-                }
-            }
+        match *self {
+            Perturbation::Start { rows } => Protocol {
+                start_row: protocol.start_row.saturating_add(rows),
+                start_column: protocol.start_column - i64::from(rows),
+                ..protocol.clone()
+            },
             _ => protocol.clone(),
         }
     }
 
     /// What the (unchanged) body sees of the image with this number.
     pub fn stimulus(&self, body: &Body, stimulus: &Grid<f64>, image: u64) -> Grid<f64> {
-        match self.kind {
-            Kind::Mirror => stimulus.mirrored(),
-            Kind::Pixel => self.with_pixel_inverted(body, stimulus, image),
+        match *self {
+            Perturbation::Mirror => stimulus.mirrored(),
+            Perturbation::Pixel { draw, seed } => with_pixel_inverted(body, stimulus, (seed, draw, image)),
             _ => stimulus.clone(),
         }
     }
@@ -311,25 +429,27 @@ impl Perturbation {
     /// Displacements as they would be in the unchanged setting: those of a mirror image are
     /// mirrored, and they stand in the unchanged order.
     pub fn undo(&self, mut displacements: Vec<f64>) -> Vec<f64> {
-        match self.kind {
-            Kind::Mirror => displacements.iter_mut().for_each(|d| *d = -*d),
-            Kind::Order => displacements.reverse(),
+        match self {
+            Perturbation::Mirror => displacements.iter_mut().for_each(|d| *d = -*d),
+            Perturbation::Order => displacements.reverse(),
             _ => {}
         }
         displacements
     }
+}
 
-    fn with_pixel_inverted(&self, body: &Body, stimulus: &Grid<f64>, image: u64) -> Grid<f64> {
-        let sensors: Vec<_> =
-            body.voxels().iter().filter(|(_, m)| m.is_sensor()).map(|(place, _)| place).collect();
-        let mut random = stream(self.seed, Purpose::AuditPixels, self.amount as u64, image);
-        let chosen = random.choose(&sensors).copied();
-        let pixel = |row, column| {
-            let pixel = stimulus[(row, column)];
-            if chosen == Some((row, column)) { 1.0 - pixel } else { pixel }
-        };
-        Grid::from_fn(stimulus.height(), stimulus.width(), pixel)
-    }
+/// The stimulus with a pixel inverted that a sensor sees, drawn by the seed, the number of the draw and
+/// that of the image.
+fn with_pixel_inverted(body: &Body, stimulus: &Grid<f64>, (seed, draw, image): (u64, u32, u64)) -> Grid<f64> {
+    let sensors: Vec<_> =
+        body.voxels().iter().filter(|(_, m)| m.is_sensor()).map(|(place, _)| place).collect();
+    let mut random = stream(seed, Purpose::AuditPixels, u64::from(draw), image);
+    let chosen = random.choose(&sensors).copied();
+    let pixel = |row, column| {
+        let pixel = stimulus[(row, column)];
+        if chosen == Some((row, column)) { 1.0 - pixel } else { pixel }
+    };
+    Grid::from_fn(stimulus.height(), stimulus.width(), pixel)
 }
 
 #[cfg(test)]
@@ -348,7 +468,11 @@ mod tests {
     }
 
     fn of(kind: Kind) -> Vec<Setting> {
-        all(RolloutMode::Sequential).iter().filter(|p| p.kind == kind).map(|p| p.apply(&setting())).collect()
+        all(RolloutMode::Sequential)
+            .iter()
+            .filter(|p| p.kind() == kind)
+            .map(|p| p.apply(&setting()))
+            .collect()
     }
 
     #[test]
@@ -363,7 +487,7 @@ mod tests {
                 changed.stimuli != plain.stimuli,
             ];
             // The images of this setting are symmetric: mirrored they are themselves.
-            let expected = match perturbation.kind {
+            let expected = match perturbation.kind() {
                 Kind::Start => [false, false, true, false],
                 Kind::Mirror => [true, false, false, false],
                 Kind::Pixel | Kind::Order => [false, false, false, true],
@@ -396,9 +520,9 @@ mod tests {
         assert!(changed.iter().any(|other| *other != changed[0]));
         // To two sensors one pixel is no noise.
         let few = Perturbation::all(&Sizes::default(), &setting().body, RolloutMode::Fresh);
-        assert!(few.iter().all(|p| p.kind != Kind::Pixel));
+        assert!(few.iter().all(|p| p.kind() != Kind::Pixel));
         let blind = Setting { body: "33/44".parse().unwrap(), ..setting() };
-        let pixel = Perturbation { kind: Kind::Pixel, amount: 1.0, seed: 1 };
+        let pixel = Perturbation::Pixel { draw: 1, seed: 1 };
         assert_eq!(pixel.apply(&blind), blind);
     }
 
@@ -422,6 +546,12 @@ mod tests {
         assert_eq!(ByTurns { start: 2, length_limits: false }.conditions().count(), 3);
         let json = serde_json::to_string(&condition(1, true)).unwrap();
         assert_eq!(json, r#"[{"kind":"start","amount":1.0},{"kind":"length_limits","amount":0.0}]"#);
+        for perturbation in all(RolloutMode::Sequential) {
+            let json = serde_json::to_string(&perturbation).unwrap();
+            assert_eq!(serde_json::from_str::<Perturbation>(&json).unwrap(), perturbation);
+        }
+        let half = serde_json::from_str::<Perturbation>(r#"{"kind":"start","amount":0.5}"#).unwrap_err();
+        assert!(half.to_string().contains("amount 0.5: expected a whole number"), "{half}");
     }
 
     #[test]
@@ -436,7 +566,7 @@ mod tests {
             all.iter().filter(|p| !p.counts_if_unstable()).map(Perturbation::name).collect();
         assert_eq!(excused, ["length limits beyond all goals"]);
         for perturbation in all {
-            let expected = match perturbation.kind {
+            let expected = match perturbation.kind() {
                 Kind::Mirror => [-2.0, -3.0],
                 Kind::Order => [3.0, 2.0],
                 _ => [2.0, 3.0],
@@ -445,6 +575,6 @@ mod tests {
         }
         // Fresh rollouts have no order.
         let fresh = super::tests::all(RolloutMode::Fresh);
-        assert!(fresh.iter().all(|p| p.kind != Kind::Order) && fresh.len() + 1 == names.len());
+        assert!(fresh.iter().all(|p| p.kind() != Kind::Order) && fresh.len() + 1 == names.len());
     }
 }

@@ -3,7 +3,7 @@
 use crate::base::Grid;
 use crate::base::stop::Stopped;
 use crate::body::Body;
-use crate::sim::{Energy, Physics, Start, System, Unstable, World, Worlds};
+use crate::sim::{Energy, Physics, Start, StepError, System, Unstable, World, Worlds};
 use crate::task::protocol::{Protocol, RolloutMode};
 use crate::task::recording::{Frame, Phase, Recording, Seen, VoxelCorners};
 use std::sync::Arc;
@@ -52,19 +52,13 @@ impl<'a> Rollout<'a> {
     /// The same without a watcher, unless `stop` is set meanwhile.
     ///
     /// # Errors
-    /// [`Stopped`] then; within, [`Unstable`] if the rollout ends.
-    pub fn show_unless(
-        &mut self,
-        stimulus: &Grid<f64>,
-        stop: &AtomicBool,
-    ) -> Result<Result<f64, Unstable>, Stopped> {
+    /// [`StepError`] if it was stopped, or the rollout became unstable.
+    pub fn show_unless(&mut self, stimulus: &Grid<f64>, stop: &AtomicBool) -> Result<f64, StepError> {
         self.look_at(stimulus);
         for _ in 0..self.protocol.control_steps {
-            if let Err(unstable) = self.step_unless(stop)? {
-                return Ok(Err(unstable));
-            }
+            self.step_unless(stop)?;
         }
-        Ok(Ok(self.moved()))
+        Ok(self.moved())
     }
 
     /// Shows an image from now on, until the next.
@@ -84,8 +78,8 @@ impl<'a> Rollout<'a> {
     /// One control step, which ends soon when `stop` is set.
     ///
     /// # Errors
-    /// [`Stopped`] then; within, [`Unstable`] if the rollout ends in it.
-    pub fn step_unless(&mut self, stop: &AtomicBool) -> Result<Result<(), Unstable>, Stopped> {
+    /// [`StepError`] if it was stopped, or the rollout became unstable.
+    pub fn step_unless(&mut self, stop: &AtomicBool) -> Result<(), StepError> {
         self.world.step_unless(stop)
     }
 
@@ -119,13 +113,13 @@ impl<'a> Rollout<'a> {
 /// lengths.
 ///
 /// # Errors
-/// [`Stopped`] then; within, [`Unstable`] if the rollout ends early.
+/// [`StepError`] if it was stopped, or the rollout became unstable.
 pub fn fresh_rollout(
     system: &Arc<System>,
     protocol: &Protocol,
     stimulus: &Grid<f64>,
     stop: &AtomicBool,
-) -> Result<Result<f64, Unstable>, Stopped> {
+) -> Result<f64, StepError> {
     Rollout::new(system, protocol).show_unless(stimulus, stop)
 }
 
@@ -141,7 +135,7 @@ pub fn fresh_rollouts_of(
     stop: &AtomicBool,
 ) -> Result<Vec<Result<f64, Unstable>>, Stopped> {
     if let [one] = stimuli {
-        return Ok(vec![fresh_rollout(system, protocol, one, stop)?]);
+        return Ok(vec![StepError::outcome(fresh_rollout(system, protocol, one, stop))?]);
     }
     let start = Start { column: protocol.start_column, row: protocol.start_row };
     let mut worlds = Worlds::new(Arc::clone(system), start, stimuli.len());
@@ -162,14 +156,14 @@ pub fn fresh_rollouts_of(
 /// Unless `stop` is set meanwhile.
 ///
 /// # Errors
-/// [`Stopped`] then; within, [`Unstable`] if a rollout ends early.
+/// [`StepError`] if it was stopped, or a rollout became unstable.
 pub fn walk(
     system: &Arc<System>,
     protocol: &Protocol,
     stimuli: &[Grid<f64>],
     measured: bool,
     stop: &AtomicBool,
-) -> Result<Result<(Vec<f64>, Energy), Unstable>, Stopped> {
+) -> Result<(Vec<f64>, Energy), StepError> {
     let mut rollout = Rollout::new(system, protocol);
     if measured {
         rollout.world = rollout.world.with_energy_meter();
@@ -179,12 +173,9 @@ pub fn walk(
         if protocol.rollout == RolloutMode::Fresh {
             rollout.reset();
         }
-        match rollout.show_unless(stimulus, stop)? {
-            Ok(displacement) => displacements.push(displacement),
-            Err(unstable) => return Ok(Err(unstable)),
-        }
+        displacements.push(rollout.show_unless(stimulus, stop)?);
     }
-    Ok(Ok((displacements, rollout.world.energy())))
+    Ok((displacements, rollout.world.energy()))
 }
 
 /// For each stimulus the first one (its index) that shows the body's sensors the same pixels: those
@@ -283,7 +274,7 @@ mod tests {
         assert_ne!(rollout.show(&image(1.0, 0.0), |_| ()).unwrap(), first);
         rollout.reset();
         assert_eq!(rollout.show(&image(1.0, 0.0), |_| ()).unwrap(), first);
-        assert_eq!(fresh_rollout(&system, &protocol, &image(1.0, 0.0), &NEVER), Ok(Ok(first)));
+        assert_eq!(fresh_rollout(&system, &protocol, &image(1.0, 0.0), &NEVER), Ok(first));
     }
 
     #[test]
@@ -296,7 +287,7 @@ mod tests {
         assert!(same_to_sensors(&blind, &[]).is_empty());
         // Images that are the same to the sensors give the same rollout.
         let (system, protocol) = (system(), protocol());
-        let live = |image| fresh_rollout(&system, &protocol, image, &NEVER).unwrap().unwrap();
+        let live = |image| fresh_rollout(&system, &protocol, image, &NEVER).unwrap();
         assert_eq!(live(&images[1]), live(&images[3]));
         assert_ne!(live(&images[0]), live(&images[1]));
     }
@@ -306,8 +297,8 @@ mod tests {
         let (system, protocol) = (system(), protocol());
         let stop = AtomicBool::new(true);
         let image = image(1.0, 0.0);
-        assert_eq!(fresh_rollout(&system, &protocol, &image, &stop), Err(Stopped));
-        assert_eq!(walk(&system, &protocol, &[image], false, &stop), Err(Stopped));
+        assert_eq!(fresh_rollout(&system, &protocol, &image, &stop), Err(Stopped.into()));
+        assert_eq!(walk(&system, &protocol, &[image], false, &stop), Err(Stopped.into()));
     }
 
     fn recorded(fresh: bool, physics: &Physics) -> Recording {
@@ -349,7 +340,7 @@ mod tests {
         assert_eq!(fresh.frames[1 + steps], fresh.frames[0]);
         assert_eq!(fresh.frames[..1 + steps], continuous.frames[..1 + steps]);
         let alone = fresh_rollout(&system(), &protocol(), &image(1.0, 0.0), &NEVER);
-        assert_eq!(alone, Ok(Ok(fresh.phases[1].displacement)));
+        assert_eq!(alone, Ok(fresh.phases[1].displacement));
     }
 
     #[test]
@@ -359,7 +350,7 @@ mod tests {
         for rollout in [RolloutMode::Fresh, RolloutMode::Sequential] {
             let protocol = Protocol { rollout, ..protocol() };
             let walk = |measured| walk(&system, &protocol, &images, measured, &NEVER);
-            let [(plain, nothing), (measured, energy)] = [false, true].map(|m| walk(m).unwrap().unwrap());
+            let [(plain, nothing), (measured, energy)] = [false, true].map(|m| walk(m).unwrap());
             let recorded = recorded(rollout == RolloutMode::Fresh, &physics).phases;
             assert_eq!(plain, recorded.iter().map(|phase| phase.displacement).collect::<Vec<_>>());
             assert_eq!((plain, nothing), (measured, Energy::default()));

@@ -124,7 +124,7 @@ impl Accuracy {
     pub(crate) fn check(&self, images: usize) -> Result<(), Error> {
         match self.right <= images {
             true => Ok(()),
-            false => Err(Error::at("right", format!("expected at most {images}, found {}", self.right))),
+            false => Err(Error::at_key("right", format!("expected at most {images}, found {}", self.right))),
         }
     }
 

@@ -51,9 +51,9 @@ impl From<PictureError> for Error {
         match error {
             PictureError::Write { path, source } => {
                 let error = Error::writing(&path, &source);
-                match error.hint {
-                    Some(_) => error,
-                    None => error.hint("check that the folder exists and is writable".to_string()),
+                match error.remedies.is_empty() {
+                    true => error.advice("check that the folder exists and is writable"),
+                    false => error,
                 }
             }
             PictureError::Threads(error) => error,

@@ -1,57 +1,26 @@
-//! Pictures and the terminal. Recordings of rollouts become images, animations, pages and text
-//! here.
+//! Pictures: recordings of rollouts become images, animations and pages here.
 //!
 //! A [`Walk`] is a checked [`Recording`](crate::task::recording::Recording); a [`Stage`] decides
 //! what part of the world a picture shows; `scene` and `panel` make drawing primitives of one
-//! frame; `raster` paints them. On top of these stand the animated GIF, the self-contained HTML
-//! page and the view in a terminal. Figures for print are vectors and stand apart, in [`plot`].
+//! frame; `raster` paints them. On top of these stand the animated GIF and the self-contained HTML
+//! page. Figures for print are vectors and stand apart, in [`plot`].
 //! `serve` is a page of its own, over HTTP.
 
-#[cfg(feature = "cli")]
-pub mod bar;
 pub mod colour;
-#[cfg(feature = "cli")]
-pub mod console;
 pub mod error;
-#[cfg(feature = "cli")]
-pub mod figures;
 pub mod fonts;
 pub mod gif;
 pub mod html;
-#[cfg(feature = "cli")]
-pub mod networks;
 pub mod palette;
 pub mod panel;
-#[cfg(feature = "cli")]
-pub mod pictures;
-#[cfg(feature = "cli")]
-pub mod player;
 pub mod plot;
 pub mod progress;
 pub mod raster;
 pub mod report;
-#[cfg(feature = "cli")]
-pub mod reporters;
-#[cfg(feature = "cli")]
-pub mod responses;
 pub mod scene;
 pub mod sheet;
 pub mod stage;
-#[cfg(feature = "cli")]
-pub mod summary;
-#[cfg(feature = "cli")]
-pub mod sweeps;
-#[cfg(feature = "cli")]
-pub mod table;
-#[cfg(feature = "cli")]
-pub mod teams;
-#[cfg(feature = "cli")]
-pub mod terminal;
-#[cfg(feature = "cli")]
-pub mod verdicts;
 pub mod walk;
-#[cfg(feature = "cli")]
-pub mod wrapping;
 
 pub use stage::Stage;
 pub use walk::Walk;

@@ -60,7 +60,7 @@ fn displacements(robot: &Published, stimuli: &[Grid<f64>], physics: &Physics) ->
         }
         "four_digit" => {
             let protocol = protocol(RolloutMode::Fresh, 250);
-            let rollout = |stimulus| fresh_rollout(&system, &protocol, stimulus, &NEVER).unwrap().unwrap();
+            let rollout = |stimulus| fresh_rollout(&system, &protocol, stimulus, &NEVER).unwrap();
             stimuli.iter().map(rollout).collect()
         }
         other => panic!("no protocol for {other}"),

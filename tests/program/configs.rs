@@ -276,8 +276,6 @@ fn an_error_blames_the_override_that_caused_it() {
     blamed(&["archive.keep=0"], 3, "archive.keep=0", &["archive.keep = 0"]);
     blamed(&["archive.keep=0", "seed=4"], 3, "archive.keep=0", &[]);
     blamed(&["train.rounds=2", "archive.keep=0"], 3, "archive.keep=0", &[]);
-    // With what stands in the file only, where the message begins with a key of the file.
-    blamed(&["physics.ground_row=9"], 3, "physics.ground_row=9", &["protocol.start_row"]);
     // Keys and items that are not there, to be set or unset.
     blamed(&["seed=4", "task.groups.3.1=1"], 2, "task.groups.3.1=1", &["1 to 2"]);
     blamed(&["task.groups.0.1=1"], 2, "task.groups.0.1=1", &["1 to 2"]);

@@ -9,7 +9,7 @@ fn missing_data_are_refused_naming_file_place_and_remedy() {
     let words = ["train-images-idx3-ubyte", "morphcog data fetch mnist"];
     let run = "evolve -c tiny.toml -o run --set data.dataset=mnist";
     sandbox.run(run).ended(3, &["data/mnist", "morphcog data fetch mnist"]);
-    sandbox.run(&format!("{run} --data empty")).ended(3, &[&words[..], &["empty", "--data"]].concat());
+    sandbox.run(&format!("{run} --data empty")).ended(3, &[&words[..], &["in empty"]].concat());
     let mut command = sandbox.command(run.split(' '));
     command.env("MORPHCOG_DATA", sandbox.path("empty"));
     said(command).ended(3, &[&words[..], &["MORPHCOG_DATA"]].concat());

@@ -492,7 +492,8 @@ fn a_shell_reads_the_commands_that_are_printed_whatever_the_path() {
         let mut unaudited = sandbox.command(["eval", "--physical-only"]);
         unaudited.arg(OsStr::from_bytes(&[b"--archive=", name].concat()));
         let hint = said(unaudited).ended(3, &["hint: `"]).err;
-        let audit = hint.split_once("hint: `morphcog audit ").unwrap().1.trim_end().trim_end_matches('`');
+        let audit = hint.split_once("hint: `morphcog audit ").unwrap().1;
+        let audit = audit.rsplit_once("` audits").unwrap().0;
         for command in [format!("eval -q -n 4 --cycles 1 {test}"), format!("audit -q {audit}")] {
             let line = format!("{PROGRAM} {command}");
             let mut bash = std::process::Command::new("bash");

@@ -79,7 +79,7 @@ fn what_cannot_be_is_refused_before_anything_is_done() {
     let unkept = "experiment.1.set=[\"generations=0\"]";
     sandbox
         .run(&format!("reproduce plan.toml --set seeds=[3] --set {unkept}"))
-        .ended(3, &[&format!("--set {unkept}: experiment 1: --set generations=0: ")]);
+        .ended(3, &[&format!("--set {unkept}: experiment 1: generations = 0: ")]);
     sandbox.run("reproduce plan.toml --set experiment.1.config=no.toml").ended(3, &["no.toml", "--set exp"]);
     sandbox
         .run("reproduce plan.toml --set experiment.2.config=tiny.toml")

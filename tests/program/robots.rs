@@ -164,7 +164,7 @@ fn a_broken_run_json_is_refused_saying_how() {
         ("[1, 2]".to_string(), "run.json"),
         (replaced("\"format_version\":1", "\"format_version\":2"), "format_version"),
         (replaced("\"format\":\"morphcog-run\"", "\"format\":\"other\""), "format"),
-        (cyclic, "elites[0].genome"),
+        (cyclic, "elites.1.genome"),
         (replaced("\"elites\":[", &format!("\"elites\":[\n{},", elite.trim_end_matches(','))), "elite"),
         (replaced("\"displacements\":[", "\"displacements\":[1.0,"), "displacement"),
         (replaced("\"cell\":[", "\"cell\":[999,"), "cell"),

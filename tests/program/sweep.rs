@@ -137,8 +137,8 @@ fn what_is_wrong_is_said_all_at_once_before_anything_starts() {
     let said = sandbox.run("sweep bad.toml").ended(
         3,
         &[
-            "task 1 (tiny-generations=0-parents=0-seed1) and 3 more: --set generations=0",
-            "task 5 (tiny-generations=5-parents=0-seed1) and 1 more: --set map_elites.parents=0",
+            "--set generations=0: bad.toml: task 1 (tiny-generations=0-parents=0-seed1) and 3 more: ",
+            "--set map_elites.parents=0: bad.toml: task 5 (tiny-generations=5-parents=0-seed1) and 1 more: ",
         ],
     );
     assert_eq!(said.err.matches("error:").count(), 2, "{}", said.err);

@@ -58,13 +58,13 @@ fn validation_images_are_of_the_training_split_and_were_never_trained_on() {
     let of_class =
         |class| dataset.indices_of(Split::Train, class).iter().filter(|i| !trained.contains(i)).count();
     let most = 2 * of_class(0).min(of_class(1));
-    let drawn = images(&[&run], &dataset, "--images", most).unwrap();
+    let drawn = images(&[&run], &dataset, Some("images"), most).unwrap();
     assert_eq!(drawn.len(), most);
     assert!(drawn.iter().all(|image| !trained.contains(&image.index)));
     assert!(drawn.iter().all(|image| dataset.label(Split::Train, image.index).unwrap() == image.label));
     // Classes take turns: a round on the first of them is fair, too.
     assert_eq!(drawn[..20].iter().filter(|image| image.label == 0).count(), 10);
-    assert!(images(&[&run], &dataset, "--images", 10 * most).is_err());
+    assert!(images(&[&run], &dataset, Some("images"), 10 * most).is_err());
 }
 
 #[test]
@@ -110,7 +110,7 @@ fn robots_are_compared_on_validation_images_without_a_look_at_the_test_images() 
     let report = EvalFile::read(&sandbox.path("run/eval-validation.json")).unwrap();
     assert_eq!(report.split, HeldOut::Validation);
     // By what robots were chosen, they are not compared.
-    let selected = images(&[&run], &dataset, "--images", 40).unwrap();
+    let selected = images(&[&run], &dataset, Some("images"), 40).unwrap();
     assert!(report.images.len() == 60 && report.images.iter().all(|image| !selected.contains(image)));
     // Nor are others of the run, or robots that are named, afterwards.
     sandbox.run(&format!("{command} --images 60 --robots top:1")).ended(0, &[]);

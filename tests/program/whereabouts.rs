@@ -219,11 +219,11 @@ fn robots_are_shown_another_dataset_if_it_is_asked_for_and_the_results_say_so() 
     assert!(sandbox.read("runs/one/plot-accuracy.svg").contains("trained on shapes"));
     sandbox.run("report runs/one --rollouts 0").ended(0, &[]);
     assert!(sandbox.read("runs/one/report.html").contains("trained on shapes"));
-    sandbox.run(COMMANDS[7]).ended(3, &["runs/one/eval.json", "shapes", "builtin", "--dataset"]);
+    sandbox.run(COMMANDS[7]).ended(3, &["runs/one/eval.json", "shapes", "builtin", "morphcog eval"]);
     // Who is best is told by the run's own images.
     sandbox.run(&format!("{command} best-validation:1 --validation 40")).ended(0, &[]);
     assert_eq!(read().robots[0].validation.as_ref().unwrap().images, 40);
-    sandbox.run(&format!("{command} top:1 --split validation")).ended(2, &["--dataset", "--split test"]);
+    sandbox.run(&format!("{command} top:1 --split validation")).ended(2, &["--dataset", "test images only"]);
     // Its own name changes nothing.
     sandbox.run(&format!("{} --dataset shapes", COMMANDS[0])).ended(0, &[]);
     let named = sandbox.read("runs/one/eval.json");

@@ -11,6 +11,9 @@ use crate::common::server;
 use morphcog::base::error::{Error, ErrorKind};
 use morphcog::base::hash::sha256_hex;
 use morphcog::base::text::is_unseen;
+use morphcog::cli::explain::explain;
+use morphcog::cli::output::console::{Console, Mode};
+use morphcog::cli::output::figures::{self, Kind, Wanted};
 use morphcog::commands::simulate::{Scenario, simulate};
 use morphcog::commands::{eval, replay};
 use morphcog::config::Config;
@@ -25,8 +28,6 @@ use morphcog::store::images::{HeldOut, HowMany};
 use morphcog::store::robots::Selection;
 use morphcog::store::run::RunFile;
 use morphcog::store::team::TeamFile;
-use morphcog::view::console::{Console, Mode};
-use morphcog::view::figures::{self, Kind, Wanted};
 use morphcog::view::plot::{Background, confusion, poster};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
@@ -112,9 +113,10 @@ impl Case {
             Err(error) if error.kind == ErrorKind::Stopped => None,
             Err(error) => {
                 self.outcome += &format!("{error} ");
-                assert!(error.message.contains(file), "names no file: {error:?}");
+                let explained = explain(&error);
+                assert!(explained.message.contains(file), "names no file: {error:?}");
                 assert!(matches!(error.kind, ErrorKind::Input | ErrorKind::Unstable), "{error:?}");
-                for text in [Some(&error.message), error.hint.as_ref()].into_iter().flatten() {
+                for text in [Some(&explained.message), explained.hint.as_ref()].into_iter().flatten() {
                     assert!(!text.contains(is_unseen), "not harmless: {text:?}");
                     assert!(text.chars().count() < 2000, "overlong: {text}");
                 }
@@ -248,7 +250,7 @@ fn scenario(world: &World, dice: &mut Dice, case: &mut Case) {
         rows += 1;
         if rows < 50 && begin.elapsed() < PATIENCE { Ok(()) } else { Err(gone()) }
     };
-    let simulated = simulate(&scenario, false, row).map_err(|error| error.within("scenario.json"));
+    let simulated = simulate(&scenario, false, row).map_err(|error| error.in_place("scenario.json"));
     case.check(simulated, "scenario.json");
 }
 

@@ -10,7 +10,6 @@ use crate::body::{Body, Material};
 use crate::grid::Grid;
 use crate::physics::Physics;
 use crate::simd::{BLOCK, Buffer};
-use crate::step::limits::in_rounds;
 use std::ops::Range;
 
 /// Sides of a voxel in the order in which they are visited: top, right, bottom, left. Each runs
@@ -297,4 +296,41 @@ fn surface_voxels(body: &Body, voxels: &[((usize, usize), [usize; 4])]) -> Vec<S
         exposed.contains(&true).then_some(SurfaceVoxel { row, column, corners, exposed })
     };
     voxels.iter().filter_map(voxel).collect()
+}
+
+/// Brings links of the rigid pass that have nothing to do with each other together, so that the
+/// processor can work on several at once. Links that share a point stay in their order: results are
+/// the same bits.
+fn in_rounds(links: &[[usize; 2]], points: usize) -> Vec<[usize; 2]> {
+    let mut taken = vec![0; points];
+    let mut round = |&[a, b]: &[usize; 2]| {
+        // After every earlier link at either end.
+        let round = 1 + taken[a].max(taken[b]);
+        (taken[a], taken[b]) = (round, round);
+        (round, [a, b])
+    };
+    let mut rounds: Vec<_> = links.iter().map(&mut round).collect();
+    rounds.sort_by_key(|(round, _)| *round);
+    rounds.into_iter().map(|(_, link)| link).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rounds_hold_every_link_and_keep_the_order_of_those_that_share_a_point() {
+        // The sides of 3 × 3 rigid voxels, of which neighbours share one.
+        let corners = |voxel: usize| [0, 1, 5, 4].map(|corner| voxel / 3 * 4 + voxel % 3 + corner);
+        let sides = |voxel: usize| SIDES.map(|(a, b)| [corners(voxel)[a], corners(voxel)[b]]);
+        let links: Vec<[usize; 2]> = (0..9).flat_map(sides).collect();
+        let rounds = in_rounds(&links, 16);
+        assert_ne!(rounds, links);
+        for point in 0..16 {
+            let at = |links: &[[usize; 2]]| {
+                links.iter().filter(|link| link.contains(&point)).copied().collect::<Vec<_>>()
+            };
+            assert_eq!(at(&rounds), at(&links));
+        }
+    }
 }

@@ -85,6 +85,7 @@ mod state;
 mod step;
 pub mod stop;
 mod system;
+mod unstable;
 mod world;
 mod worlds;
 
@@ -96,5 +97,6 @@ pub use simd::{FloatEnvironment, InstructionSet};
 pub use state::State;
 pub use step::actuation::width;
 pub use system::System;
-pub use world::{Start, StateMismatch, Unstable, UnstableReason, World};
+pub use unstable::{StepError, Unstable, UnstableReason};
+pub use world::{Start, StateMismatch, World};
 pub use worlds::Worlds;

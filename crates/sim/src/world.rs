@@ -8,6 +8,7 @@ use crate::state::{State, X, Y};
 use crate::step::{ControlStep, Ended, actuation};
 use crate::stop::{NEVER, Stopped};
 use crate::system::System;
+use crate::unstable::{StepError, Unstable, UnstableReason};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
@@ -19,30 +20,6 @@ pub struct Start {
     pub column: i64,
     /// Row \[voxels\]; `Physics::ground_row` (2) stands on the ground.
     pub row: u32,
-}
-
-/// How a simulation became unstable.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub enum UnstableReason {
-    /// Too many distant surface voxels overlap (EvoGym's criterion).
-    Overlaps,
-    /// A voxel has blown up, or a coordinate is no number any more.
-    BlownUp,
-}
-
-/// A simulation became unstable: it ended there, and has no displacement.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[error("unstable in control step {control_step}: {}", match reason {
-    UnstableReason::Overlaps => "too many surface voxels overlap",
-    UnstableReason::BlownUp => "a voxel has blown up",
-})]
-pub struct Unstable {
-    /// The control step in which it happened, from 0.
-    pub control_step: u64,
-    /// What happened.
-    pub reason: UnstableReason,
 }
 
 /// A state of a simulation that is not of this system.
@@ -126,24 +103,23 @@ impl World {
     /// # Errors
     /// [`Unstable`] if the simulation ends in it; the state is then of no use.
     pub fn step(&mut self) -> Result<(), Unstable> {
-        self.step_unless(&NEVER).expect("NEVER is never set")
+        StepError::outcome(self.step_unless(&NEVER)).expect("NEVER is never set")
     }
 
     /// One control step, which ends within a substep or two when `stop` is set.
     ///
     /// # Errors
-    /// [`Stopped`] then; within, [`Unstable`] if the simulation ends in it. The state is of no use
-    /// in either case.
-    pub fn step_unless(&mut self, stop: &AtomicBool) -> Result<Result<(), Unstable>, Stopped> {
+    /// [`StepError`] if it was stopped, or the simulation became unstable.
+    pub fn step_unless(&mut self, stop: &AtomicBool) -> Result<(), StepError> {
         self.begin_step();
         let World { system, start, state, scratch, meter, .. } = self;
         let control_step = state.control_step;
         let (system, meter, start_column) = (&**system, meter.as_mut(), start.column);
         let steps = ControlStep { system, start_column, state, scratch, meter, stop };
         match dispatch(self.instructions, steps) {
-            Ok(()) => Ok(self.end_step()),
-            Err(Ended::Stopped) => Err(Stopped),
-            Err(Ended::Unstable(reason)) => Ok(Err(Unstable { control_step, reason })),
+            Ok(()) => Ok(self.end_step()?),
+            Err(Ended::Stopped) => Err(Stopped.into()),
+            Err(Ended::Unstable(reason)) => Err(Unstable { control_step, reason }.into()),
         }
     }
 

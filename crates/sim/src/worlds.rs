@@ -6,13 +6,14 @@ use crate::step::limits::{SharedRigidPass, limit_rigid};
 use crate::step::{Ended, before_rigid};
 use crate::stop::{NEVER, Stopped, check};
 use crate::system::System;
-use crate::world::{Start, Unstable, UnstableReason, World};
+use crate::unstable::{Unstable, UnstableReason};
+use crate::world::{Start, World};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 /// Simulations of one system from the same start, each under a stimulus of its own, that step side
 /// by side. The bits are those of each by itself. Bodies with many rigid voxels are faster so: the
-/// rigid pass (physics.md, "One substep", 5) is serial within a simulation, and is done for all of
+/// rigid pass (physics.md, "One substep", 4b) is serial within a simulation, and is done for all of
 /// them at once.
 #[derive(Clone, Debug)]
 pub struct Worlds {

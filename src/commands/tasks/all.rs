@@ -56,7 +56,7 @@ pub fn check_data<'a>(tasks: impl Iterator<Item = (usize, &'a Task)>, place: &Pl
             Entry::Occupied(loaded) => loaded.into_mut(),
             Entry::Vacant(place_of) => place_of.insert(whereabouts.load(&config.data, splits)?),
         };
-        let named = |error: Error| error.within(&format!("task {number} ({})", task.name));
+        let named = |error: Error| error.in_place(&format!("task {number} ({})", task.name));
         if let Some(groups) = task.run.groups() {
             train::check_groups(groups, dataset).map_err(named)?;
         }
@@ -88,7 +88,7 @@ pub(crate) fn check_test(
     key: &str,
 ) -> Result<(), Error> {
     let drawn = held_out::test_images(&config.classes(), dataset, images, 1);
-    drawn.map(|_| ()).map_err(|error| error.within(&format!("{key} = {images}")))
+    drawn.map(|_| ()).map_err(|error| error.in_place(&format!("{key} = {images}")))
 }
 
 /// Does all tasks here, `jobs` at once; `None`: one per core. One that fails does not stop others.
@@ -157,8 +157,7 @@ pub fn run_all(
                     elsewhere.lock().unwrap_or_else(PoisonError::into_inner).push(*task);
                 }
                 Err(error) => {
-                    let hint = error.hint.as_ref().map_or(String::new(), |hint| format!("; {hint}"));
-                    observer.warning(&format!("task {number} ({}) failed: {error}{hint}", task.name));
+                    observer.failed(&error.in_place(&format!("task {number} ({}) failed", task.name)), "");
                     summary.failed.push(*number);
                 }
             }

@@ -3,6 +3,7 @@
 use crate::base::error::{Error, ErrorKind};
 use crate::base::observer::Observer;
 use crate::base::ranks::Ranks;
+use crate::base::remedy::Remedy;
 use crate::commands::tasks::task::{Place, Run, Task, selection};
 use crate::commands::{audit, eval};
 use crate::search::{evolve, showing, train, validation};
@@ -43,7 +44,7 @@ pub fn run(task: &Task, place: &Place, stop: &AtomicBool, observer: &dyn Observe
     (file.state, file.error) = match &ended {
         Ok(()) => (State::Done, None),
         Err(error) if error.kind == ErrorKind::Stopped => (State::Stopped, None),
-        Err(error) => (State::Failed, Some(error.message.clone())),
+        Err(error) => (State::Failed, Some(error.to_string())),
     };
     // Why it ended says more than that this could not be written down.
     let written = file.write(&path);
@@ -108,7 +109,8 @@ pub(crate) fn test_of(task: &Task, place: &Place) -> Result<Option<eval::Options
 /// The run, and the steps after it. What was done before is not done again.
 fn steps(task: &Task, place: &Place, stop: &AtomicBool, observer: &dyn Observer) -> Result<(), Error> {
     let folder = place.folder(task);
-    let stopped = || Error::stopped("stopped; what is done so far is kept".to_string());
+    let stopped =
+        || Error::stopped("stopped; what is done so far is kept".to_string()).remedy(Remedy::Repeat);
     match &task.run {
         Run::Evolve(config, name, _) => {
             let options = evolve::Options {
@@ -120,7 +122,7 @@ fn steps(task: &Task, place: &Place, stop: &AtomicBool, observer: &dyn Observer)
                 threads: place.threads,
                 ranks: Ranks::ALONE,
             };
-            let finished = evolve::evolve(&options, stop, observer).map_err(elsewhere)?;
+            let finished = evolve::evolve(&options, stop, observer).map_err(of_task)?;
             if written(finished.stopped, finished.unwritten)? {
                 return Err(stopped());
             }
@@ -140,7 +142,7 @@ fn steps(task: &Task, place: &Place, stop: &AtomicBool, observer: &dyn Observer)
             };
             let trained = train::train(&options, stop, observer).map_err(|error| match error.kind {
                 ErrorKind::Stopped => stopped(),
-                _ => elsewhere(error),
+                _ => of_task(error),
             })?;
             if trained.validated.is_none() {
                 return Err(stopped());
@@ -190,31 +192,27 @@ fn steps(task: &Task, place: &Place, stop: &AtomicBool, observer: &dyn Observer)
     Ok(())
 }
 
-/// Tasks have no options of their own, as hints of `evolve` and `train` name them; and a run of
-/// another kind in the folder is no process that works there.
-fn elsewhere(error: Error) -> Error {
-    match (error.kind, &error.hint) {
-        (ErrorKind::Occupied | ErrorKind::Input | ErrorKind::Usage, Some(hint))
-            if hint.contains("--force") || hint.contains("--resume") =>
-        {
-            let hint = "move that folder away, or name another with --out".to_string();
-            Error { kind: ErrorKind::Input, ..error }.hint(hint)
-        }
-        (ErrorKind::Other, Some(hint)) => {
-            let hint = hint.replace("with --resume the same command", "the same command");
-            error.hint(hint)
-        }
-        _ => error,
+/// What a task can do about an error of its run: it always resumes, so that a run that cannot be resumed
+/// is another one, which is in the way.
+fn of_task(error: Error) -> Error {
+    let is_in_the_way = error.remedies.iter().any(|remedy| match remedy {
+        Remedy::Resume | Remedy::Replace => true,
+        // A run of another kind, which another command goes on with.
+        Remedy::Run(..) => error.kind == ErrorKind::Occupied,
+        _ => false,
+    });
+    if is_in_the_way {
+        let error = Error { kind: ErrorKind::Input, remedies: Vec::new(), ..error };
+        return error.remedy(Remedy::MoveAway).remedy(Remedy::ChooseOut);
     }
+    let by_itself = |remedy| if remedy == Remedy::RepeatResuming { Remedy::Repeat } else { remedy };
+    Error { remedies: error.remedies.into_iter().map(by_itself).collect(), ..error }
 }
 
 /// What later steps read from its file, which must be there.
 pub(crate) fn written<T>(found: T, unwritten: Option<Error>) -> Result<T, Error> {
     match unwritten {
         None => Ok(found),
-        Some(error) => {
-            let hint = error.hint.clone().map_or(String::new(), |hint| format!("{hint}; "));
-            Err(error.hint(format!("{hint}the same command goes on")))
-        }
+        Some(error) => Err(error.remedy(Remedy::Repeat)),
     }
 }

@@ -2,6 +2,7 @@
 
 use crate::base::error::Error;
 use crate::base::named;
+use crate::base::remedy::Remedy;
 use crate::config::audit::Criteria;
 use crate::config::{Config, Settings, differing};
 use crate::store::images::{HeldOut, HowMany};
@@ -136,7 +137,7 @@ impl Steps {
     pub(crate) fn check(&self, trains: bool) -> Result<(), Error> {
         if let Some(step) = &self.audit {
             selection("audit.robots", &step.robots)?;
-            step.criteria.check().map_err(|error| error.of("audit.criteria"))?;
+            step.criteria.check().map_err(|error| error.with_key("audit.criteria"))?;
         }
         let Some(step) = &self.eval else { return Ok(()) };
         let tested = selection("eval.robots", &step.robots)?;
@@ -160,7 +161,7 @@ impl Steps {
 
 /// Reads a selection of robots.
 pub(crate) fn selection(key: &str, text: &str) -> Result<Selection, Error> {
-    text.parse().map_err(|error: String| Error::at(key, error))
+    text.parse().map_err(|error: String| Error::at_key(key, error))
 }
 
 /// Where tasks are done, and with what.
@@ -269,7 +270,7 @@ pub fn check_folders(tasks: &[Task], place: &Place) -> Result<(), Vec<Error>> {
             Ok(Some(keys)) => another(&place.folder(task), &keys),
             Err(error) => error,
         };
-        Some(error.within(&format!("task {number} ({})", task.name)))
+        Some(error.in_place(&format!("task {number} ({})", task.name)))
     };
     let refused: Vec<Error> = (1..).zip(tasks).filter_map(check).collect();
     if refused.is_empty() { Ok(()) } else { Err(refused) }
@@ -281,5 +282,5 @@ pub(crate) fn another(folder: &Path, keys: &[(String, String, String)]) -> Error
         |(key, there, now): &(String, String, String)| format!("{key} = {there} there, {now} in the plan");
     let keys: Vec<String> = keys.iter().map(said).collect();
     let text = format!("{}: the run there differs: {}", folder.display(), keys.join("; "));
-    Error::input(text).hint("move that folder away, or name another with --out".to_string())
+    Error::input(text).remedy(Remedy::MoveAway).remedy(Remedy::ChooseOut)
 }

@@ -53,7 +53,7 @@ pub(crate) fn config_of(
         return Err(Error::value("body", found, &format!("{height} × {width}, as the gaits have")));
     }
     if config.task != asked.task {
-        return Err(Error::at(
+        return Err(Error::at_key(
             "task",
             "expected the groups that are trained to be said once, not as a key, too",
         ));
@@ -90,7 +90,7 @@ fn fixed(config: &Config, asked: &Config) -> Result<(), Error> {
         ("protocol.rollout", config.protocol.rollout != asked.protocol.rollout, "has fresh rollouts"),
     ];
     match fixed.into_iter().find(|(_, is_set, _)| *is_set) {
-        Some((key, _, has)) => Err(Error::at(key, format!("expected without: a training {has}"))),
+        Some((key, _, has)) => Err(Error::at_key(key, format!("expected without: a training {has}"))),
         None => Ok(()),
     }
 }

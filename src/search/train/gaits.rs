@@ -3,6 +3,7 @@
 use crate::base::error::Error;
 use crate::base::hash::sha256_hex;
 use crate::base::observer::Observer;
+use crate::base::remedy::Remedy;
 use crate::config::Config;
 use crate::config::train::TrainConfig;
 use crate::data::dataset::{Dataset, Split};
@@ -73,7 +74,7 @@ pub(super) fn walkers<'a>(
             "{}: none of the chosen robots has a soft voxel or a sensor: there is nothing to train",
             source.path.display()
         );
-        return Err(Error::input(text).hint("choose others with --robots".to_string()));
+        return Err(Error::input(text).remedy(Remedy::ChooseRobots(None)));
     }
     Ok(walkers)
 }

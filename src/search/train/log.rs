@@ -4,6 +4,7 @@ use crate::base::Grid;
 use crate::base::error::Error;
 use crate::base::files::write_atomically;
 use crate::base::observer::{Observer, Work};
+use crate::base::remedy::Remedy;
 use crate::body::Body;
 use crate::config::Config;
 use crate::store::results;
@@ -52,15 +53,13 @@ impl<'a> Log<'a> {
         let mut batches = Vec::new();
         if path.exists() {
             let name = path.display().to_string();
-            let anew = || "train anew with --force".to_string();
-            let file: File = results::read(&path, "").map_err(|error| error.hint(anew()))?;
+            let file: File = results::read(&path, None).map_err(|error| error.remedy(Remedy::Replace))?;
             if file.key != key {
                 let text = format!(
                     "{name}: expected the training that began here: other robots, images or settings"
                 );
-                return Err(Error::usage(text).hint(
-                    "go on with those, write elsewhere with --out, or train anew with --force".to_string(),
-                ));
+                let error = Error::usage(text).advice("go on with those");
+                return Err(error.remedy(Remedy::ChooseOut).remedy(Remedy::Replace));
             }
             if file.checksum.is_none() {
                 observer.warning(&format!("{name}: it has no checksum, so damage to it would go unnoticed"));
@@ -137,7 +136,7 @@ impl<'a> Log<'a> {
             Some(batch) => {
                 let (path, wanted, found) = (self.path.display(), stimuli.len(), batch.len());
                 let text = format!("{path}: rollouts {number}: expected {wanted}, found {found}");
-                return Err(Error::input(text).hint("train anew with --force".to_string()));
+                return Err(Error::input(text).remedy(Remedy::Replace));
             }
             None => None,
         };
@@ -180,8 +179,7 @@ fn count(batches: &[Batch]) -> usize {
 }
 
 pub(super) fn stopped() -> Error {
-    Error::stopped("stopped; what was simulated is saved".to_string())
-        .hint("the same command with --resume goes on".to_string())
+    Error::stopped("stopped; what was simulated is saved".to_string()).remedy(Remedy::RepeatResuming)
 }
 
 /// Rollouts that are kept.

@@ -15,6 +15,7 @@ pub(crate) use config::{check_groups, config_of, sized, with_images};
 use crate::base::error::Error;
 use crate::base::files::write_atomically;
 use crate::base::observer::Observer;
+use crate::base::remedy::Remedy;
 use crate::base::text::counted;
 use crate::base::threads::pool;
 use crate::config::Config;
@@ -27,7 +28,7 @@ use crate::store::folder::{IfExists, RunFolder};
 use crate::store::images::ImageRef;
 use crate::store::metrics::{Metrics, Totals};
 use crate::store::names::{ELITES, RUN_JSON, TRAINING_JSON};
-use crate::store::robots::{Selection, Source};
+use crate::store::robots::{Selection, Source, VALIDATED};
 use crate::store::run::{Dimensions, FORMAT, FORMAT_VERSION, Robot, RunFile};
 use crate::store::training::Origin;
 use crate::store::validation::Validated;
@@ -87,8 +88,9 @@ pub struct Finished {
 /// [`IfExists::Resume`] goes on). Nothing that was there is lost.
 pub fn train(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Result<Finished, Error> {
     if options.robots.validated().is_some() {
-        let text = "--robots best-validation: expected another selection: gaits have no task to validate";
-        return Err(Error::usage(text.to_string()).hint("the fittest four are --robots top:4".to_string()));
+        let text = "expected another selection: gaits have no task to validate";
+        let error = Error::argument("robots", VALIDATED, text);
+        return Err(error.remedy(Remedy::ChooseRobots(Some("top:4"))));
     }
     let source = Source::read(&options.archive)?;
     let whereabouts = Whereabouts::given(options.data.as_deref())
@@ -116,9 +118,7 @@ pub fn train(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> R
     let [log, run] = [TRAINING_JSON, RUN_JSON].map(|name| options.out.join(name));
     if options.if_exists == IfExists::Resume && run.exists() && !log.exists() {
         let text = format!("{}: the run in this folder is no training", options.out.display());
-        return Err(
-            Error::occupied(text).hint("write elsewhere with --out, or replace it by --force".to_string())
-        );
+        return Err(Error::occupied(text).remedy(Remedy::ChooseOut).remedy(Remedy::Replace));
     }
     apart(&options.out, &source.path)?;
     let folder = RunFolder::open(&options.out, options.if_exists, stop, observer)?;
@@ -167,8 +167,8 @@ fn apart(out: &Path, archive: &Path) -> Result<(), Error> {
     let [out_now, of_gaits] =
         [Some(out), of_gaits.as_deref()].map(|folder| folder.and_then(|folder| folder.canonicalize().ok()));
     if out_now.is_some() && out_now == of_gaits {
-        let text = format!("--out {}: expected another folder: the gaits are in this one", out.display());
-        return Err(Error::usage(text));
+        let text = "expected another folder: the gaits are in this one";
+        return Err(Error::argument("out", out.display(), text));
     }
     Ok(())
 }

@@ -3,6 +3,7 @@
 use crate::base::error::Error;
 use crate::base::number;
 use crate::base::observer::{Observer, Work};
+use crate::base::remedy::Remedy;
 use crate::base::text::counted;
 use crate::config::Config;
 use crate::config::train::TrainConfig;
@@ -70,7 +71,7 @@ impl Trainer<'_> {
         let windows = Windows::of(config, self.dataset, &training.images, self.groups())?;
         let told = |tried: usize| observer.progress(tried as u64);
         let found = windows.best(&walker.gait, response, log.stop, &told).map_err(|_| stopped())?;
-        told_window(observer, robot, &found, count);
+        report_window(observer, robot, &found, count);
         with.stimulus.margin = found.margins;
         Ok(with)
     }
@@ -120,7 +121,7 @@ impl Trainer<'_> {
             let (gait, robot) = (&walker.gait, &walker.robot.id);
             log.begins(format!("{robot}: response:"), self.config.train.random_images);
             let Some(response) = self.response(gait, measured, log)? else { continue };
-            told_response(observer, &walker.robot.id, gait, &response);
+            report_response(observer, &walker.robot.id, gait, &response);
             let seeing = match plan.rounds {
                 // It keeps its own sensors, which are for the images as it sees them.
                 0 => Config { train: TrainConfig { windows: 0, ..config.train }, ..(*config).clone() },
@@ -133,24 +134,24 @@ impl Trainer<'_> {
             let mut rollouts = Kept { config, conditions, log };
             if plan.rounds == 0 {
                 let fitness = teacher.own(&mut rollouts)?;
-                told_own(observer, &walker.robot.id, fitness);
+                report_own(observer, &walker.robot.id, fitness);
                 best = Some((walker, seeing, teacher));
                 break;
             }
-            told_round(observer, &walker.robot.id, &teacher.round(&mut rollouts)?, &plan);
+            report_round(observer, &walker.robot.id, &teacher.round(&mut rollouts)?, &plan);
             if best.as_ref().is_none_or(|(_, _, best)| teacher.predicted() > best.predicted()) {
                 best = Some((walker, seeing, teacher));
             }
         }
         let Some((walker, seeing, mut teacher)) = best else {
             let text = "none of the chosen robots is stable with random images: there is nothing to train";
-            return Err(Error::input(text.to_string()).hint("choose others with --robots".to_string()));
+            return Err(Error::input(text.to_string()).remedy(Remedy::ChooseRobots(None)));
         };
         let mut rollouts = Kept { config, conditions: probing.conditions(), log };
         for number in 2..=plan.rounds {
             rollouts.log.begins_round(&walker.robot.id, number, &plan);
             let round = teacher.round(&mut rollouts)?;
-            told_round(observer, &walker.robot.id, &round, &plan);
+            report_round(observer, &walker.robot.id, &round, &plan);
         }
         let challengers = teacher.challengers();
         rollouts.log.begins_challenges(challengers);
@@ -161,13 +162,13 @@ impl Trainer<'_> {
             if !has_simulated.swap(false, Ordering::Relaxed) {
                 observer.skips(1);
             }
-            told_challenge(observer, challenge, challengers);
+            report_challenge(observer, challenge, challengers);
         };
         Ok((walker, seeing, teacher.finish(&mut rollouts, told)?))
     }
 }
 
-fn told_response(observer: &dyn Observer, robot: &str, gait: &Gait, response: &Response) {
+fn report_response(observer: &dyn Observer, robot: &str, gait: &Gait, response: &Response) {
     let places = counted(gait.places().len(), "soft voxel or sensor", "soft voxels and sensors");
     let share = number::explained(response.r_squared);
     let noise = number::fixed(response.noise, 1);
@@ -176,7 +177,7 @@ fn told_response(observer: &dyn Observer, robot: &str, gait: &Gait, response: &R
     ));
 }
 
-fn told_window(observer: &dyn Observer, robot: &str, found: &Found, tried: usize) {
+fn report_window(observer: &dyn Observer, robot: &str, found: &Found, tried: usize) {
     let Found { margins, predicted, predicted_before } = found;
     let [after, before] = [predicted, predicted_before].map(|fitness| number::fixed(*fitness, 2));
     observer.note(&format!(
@@ -191,12 +192,12 @@ fn told_window(observer: &dyn Observer, robot: &str, found: &Found, tried: usize
     );
 }
 
-fn told_own(observer: &dyn Observer, robot: &str, fitness: f64) {
+fn report_own(observer: &dyn Observer, robot: &str, fitness: f64) {
     observer.note(&format!("{robot}: fitness {} as it is", number::fixed(fitness, 2)));
     observer.finding("own", &serde_json::json!({ "robot": robot, "fitness": fitness }));
 }
 
-fn told_round(observer: &dyn Observer, robot: &str, round: &Round, plan: &Plan) {
+fn report_round(observer: &dyn Observer, robot: &str, round: &Round, plan: &Plan) {
     let Round { round, predicted, measured, off, changed, rollouts } = round;
     let [p, m] = [predicted, measured].map(|fitness| number::fixed(*fitness, 2));
     observer.note(&format!("{robot}: round {round} of {}: fitness {m}, predicted {p}", plan.rounds));
@@ -210,7 +211,7 @@ fn told_round(observer: &dyn Observer, robot: &str, round: &Round, plan: &Plan) 
     );
 }
 
-fn told_challenge(observer: &dyn Observer, challenge: &Challenge, challengers: usize) {
+fn report_challenge(observer: &dyn Observer, challenge: &Challenge, challengers: usize) {
     let Challenge { number, other_gait, shown, fitness, won } = challenge;
     let what = if *other_gait { "another gait" } else { "other sensors" };
     if *won {

@@ -1,7 +1,7 @@
 //! Robots as buttons: a click plays them.
 
 use crate::base::number;
-use crate::base::shell::{in_shell, quoted};
+use crate::base::remedy::Invocation;
 use crate::body::{Body, Material};
 use crate::commands::report::Dossier;
 use crate::store::run::Robot;
@@ -9,6 +9,7 @@ use crate::view::colour::{MARK_WIDTH, mark, mark_colour, placed};
 use crate::view::html::escape;
 use crate::view::plot::canvas::Piece;
 use crate::view::plot::robot;
+use crate::view::report::Spell;
 use crate::view::report::maps::Rollouts;
 use std::collections::BTreeSet;
 use std::fmt::Write;
@@ -20,7 +21,7 @@ const SHOWN: usize = 5;
 /// who cannot see it, and whether it is played at first.
 pub(super) fn button(
     run: usize,
-    dossier: &Dossier,
+    (dossier, spell): (&Dossier, Spell),
     rollouts: &Rollouts,
     robot: &Robot,
     (style, name, first): (&str, &str, bool),
@@ -28,8 +29,8 @@ pub(super) fn button(
 ) -> String {
     let about = about(dossier, robot);
     let rollout = rollouts.id(run, &robot.id).unwrap_or_default();
-    let command =
-        format!("morphcog replay --robot {} --archive {}", quoted(&robot.id), in_shell(&dossier.path));
+    let replay = Invocation::new("replay").option("robot", robot.id.as_str());
+    let command = spell(&replay.option("archive", dossier.path.as_path()));
     format!(
         "<button type=\"button\" style=\"{style}\" data-robot=\"{}\" data-rollout=\"{}\" data-about=\"{}\" \
          data-command=\"{}\" \
@@ -65,7 +66,7 @@ fn about(dossier: &Dossier, robot: &Robot) -> String {
 }
 
 /// The fittest robots, and the most different ones.
-pub(super) fn bodies(run: usize, dossier: &Dossier, rollouts: &Rollouts) -> String {
+pub(super) fn bodies(run: usize, dossier: &Dossier, rollouts: &Rollouts, spell: Spell) -> String {
     let mut fittest: Vec<&Robot> = dossier.run.elites.iter().collect();
     fittest.sort_by(|a, b| b.objective.total_cmp(&a.objective));
     let mut seen = BTreeSet::new();
@@ -87,7 +88,7 @@ pub(super) fn bodies(run: usize, dossier: &Dossier, rollouts: &Rollouts) -> Stri
                 escape(&robot.task),
                 walks.join(" ")
             );
-            button(run, dossier, rollouts, robot, ("", "", is_first), &content)
+            button(run, (dossier, spell), rollouts, robot, ("", "", is_first), &content)
         })
         .collect();
     format!("<div class=\"bodies\">{buttons}</div>\n")

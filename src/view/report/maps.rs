@@ -7,6 +7,7 @@ use crate::store::run::Robot;
 use crate::view::error::PictureError;
 use crate::view::html::{escape, packed};
 use crate::view::plot::{below, sequential};
+use crate::view::report::Spell;
 use crate::view::report::bodies::{bodies, button};
 use crate::view::walk::Walk;
 use rayon::prelude::*;
@@ -85,7 +86,7 @@ fn range(bin: usize, area: usize) -> String {
 }
 
 /// The map with its player.
-pub(super) fn archive(number: usize, dossier: &Dossier, rollouts: &Rollouts) -> String {
+pub(super) fn archive(number: usize, dossier: &Dossier, rollouts: &Rollouts, spell: Spell) -> String {
     let run = &dossier.run;
     let tasks = &run.dimensions.tasks;
     let area = run.config.body.height * run.config.body.width;
@@ -147,7 +148,7 @@ pub(super) fn archive(number: usize, dossier: &Dossier, rollouts: &Rollouts) -> 
                         Some(robot) => {
                             let style = format!("background:{}", colour(robot.objective));
                             let first = best.as_ref() == Some(&robot.id);
-                            button(number, dossier, rollouts, robot, (&style, &name, first), "")
+                            button(number, (dossier, spell), rollouts, robot, (&style, &name, first), "")
                         }
                         None if possible.contains(&cell) => {
                             format!("<span class=\"empty\" role=\"img\" aria-label=\"{name}: empty\"></span>")
@@ -167,6 +168,6 @@ pub(super) fn archive(number: usize, dossier: &Dossier, rollouts: &Rollouts) -> 
 }
 
 /// The robots of a training with their player.
-pub(super) fn robots(number: usize, dossier: &Dossier, rollouts: &Rollouts) -> String {
-    format!("<div class=\"archive\">\n{}{PLAYER}</div>\n", bodies(number, dossier, rollouts))
+pub(super) fn robots(number: usize, dossier: &Dossier, rollouts: &Rollouts, spell: Spell) -> String {
+    format!("<div class=\"archive\">\n{}{PLAYER}</div>\n", bodies(number, dossier, rollouts, spell))
 }

@@ -2,11 +2,13 @@
 //! be played, and what tests found of them. No network, works from `file://`.
 
 mod bodies;
+pub(crate) mod decisions;
 mod maps;
 pub(crate) mod tables;
 mod team;
 mod words;
 
+use crate::base::remedy::Invocation;
 use crate::commands::report::{Dossier, Findings, Gathered};
 use crate::view::error::PictureError;
 use crate::view::html::{escape, fill};
@@ -18,13 +20,18 @@ use std::sync::atomic::{AtomicU64, Ordering};
 const SCRIPT: &str =
     concat!(include_str!("../drawing.js"), include_str!("../stages.js"), include_str!("report.js"));
 
+/// Spells a command as its users type it.
+pub type Spell<'a> = &'a dyn Fn(&Invocation) -> String;
+
 /// What goes into a page.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 pub struct Content<'a> {
     /// What is known.
     pub gathered: &'a Gathered,
     /// Most robots of each run that can be played; the fittest of them.
     pub rollouts: usize,
+    /// Spells the commands that make it all again.
+    pub spell: Spell<'a>,
 }
 
 impl Content<'_> {
@@ -52,7 +59,7 @@ impl Content<'_> {
             content += &overview(runs, together);
         }
         for (number, dossier) in runs.iter().enumerate() {
-            content += &run(number, dossier, &rollouts, runs.len() > 1);
+            content += &run(number, dossier, &rollouts, runs.len() > 1, self.spell);
         }
         content += &rollouts.elements();
         let style =
@@ -91,7 +98,13 @@ fn overview(runs: &[Dossier], together: &Findings) -> String {
 }
 
 /// A run.
-fn run(number: usize, dossier: &Dossier, rollouts: &Rollouts, is_one_of_several: bool) -> String {
+fn run(
+    number: usize,
+    dossier: &Dossier,
+    rollouts: &Rollouts,
+    is_one_of_several: bool,
+    spell: Spell,
+) -> String {
     let name = if is_one_of_several { format!("{}: ", words::name(dossier)) } else { String::new() };
     let heading = |what: &str| format!("<h2>{}{what}</h2>\n", escape(&name));
     let mut out = format!("<section id=\"run{number}\" data-run=\"{number}\">\n{}", heading("What was run"));
@@ -99,14 +112,14 @@ fn run(number: usize, dossier: &Dossier, rollouts: &Rollouts, is_one_of_several:
     if dossier.run.origin.is_some() {
         // It has one robot, and no archive that came along.
         out += &heading("The robot");
-        out += &maps::robots(number, dossier, rollouts);
+        out += &maps::robots(number, dossier, rollouts, spell);
     } else {
         out += &heading("Archive");
-        out += &maps::archive(number, dossier, rollouts);
+        out += &maps::archive(number, dossier, rollouts, spell);
         out += &heading("The fittest, and the most different");
         out += "<p>The fittest robots, then those whose bodies differ most from each other. Press one to watch \
          it above.</p>\n";
-        out += &bodies::bodies(number, dossier, rollouts);
+        out += &bodies::bodies(number, dossier, rollouts, spell);
         let mut figures = String::new();
         if let Some(progress) = &dossier.progress {
             figures += &figure(&plot::progress(std::slice::from_ref(progress)), "column");
@@ -119,7 +132,7 @@ fn run(number: usize, dossier: &Dossier, rollouts: &Rollouts, is_one_of_several:
     out += &heading("Methods");
     out += &words::methods(dossier);
     out += &heading("Commands");
-    out += &words::commands(dossier);
+    out += &words::commands(dossier, spell);
     out + "</section>\n"
 }
 

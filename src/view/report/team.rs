@@ -11,9 +11,10 @@ use crate::task::recording::{Frame, Recording, VoxelCorners};
 use crate::task::voting::Tally;
 use crate::view::error::PictureError;
 use crate::view::html::{corners, escape, materials, pack};
+use crate::view::plot;
 use crate::view::plot::{COLUMN, Figure};
+use crate::view::report::decisions;
 use crate::view::report::{figure, tables};
-use crate::view::{plot, teams};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD as BASE64;
 use rayon::prelude::*;
@@ -47,11 +48,11 @@ pub(super) fn section(
          gives none.</p>\n",
         file.threshold
     );
-    if let Some((headers, rows)) = teams::table(file) {
+    if let Some((headers, rows)) = decisions::table(file) {
         let headers: Vec<&str> = headers.iter().map(String::as_str).collect();
         out += &tables::table(&headers, rows);
     }
-    for line in teams::remarks(file) {
+    for line in decisions::remarks(file) {
         out += &format!("<p>{}.</p>\n", escape(&line));
     }
     if count(team) > 0 {

@@ -4,7 +4,8 @@ use crate::base::files::exists;
 use crate::base::hash::short;
 use crate::base::number;
 use crate::base::number::percent;
-use crate::base::shell::{in_shell, quoted};
+use crate::base::remedy::{Invocation, Value};
+use crate::base::shell::in_shell;
 use crate::commands::report::Dossier;
 use crate::config::capacity::CapacityConfig;
 use crate::config::train::TrainConfig;
@@ -24,8 +25,9 @@ use crate::task::perturbation::ByTurns;
 use crate::task::protocol::RolloutMode;
 use crate::task::stimulus::Encoding;
 use crate::view::html::escape;
+use crate::view::report::Spell;
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// A run in short, with its folder if another one is called the same.
 pub(super) fn name(dossier: &Dossier) -> String {
@@ -196,45 +198,41 @@ pub(super) fn methods(dossier: &Dossier) -> String {
 
 /// The commands that make a run and its tests again; audits with other criteria, and networks
 /// trained with other hyperparameters, need these besides.
-pub(super) fn commands(dossier: &Dossier) -> String {
+pub(super) fn commands(dossier: &Dossier, spell: Spell) -> String {
     let number = dossier.namesake.map_or(String::new(), |before| format!("-{}", before + 1));
-    let again = format!("again/{}-seed{}{number}", dossier.run.name, dossier.run.config.seed);
-    let [again, eval] =
-        [again.clone(), format!("{again}/{EVAL_JSON}")].map(|path| in_shell(Path::new(&path)));
-    let mut lines = made_by(dossier, &again);
+    let again = PathBuf::from(format!("again/{}-seed{}{number}", dossier.run.name, dossier.run.config.seed));
+    let of_run = |command: &'static str| Invocation::new(command).option("archive", again.as_path());
+    let mut lines = made_by(dossier, &again, spell);
     let found = &dossier.findings;
     if let Some(audit) = &found.audit {
         let ids: Vec<&str> = audit.robots.iter().map(|robot| robot.id.as_str()).collect();
-        let some = if ids.len() < audit.elites {
-            format!(" --robots {}", quoted(ids.join(",")))
-        } else {
-            String::new()
-        };
-        lines.push(format!("morphcog audit --archive {again}{some}"));
+        let all = of_run("audit");
+        let audit = if ids.len() < audit.elites { all.option("robots", ids.join(",")) } else { all };
+        lines.push(spell(&audit));
     }
     if let Some(report) = &found.eval {
         let ids: Vec<&str> = report.robots.iter().map(|robot| robot.id.as_str()).collect();
-        let (images, seed) = (how_many(&report.images), report.seed);
-        let mut line = format!(
-            "morphcog eval --archive {again} --images {images} --seed {seed} --robots {}",
-            quoted(ids.join(","))
-        );
+        let mut eval = of_run("eval")
+            .option("images", how_many(&report.images).to_string())
+            .option("seed", report.seed.to_string())
+            .option("robots", ids.join(","));
         if report.trained_on.is_some() {
-            line += &format!(" --dataset {}", quoted(&report.dataset));
+            eval = eval.option("dataset", report.dataset.as_str());
         }
         if report.threshold != direction::THRESHOLD {
-            line += &format!(" --threshold {}", report.threshold);
+            eval = eval.option("threshold", report.threshold.to_string());
         }
         let cycles = report.control_steps / dossier.run.config.physics.cycle_steps.max(1);
         if cycles != showing::CYCLES {
-            line += &format!(" --cycles {cycles}");
+            eval = eval.option("cycles", cycles.to_string());
         }
-        lines.push(line);
+        lines.push(spell(&eval));
     }
     if let Some(file) = &found.capacity {
-        lines.push(format!("morphcog capacity --eval {eval}{}", settings(file)));
+        let capacity = Invocation::new("capacity").option("eval", again.join(EVAL_JSON).as_path());
+        lines.push(spell(&with_settings(capacity, file)));
     }
-    lines.push(format!("morphcog report --archive {again}"));
+    lines.push(spell(&of_run("report")));
     format!("<pre>{}</pre>\n", escape(&lines.join("\n")))
 }
 
@@ -250,33 +248,40 @@ fn how_many(images: &[ImageRef]) -> HowMany {
 }
 
 /// The command that makes the run again, after what is to be known for it.
-fn made_by(dossier: &Dossier, again: &str) -> Vec<String> {
+fn made_by(dossier: &Dossier, again: &Path, spell: Spell) -> Vec<String> {
     let (run, config) = (&dossier.run, dossier.path.with_file_name(CONFIG));
     let Some(origin) = &run.origin else {
         let known = exists(&config);
         let missing = format!("# CONFIG: the key \"config\" of {}", in_shell(&dossier.path));
-        let config = if known { in_shell(&config) } else { "CONFIG".to_string() };
+        let config = if known { Value::Path(config) } else { Value::Placeholder("CONFIG") };
         let name = &run.dataset.name;
-        let (images, data) = match name == BUILTIN {
-            true => (None, ""),
-            false => (Some(format!("# IMAGES: the folder with the files of {name}")), " --data IMAGES"),
+        let evolve = Invocation::new("evolve").option("config", config);
+        let (images, evolve) = match name == BUILTIN {
+            true => (None, evolve),
+            false => {
+                let images = format!("# IMAGES: the folder with the files of {name}");
+                (Some(images), evolve.option("data", Value::Placeholder("IMAGES")))
+            }
         };
-        let line = format!("morphcog evolve --config {config}{data} --out {again}");
+        let line = spell(&evolve.option("out", again));
         return (!known).then_some(missing).into_iter().chain(images).chain([line]).collect();
     };
     let gaits = format!("# GAITS: run {}, SHA-256 of its content {}…", origin.name, short(&origin.sha256));
     let robot = run.elites.first().and_then(|robot| robot.parent.as_deref());
-    let task = run.dimensions.tasks.join(" ");
-    let mut line =
-        format!("morphcog train --archive GAITS --task {} --seed {}", quoted(task), run.config.seed);
-    line += &robot.map_or(String::new(), |robot| format!(" --robots {}", quoted(robot)));
+    let mut train = Invocation::new("train")
+        .option("archive", Value::Placeholder("GAITS"))
+        .option("task", run.dimensions.tasks.join(" "))
+        .option("seed", run.config.seed.to_string());
+    if let Some(robot) = robot {
+        train = train.option("robots", robot);
+    }
     // The gaits' run may have any of these otherwise.
-    line += &format!(" --set {}", quoted(format!("data.dataset={}", run.config.data.dataset)));
+    train = train.option("set", format!("data.dataset={}", run.config.data.dataset));
     for (key, value) in seeing_and_training(&run.config) {
         let value = value.as_str().map_or_else(|| value.to_string(), str::to_string);
-        line += &format!(" --set {}", quoted(format!("{key}={value}")));
+        train = train.option("set", format!("{key}={value}"));
     }
-    vec![gaits, format!("{line} --out {again}")]
+    vec![gaits, spell(&train.option("out", again))]
 }
 
 /// The keys of `[stimulus]`, `[train]` and `[validation]` with their values, those at their defaults too.
@@ -300,15 +305,14 @@ fn seeing_and_training(config: &Config) -> Settings {
     settings
 }
 
-/// The settings of a capacity, as far as its file has them, where they are not the defaults.
-fn settings(file: &CapacityFile) -> String {
+/// A command with the settings of a capacity, as far as its file has them, where they are not the
+/// defaults.
+fn with_settings(command: Invocation, file: &CapacityFile) -> Invocation {
     let usual = CapacityConfig::default();
-    let mut text = if file.patience_on == "test" { String::new() } else { " --clean".to_string() };
-    if file.physical_only {
-        text += " --physical-only";
-    }
+    let mut command =
+        command.switch("clean", file.patience_on != "test").switch("physical_only", file.physical_only);
     if file.trainings != usual.trainings {
-        text += &format!(" --set trainings={}", file.trainings);
+        command = command.option("set", format!("trainings={}", file.trainings));
     }
     let curves: Vec<_> = file.tasks.iter().flat_map(|task| &task.curves).collect();
     let sizes: Vec<usize> =
@@ -318,7 +322,8 @@ fn settings(file: &CapacityFile) -> String {
         && !usual.sizes().eq(points.iter().map(|point| point.size))
     {
         let step = points.windows(2).next().map_or(1, |two| two[1].size.saturating_sub(two[0].size).max(1));
-        text += &format!(" --set {} --set step={step}", quoted(format!("sizes=[{least},{most}]")));
+        command =
+            command.option("set", format!("sizes=[{least},{most}]")).option("set", format!("step={step}"));
     }
-    text
+    command
 }

@@ -127,8 +127,8 @@ pub trait Lanes:
     fn max_abs(self, other: Self) -> Self;
     /// Lanes in which self > other (false where one is no number).
     fn gt(self, other: Self) -> Self::Mask;
-    /// Where the mask holds `self`, elsewhere `other`.
-    fn or_else(self, mask: Self::Mask, other: Self) -> Self;
+    /// `yes` where the mask holds, elsewhere `no`.
+    fn select(mask: Self::Mask, yes: Self, no: Self) -> Self;
     /// Whether a mask holds in any lane.
     fn any(mask: Self::Mask) -> bool;
     /// Whether a mask holds in all lanes.

@@ -123,8 +123,8 @@ impl Lanes for F64x4 {
     }
 
     #[inline(always)]
-    fn or_else(self, mask: Mask, other: Self) -> Self {
-        F64x4(each!(i in [0, 1, 2, 3] => if mask.0[i] { self.0[i] } else { other.0[i] }))
+    fn select(mask: Mask, yes: Self, no: Self) -> Self {
+        F64x4(each!(i in [0, 1, 2, 3] => if mask.0[i] { yes.0[i] } else { no.0[i] }))
     }
 
     #[inline(always)]

@@ -148,9 +148,9 @@ impl Lanes for F64x4 {
     }
 
     #[inline(always)]
-    fn or_else(self, mask: Mask4, other: Self) -> Self {
+    fn select(mask: Mask4, yes: Self, no: Self) -> Self {
         // SAFETY: the processor has the instruction (see the module).
-        unsafe { F64x4(_mm256_blendv_pd(other.0, self.0, mask.0)) }
+        unsafe { F64x4(_mm256_blendv_pd(no.0, yes.0, mask.0)) }
     }
 
     #[inline(always)]
@@ -264,9 +264,9 @@ impl Lanes for F64x8 {
     }
 
     #[inline(always)]
-    fn or_else(self, mask: Mask8, other: Self) -> Self {
+    fn select(mask: Mask8, yes: Self, no: Self) -> Self {
         // SAFETY: the processor has the instruction (see the module).
-        unsafe { F64x8(_mm512_mask_blend_pd(mask.0, other.0, self.0)) }
+        unsafe { F64x8(_mm512_mask_blend_pd(mask.0, no.0, yes.0)) }
     }
 
     #[inline(always)]

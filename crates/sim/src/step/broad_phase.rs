@@ -13,7 +13,7 @@ use crate::state::{Pair, State, X, Y, slices};
 use crate::step::geometry::{Bounds, Vector};
 use crate::step::springs::vectors;
 use crate::system::System;
-use crate::world::UnstableReason;
+use crate::unstable::UnstableReason;
 
 /// How far a point may move before the lists are made anew \[voxel lengths\].
 const BUDGET: f64 = 0.2;

@@ -31,7 +31,7 @@ impl Limits {
     #[inline(always)]
     pub fn excess<L: Lanes>(&self, square: L) -> L {
         let [low, high] = each!(i in [0, 1] => L::splat(1.0 / self.squares[i]));
-        let limit = high.or_else(square.gt(L::splat(self.middle)), low);
+        let limit = L::select(square.gt(L::splat(self.middle)), high, low);
         square.mul_add(limit, L::splat(-1.0))
     }
 
@@ -115,7 +115,7 @@ fn limit_horizontal<L: Lanes>(system: &System, from: &Pair, to: &mut Pair) -> Re
                 limits[i].beyond(squares[i], L::load(exists, i * BLOCK + lane))
             });
             others = others | ((other[0] | other[1]) | other[2]);
-            let t = limits[0].excess(squares[0]).or_else(beyond, zero);
+            let t = L::select(beyond, limits[0].excess(squares[0]), zero);
             far = far | t.abs().gt(L::splat(RANGE));
             let sums = gather.next_horizontal(share * rsqrt_series(t), &vectors);
             (L::load(from[X], slot) + sums[X]).store(to[X], slot);
@@ -157,7 +157,7 @@ fn limit_any<L: Lanes, const FAR: bool>(
                 continue;
             }
             others = others | other;
-            let t = each!(i in [0, 1, 2, 3] => limits[i].excess(squares[i]).or_else(beyond[i], zero));
+            let t = each!(i in [0, 1, 2, 3] => L::select(beyond[i], limits[i].excess(squares[i]), zero));
             let greatest = t[0].max_abs(t[1]).max_abs(t[2].max_abs(t[3]));
             far = far | greatest.gt(L::splat(RANGE));
             let pull =
@@ -168,22 +168,6 @@ fn limit_any<L: Lanes, const FAR: bool>(
         }
     }
     reach::<L>(others, far)
-}
-
-/// Brings links of the rigid pass that have nothing to do with each other together, so that the
-/// processor can work on several at once. Links that share a point stay in their order: results are
-/// the same bits.
-pub(crate) fn in_rounds(links: &[[usize; 2]], points: usize) -> Vec<[usize; 2]> {
-    let mut taken = vec![0; points];
-    let mut round = |&[a, b]: &[usize; 2]| {
-        // After every earlier link at either end.
-        let round = 1 + taken[a].max(taken[b]);
-        (taken[a], taken[b]) = (round, round);
-        (round, [a, b])
-    };
-    let mut rounds: Vec<_> = links.iter().map(&mut round).collect();
-    rounds.sort_by_key(|(round, _)| *round);
-    rounds.into_iter().map(|(_, link)| link).collect()
 }
 
 /// The sides of rigid voxels, one after the other on current positions; a side shared by two comes
@@ -272,13 +256,13 @@ impl SharedRigidPass {
                 if !L::any(beyond) {
                     continue;
                 }
-                let t = (square - high.or_else(long, low)) * of_high.or_else(long, of_low);
-                let factor = share * shrink(t.or_else(beyond, zero));
+                let t = (square - L::select(long, high, low)) * L::select(long, of_high, of_low);
+                let factor = share * shrink(L::select(beyond, t, zero));
                 // Where nothing is beyond, not even a zero's sign may change.
-                (xa + factor * dx).or_else(beyond, xa).store(&mut x[a], lane);
-                (ya + factor * dy).or_else(beyond, ya).store(&mut y[a], lane);
-                (xb - factor * dx).or_else(beyond, xb).store(&mut x[b], lane);
-                (yb - factor * dy).or_else(beyond, yb).store(&mut y[b], lane);
+                L::select(beyond, xa + factor * dx, xa).store(&mut x[a], lane);
+                L::select(beyond, ya + factor * dy, ya).store(&mut y[a], lane);
+                L::select(beyond, xb - factor * dx, xb).store(&mut x[b], lane);
+                L::select(beyond, yb - factor * dy, yb).store(&mut y[b], lane);
             }
         }
         for (lane, position) in positions.iter_mut().enumerate() {
@@ -301,7 +285,7 @@ fn shrink<L: Lanes>(t: L) -> L {
         return near;
     }
     let one = L::splat(1.0);
-    (one - one / (one + t).sqrt()).or_else(far, near)
+    L::select(far, one - one / (one + t).sqrt(), near)
 }
 
 /// 1 − 1/√(1 + t), in the order with the shortest chain.
@@ -313,26 +297,4 @@ fn shrink_scalar(t: f64) -> f64 {
     let [c0, c1, c2, c3, c4, c5] = TERMS;
     let square = t * t;
     ((c0 + c1 * t) + square * ((c2 + c3 * t) + square * (c4 + c5 * t))) * t
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::lattice::SIDES;
-
-    #[test]
-    fn rounds_hold_every_link_and_keep_the_order_of_those_that_share_a_point() {
-        // The sides of 3 × 3 rigid voxels, of which neighbours share one.
-        let corners = |voxel: usize| [0, 1, 5, 4].map(|corner| voxel / 3 * 4 + voxel % 3 + corner);
-        let sides = |voxel: usize| SIDES.map(|(a, b)| [corners(voxel)[a], corners(voxel)[b]]);
-        let links: Vec<[usize; 2]> = (0..9).flat_map(sides).collect();
-        let rounds = in_rounds(&links, 16);
-        assert_ne!(rounds, links);
-        for point in 0..16 {
-            let at = |links: &[[usize; 2]]| {
-                links.iter().filter(|link| link.contains(&point)).copied().collect::<Vec<_>>()
-            };
-            assert_eq!(at(&rounds), at(&links));
-        }
-    }
 }

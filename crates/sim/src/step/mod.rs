@@ -16,7 +16,7 @@ use crate::simd::{Kernel, Lanes};
 use crate::state::State;
 use crate::stop::{Stopped, check};
 use crate::system::System;
-use crate::world::UnstableReason;
+use crate::unstable::UnstableReason;
 use std::sync::atomic::AtomicBool;
 
 /// The substeps of a control step.

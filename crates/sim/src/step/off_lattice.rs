@@ -98,7 +98,7 @@ impl OffLattice {
             let all = L::splat(f64::from_bits(u64::MAX >> 1));
             let pull = each!(i in [0, 1, 2, 3] => {
                 let square = square[i] * L::load(&self.inverse_rest_square, at + i * BLOCK);
-                let t = limits.excess(square).or_else(limits.beyond(square, all), L::splat(0.0));
+                let t = L::select(limits.beyond(square, all), limits.excess(square), L::splat(0.0));
                 share * rsqrt_exact(t)
             });
             self.put(at, vector, pull);

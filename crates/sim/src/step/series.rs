@@ -29,7 +29,7 @@ pub(crate) fn rsqrt_exact<L: Lanes>(t: L) -> L {
         return brief;
     }
     let one = L::splat(1.0);
-    (one - one / (one + t).sqrt()).or_else(beyond, brief)
+    L::select(beyond, one - one / (one + t).sqrt(), brief)
 }
 
 #[cfg(test)]

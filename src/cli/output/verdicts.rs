@@ -2,9 +2,9 @@
 
 use crate::base::number;
 use crate::base::text::counted;
+use crate::cli::output::console::{Console, Mode};
 use crate::commands::audit::Finished;
 use crate::store::audit::{AuditFile, RobotAudit, Verdict};
-use crate::view::console::{Console, Mode};
 use std::path::Path;
 
 /// After an audit: a line per robot, how many there are of each verdict, and what breaks walks.

@@ -3,9 +3,9 @@
 
 use crate::base::observer::Generation;
 use crate::base::text::one_line;
-use crate::view::console::{Console, Mode, lock};
+use crate::cli::output::console::{Console, Mode, lock};
+use crate::cli::output::wrapping::one_of;
 use crate::view::progress::{Pacer, Recent, Words, count_line, generation_line};
-use crate::view::wrapping::one_of;
 use indicatif::ProgressBar;
 use serde::Serialize;
 use std::sync::Mutex;
@@ -152,7 +152,7 @@ impl<'c> Live<'c> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::view::console::tests::console;
+    use crate::cli::output::console::tests::console;
 
     const PROGRESS: Generation =
         Generation { done: 0, total: 100, best: Some(1.0), coverage: 0.5, evaluations: 0 };

@@ -3,9 +3,9 @@
 
 use crate::base::error::Error;
 use crate::base::signals;
-use crate::view::console::{Console, Mode};
-use crate::view::terminal;
-use crate::view::terminal::Depth;
+use crate::cli::output::console::{Console, Mode};
+use crate::cli::output::terminal;
+use crate::cli::output::terminal::Depth;
 use crate::view::walk::Walk;
 use crossterm::event::{self, Event, KeyCode, KeyEventKind, KeyModifiers};
 use crossterm::terminal::{disable_raw_mode, enable_raw_mode, size};

@@ -2,11 +2,13 @@
 //! to stderr.
 #![allow(clippy::disallowed_methods, reason = "this is the module that writes")]
 
-pub use crate::view::bar::{Bar, Counter, Live};
+pub use crate::cli::output::bar::{Bar, Counter, Live};
 
+use crate::base;
 use crate::base::text::{is_unseen, one_line, shortened};
-use crate::view::table;
-use crate::view::wrapping::{wrapped, wrapped_command};
+use crate::cli::explain::explain;
+use crate::cli::output::table;
+use crate::cli::output::wrapping::{wrapped, wrapped_command};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde::Serialize;
 use std::error::Error;
@@ -216,6 +218,12 @@ impl Console {
     /// A warning, to stderr, in every mode.
     pub fn warning(&self, text: &str) {
         self.err(&self.painted("warning:", "1;33", text));
+    }
+
+    /// An error and what to do about it, in the words of the command line, to stderr, in every mode.
+    pub fn failed(&self, error: &base::error::Error) {
+        let explained = explain(error);
+        self.error(&explained, explained.hint.as_deref());
     }
 
     /// An error with its causes and perhaps what to do, to stderr, in every mode. A cause that the

@@ -3,14 +3,15 @@
 use crate::analysis::gallery;
 use crate::base::error::Error;
 use crate::base::{named, number};
+use crate::cli::output::console::Console;
+use crate::cli::output::player;
 use crate::commands::replay::Replay;
 use crate::store::folder;
-use crate::view::console::Console;
 use crate::view::error::PictureError;
 use crate::view::scene::Look;
 use crate::view::stage::Stage;
 use crate::view::walk::Walk;
-use crate::view::{gif, html, player, raster};
+use crate::view::{gif, html, raster};
 use std::fmt;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
@@ -138,7 +139,7 @@ pub fn folder(archive: Option<&Path>, robot: &str) -> Result<PathBuf, Error> {
 /// If a picture cannot be made or written.
 pub fn make(console: &Console, replay: &Replay, wanted: &Wanted) -> Result<Vec<PathBuf>, Error> {
     let failed = |error: PictureError| match error {
-        PictureError::Size { .. } => Error::usage(format!("--width: {error}")),
+        PictureError::Size { .. } => Error::usage(error.to_string()).about("width"),
         error => error.into(),
     };
     let mut made = Vec::new();

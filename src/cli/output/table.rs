@@ -1,6 +1,6 @@
 //! Tables as aligned text, for terminals of any width.
 
-use crate::view::wrapping::{least_of_cell, width, wrapped_cell};
+use crate::cli::output::wrapping::{least_of_cell, width, wrapped_cell};
 
 /// Blanks between two columns.
 const GAP: usize = 2;

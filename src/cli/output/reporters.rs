@@ -1,7 +1,9 @@
 //! [`Reporter`]: what the console shows while a command runs.
 
+use crate::base::error::Error;
 use crate::base::observer::{Generation, Observer, Work};
-use crate::view::console::{Bar, Console, Counter};
+use crate::cli::explain::{Explained, explain};
+use crate::cli::output::console::{Bar, Console, Counter};
 use std::sync::{PoisonError, RwLock};
 
 /// Shows on a console how a command goes on.
@@ -76,5 +78,11 @@ impl Observer for Reporter<'_> {
 
     fn warning(&self, text: &str) {
         self.console.warning(text);
+    }
+
+    fn failed(&self, error: &Error, then: &str) {
+        let Explained { message, hint } = explain(error);
+        let parts = [Some(message), hint, Some(then.to_string()).filter(|then| !then.is_empty())];
+        self.console.warning(&parts.into_iter().flatten().collect::<Vec<_>>().join("; "));
     }
 }

@@ -3,6 +3,9 @@
 use crate::analysis::gallery;
 use crate::base::error::Error;
 use crate::base::files::exists;
+use crate::base::remedy::{Invocation, Remedy};
+use crate::cli::output::console::Console;
+use crate::cli::output::sweeps;
 use crate::commands::one_by_one::Named;
 use crate::commands::plot::Progress;
 use crate::commands::replay;
@@ -13,11 +16,9 @@ use crate::store::folder;
 use crate::store::names::METRICS;
 use crate::store::names::{CAPACITY_JSON, EVAL_JSON, RUN_JSON};
 use crate::store::run::{RunFile, different};
-use crate::view::console::Console;
 use crate::view::error::write_whole;
 use crate::view::plot;
 use crate::view::plot::{Background, Figure, PRINT};
-use crate::view::sweeps;
 use std::fmt;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
@@ -117,7 +118,7 @@ pub fn make(console: &Console, wanted: &Wanted) -> Result<Vec<PathBuf>, Error> {
         _ => archives.len(),
     };
     if count > 1 && wanted.out.is_some() {
-        return Err(Error::usage(format!("--out: expected with one figure only, these are {count}")));
+        return Err(Error::usage(format!("expected with one figure only, these are {count}")).about("out"));
     }
     let named = |path: &Path, ending: &str| match path.extension() {
         Some(_) => path.to_path_buf(),
@@ -211,8 +212,8 @@ fn possible(figure: &Figure, dpi: u32) -> Result<(), Error> {
     let most = figure.fitting(dpi);
     match most < dpi {
         true => {
-            let text = format!("--dpi {dpi}: {}: expected at most {most}, or an .svg file", figure.title());
-            Err(Error::usage(text))
+            let text = format!("{}: expected at most {most}, or an .svg file", figure.title());
+            Err(Error::argument("dpi", dpi, text))
         }
         false => Ok(()),
     }
@@ -230,8 +231,8 @@ pub fn endings(out: Option<&Path>) -> Result<Vec<&'static str>, Error> {
         Some("svg") => Ok(vec!["svg"]),
         Some("png") => Ok(vec!["png"]),
         Some(_) => {
-            let text = format!("--out: {}: expected a file name that ends in .svg or .png", path.display());
-            Err(Error::usage(text))
+            let text = "expected a file name that ends in .svg or .png";
+            Err(Error::argument("out", path.display(), text))
         }
     }
 }
@@ -247,7 +248,8 @@ fn with_ending(stem: &Path, ending: &str) -> PathBuf {
 pub fn no_robot(kind: Kind) -> Error {
     let of_robots = Kind::ALL.iter().filter(|(kind, _)| kind.is_of_robot()).map(|(_, name)| *name);
     let of_robots = of_robots.collect::<Vec<_>>().join(", ");
-    Error::usage(format!("--robot: plot {kind} shows no single robot; expected with {of_robots} only"))
+    let text = format!("plot {kind} shows no single robot; expected with {of_robots} only");
+    Error::usage(text).about("robot")
 }
 
 /// That a run has too few generations for a line.
@@ -255,7 +257,8 @@ fn too_short(path: &Path, run: &RunFile, generations: usize) -> Error {
     let path = path.with_file_name(METRICS);
     let text = format!("{}: expected at least 2 generations, found {generations}", path.display());
     match run.origin {
-        Some(_) => Error::input(text).hint("morphcog plot accuracy shows what its test found".to_string()),
+        Some(_) => Error::input(text)
+            .remedy(Remedy::Run(Invocation::new("plot").value("accuracy"), "shows what its test found")),
         None => Error::input(text),
     }
 }
@@ -291,10 +294,10 @@ fn of_robot(wanted: &Wanted, named: &Named) -> Result<Made, Error> {
 }
 
 fn of_run(kind: Kind, path: &Path) -> Result<Figure, Error> {
-    let hint = |error: Error| match error.hint {
-        None => error
-            .hint(format!("morphcog {} makes it", if kind == Kind::Accuracy { "eval" } else { "capacity" })),
-        Some(_) => error,
+    let maker = if kind == Kind::Accuracy { "eval" } else { "capacity" };
+    let with_maker = |error: Error| match error.remedies.is_empty() {
+        true => error.remedy(Remedy::Run(Invocation::new(maker), "makes it")),
+        false => error,
     };
     match kind {
         Kind::Accuracy => {
@@ -303,16 +306,16 @@ fn of_run(kind: Kind, path: &Path) -> Result<Figure, Error> {
                 true => EvalFile::read(path),
                 false => RunFile::read(path).and_then(|run| EvalFile::of_runs(&beside, &[&run])),
             };
-            let (report, path) = (report.map_err(hint)?, beside);
+            let (report, path) = (report.map_err(with_maker)?, beside);
             if report.robots.is_empty() {
                 let text = format!("{}: robots: expected at least one, found none", path.display());
-                return Err(hint(Error::input(text)));
+                return Err(with_maker(Error::input(text)));
             }
             Ok(plot::accuracy(&report))
         }
         Kind::Capacity => {
             let (beside, eval) = (result(path, CAPACITY_JSON), folder::beside(path, EVAL_JSON));
-            let file = CapacityFile::read(&beside).map_err(hint)?;
+            let file = CapacityFile::read(&beside).map_err(with_maker)?;
             if beside != *path {
                 let run = RunFile::read(path)?;
                 let is_of_it = match exists(&eval) {
@@ -322,9 +325,8 @@ fn of_run(kind: Kind, path: &Path) -> Result<Figure, Error> {
                 };
                 if !is_of_it {
                     let text = format!("{}: it is about the robots of another run", beside.display());
-                    return Err(
-                        Error::input(text).hint("morphcog capacity makes that of this run".to_string())
-                    );
+                    let remedy = Remedy::Run(Invocation::new("capacity"), "makes that of this run");
+                    return Err(Error::input(text).remedy(remedy));
                 }
             }
             Ok(plot::capacity(&file))
