@@ -19,12 +19,11 @@ mod team;
 mod train;
 mod values;
 
-use crate::analysis::gallery;
 use crate::base::error::{Error, ErrorKind};
 use crate::base::ranks::Ranks;
 use crate::base::remedy::Remedy;
 use crate::base::text::counted;
-use crate::base::{shipped, signals, threads};
+use crate::base::{signals, threads};
 use crate::cli::output::console::Console;
 use crate::cli::output::pictures::Format;
 use crate::cli::output::reporters::Reporter;
@@ -39,15 +38,17 @@ use crate::data::catalogue::Catalogue;
 use crate::data::dataset::{BUILTIN, Dataset, DatasetError, Split};
 use crate::data::fetch::{FetchError, FetchOptions, Program, fetch};
 use crate::data::files::{FilesError, places};
+use crate::draw::sheet;
+use crate::draw::sheet::SheetError;
+use crate::robots::published;
+use crate::robots::selection::{BEST, Selection};
 use crate::search::evolve;
+use crate::shipped::gallery;
 use crate::sim::{FloatEnvironment, InstructionSet};
 use crate::store::capacity::CapacityFile;
 use crate::store::folder;
 use crate::store::folder::IfExists;
 use crate::store::names::RUN_JSON;
-use crate::store::robots::{BEST, Selection};
-use crate::view::sheet;
-use crate::view::sheet::SheetError;
 pub use args::Cli;
 use args::{Command, DataCommand, DatasetArgs, EvalArgs, EvolveArgs, ReplayArgs, SimulateArgs};
 use choice::{Runs, selected};
@@ -90,7 +91,7 @@ pub fn run(cli: Cli, console: &Console, ranks: Ranks) -> Result<(), Error> {
         Command::Simulate(args) => run_simulate(&args, console),
         Command::Serve(args) => serve::run(args, console),
         Command::Data { command } => run_data(command, console),
-        Command::Gallery => gallery::gallery().map(|robots| summary::gallery(console, &robots)),
+        Command::Gallery => published::gallery().map(|robots| summary::gallery(console, &robots)),
         Command::Config { name: None, .. } => {
             summary::configs(console, &[&config::BUILT_IN[..], &[PAPER_TOML]].concat());
             Ok(())
@@ -202,10 +203,10 @@ fn replay_best(folder: &Path, shown: replay::Options, console: &Console) -> Resu
 
 fn run_eval(args: EvalArgs, console: &Console, ranks: Ranks) -> Result<(), Error> {
     let (archives, robots) = (args.archives.paths(), selected(args.robots)?.unwrap_or(Selection::All));
-    let of_gallery = archives.is_empty() && gallery::is_meant(&robots)?;
+    let of_gallery = archives.is_empty() && published::is_meant(&robots)?;
     if of_gallery && args.physical_only {
         let text = "--physical-only: expected robots of an archive, not published ones";
-        return Err(gallery::not_audited(text));
+        return Err(published::not_audited(text));
     }
     let archives = match archives.is_empty() {
         true if of_gallery => Vec::new(),
@@ -222,7 +223,7 @@ fn run_eval(args: EvalArgs, console: &Console, ranks: Ranks) -> Result<(), Error
     };
     let out = args.out.unwrap_or_else(beside);
     let robots = match robots {
-        Selection::Ids(ids) if of_gallery && ids.iter().any(|id| id == gallery::ALL) => Selection::All,
+        Selection::Ids(ids) if of_gallery && ids.iter().any(|id| id == published::ALL) => Selection::All,
         robots => robots,
     };
     let options = eval::Options {
@@ -273,7 +274,7 @@ fn run_replay(args: ReplayArgs, console: &Console) -> Result<(), Error> {
     let is_bare = args.archive.is_none() && args.robot == Selection::Ids(vec![BEST.to_string()]);
     let is_first_look = is_bare && folder::newest_run().is_err();
     let archives = match is_first_look {
-        true => vec![folder::first_run(PathBuf::from(shipped::ZERO_ONE)).map_err(Error::other)?],
+        true => vec![folder::first_run(PathBuf::from(gallery::ZERO_ONE)).map_err(Error::other)?],
         false => args.archive.map_or(Vec::new(), |Runs(paths)| paths),
     };
     let search = one_by_one::Options {
@@ -287,7 +288,7 @@ fn run_replay(args: ReplayArgs, console: &Console) -> Result<(), Error> {
     let folder = pictures::folder(archive.as_deref(), &robot)?;
     let options = replay::Options { robot, physical_only, archive, images, data, dataset };
     if is_first_look {
-        console.info(&format!("no run under runs/: the best body of {}", shipped::ZERO_ONE));
+        console.info(&format!("no run under runs/: the best body of {}", gallery::ZERO_ONE));
     }
     let is_any = options.dataset.is_none() && options.data.is_none() && options.images.is_empty();
     let replay = match replay::replay(&options) {

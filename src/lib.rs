@@ -73,14 +73,19 @@ pub mod cli;
 pub mod commands;
 pub mod config;
 pub mod data;
+#[cfg(feature = "figures")]
+pub mod draw;
 pub mod genome;
+pub mod images;
 pub mod qd;
+pub mod response;
+pub mod robots;
 pub mod search;
 #[cfg(feature = "serve")]
 pub mod serve;
+pub mod shipped;
 pub mod store;
 pub mod task;
-#[cfg(feature = "figures")]
-pub mod view;
+pub mod training;
 
 pub use morphcog_sim as sim;

@@ -3,33 +3,34 @@
 mod remedies;
 
 use exceptions::{Error as MorphcogError, Unstable};
+use morphcog::base::Grid;
 use morphcog::base::error::{Error, ErrorKind};
 use morphcog::base::hash::sha256_hex;
 use morphcog::base::observer::{Generation, Observer, Work};
 use morphcog::base::ranks::Ranks;
 use morphcog::base::stop::Stopped;
 use morphcog::base::threads::{MOST_THREADS, pool};
-use morphcog::base::{Grid, named};
 use morphcog::body::{Body, Material};
+use morphcog::cli::output::progress::{Recent, Words, count_line, generation_line};
 use morphcog::commands::{audit, eval, one_by_one, replay};
 use morphcog::config;
 use morphcog::config::audit::Criteria;
 use morphcog::data::dataset::{Dataset, DatasetError, Split};
 use morphcog::data::files::places;
-use morphcog::search::{evolve, showing};
+use morphcog::draw::walk::Walk;
+use morphcog::draw::{gif, html};
+use morphcog::robots::selection::Selection;
+use morphcog::search::{evolve, held_out_run};
+use morphcog::shipped;
 use morphcog::sim::{FloatEnvironment, InstructionSet, Physics, Start, System};
 use morphcog::store::folder::{self, IfExists};
 use morphcog::store::images::HeldOut;
 use morphcog::store::names::AUDIT_JSON;
-use morphcog::store::robots::Selection;
 use morphcog::store::run::RunFile;
 use morphcog::task::direction;
 use morphcog::task::evaluation::fresh_rollouts;
 use morphcog::task::protocol::{MAX_ROW, MAX_STEPS, Protocol, RolloutMode};
 use morphcog::task::stimulus::stimulus;
-use morphcog::view::progress::{Recent, Words, count_line, generation_line};
-use morphcog::view::walk::Walk;
-use morphcog::view::{gif, html};
 use numpy::{PyArray1, PyArray2, PyArray3, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
 use pyo3::exceptions::{PyKeyboardInterrupt, PyMemoryError, PyRuntimeError};
 use pyo3::prelude::*;
@@ -358,7 +359,7 @@ impl RunData {
             return Err(refused(format!("{text}: {}", names.join(", "))));
         };
         let run = RunFile::read(path).map_err(|error| raised(&error))?;
-        let place = match named::is_named(path) {
+        let place = match shipped::is_named(path) {
             true => path.clone(),
             false => std::path::absolute(path)?,
         };
@@ -450,7 +451,7 @@ impl RunData {
             validation: None,
             seed: 1,
             threshold: direction::THRESHOLD,
-            cycles: showing::CYCLES,
+            cycles: held_out_run::CYCLES,
             data,
             dataset: None,
             out: folder::beside(&self.place, eval::own_name(split)),

@@ -1,6 +1,7 @@
-//! What is found out about robots: responses, verdicts, the published robots and numbers.
+//! Analysis of tested robots: verdicts of audits, votes of a team, simple classifiers, and the
+//! paper's own numbers.
 
-pub mod gallery;
-pub mod measure;
+pub mod baselines;
 pub mod published;
 pub mod verdict;
+pub mod votes;

@@ -1,7 +1,7 @@
 //! Writing files so that nothing is ever half-written, and reading texts that end.
 
-use crate::base::named::{self, Place};
 use crate::base::ownership::{self, folder_of};
+use crate::shipped::{self, Place};
 use flate2::read::MultiGzDecoder;
 use std::ffi::{OsStr, OsString};
 use std::fs::{DirEntry, File, Metadata};
@@ -75,7 +75,7 @@ pub fn read_bytes(path: &Path) -> io::Result<Vec<u8>> {
 /// # Errors
 /// As [`open_file`]; if it is no UTF-8; if it has more than 256 megabytes.
 pub fn read_text(path: &Path) -> io::Result<String> {
-    let source: Box<dyn Read> = match named::place(path).transpose()? {
+    let source: Box<dyn Read> = match shipped::place(path).transpose()? {
         Some(Place::Shipped(text)) => return Ok(text.to_string()),
         Some(Place::Compressed(file)) => Box::new(MultiGzDecoder::new(open_file(&file)?)),
         None => Box::new(open_file(path)?),
@@ -131,7 +131,7 @@ pub fn home_expanded(path: &Path) -> PathBuf {
 
 /// Whether there is a file, on the disk or of a [named] run.
 pub fn exists(path: &Path) -> bool {
-    named::place(path).map_or_else(|| path.exists(), |place| place.is_ok())
+    shipped::place(path).map_or_else(|| path.exists(), |place| place.is_ok())
 }
 
 /// Writes a file as a whole or not at all: to a temporary name in the same folder, synced, then

@@ -1,12 +1,10 @@
 //! What every module stands on (random generators, hashes, files; numbers, lines and tables as
 //! text).
 
-pub mod atlas;
 pub mod clock;
 pub mod error;
 pub mod files;
 pub mod hash;
-pub mod named;
 pub mod number;
 pub mod observer;
 pub mod ownership;
@@ -15,7 +13,6 @@ pub(crate) mod ranges;
 pub mod ranks;
 pub mod remedy;
 pub mod shell;
-pub mod shipped;
 pub mod signals;
 pub mod statistics;
 pub mod table;

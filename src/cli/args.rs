@@ -22,11 +22,11 @@ use crate::commands::schema;
 use crate::config;
 use crate::data::catalogue::FETCHABLE;
 use crate::data::dataset::BUILTIN;
-use crate::search::showing;
+use crate::draw::scene::Look;
+use crate::robots::selection::Selection;
+use crate::search::held_out_run;
 use crate::store::images::{HeldOut, HowMany};
-use crate::store::robots::Selection;
 use crate::task::direction;
-use crate::view::scene::Look;
 use clap::builder::{StringValueParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
@@ -329,7 +329,7 @@ pub(super) struct EvalArgs {
     #[arg(long, default_value_t = direction::THRESHOLD, value_parser = decimal())]
     pub(super) threshold: f64,
     /// Actuation cycles per image.
-    #[arg(long, default_value_t = showing::CYCLES, value_parser = whole::<u32>(1..=10_000))]
+    #[arg(long, default_value_t = held_out_run::CYCLES, value_parser = whole::<u32>(1..=10_000))]
     pub(super) cycles: u32,
     /// Folder with the images.
     #[arg(long, value_name = "DIR")]

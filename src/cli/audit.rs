@@ -1,6 +1,5 @@
 //! `morphcog audit`: its words, and what it calls.
 
-use crate::analysis::gallery;
 use crate::base::error::Error;
 use crate::base::ranks::Ranks;
 use crate::base::remedy::Remedy;
@@ -15,11 +14,13 @@ use crate::cli::values::{seed, threads};
 use crate::commands::audit;
 use crate::commands::audit::{Finished, Options, Source};
 use crate::config::audit::Criteria;
+use crate::robots::published;
+use crate::robots::selection;
+use crate::robots::selection::Selection;
 use crate::search::validation;
+use crate::store::folder;
 use crate::store::names::AUDIT_JSON;
-use crate::store::robots::Selection;
 use crate::store::run::different;
-use crate::store::{folder, robots};
 use clap::Args;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
@@ -90,7 +91,7 @@ pub(super) fn run(args: AuditArgs, console: &Console, ranks: Ranks) -> Result<()
         true => vec![Some(chosen)],
         false => {
             let runs: Result<Vec<_>, Error> =
-                archives.iter().map(|path| robots::Source::read(path)).collect();
+                archives.iter().map(|path| selection::Source::read(path)).collect();
             let runs = runs?;
             different(runs.iter().map(|source| (source.path.as_path(), &source.run)))?;
             chosen.of_each(&runs, args.seed)?
@@ -182,7 +183,7 @@ fn sources(archives: &[PathBuf], robots: &Selection) -> Result<Vec<Source>, Erro
     if !archives.is_empty() {
         return Ok(archives.iter().cloned().map(Source::Archive).collect());
     }
-    if gallery::is_meant(robots)? {
+    if published::is_meant(robots)? {
         return Ok(vec![Source::Gallery]);
     }
     Ok(vec![Source::Archive(folder::newest_run()?)])

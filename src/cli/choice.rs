@@ -1,9 +1,7 @@
 //! What commands have in common that take archives, or robots of them: one rule, and the same words
 //! of help.
 
-use crate::analysis::gallery;
 use crate::base::error::Error;
-use crate::base::named;
 use crate::base::signals;
 use crate::base::stop::NEVER;
 use crate::base::text::counted;
@@ -11,8 +9,10 @@ use crate::cli::output::console::Console;
 use crate::cli::output::reporters::Reporter;
 use crate::commands::one_by_one;
 use crate::commands::one_by_one::Named;
+use crate::robots::published;
+use crate::robots::selection::Selection;
+use crate::shipped;
 use crate::store::folder;
-use crate::store::robots::Selection;
 use crate::store::run::RunFile;
 use clap::Args;
 use clap::builder::{PathBufValueParser, TypedValueParser};
@@ -65,7 +65,7 @@ pub(super) fn selected(mut given: Vec<Selection>) -> Result<Option<Selection>, E
 
 /// The robots of a selection, for a command that looks at them one by one.
 pub(super) fn one_by_one(search: &one_by_one::Options, console: &Console) -> Result<Vec<Named>, Error> {
-    if !(search.archives.is_empty() && gallery::is_meant(&search.robots)?) {
+    if !(search.archives.is_empty() && published::is_meant(&search.robots)?) {
         say_simulated(&search.archives, console);
     }
     // Only a search on validation images is stopped in an orderly way: signals end all else at
@@ -110,7 +110,7 @@ fn meant<'a>(archives: impl IntoIterator<Item = &'a PathBuf>) -> impl Iterator<I
     if archives.is_empty() {
         archives.extend(folder::newest_run());
     }
-    archives.into_iter().filter(|path| !named::is_named(path))
+    archives.into_iter().filter(|path| !shipped::is_named(path))
 }
 
 /// Says of which archives a command reads the robots that there are so far: those whose runs have not

@@ -3,7 +3,7 @@
 use crate::base::error::{Error, ErrorKind};
 use crate::base::ranks::Ranks;
 use crate::base::remedy::Remedy;
-use crate::base::{shipped, signals};
+use crate::base::signals;
 use crate::cli::output::console::Console;
 use crate::cli::output::reporters::Reporter;
 use crate::cli::output::summary;
@@ -13,14 +13,15 @@ use crate::commands::replay::Shown;
 use crate::commands::{eval, replay};
 use crate::data::builtin::BuiltinDigits;
 use crate::data::dataset::{Dataset, Split};
-use crate::search::showing::CYCLES;
-use crate::search::train;
+use crate::robots::selection::{BEST, Selection};
+use crate::search::held_out_run::CYCLES;
+use crate::shipped::gallery;
 use crate::store::folder;
 use crate::store::folder::IfExists;
 use crate::store::images::{HeldOut, HowMany};
 use crate::store::names::{EVAL_JSON, RUN_JSON};
-use crate::store::robots::{BEST, Selection};
 use crate::task::direction::THRESHOLD;
+use crate::training;
 use clap::Args;
 use std::path::PathBuf;
 
@@ -74,8 +75,8 @@ pub(super) struct DemoArgs {
 
 pub(super) fn run(args: DemoArgs, console: &Console) -> Result<(), Error> {
     let threads = args.threads.map(usize::from);
-    let options = train::Options {
-        archive: folder::first_run(PathBuf::from(shipped::GAITS)).map_err(Error::other)?,
+    let options = training::Options {
+        archive: folder::first_run(PathBuf::from(gallery::GAITS)).map_err(Error::other)?,
         robots: Selection::Ids(vec![BEST.to_string()]),
         groups: [vec![0], vec![1]].into(),
         seed: Some(args.seed),
@@ -88,7 +89,7 @@ pub(super) fn run(args: DemoArgs, console: &Console) -> Result<(), Error> {
     };
     let stop = signals::stop_flag()?;
     let finished =
-        train::train(&options, &stop, &Reporter::new(console)).map_err(|error| match error.kind {
+        training::train(&options, &stop, &Reporter::new(console)).map_err(|error| match error.kind {
             ErrorKind::Stopped => error.remedy(Remedy::Repeat),
             _ => error,
         })?;
@@ -127,18 +128,18 @@ fn new_digits() -> Result<Vec<Shown>, Error> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::search::probing::Probing;
+    use crate::response::gait::Gait;
+    use crate::response::probing::Probing;
+    use crate::robots::selection::Source;
     use crate::store::names::RESPONSE_JSON;
     use crate::store::response::ResponseFile;
-    use crate::store::robots::Source;
-    use crate::task::gait::Gait;
 
     #[test]
     fn the_response_that_ships_with_the_gaits_is_what_the_training_begins_with() {
-        let archive = folder::first_run(PathBuf::from(shipped::GAITS)).unwrap();
+        let archive = folder::first_run(PathBuf::from(gallery::GAITS)).unwrap();
         let Source { run, .. } = Source::read(&archive).unwrap();
         let set = LITTLE.map(str::to_string);
-        let config = train::config_of(&run.config, &[vec![0], vec![1]], Some(1), &set).unwrap();
+        let config = training::config_of(&run.config, &[vec![0], vec![1]], Some(1), &set).unwrap();
         assert_eq!((config.data.dataset.as_str(), config.train.random_images), ("builtin", 600));
         // After a change of the version, `morphcog response` makes it anew.
         let file = ResponseFile::read(&archive.with_file_name(RESPONSE_JSON)).unwrap();

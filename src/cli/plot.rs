@@ -10,8 +10,8 @@ use crate::cli::values::{MOST, offering, seed, whole};
 use crate::commands::one_by_one;
 use crate::commands::one_by_one::Named;
 use crate::commands::replay::{Options, Shown};
-use crate::store::robots::{BEST, Selection};
-use crate::view::plot::Background;
+use crate::draw::plot::Background;
+use crate::robots::selection::{BEST, Selection};
 use clap::Args;
 use std::path::PathBuf;
 

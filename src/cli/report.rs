@@ -8,9 +8,9 @@ use crate::cli::explain::spell;
 use crate::cli::output::console::Console;
 use crate::cli::values::{MOST, whole};
 use crate::commands::report;
+use crate::draw::error::write_whole;
+use crate::draw::report::Content;
 use crate::store::folder;
-use crate::view::error::write_whole;
-use crate::view::report::Content;
 use clap::Args;
 use std::path::PathBuf;
 

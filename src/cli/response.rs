@@ -1,7 +1,5 @@
 //! `morphcog response`: its words, and what it calls.
 
-use crate::analysis::measure::Options;
-use crate::analysis::{gallery, measure};
 use crate::base::error::Error;
 use crate::base::signals;
 use crate::base::text::counted;
@@ -13,9 +11,12 @@ use crate::cli::output::responses;
 use crate::cli::values::{MOST, decimal, seed, threads, whole};
 use crate::commands::one_by_one;
 use crate::commands::one_by_one::Named;
+use crate::commands::response;
+use crate::commands::response::Options;
+use crate::robots::published;
+use crate::robots::selection::{BEST, Selection};
 use crate::store::folder;
 use crate::store::names::RESPONSE_JSON;
-use crate::store::robots::{BEST, Selection};
 use crate::task::grouping::Groups;
 use clap::Args;
 use std::path::{Path, PathBuf};
@@ -84,13 +85,13 @@ pub(super) struct ResponseArgs {
 pub(super) fn run(args: ResponseArgs, console: &Console) -> Result<(), Error> {
     let robots = selected(args.robots)?.unwrap_or(Selection::Ids(vec![BEST.to_string()]));
     let archive = match args.archive {
-        None if gallery::is_meant(&robots)? => None,
+        None if published::is_meant(&robots)? => None,
         None => Some(folder::newest_run()?),
         given => given,
     };
     if archive.is_none() && args.physical_only {
         let text = "--physical-only: expected robots of an archive, not published ones";
-        return Err(gallery::not_audited(text));
+        return Err(published::not_audited(text));
     }
     let search = one_by_one::Options {
         robots,
@@ -118,7 +119,7 @@ pub(super) fn run(args: ResponseArgs, console: &Console) -> Result<(), Error> {
         archive,
     };
     let stop = signals::stop_flag()?;
-    let finished = measure::measure(&options, &stop, &Reporter::new(console))?;
+    let finished = response::measure(&options, &stop, &Reporter::new(console))?;
     responses::response(console, &finished, &options.out);
     if let Some(error) = finished.unwritten {
         return Err(error);

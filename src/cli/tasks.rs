@@ -3,7 +3,7 @@
 use crate::base::error::Error;
 use crate::base::remedy::Remedy;
 use crate::base::shell::{in_shell, quoted};
-use crate::base::{atlas, signals};
+use crate::base::signals;
 use crate::cli::output::console::Console;
 use crate::cli::output::reporters::Reporter;
 use crate::cli::output::sweeps;
@@ -11,6 +11,7 @@ use crate::cli::values::{MOST, threads, whole};
 use crate::cli::{choice, process};
 use crate::commands::tasks;
 use crate::commands::tasks::{Place, Run, Summary, Task};
+use crate::shipped::atlas;
 use clap::Args;
 use std::path::{Path, PathBuf};
 

@@ -2,8 +2,8 @@
 
 use crate::base::error::Error;
 use crate::base::remedy::Remedy;
+use crate::base::signals;
 use crate::base::text::counted;
-use crate::base::{shipped, signals};
 use crate::cli::choice;
 use crate::cli::choice::{Archives, selected};
 use crate::cli::output::console::Console;
@@ -12,9 +12,10 @@ use crate::cli::output::teams;
 use crate::cli::values::{held_out, seed, threads};
 use crate::commands::team;
 use crate::commands::team::Options;
+use crate::robots::selection::{BEST, Selection};
+use crate::shipped::gallery;
 use crate::store::folder;
 use crate::store::images::{HeldOut, HowMany};
-use crate::store::robots::{BEST, Selection};
 use clap::Args;
 use std::path::PathBuf;
 
@@ -76,8 +77,8 @@ pub(super) struct TeamArgs {
 pub(super) fn run(args: TeamArgs, console: &Console) -> Result<(), Error> {
     let mut archives = args.archives.paths();
     if archives.is_empty() {
-        archives = folder::run_json(PathBuf::from(shipped::TEAM)).map_err(Error::other)?;
-        console.line(&format!("no --archive: the {} robots of {}", archives.len(), shipped::TEAM));
+        archives = folder::run_json(PathBuf::from(gallery::TEAM)).map_err(Error::other)?;
+        console.line(&format!("no --archive: the {} robots of {}", archives.len(), gallery::TEAM));
     }
     choice::say_simulated(&archives, console);
     let options = Options {

@@ -1,7 +1,6 @@
 //! `morphcog train`: its words, and what it calls.
 
 use crate::base::error::Error;
-use crate::base::named;
 use crate::base::ranks::Ranks;
 use crate::base::remedy::Remedy;
 use crate::base::shell::in_shell;
@@ -14,14 +13,16 @@ use crate::cli::output::{summary, verdicts};
 use crate::cli::values::{seed, threads};
 use crate::commands::audit;
 use crate::config::audit::Criteria;
-use crate::search::train::{Finished, Options};
-use crate::search::{evolve, train};
+use crate::images::whereabouts::Whereabouts;
+use crate::robots::selection::Selection;
+use crate::search::evolve;
+use crate::shipped;
 use crate::store::folder;
 use crate::store::folder::IfExists;
 use crate::store::names::{AUDIT_JSON, RUN_JSON};
-use crate::store::robots::Selection;
-use crate::store::whereabouts::Whereabouts;
 use crate::task::grouping::{Groups, groups_text};
+use crate::training;
+use crate::training::{Finished, Options};
 use clap::Args;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
@@ -82,7 +83,7 @@ pub(super) fn run(args: TrainArgs, console: &Console) -> Result<(), Error> {
     let archive = args.archive.map_or_else(folder::newest_run, Ok)?;
     let robots = selected(args.robots)?.unwrap_or(Selection::Top(GAITS));
     let name = name(&archive, args.task.classes(), args.seed);
-    let beside = match named::is_named(&archive) {
+    let beside = match shipped::is_named(&archive) {
         true => Some(Path::new(folder::RUNS)),
         false => archive.parent().and_then(|folder| folder.parent()),
     };
@@ -114,7 +115,7 @@ const GAITS: usize = 4;
 /// How a training of an archive's gaits is called: after the archive's folder and the task.
 fn name(archive: &Path, [a, b]: &[Vec<u8>; 2], seed: Option<u64>) -> String {
     let folder = archive.parent().and_then(Path::file_name).map(|name| name.to_string_lossy());
-    let of = match named::name(archive) {
+    let of = match shipped::name(archive) {
         Some((_, name)) => name,
         None => folder.as_deref().unwrap_or("run"),
     };
@@ -142,7 +143,7 @@ pub(super) fn after_evolution(evolution: &evolve::Options) -> Result<Options, Er
     let of_training = out.with_file_name(&name);
     // What would stop the training is said before gaits evolve for an hour.
     let whereabouts = Whereabouts::given(data.as_deref()).and_of_resumed(*if_exists, &archive);
-    train::check(config, groups, &whereabouts)?;
+    training::check(config, groups, &whereabouts)?;
     if *if_exists == IfExists::Refuse {
         folder::vacant(&of_training)?;
     }
@@ -163,7 +164,7 @@ pub(super) fn after_evolution(evolution: &evolve::Options) -> Result<Options, Er
 /// Trains, validates and audits, and says how it went.
 pub(super) fn trained(options: &Options, stop: &AtomicBool, console: &Console) -> Result<(), Error> {
     choice::say_simulated([&options.archive], console);
-    let finished = train::train(options, stop, &Reporter::new(console))?;
+    let finished = training::train(options, stop, &Reporter::new(console))?;
     let Finished { validated, .. } = &finished;
     summary::training(console, &finished, &options.out);
     let Some(validated) = validated else {

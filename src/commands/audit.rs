@@ -1,6 +1,5 @@
 //! `morphcog audit`: does a robot's behaviour survive changes that no honest walker should notice?
 
-use crate::analysis::gallery;
 use crate::analysis::verdict::Behaviour;
 use crate::base::error::Error;
 use crate::base::observer::{Observer, Work};
@@ -13,18 +12,19 @@ use crate::body::Body;
 use crate::config::Config;
 use crate::config::audit::Criteria;
 use crate::data::dataset::Split;
-use crate::search::training::Training;
+use crate::images::training::Training;
+use crate::images::whereabouts::{Whereabouts, load_dataset_of, see};
+use crate::robots::published;
+use crate::robots::selection;
+use crate::robots::selection::Selection;
 use crate::sim::{Energy, StepError, System};
 use crate::store::audit::{AuditFile, PerturbedRollout, RobotAudit};
 use crate::store::folder;
 use crate::store::folder::check_out;
 use crate::store::names::AUDIT_JSON;
 use crate::store::results::replaced;
-use crate::store::robots;
-use crate::store::robots::Selection;
 use crate::store::run::{Robot, RunFile};
 use crate::store::unwritten::Unwritten;
-use crate::store::whereabouts::{Whereabouts, load_dataset_of, see};
 use crate::task::evaluation::fresh_rollouts;
 use crate::task::fitness::Fitness;
 use crate::task::grouping::Grouping;
@@ -202,18 +202,18 @@ fn open(options: &Options) -> Result<Opened, Error> {
     match &options.source {
         Source::Gallery => {
             check_out(&options.out, Path::new(""), AUDIT_JSON)?;
-            let source = gallery::source(data, None)?;
+            let source = published::source(data, None)?;
             let config = source.run.config.clone();
             let training = Training::load(&config, data)?;
-            let all = gallery::gallery()?;
+            let all = published::gallery()?;
             let order: Vec<String> = all.iter().map(|robot| robot.name.clone()).collect();
             let is_asked = |name: &str| match &options.robots {
-                Selection::Ids(ids) if !ids.iter().any(|id| id == gallery::ALL) => {
+                Selection::Ids(ids) if !ids.iter().any(|id| id == published::ALL) => {
                     ids.iter().any(|id| id.eq_ignore_ascii_case(name))
                 }
                 _ => true,
             };
-            let subject = |robot: gallery::Published| Subject {
+            let subject = |robot: published::Published| Subject {
                 id: robot.name,
                 task: "0|1".to_string(),
                 body: robot.body,
@@ -224,7 +224,7 @@ fn open(options: &Options) -> Result<Opened, Error> {
             Ok(Opened { config, fitness: Fitness::Min, training, subjects, order, file })
         }
         Source::Archive(path) => {
-            let source = robots::Source::read(path)?;
+            let source = selection::Source::read(path)?;
             source.has_task()?;
             let run = &source.run;
             check_out(&options.out, path, AUDIT_JSON)?;

@@ -1,7 +1,8 @@
 //! `morphcog capacity`: the networks that the robots are worth (paper, "Morphological cognition
 //! capacity").
 
-use crate::analysis::gallery;
+pub(crate) mod images;
+
 use crate::base::error::{Error, ErrorKind};
 use crate::base::hash::sha256_hex;
 use crate::base::observer::{Observer, Work};
@@ -10,8 +11,9 @@ use crate::base::statistics::standard_deviation;
 use crate::base::text::counted;
 use crate::base::threads::pool;
 use crate::baseline::{Kind, Pooling, Trained, curve};
-use crate::commands::capacity_images::{Images, Task};
+use crate::commands::capacity::images::{Images, Task};
 use crate::config::capacity::CapacityConfig;
+use crate::robots::published;
 use crate::store::audit::AuditFile;
 use crate::store::capacity::{CapacityFile, Curve, FORMAT, FORMAT_VERSION, Point, TaskCapacity};
 use crate::store::eval::{EvalFile, RobotReport};
@@ -313,9 +315,9 @@ fn robots<'a>(report: &'a EvalFile, options: &Options) -> Result<Vec<&'a RobotRe
     if !options.physical_only {
         return Ok(report.robots.iter().collect());
     }
-    if report.runs.iter().any(|run| run.name == gallery::ALL) {
+    if report.runs.iter().any(|run| run.name == published::ALL) {
         let text = "expected an evaluation of robots of an archive, not of published ones";
-        return Err(gallery::not_audited(text));
+        return Err(published::not_audited(text));
     }
     let folder = options.eval.parent().unwrap_or(Path::new(""));
     let audit = |run: &RunRef| match &run.archive {

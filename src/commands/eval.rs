@@ -1,6 +1,7 @@
 //! `morphcog eval`: how well robots do on held-out images (paper, "Generalization test").
 
-use crate::analysis::gallery;
+pub(crate) mod images;
+
 use crate::base::error::Error;
 use crate::base::observer::{Observer, Work};
 use crate::base::ranges::MOST;
@@ -8,11 +9,14 @@ use crate::base::ranks::Ranks;
 use crate::base::remedy::Remedy;
 use crate::base::text::counted;
 use crate::base::threads::pool;
-use crate::commands::eval_images::HeldOutImages;
+use crate::commands::eval::images::HeldOutImages;
 use crate::config::validation::LEAST;
 use crate::config::{Config, TaskConfig};
 use crate::data::dataset::{Dataset, Split};
-use crate::search::showing::{HeldOutRun, control_steps, task_of};
+use crate::images::whereabouts::{Whereabouts, load_dataset_of, part_of_others, say_transposed, size_of};
+use crate::robots::published;
+use crate::robots::selection::{Chosen, Selection, Source};
+use crate::search::held_out_run::{HeldOutRun, control_steps, task_of};
 use crate::search::validation;
 use crate::store::audit::{AuditFile, RobotAudit};
 use crate::store::eval::{EvalFile, RobotReport, Trial};
@@ -20,11 +24,9 @@ use crate::store::folder::check_out;
 use crate::store::images::{HeldOut, HowMany};
 use crate::store::names::{EVAL_JSON, EVAL_VALIDATION_JSON};
 use crate::store::results::{self, replaced, write_with_table};
-use crate::store::robots::{Chosen, Selection, Source};
 use crate::store::run::different;
 use crate::store::unwritten::Unwritten;
 use crate::store::validation::Validated;
-use crate::store::whereabouts::{Whereabouts, load_dataset_of, part_of_others, say_transposed, size_of};
 use crate::task::grouping::Grouping;
 use crate::task::protocol::MAX_STEPS;
 use crate::task::stimulus::StimulusParams;
@@ -368,7 +370,7 @@ impl Testing<'_> {
 /// is named.
 fn sources(options: &Options) -> Result<Vec<Source>, Error> {
     let sources: Vec<Source> = match options.archives.as_slice() {
-        [] => vec![gallery::source(options.data.as_deref(), options.dataset.as_deref())?],
+        [] => vec![published::source(options.data.as_deref(), options.dataset.as_deref())?],
         archives => archives.iter().map(|path| Source::read(path)).collect::<Result<_, _>>()?,
     };
     for source in &sources {

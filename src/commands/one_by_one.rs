@@ -1,13 +1,13 @@
 //! Robots for commands that look at them one by one (`replay`, `plot`): which they are, and of
 //! which archives.
 
-use crate::analysis::gallery;
 use crate::base::error::Error;
 use crate::base::observer::Observer;
 use crate::base::remedy::Remedy;
+use crate::robots::published;
+use crate::robots::selection::{Selection, Source, first_physical};
 use crate::search::validation;
 use crate::store::folder;
-use crate::store::robots::{Selection, Source, first_physical};
 use crate::store::run::{Robot, different};
 use crate::store::validation::Validated;
 use std::path::PathBuf;
@@ -45,11 +45,11 @@ pub struct Named {
 /// If there are none such, or a signal stopped the search for the best on validation images.
 pub fn named(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Result<Vec<Named>, Error> {
     let Options { robots, archives, seed, .. } = options;
-    let of_gallery = archives.is_empty() && gallery::is_meant(robots)?;
+    let of_gallery = archives.is_empty() && published::is_meant(robots)?;
     let one = |robot: &String| Named { archive: archives.first().cloned(), robot: robot.clone() };
     match robots {
-        Selection::Ids(ids) if of_gallery && ids.iter().any(|id| id == gallery::ALL) => {
-            let all = gallery::gallery()?;
+        Selection::Ids(ids) if of_gallery && ids.iter().any(|id| id == published::ALL) => {
+            let all = published::gallery()?;
             return Ok(all.into_iter().map(|robot| Named { archive: None, robot: robot.name }).collect());
         }
         Selection::Ids(ids) if archives.len() < 2 => return Ok(ids.iter().map(one).collect()),

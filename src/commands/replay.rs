@@ -1,6 +1,5 @@
 //! `morphcog replay`: record a robot's rollout, for the pictures.
 
-use crate::analysis::gallery;
 use crate::base::error::Error;
 use crate::base::number;
 use crate::base::remedy::{Invocation, Remedy};
@@ -8,11 +7,12 @@ use crate::base::text::counted;
 use crate::body::Body;
 use crate::config::{Config, DataConfig};
 use crate::data::dataset::Split;
-use crate::search::training::Training;
+use crate::images::training::Training;
+use crate::images::whereabouts::{Whereabouts, load_dataset_of, see};
+use crate::robots::published;
+use crate::robots::selection::{Selection, Source};
 use crate::store::folder;
 use crate::store::images::{DatasetRef, ImageRef};
-use crate::store::robots::{Selection, Source};
-use crate::store::whereabouts::{Whereabouts, load_dataset_of, see};
 use crate::task::judge::Judge;
 use crate::task::protocol::RolloutMode;
 use crate::task::recording::{Recording, Seen};
@@ -133,7 +133,7 @@ pub fn subject(options: &Options) -> Result<Subject, Error> {
     };
     // Published robots come without images of their own.
     let offer = |error: Error| match found.published {
-        true => gallery::without_mnist(error),
+        true => published::without_mnist(error),
         false => error,
     };
     let (asks, mut shown) = (!options.images.is_empty(), options.images.clone());
@@ -241,11 +241,11 @@ impl Found {
 /// What is wrong with robot or archive.
 pub fn find(options: &Options) -> Result<Found, Error> {
     if options.archive.is_none()
-        && let Some(robot) = gallery::find(&options.robot)?
+        && let Some(robot) = published::find(&options.robot)?
     {
         if options.physical_only {
             let text = "expected a robot of an archive, not a published one";
-            return Err(gallery::not_audited(text));
+            return Err(published::not_audited(text));
         }
         let about = vec![
             ("Robot".to_string(), robot.name.clone()),
@@ -254,7 +254,7 @@ pub fn find(options: &Options) -> Result<Found, Error> {
             ("Published fitness".to_string(), format!("{} voxel lengths", number::fixed(robot.fitness, 2))),
         ];
         let judge = Some(robot.judge());
-        let (name, body, config) = (robot.name, robot.body, gallery::config()?);
+        let (name, body, config) = (robot.name, robot.body, published::config()?);
         return Ok(Found {
             name,
             body,

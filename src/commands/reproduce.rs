@@ -14,14 +14,14 @@ use crate::commands::tasks::{self, Place, Run, Steps, Summary, Task};
 use crate::commands::{audit, capacity, eval, plan, table};
 use crate::config::Config;
 use crate::data::dataset::Split;
-use crate::search::showing;
+use crate::images::whereabouts::Whereabouts;
+use crate::robots::selection::{Chosen, Selection, Source};
+use crate::search::held_out_run;
 use crate::store::audit::{AuditFile, Verdict};
 use crate::store::capacity::CapacityFile;
 use crate::store::eval::EvalFile;
 use crate::store::images::{HeldOut, HowMany};
 use crate::store::names::{AUDIT_JSON, RUN_JSON};
-use crate::store::robots::{Chosen, Selection, Source};
-use crate::store::whereabouts::Whereabouts;
 use crate::task::direction;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -271,7 +271,7 @@ impl Job<'_> {
             validation: None,
             seed: 1,
             threshold: direction::THRESHOLD,
-            cycles: showing::CYCLES,
+            cycles: held_out_run::CYCLES,
             data: self.place.data.clone(),
             dataset: None,
             out: path.to_path_buf(),

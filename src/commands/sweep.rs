@@ -4,15 +4,15 @@
 use crate::base::error::Error;
 use crate::base::files::{home_expanded, read_given};
 use crate::base::hash::sha256_hex;
-use crate::base::named;
 use crate::base::remedy::{Invocation, Remedy};
 use crate::commands::tasks::task::selection;
 use crate::commands::tasks::{AuditStep, EvalStep, Run, Steps, Task, Training};
 use crate::config::{Config, Settings, flatten, reading};
-use crate::search::train;
+use crate::robots::selection::Source;
+use crate::shipped;
 use crate::store::folder::{self, one_run};
-use crate::store::robots::Source;
 use crate::task::grouping::{Groups, groups_text};
+use crate::training;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
@@ -261,7 +261,7 @@ impl SweepPlan {
     fn base(&self, path: &Path) -> Result<Base, Error> {
         let folder = path.parent().unwrap_or(Path::new(""));
         if let Some(archive) = &self.archive {
-            let is_named = named::is_named(archive);
+            let is_named = shipped::is_named(archive);
             let archive = if is_named { archive.clone() } else { folder.join(home_expanded(archive)) };
             let archive = one_run(archive).map_err(|text| Error::at_key("archive", text))?;
             let source =
@@ -309,7 +309,7 @@ impl SweepPlan {
             }
             Base::Train(archive, source) => {
                 let groups = groups.cloned().expect("a plan with an archive has groups");
-                let config = train::config_of(&source.run.config, groups.classes(), Some(seed), &set)?;
+                let config = training::config_of(&source.run.config, groups.classes(), Some(seed), &set)?;
                 Run::Train(Box::new(Training {
                     archive: archive.clone(),
                     sha256: source.run.fingerprint(),
@@ -343,7 +343,7 @@ impl Base {
     fn name(&self, combination: &[&Setting], groups: Option<&Groups>, seed: u64) -> String {
         let base = match self {
             Base::Evolve(name, _) => name.clone(),
-            Base::Train(archive, source) => match named::name(archive) {
+            Base::Train(archive, source) => match shipped::name(archive) {
                 Some((_, run)) => run.to_string(),
                 None => {
                     let folder = archive.parent().and_then(Path::file_name);

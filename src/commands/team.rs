@@ -1,6 +1,7 @@
 //! `morphcog team`: robots of several runs, each with two groups of classes of its own, answer
 //! together which class an image is of.
 
+use crate::analysis::votes::{Accuracy, Ballot, CLIP};
 use crate::base::Grid;
 use crate::base::error::Error;
 use crate::base::observer::{Observer, Work};
@@ -9,26 +10,25 @@ use crate::base::text::counted;
 use crate::base::threads::pool;
 use crate::baseline::linear::{Labelled, Linear, Moments};
 use crate::baseline::nearest::nearest;
-use crate::commands::eval_images::chosen_by;
+use crate::commands::eval::images::chosen_by;
 use crate::config::Config;
 use crate::data::dataset::{Dataset, Split};
-use crate::search::held_out::{images_besides, test_images};
-use crate::search::showing::{CYCLES, HeldOutRun, control_steps, task_of};
+use crate::images::held_out::{images_besides, test_images};
+use crate::images::whereabouts::{Whereabouts, load_dataset_of, part_of_others, see, see_all};
+use crate::robots::selection::{BEST, Chosen, Selection, Source, VALIDATED};
+use crate::search::held_out_run::{CYCLES, HeldOutRun, control_steps, task_of};
 use crate::store::eval::Trial;
 use crate::store::folder::check_out;
 use crate::store::images::{HeldOut, HowMany, ImageRef};
 use crate::store::names::{TEAM_JSON, TEAM_VALIDATION_JSON};
 use crate::store::results::{self, replaced};
-use crate::store::robots::{BEST, Chosen, Selection, Source, VALIDATED};
 use crate::store::run::different;
 use crate::store::team::{FORMAT, FORMAT_VERSION, Member, TeamBaselines, TeamFile};
 use crate::store::unwritten::Unwritten;
 use crate::store::validation::shown as shown_for_validation;
-use crate::store::whereabouts::{Whereabouts, load_dataset_of, part_of_others, see, see_all};
 use crate::task::direction::THRESHOLD;
 use crate::task::grouping::{self, Group};
 use crate::task::judge::Judge;
-use crate::task::voting::{Accuracy, Ballot, CLIP};
 use rayon::prelude::*;
 use std::collections::BTreeSet;
 use std::path::PathBuf;

@@ -2,12 +2,6 @@
 //! validation images.
 
 pub mod evolve;
-pub mod held_out;
-pub mod probing;
-pub mod response;
+pub mod held_out_run;
 pub mod resume;
-pub mod showing;
-pub mod train;
-pub mod training;
 pub mod validation;
-pub(crate) mod windows;

@@ -4,7 +4,7 @@
 use crate::base::error::Error;
 use crate::base::remedy::Remedy;
 use crate::config::{Config, differing};
-use crate::search::training::Training;
+use crate::images::training::Training;
 use crate::store::checkpoint;
 use crate::store::checkpoint::{Checkpoint, KnownBodies};
 use crate::store::folder::RunFolder;

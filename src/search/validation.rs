@@ -1,6 +1,6 @@
 //! Choosing robots by their answers to images that are neither training nor test images.
 //!
-//! [`held_out`](crate::search::held_out) says which images. Robots are screened in rounds: all on a
+//! [`held_out`](crate::images::held_out) says which images. Robots are screened in rounds: all on a
 //! tenth of them, the better third of each task on three tenths, the better tenth on all. Results
 //! are kept beside the run.
 
@@ -12,16 +12,16 @@ use crate::base::threads::pool;
 use crate::config::Config;
 use crate::config::validation::ValidationConfig;
 use crate::data::dataset::{Dataset, Split};
-use crate::search::held_out::images;
-use crate::search::showing;
-use crate::search::showing::HeldOutRun;
+use crate::images::held_out::images;
+use crate::images::whereabouts::{Whereabouts, load_dataset_of, see_all};
+use crate::robots::selection::{Chosen, Selection, Source, first_physical};
+use crate::search::held_out_run;
+use crate::search::held_out_run::HeldOutRun;
 use crate::store::eval::{RobotReport, Trial};
 use crate::store::images::ImageRef;
 use crate::store::names::VALIDATION_JSON;
-use crate::store::robots::{Chosen, Selection, Source, first_physical};
 use crate::store::run::{Robot, RunFile};
 use crate::store::validation::{FORMAT, Ranking, Validated, ValidationFile};
-use crate::store::whereabouts::{Whereabouts, load_dataset_of, see_all};
 use crate::task::direction;
 use crate::task::grouping;
 use crate::task::grouping::Grouping;
@@ -116,10 +116,10 @@ fn ranked(
 ) -> Result<Option<Vec<Validated>>, Error> {
     let config = &source.run.config;
     let grouping = config.grouping()?;
-    let control_steps = showing::control_steps(config, showing::CYCLES);
+    let control_steps = held_out_run::control_steps(config, held_out_run::CYCLES);
     let walker = HeldOutRun { config, control_steps, pool, stop, observer, done: AtomicU64::new(0) };
     let chosen = Selection::Validated(count).of(std::slice::from_ref(source), 0)?;
-    let skilled = |robot: &&Robot| showing::task_of(&grouping, robot).is_some();
+    let skilled = |robot: &&Robot| held_out_run::task_of(&grouping, robot).is_some();
     let robots = chosen.iter().map(|chosen| chosen.robot).filter(skilled).collect();
     let images = config.validation.images;
     let wanted = Wanted { count, images, argument: None, threshold: direction::THRESHOLD };
@@ -225,8 +225,8 @@ pub(crate) fn best<'a>(
 fn is_own(run: &RunFile, robots: &[&Robot], wanted: &Wanted, control_steps: u32) -> bool {
     let ValidationConfig { images, best } = run.config.validation;
     let Ok(grouping) = run.config.grouping() else { return false };
-    let all = run.elites.iter().filter(|robot| showing::task_of(&grouping, robot).is_some()).count();
-    let usual = (images, direction::THRESHOLD, showing::control_steps(&run.config, showing::CYCLES));
+    let all = run.elites.iter().filter(|robot| held_out_run::task_of(&grouping, robot).is_some()).count();
+    let usual = (images, direction::THRESHOLD, held_out_run::control_steps(&run.config, held_out_run::CYCLES));
     (wanted.images, wanted.threshold, control_steps) == usual
         && (best == 0 || wanted.count == best)
         && robots.len() == all

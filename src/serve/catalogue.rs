@@ -1,13 +1,13 @@
 //! [`Catalogue`]: the robots that can be watched: published ones, and those of archives.
 
-use crate::analysis::gallery;
 use crate::base::error::Error;
 use crate::base::files::read_text;
-use crate::base::shipped;
 use crate::body::{Body, VoxelCounts};
 use crate::config::Config;
+use crate::robots::published;
 use crate::serve::course::Course;
 use crate::serve::refusal::Refusal;
+use crate::shipped::gallery;
 use crate::sim::Physics;
 use crate::store::audit::AuditFile;
 use crate::store::images::DatasetRef;
@@ -194,8 +194,8 @@ impl Catalogue {
         runs: &Path,
     ) -> Result<(Self, Vec<String>), Error> {
         let mut notes = Vec::new();
-        let zero_one = trained(shipped::ZERO_ONE, "Trained on thousands of images")?;
-        let team = trained(shipped::TEAM, "Ten digits: a robot for each pair")?;
+        let zero_one = trained(gallery::ZERO_ONE, "Trained on thousands of images")?;
+        let team = trained(gallery::TEAM, "Ten digits: a robot for each pair")?;
         let built_in = [zero_one, published()?, team].map(Arc::new).to_vec();
         let mut watch = Watch {
             watched: Vec::new(),
@@ -400,10 +400,10 @@ fn fittest_first(robots: &mut [Entry]) {
 }
 
 fn published() -> Result<Collection, Error> {
-    let config = gallery::config()?;
+    let config = published::config()?;
     let grouping = config.grouping()?;
     let tasks: Vec<String> = grouping.tasks().iter().map(|split| split.name()).collect();
-    let entry = |robot: gallery::Published| Entry {
+    let entry = |robot: published::Published| Entry {
         judge: Some(robot.judge()),
         id: robot.name,
         task: tasks.first().expect("the published robots perform a task").clone(),
@@ -415,7 +415,7 @@ fn published() -> Result<Collection, Error> {
         audit: None,
         body: robot.body,
     };
-    let mut robots: Vec<Entry> = gallery::gallery()?.into_iter().map(entry).collect();
+    let mut robots: Vec<Entry> = published::gallery()?.into_iter().map(entry).collect();
     fittest_first(&mut robots);
     let name = "Published with the paper".to_string();
     Ok(Collection {
@@ -435,7 +435,7 @@ fn published() -> Result<Collection, Error> {
 /// holds).
 fn trained(set: &str, name: &str) -> Result<Collection, Error> {
     let mut all = Vec::new();
-    for (run, audit) in gallery::trained(set)? {
+    for (run, audit) in published::trained(set)? {
         all.push(of_run(run, Some(&audit))?);
     }
     let mut robots: Vec<Entry> = all.iter_mut().flat_map(|one| std::mem::take(&mut one.robots)).collect();
@@ -495,7 +495,7 @@ mod tests {
 
     /// A run as text.
     fn run() -> &'static str {
-        shipped::text("gallery:zero_one-1", RUN_JSON).unwrap()
+        gallery::text("gallery:zero_one-1", RUN_JSON).unwrap()
     }
 
     fn write(runs: &Path, name: &str, text: &str) -> PathBuf {

@@ -4,9 +4,9 @@
 use crate::base::Grid;
 use crate::base::error::Error;
 use crate::data::dataset::{BUILTIN, Dataset, Split};
+use crate::images::whereabouts::{Whereabouts, load_dataset_of};
 use crate::serve::catalogue::Catalogue;
 use crate::serve::refusal::Refusal;
-use crate::store::whereabouts::{Whereabouts, load_dataset_of};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 

@@ -1,13 +1,13 @@
 //! Which answer a request gets.
 
 use crate::body::Body;
+use crate::draw::html::materials;
 use crate::serve::assets::asset;
 use crate::serve::http::{Request, Response};
 use crate::serve::refusal::Refusal;
 use crate::serve::request::{ChangeRequest, Pace, Plan, SeeRequest, SimulationRequest};
 use crate::serve::team::{TeamPlan, TeamRequest};
 use crate::serve::{Service, request, team};
-use crate::view::html::materials;
 use serde::Deserialize;
 use serde_json::json;
 

@@ -3,13 +3,13 @@
 //! As in the page of a replay: steps of 1/200 voxel length from an origin per moment, near the
 //! centre of mass.
 
+use crate::draw::html::{STEPS, corners, quantised};
 use crate::serve::catalogue::Who;
 use crate::serve::request::{Plan, Seen};
 use crate::serve::simulation::{Event, STEPS_PER_SECOND};
 use crate::serve::team::{Name, TeamEvent};
 use crate::task::direction::THRESHOLD;
 use crate::task::recording::{Frame, VoxelCorners};
-use crate::view::html::{STEPS, corners, quantised};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD as BASE64;
 use serde_json::{Value, json};

@@ -1,6 +1,7 @@
 //! A team: robots of several tasks see one picture at the same time, and their walks are counted while
 //! they walk.
 
+use crate::analysis::votes::{CLIP, Tally};
 use crate::serve::catalogue::{Catalogue, Collection, Who};
 use crate::serve::images::ImageSets;
 use crate::serve::refusal::Refusal;
@@ -13,7 +14,6 @@ use crate::task::judge::Judge;
 use crate::task::recording::{Frame, VoxelCorners};
 use crate::task::rollout::Rollout;
 use crate::task::stimulus::StimulusParams;
-use crate::task::voting::{CLIP, Tally};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
@@ -245,13 +245,13 @@ fn tally(walkers: &[Walker], judges: &[&Judge], classes: &[u8]) -> Tally {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::analysis::votes::Ballot;
     use crate::base::Grid;
     use crate::base::threads::pool;
     use crate::serve::simulations::Simulations;
     use crate::sim::Physics;
     use crate::task::protocol::Protocol;
     use crate::task::rollout::fresh_rollout;
-    use crate::task::voting::Ballot;
     use std::sync::atomic::AtomicBool;
 
     fn plan() -> TeamPlan {

@@ -2,11 +2,11 @@
 
 use crate::base::error::Error;
 use crate::base::files::{check_file, check_writable, read_text, remove_half_written, write_atomically};
-use crate::base::named;
 use crate::base::observer::Observer;
 use crate::base::remedy::Value;
 use crate::base::remedy::{Invocation, Remedy};
 use crate::config::Config;
+use crate::shipped;
 use crate::store::lock;
 use crate::store::lock::Lock;
 use crate::store::names::{
@@ -73,7 +73,7 @@ impl RunFolder {
         stop: &AtomicBool,
         observer: &dyn Observer,
     ) -> Result<Self, Error> {
-        if named::is_named(path) {
+        if shipped::is_named(path) {
             let text = "expected another name: so are runs called that lie elsewhere";
             return Err(Error::argument("out", path.display(), text));
         }
@@ -282,8 +282,8 @@ fn before_dot(name: &OsStr) -> Option<&[u8]> {
 /// # Errors
 /// If none that ships with the program has that name; if it is another kind of file.
 pub fn run_json(path: PathBuf) -> Result<Vec<PathBuf>, String> {
-    if named::is_named(&path) {
-        named::runs(&path)
+    if shipped::is_named(&path) {
+        shipped::runs(&path)
     } else if path.is_dir() {
         Ok(vec![path.join(RUN_JSON)])
     } else if path.is_file() && path.extension().is_none_or(|ending| ending != "json") {
@@ -328,7 +328,7 @@ pub fn archive(run_json: &Path) -> Value {
 
 /// The name of a run that is named, as "gallery:zero_one-1".
 pub(crate) fn full_name(run_json: &Path) -> Option<String> {
-    named::name(run_json).map(|(of, run)| format!("{of}:{run}"))
+    shipped::name(run_json).map(|(of, run)| format!("{of}:{run}"))
 }
 
 /// What a run is called in a message: its name if it has one, else its run.json.
@@ -339,7 +339,7 @@ pub fn name(run_json: &Path) -> String {
 /// Where results of a run go if nothing is said: beside its run.json; those of a named one to the
 /// present folder.
 pub fn beside(archive: &Path, name: &str) -> PathBuf {
-    match named::name(archive) {
+    match shipped::name(archive) {
         Some((of, run)) => PathBuf::from(format!("{of}-{run}-{name}")),
         None => archive.with_file_name(name),
     }
@@ -352,10 +352,10 @@ pub fn beside_all(archives: &[PathBuf], name: &str) -> PathBuf {
     if others.is_empty() {
         return beside(first, name);
     }
-    let Some((of, _)) = archives.iter().find_map(|path| named::name(path)) else {
+    let Some((of, _)) = archives.iter().find_map(|path| shipped::name(path)) else {
         return above(archives).join(name);
     };
-    match named::set(first).filter(|set| others.iter().all(|other| named::set(other) == Some(*set))) {
+    match shipped::set(first).filter(|set| others.iter().all(|other| shipped::set(other) == Some(*set))) {
         // `team.json` of `gallery:team` says it already.
         Some((of, set)) if !name.starts_with(set) => PathBuf::from(format!("{of}-{set}-{name}")),
         _ => PathBuf::from(format!("{of}-{name}")),

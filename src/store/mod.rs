@@ -12,7 +12,6 @@ pub mod metrics;
 pub mod names;
 pub mod response;
 pub(crate) mod results;
-pub mod robots;
 pub mod run;
 #[cfg(test)]
 pub(crate) mod samples;
@@ -23,4 +22,3 @@ pub mod training;
 pub mod trainings;
 pub mod unwritten;
 pub mod validation;
-pub mod whereabouts;

@@ -410,8 +410,9 @@ mod tests {
 
     #[test]
     fn an_empty_archive_is_told_with_its_file() {
-        let source = crate::store::robots::Source { path: "runs/a/run.json".into(), run: samples::run(&[]) };
-        let error = crate::store::robots::Selection::All.of(&[source], 1).unwrap_err();
+        let source =
+            crate::robots::selection::Source { path: "runs/a/run.json".into(), run: samples::run(&[]) };
+        let error = crate::robots::selection::Selection::All.of(&[source], 1).unwrap_err();
         assert!(error.message.starts_with("runs/a/run.json: "), "{error}");
     }
 }

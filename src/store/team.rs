@@ -1,5 +1,6 @@
 //! `team.json` and `team.csv`: what robots of several runs answer together.
 
+use crate::analysis::votes::{Accuracy, Ballot};
 use crate::base::error::Error;
 use crate::base::ranges;
 use crate::base::table;
@@ -11,7 +12,6 @@ use crate::task::direction::{Assignment, Direction};
 use crate::task::grouping::Group;
 use crate::task::judge::Judge;
 use crate::task::protocol::MAX_STEPS;
-use crate::task::voting::{Accuracy, Ballot};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;

@@ -1,23 +1,15 @@
 //! What a robot is asked to do: stimuli, protocols, rollouts and their scores; how a gait responds,
 //! and how it is taught.
 
-pub mod baselines;
 pub mod direction;
 pub mod evaluation;
 pub mod fitness;
-pub mod gait;
 pub mod grouping;
 pub mod judge;
-pub mod lesson;
 pub mod margins;
 pub mod perturbation;
 pub mod protocol;
 pub mod recording;
-pub mod refine;
-pub mod response;
 pub mod rollout;
 pub mod score;
 pub mod stimulus;
-pub mod teach;
-pub mod teachable;
-pub mod voting;

@@ -382,7 +382,7 @@ fn what_is_against_the_plan_is_found() {
     assert_eq!(found("qd/archive.rs", "use crate::genome::Genome;"), 1);
     assert_eq!(found("qd/archive.rs", "use crate::{base::{Grid, hash}, task::score, store};"), 2);
     assert_eq!(found("task/score.rs", "fn f() -> crate::store::Error { crate::sim::f() }"), 1);
-    assert_eq!(found("search/train/mod.rs", "use crate::store::Error; use crate::view::Scene;"), 1);
+    assert_eq!(found("search/train/mod.rs", "use crate::store::Error; use crate::draw::Scene;"), 1);
     assert_eq!(found("search/train/mod.rs", "use super::super::super::view::Scene;"), 1);
     assert_eq!(found("attic/old.rs", ""), 1);
     let hidden = "// use crate::genome::Genome;\n/* crate::store */ const X: &str = \"crate::store\";";

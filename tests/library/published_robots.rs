@@ -3,12 +3,12 @@
 
 use crate::common::program::{Sandbox, mnist, said};
 use crate::common::reference::golden;
-use morphcog::analysis::gallery;
 use morphcog::base::Grid;
 use morphcog::base::stop::NEVER;
 use morphcog::body::Body;
 use morphcog::data::dataset::{Dataset, Split};
 use morphcog::data::files::places;
+use morphcog::robots::published;
 use morphcog::sim::{Physics, System};
 use morphcog::store::eval::EvalFile;
 use morphcog::task::grouping::Group::{A, B};
@@ -106,14 +106,14 @@ fn the_robot_that_starts_clear_of_the_ground_has_its_published_fitness_to_a_mill
 #[test]
 fn the_built_in_gallery_holds_these_very_robots() {
     let robots: BTreeMap<String, Published> = golden("published_robots");
-    let gallery = gallery::gallery().unwrap();
+    let gallery = published::gallery().unwrap();
     assert_eq!(gallery.len(), 5);
     for shipped in gallery {
         let published = &robots[&shipped.name];
         assert_eq!((&shipped.body, shipped.fitness), (&published.body, published.published_fitness));
         assert_eq!(published.task, "zero_one");
     }
-    let config = gallery::config().unwrap();
+    let config = published::config().unwrap();
     assert_eq!((config.protocol.rollout, config.protocol.control_steps), (RolloutMode::Sequential, 500));
     assert_eq!((config.protocol.start_row, config.protocol.start_column), (2, 493));
     assert_eq!(config.data.train_images.as_deref(), Some(&IMAGES[..2]));

@@ -3,9 +3,9 @@
 use crate::common::program::{Made, Sandbox, TINY};
 use morphcog::base::observer::{Observer, Work};
 use morphcog::commands::audit::{Options, Source};
+use morphcog::robots::selection::Selection;
 use morphcog::store::audit::AuditFile;
 use morphcog::store::audit::Verdict;
-use morphcog::store::robots::Selection;
 use std::collections::BTreeSet;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};

@@ -3,8 +3,8 @@
 #![cfg(unix)]
 
 use crate::common::program::{PROGRAM, SETTINGS, Said, Sandbox, files, said};
+use morphcog::response::gait::Gait;
 use morphcog::store::run::Robot;
-use morphcog::task::gait::Gait;
 use std::process::Command;
 
 /// Runs the program where no file may become larger than this number of blocks (of 512 or 1024

@@ -5,7 +5,7 @@
 use crate::common::program::{Sandbox, TINY};
 use morphcog::body::{Body, Material};
 use morphcog::config::Config;
-use morphcog::search::training::Training;
+use morphcog::images::training::Training;
 use morphcog::store::run::RunFile;
 use morphcog::task::evaluation::{Job, Outcome, Savings, evaluate};
 use std::path::Path;

@@ -5,11 +5,11 @@ use crate::common::program::{Sandbox, TINY, files, terminate};
 use morphcog::base::stop::{NEVER, Stopped};
 use morphcog::body::Body;
 use morphcog::genome::Genome;
-use morphcog::search::probing::Probing;
+use morphcog::response::gait::Gait;
+use morphcog::response::probing::Probing;
 use morphcog::store::response::{EndedBy, ResponseFile};
 use morphcog::store::run::Robot;
 use morphcog::task::evaluation::fresh_rollouts;
-use morphcog::task::gait::Gait;
 
 /// An evolved walker: 28 soft voxels and sensors.
 const WALKER: &str = "2222222/2222222/2225222/2441433/6661333/6661333/3333333";

@@ -215,8 +215,9 @@ fn robots_that_ship_with_the_program_are_named_where_archives_are() {
     sandbox.run("plot accuracy -q -a gallery:zero_one-2").ended(0, &[]);
     assert!(sandbox.path("gallery-zero_one-2-plot-accuracy.svg").exists());
     sandbox.run("plot body -q -a gallery:zero_one-1 --robot best").ended(0, &[]);
-    let id =
-        &morphcog::analysis::gallery::trained(morphcog::base::shipped::ZERO_ONE).unwrap()[0].0.elites[0].id;
+    let id = &morphcog::robots::published::trained(morphcog::shipped::gallery::ZERO_ONE).unwrap()[0].0.elites
+        [0]
+    .id;
     assert!(sandbox.path(&format!("gallery-zero_one-1-plot-body-{id}.svg")).exists());
     let refused = sandbox.run("eval -a gallery:zero --images 2");
     refused.ended(2, &["gallery:zero", "gallery:all, gallery:zero_one, gallery:zero_one-1"]);

@@ -8,12 +8,12 @@ use crate::common::program::{PROGRAM, Sandbox, said};
 use crate::common::server::{Answer, Server};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD as BASE64;
-use morphcog::analysis::gallery;
 use morphcog::base::Grid;
-use morphcog::base::shipped::TEAM;
 use morphcog::base::stop::NEVER;
 use morphcog::data::dataset::{BUILTIN, Dataset, Split};
+use morphcog::robots::published;
 use morphcog::serve::simulations::MAX_SIMULATIONS;
+use morphcog::shipped::gallery::TEAM;
 use morphcog::sim::Physics;
 use morphcog::task::direction::Direction;
 use morphcog::task::evaluation::fresh_rollouts;
@@ -409,7 +409,7 @@ fn bodies_and_scenarios_are_checked_and_pictures_reduced_as_runs_do() {
         let seen = json_of(&server.post("/api/stimulus", &asked))["stimulus"].clone();
         serde_json::from_value::<Grid<f64>>(seen).unwrap()
     };
-    let config = gallery::config().unwrap();
+    let config = published::config().unwrap();
     let expected = stimulus(&drawing(), 14, 14, &config.stimulus).unwrap();
     assert_eq!(see(json!({ "archive": 1, "robot": "XFJPI" })), expected);
     let own = StimulusParams {
@@ -468,8 +468,8 @@ fn a_simulation_is_what_the_engine_computes() {
     assert_eq!((names[0], names[names.len() - 1]), ("begin", "end"));
     assert!(names[1..names.len() - 1].iter().all(|name| *name == "moments"));
 
-    let config = gallery::config().unwrap();
-    let robot = gallery::find("QMAXD").unwrap().unwrap();
+    let config = published::config().unwrap();
+    let robot = published::find("QMAXD").unwrap().unwrap();
     let seen = stimulus(&drawing(), 14, 14, &config.stimulus).unwrap();
     let protocol = Protocol { control_steps: 120, ..config.protocol.clone() };
     let images = [Seen { class: 0, label: "drawing".to_string(), stimulus: seen.clone() }];
@@ -593,7 +593,7 @@ fn robots_of_several_tasks_walk_together_as_a_team_and_are_counted() {
 fn each_robot_of_the_team_that_ships_sees_and_walks_as_its_own_run_says() {
     let sandbox = Sandbox::new();
     let server = Server::start(&sandbox, "");
-    let team = gallery::trained(TEAM).unwrap();
+    let team = published::trained(TEAM).unwrap();
     let first = &team[0].0.config;
     assert!(team.iter().any(|(run, _)| run.config.stimulus != first.stimulus), "all have one window");
     let drawing = Grid::from_fn(28, 28, |r, c| if (r + 2 * c) % 7 < 3 { 255 } else { 0 });
@@ -721,7 +721,7 @@ fn the_gallery_walks_as_it_was_trained() {
         evogym_displacements: Vec<Vec<f64>>,
     }
     let references: BTreeMap<String, Reference> = crate::common::reference::golden("published_robots");
-    for robot in gallery::gallery().unwrap() {
+    for robot in published::gallery().unwrap() {
         let under_zero = references[&robot.name].evogym_displacements[0][0];
         assert_eq!(Direction::of(under_zero, 3.0), Some(robot.zero_walks), "{}", robot.name);
     }

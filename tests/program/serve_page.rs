@@ -7,8 +7,8 @@ use crate::common::browser::{Browser, Tab, found, keep_picture};
 use crate::common::hostile::Dice;
 use crate::common::program::{Sandbox, terminate};
 use crate::common::server::{Proxy, Server};
-use morphcog::analysis::gallery;
-use morphcog::base::shipped::{TEAM, ZERO_ONE};
+use morphcog::robots::published;
+use morphcog::shipped::gallery::{TEAM, ZERO_ONE};
 use serde_json::Value;
 use std::f64::consts::TAU;
 use std::time::{Duration, Instant};
@@ -50,7 +50,7 @@ fn one() -> Vec<[f64; 2]> {
 
 /// The robot that the page begins with.
 fn best() -> String {
-    let trained = gallery::trained(ZERO_ONE).unwrap();
+    let trained = published::trained(ZERO_ONE).unwrap();
     trained[0].0.elites[0].id.clone()
 }
 
@@ -462,7 +462,7 @@ fn a_team_walks_on_small_stages_and_its_votes_are_counted() {
     let Some(mut browser) = browser(&sandbox) else { return };
     // All three are called tiny, and have one seed.
     for (name, pair) in [("a", "0v1"), ("b", "0v2"), ("c", "1v2")] {
-        let (mut run, _) = gallery::trained(&format!("{TEAM}-{pair}")).unwrap().remove(0);
+        let (mut run, _) = published::trained(&format!("{TEAM}-{pair}")).unwrap().remove(0);
         (run.name, run.config.seed) = ("tiny".to_string(), 3);
         sandbox.write(&format!("{name}/run.json"), run.to_json());
     }

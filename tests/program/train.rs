@@ -6,14 +6,15 @@ use morphcog::base::ranks::Ranks;
 use morphcog::base::stop::NEVER;
 use morphcog::config::Config;
 use morphcog::data::dataset::Split;
-use morphcog::search::training::Training;
-use morphcog::search::{evolve, train};
+use morphcog::images::training::Training;
+use morphcog::images::whereabouts::load_dataset;
+use morphcog::response::gait::Gait;
+use morphcog::robots::selection::Selection;
+use morphcog::search::evolve;
 use morphcog::store::folder::IfExists;
 use morphcog::store::images::ImageRef;
-use morphcog::store::robots::Selection;
 use morphcog::store::run::{Robot, RunFile};
-use morphcog::store::whereabouts::load_dataset;
-use morphcog::task::gait::Gait;
+use morphcog::training;
 use proptest::prelude::*;
 use proptest::test_runner::{RngAlgorithm, TestRng, TestRunner};
 use std::collections::BTreeSet;
@@ -508,7 +509,7 @@ fn made_by(config: &str, groups: &str) -> usize {
     if read("any").elites.is_empty() {
         return 1;
     }
-    let options = train::Options {
+    let options = training::Options {
         archive: sandbox.path("any/run.json"),
         robots: Selection::Top(3),
         groups: groups.parse().unwrap(),
@@ -520,7 +521,7 @@ fn made_by(config: &str, groups: &str) -> usize {
         data: None,
         threads,
     };
-    match train::train(&options, &NEVER, &()) {
+    match training::train(&options, &NEVER, &()) {
         Ok(_) => {
             let taught = read("taught");
             Config::load(&sandbox.path("taught/config.toml").to_string_lossy(), &[]).unwrap();

@@ -5,15 +5,15 @@ use crate::common::program::{Made, Sandbox, TINY};
 use morphcog::base::observer::{Generation, Observer};
 use morphcog::config::Config;
 use morphcog::data::dataset::Split;
+use morphcog::images::held_out::images;
+use morphcog::images::training::Training;
+use morphcog::images::whereabouts::load_dataset;
 use morphcog::search::evolve::{Options, evolve};
-use morphcog::search::held_out::images;
-use morphcog::search::training::Training;
 use morphcog::store::audit::AuditFile;
 use morphcog::store::eval::EvalFile;
 use morphcog::store::folder::IfExists;
 use morphcog::store::images::HeldOut;
 use morphcog::store::run::Robot;
-use morphcog::store::whereabouts::load_dataset;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, Ordering};
 

@@ -4,8 +4,8 @@
 use crate::base::observer::Generation;
 use crate::base::text::one_line;
 use crate::cli::output::console::{Console, Mode, lock};
+use crate::cli::output::progress::{Pacer, Recent, Words, count_line, generation_line};
 use crate::cli::output::wrapping::one_of;
-use crate::view::progress::{Pacer, Recent, Words, count_line, generation_line};
 use indicatif::ProgressBar;
 use serde::Serialize;
 use std::sync::Mutex;

@@ -1,6 +1,5 @@
 //! What `morphcog plot` makes: figures as SVG and PNG.
 
-use crate::analysis::gallery;
 use crate::base::error::Error;
 use crate::base::files::exists;
 use crate::base::remedy::{Invocation, Remedy};
@@ -10,15 +9,16 @@ use crate::commands::one_by_one::Named;
 use crate::commands::plot::Progress;
 use crate::commands::replay;
 use crate::commands::replay::{Found, Options};
+use crate::draw::error::write_whole;
+use crate::draw::plot;
+use crate::draw::plot::{Background, Figure, PRINT};
+use crate::robots::published;
 use crate::store::capacity::CapacityFile;
 use crate::store::eval::EvalFile;
 use crate::store::folder;
 use crate::store::names::METRICS;
 use crate::store::names::{CAPACITY_JSON, EVAL_JSON, RUN_JSON};
 use crate::store::run::{RunFile, different};
-use crate::view::error::write_whole;
-use crate::view::plot;
-use crate::view::plot::{Background, Figure, PRINT};
 use std::fmt;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
@@ -274,7 +274,7 @@ fn of_robot(wanted: &Wanted, named: &Named) -> Result<Made, Error> {
     let options = Options { robot, archive, ..wanted.options.clone() };
     // Without an archive it is a published robot, or one of the newest run.
     let beside = match &options.archive {
-        None if gallery::find(&options.robot)?.is_none() => Some(folder::newest_run()?),
+        None if published::find(&options.robot)?.is_none() => Some(folder::newest_run()?),
         given => given.clone(),
     };
     let archive = beside.as_deref();

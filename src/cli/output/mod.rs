@@ -6,6 +6,7 @@ pub mod figures;
 pub mod networks;
 pub mod pictures;
 pub mod player;
+pub mod progress;
 pub mod reporters;
 pub mod responses;
 pub mod summary;

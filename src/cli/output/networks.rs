@@ -7,10 +7,10 @@ use crate::baseline::curve::Crossing;
 use crate::cli::output::console::{Console, Mode};
 use crate::commands::capacity::FIGURES;
 use crate::commands::reproduce::Finished;
+use crate::draw::error::{PictureError, write_whole};
+use crate::draw::plot;
+use crate::draw::report::tables::size;
 use crate::store::capacity::{CapacityFile, TaskCapacity};
-use crate::view::error::{PictureError, write_whole};
-use crate::view::plot;
-use crate::view::report::tables::size;
 use std::path::{Path, PathBuf};
 
 /// The table: task, accuracy and capacity, the paper's beside ours; `out` is the file, if it was

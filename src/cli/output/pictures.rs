@@ -1,17 +1,18 @@
 //! What `morphcog replay` makes of a recording: files, or a view in the terminal.
 
-use crate::analysis::gallery;
 use crate::base::error::Error;
-use crate::base::{named, number};
+use crate::base::number;
 use crate::cli::output::console::Console;
 use crate::cli::output::player;
 use crate::commands::replay::Replay;
+use crate::draw::error::PictureError;
+use crate::draw::scene::Look;
+use crate::draw::stage::Stage;
+use crate::draw::walk::Walk;
+use crate::draw::{gif, html, raster};
+use crate::robots::published;
+use crate::shipped;
 use crate::store::folder;
-use crate::view::error::PictureError;
-use crate::view::scene::Look;
-use crate::view::stage::Stage;
-use crate::view::walk::Walk;
-use crate::view::{gif, html, raster};
 use std::fmt;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
@@ -124,10 +125,10 @@ impl Wanted {
 pub fn folder(archive: Option<&Path>, robot: &str) -> Result<PathBuf, Error> {
     let archive = match archive {
         Some(path) => path.to_path_buf(),
-        None if gallery::find(robot)?.is_some() => return Ok(PathBuf::new()),
+        None if published::find(robot)?.is_some() => return Ok(PathBuf::new()),
         None => folder::newest_run()?,
     };
-    match named::is_named(&archive) {
+    match shipped::is_named(&archive) {
         true => Ok(PathBuf::new()),
         false => Ok(archive.parent().unwrap_or(Path::new("")).to_path_buf()),
     }

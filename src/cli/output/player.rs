@@ -6,7 +6,7 @@ use crate::base::signals;
 use crate::cli::output::console::{Console, Mode};
 use crate::cli::output::terminal;
 use crate::cli::output::terminal::Depth;
-use crate::view::walk::Walk;
+use crate::draw::walk::Walk;
 use crossterm::event::{self, Event, KeyCode, KeyEventKind, KeyModifiers};
 use crossterm::terminal::{disable_raw_mode, enable_raw_mode, size};
 use std::io::IsTerminal;

@@ -1,13 +1,13 @@
 //! What `morphcog response` says at its end, and its pictures.
 
-use crate::analysis::gallery;
-use crate::analysis::measure::Finished;
 use crate::base::number;
 use crate::base::number::percent;
 use crate::cli::output::console::{Console, Mode};
+use crate::commands::response::Finished;
+use crate::draw::error::{PictureError, write_whole};
+use crate::draw::plot;
+use crate::robots::published;
 use crate::store::response::{EndedBy, RobotResponse};
-use crate::view::error::{PictureError, write_whole};
-use crate::view::plot;
 use std::path::Path;
 
 /// After a measurement: a line per robot.
@@ -93,7 +93,7 @@ fn row(robot: &RobotResponse, is_taught: bool, has_window: bool) -> Vec<String> 
 pub fn pictures(console: &Console, finished: &Finished) -> Result<(), PictureError> {
     let Finished { file, pictures, .. } = finished;
     for (robot, [svg, png]) in file.robots.iter().zip(pictures) {
-        let of = match file.run == gallery::ALL {
+        let of = match file.run == published::ALL {
             true => format!("robot {}, published with the paper", robot.id),
             false => format!("robot {}, {}, seed {}", robot.id, file.run, file.run_seed),
         };

@@ -1,6 +1,5 @@
 //! What a command says at its end.
 
-use crate::analysis::gallery::Published;
 use crate::analysis::published;
 use crate::base::clock::CLOCK;
 use crate::base::number;
@@ -9,18 +8,19 @@ use crate::base::shell::in_shell;
 use crate::base::text::counted;
 use crate::cli::output::console::{Console, Mode};
 use crate::cli::output::networks;
+use crate::cli::output::progress::duration;
 use crate::commands::bench::Speed;
 use crate::commands::data::Found;
 use crate::data::fetch::{Fetched, Outcome};
+use crate::draw::report::tables::of_robot;
+use crate::robots::published::Published;
 use crate::search::evolve::Finished;
-use crate::search::train;
 use crate::store::capacity::CapacityFile;
 use crate::store::eval::{EvalFile, RobotReport};
 use crate::store::images::{HeldOut, ImageRef};
 use crate::store::names::RUN_JSON;
 use crate::store::validation::Validated;
-use crate::view::progress::duration;
-use crate::view::report::tables::of_robot;
+use crate::training;
 use std::path::Path;
 
 /// Robots shown after an evolution.
@@ -102,8 +102,8 @@ pub fn evolution(console: &Console, finished: &Finished, out: &Path, goes_on: bo
 }
 
 /// After a training: the robot.
-pub fn training(console: &Console, finished: &train::Finished, out: &Path) {
-    let train::Finished { run, rollouts, size, .. } = finished;
+pub fn training(console: &Console, finished: &training::Finished, out: &Path) {
+    let training::Finished { run, rollouts, size, .. } = finished;
     let Some(robot) = run.best() else { return };
     if console.mode() == Mode::Json {
         let done = serde_json::json!({

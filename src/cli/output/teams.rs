@@ -3,10 +3,10 @@
 use crate::base::error::Error;
 use crate::base::number::percent;
 use crate::cli::output::console::{Console, Mode};
+use crate::draw::error::write_whole;
+use crate::draw::plot;
+use crate::draw::report::decisions::{figures, remarks, table};
 use crate::store::team::{Decoded, FIGURES, Member, TeamFile, figure};
-use crate::view::error::write_whole;
-use crate::view::plot;
-use crate::view::report::decisions::{figures, remarks, table};
 use std::path::Path;
 
 /// After a test: a line per robot, the answers of the team, what answers the same images without

@@ -1,10 +1,10 @@
 //! A frame of a recording as text, for a live view in a terminal.
 
 use crate::body::Material;
-use crate::view::colour;
-use crate::view::colour::Colour;
-use crate::view::panel::readout;
-use crate::view::walk::{Walk, area};
+use crate::draw::colour;
+use crate::draw::colour::Colour;
+use crate::draw::panel::readout;
+use crate::draw::walk::{Walk, area};
 
 /// Columns of the stimulus' corner are only taken from views at least this wide.
 const WIDE: usize = 40;
@@ -189,7 +189,7 @@ fn letter(pixel: Pixel) -> char {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::view::simulated;
+    use crate::draw::simulated;
 
     /// The visible characters of every line.
     fn visible(text: &str) -> Vec<usize> {

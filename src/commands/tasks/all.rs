@@ -8,11 +8,13 @@ use crate::commands::tasks::steps::{is_done, run};
 use crate::commands::tasks::task::{Place, Run, Task};
 use crate::config::{Config, DataConfig};
 use crate::data::dataset::{Dataset, Split};
-use crate::search::{held_out, train, training};
+use crate::images::whereabouts::Whereabouts;
+use crate::images::held_out;
+use crate::images::training::Training;
 use crate::store::images::{HeldOut, HowMany};
 use crate::store::names::{DATA_FOLDER, TASK_JSON};
 use crate::store::task::TaskFile;
-use crate::store::whereabouts::Whereabouts;
+use crate::training;
 use serde_json::Value;
 use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, BTreeSet};
@@ -58,15 +60,15 @@ pub fn check_data<'a>(tasks: impl Iterator<Item = (usize, &'a Task)>, place: &Pl
         };
         let named = |error: Error| error.in_place(&format!("task {number} ({})", task.name));
         if let Some(groups) = task.run.groups() {
-            train::check_groups(groups, dataset).map_err(named)?;
+            training::check_groups(groups, dataset).map_err(named)?;
         }
         match &task.run {
             Run::Evolve(config, ..) => {
-                training::Training::images(config, dataset).map_err(named)?;
+                Training::images(config, dataset).map_err(named)?;
                 held_out::check(config, &[], "data.images_per_class", dataset).map_err(named)?;
             }
             Run::Train(training) => {
-                train::with_images(training.config.clone(), &[], dataset, &()).map_err(named)?;
+                training::with_images(training.config.clone(), &[], dataset, &()).map_err(named)?;
             }
         }
         let Some(step) = test.filter(|step| known.insert((name, step.images, config.classes()))) else {

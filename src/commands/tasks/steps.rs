@@ -6,14 +6,15 @@ use crate::base::ranks::Ranks;
 use crate::base::remedy::Remedy;
 use crate::commands::tasks::task::{Place, Run, Task, selection};
 use crate::commands::{audit, eval};
-use crate::search::{evolve, showing, train, validation};
+use crate::robots::selection::Selection;
+use crate::search::{evolve, held_out_run, validation};
 use crate::store::eval::EvalFile;
 use crate::store::folder::IfExists;
 use crate::store::lock::Lock;
 use crate::store::names::{AUDIT_JSON, RUN_JSON, TASK_JSON, TASK_LOCK};
-use crate::store::robots::Selection;
 use crate::store::task::{State, TaskFile};
 use crate::task::direction;
+use crate::training;
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
@@ -97,7 +98,7 @@ pub(crate) fn test_of(task: &Task, place: &Place) -> Result<Option<eval::Options
         validation: None,
         seed: 1,
         threshold: direction::THRESHOLD,
-        cycles: showing::CYCLES,
+        cycles: held_out_run::CYCLES,
         data: place.data.clone(),
         dataset: None,
         out: folder.join(eval::own_name(step.split)),
@@ -128,7 +129,7 @@ fn steps(task: &Task, place: &Place, stop: &AtomicBool, observer: &dyn Observer)
             }
         }
         Run::Train(training) => {
-            let options = train::Options {
+            let options = training::Options {
                 archive: training.archive.clone(),
                 robots: selection("robots", &training.robots)?,
                 groups: training.groups.clone(),
@@ -140,7 +141,7 @@ fn steps(task: &Task, place: &Place, stop: &AtomicBool, observer: &dyn Observer)
                 data: place.data.clone(),
                 threads: place.threads,
             };
-            let trained = train::train(&options, stop, observer).map_err(|error| match error.kind {
+            let trained = training::train(&options, stop, observer).map_err(|error| match error.kind {
                 ErrorKind::Stopped => stopped(),
                 _ => of_task(error),
             })?;

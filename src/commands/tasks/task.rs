@@ -1,16 +1,16 @@
 //! What a task is: what makes its run, and what is done with that.
 
 use crate::base::error::Error;
-use crate::base::named;
 use crate::base::remedy::Remedy;
 use crate::config::audit::Criteria;
 use crate::config::{Config, Settings, differing};
+use crate::images::whereabouts::Whereabouts;
+use crate::robots::selection::{BEST, Selection};
+use crate::shipped;
 use crate::store::images::{HeldOut, HowMany};
 use crate::store::names::TASK_JSON;
-use crate::store::robots::{BEST, Selection};
 use crate::store::run::RunFile;
 use crate::store::task::TaskFile;
-use crate::store::whereabouts::Whereabouts;
 use crate::task::grouping::Groups;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -243,7 +243,7 @@ impl Task {
     /// The folder of the atlas that its gaits are from, if they are.
     pub fn atlas(&self) -> Option<PathBuf> {
         let Run::Train(training) = &self.run else { return None };
-        named::atlas_of(&training.archive)
+        shipped::atlas_of(&training.archive)
     }
 
     /// How much of it there is to show on a bar: generations, or challengers.

@@ -1,0 +1,162 @@
+//! The images that networks are trained and tested on: those of the robots, seen as they see them.
+
+use crate::base::Grid;
+use crate::base::error::Error;
+use crate::base::hash::sha256_hex;
+use crate::base::random::{Purpose, stream};
+use crate::base::remedy::Remedy;
+use crate::baseline::{Kind, Samples, Trained, train};
+use crate::commands::capacity::Options;
+use crate::config::capacity::CapacityConfig;
+use crate::data::dataset::{Dataset, Split};
+use crate::images::whereabouts::{Whereabouts, seen};
+use crate::store::eval::EvalFile;
+use crate::store::images::ImageRef;
+use crate::store::names::RUN_JSON;
+use crate::store::setting::{RunRef, Setting};
+use crate::task::grouping;
+use crate::task::grouping::Group;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
+
+/// The images networks learn from, wait on and are tested on, with their classes.
+pub(crate) struct Images {
+    /// By run.
+    training: Vec<Vec<Seen>>,
+    waiting: Vec<Seen>,
+    test: Vec<Seen>,
+    /// Of all of them, and how they are seen.
+    pub key: String,
+}
+
+/// An image as the robots see it.
+pub(crate) struct Seen {
+    stimulus: Grid<f64>,
+    class: u8,
+}
+
+impl Images {
+    pub fn of(report: &EvalFile, setting: &Setting, options: &Options) -> Result<Images, Error> {
+        let dataset = whereabouts(options).load_of(&setting.train_sha256, &setting.data, &Split::ALL)?;
+        if report.test_sha256 != dataset.fingerprint(Split::Test) {
+            let text = format!(
+                "{}: the images here are not those of {} (another SHA-256)",
+                dataset.place(),
+                options.eval.display()
+            );
+            return Err(Error::input(text).remedy(Remedy::NameData));
+        }
+        let see = |split: Split, images: &[ImageRef]| -> Result<Vec<Seen>, Error> {
+            let one = |image: &ImageRef| {
+                let stimulus = seen(&setting.body, &setting.stimulus, &dataset, split, image.index)?;
+                Ok(Seen { stimulus, class: image.label })
+            };
+            images.iter().map(one).collect()
+        };
+        let waited = if options.config.clean {
+            waiting(&dataset, setting, &report.runs, options)?
+        } else {
+            Vec::new()
+        };
+        let training: Result<Vec<_>, Error> =
+            report.runs.iter().map(|run| see(Split::Train, &run.training_images)).collect();
+        let (training, test_images) = (training?, see(Split::Test, &report.images)?);
+        let waiting = see(Split::Train, &waited)?;
+        // Pixels, not indices: what is learnt depends on those.
+        let all = training.iter().flatten().chain(&test_images).chain(&waiting);
+        let pixels: Vec<(u8, &[f64])> = all.map(|seen| (seen.class, seen.stimulus.cells())).collect();
+        let counts: Vec<usize> = training.iter().map(Vec::len).collect();
+        let (size, waited) = ((setting.body.height, setting.body.width), waiting.len());
+        let key = sha256_hex(format!("{size:?} {counts:?} {pixels:?} {waited}").as_bytes());
+        Ok(Images { training, waiting, test: test_images, key })
+    }
+}
+
+/// Where the images are: a run beside the evaluation, or in a folder beside it, may know.
+fn whereabouts(options: &Options) -> Whereabouts {
+    let folder = options.eval.parent().filter(|folder| !folder.as_os_str().is_empty());
+    let entries = std::fs::read_dir(folder.unwrap_or(Path::new("."))).into_iter().flatten().flatten();
+    let mut runs: Vec<PathBuf> = entries.map(|entry| entry.path().join(RUN_JSON)).collect();
+    runs.sort();
+    let here = Whereabouts::given(options.data.as_deref()).and_of(&options.eval);
+    runs.iter().fold(here, |whereabouts, run| whereabouts.and_of(run))
+}
+
+/// Images of the training split that no run was trained on last.
+fn waiting(
+    dataset: &Dataset,
+    setting: &Setting,
+    runs: &[RunRef],
+    options: &Options,
+) -> Result<Vec<ImageRef>, Error> {
+    let classes = setting.task.classes();
+    let per_class = options.config.waiting_images.div_ceil(classes.len().max(1));
+    let trained =
+        |index: &usize| runs.iter().any(|run| run.training_images.iter().any(|i| i.index == *index));
+    let mut all = Vec::new();
+    for &label in &classes {
+        let free: Vec<usize> =
+            dataset.indices_of(Split::Train, label).iter().copied().filter(|index| !trained(index)).collect();
+        if free.len() < per_class {
+            let found = free.len();
+            let text =
+                format!("capacity: waiting_images: expected {per_class} of class {label}, found {found}");
+            let advice = match found * classes.len() {
+                0 => "clean = false needs none".to_string(),
+                most => format!("ask for at most {most}"),
+            };
+            return Err(Error::input(text).advice(advice));
+        }
+        let rng = &mut stream(options.config.seed, Purpose::Waiting, 0, u64::from(label));
+        all.extend(rng.sample(free.len(), per_class).into_iter().map(|i| ImageRef { index: free[i], label }));
+    }
+    Ok(all)
+}
+
+/// The images of a task, with their groups, as networks of a kind see them.
+pub(crate) struct Task {
+    kind: Kind,
+    training: Vec<Samples>,
+    waiting: Option<Samples>,
+    test: Samples,
+}
+
+impl Task {
+    pub fn new(
+        split: &grouping::Split,
+        kind: Kind,
+        config: &CapacityConfig,
+        images: &Images,
+    ) -> Result<Self, Error> {
+        let samples = |of: &[Seen]| {
+            let grouped = of.iter().filter_map(|seen| Some((&seen.stimulus, split.group(seen.class)?)));
+            let grouped: Vec<(&Grid<f64>, usize)> =
+                grouped.map(|(stimulus, group)| (stimulus, usize::from(group == Group::B))).collect();
+            Samples::new(&grouped, kind, config.of(kind))
+                .map_err(|error| Error::input(format!("capacity: {error}")))
+        };
+        let training: Result<Vec<Samples>, Error> = images.training.iter().map(|run| samples(run)).collect();
+        let waiting = (!images.waiting.is_empty()).then(|| samples(&images.waiting)).transpose()?;
+        Ok(Task { kind, training: training?, waiting, test: samples(&images.test)? })
+    }
+
+    /// The training of this number; the runs take turns in lending their images.
+    ///
+    /// # Errors
+    /// Of kind [`ErrorKind::Stopped`](crate::base::error::ErrorKind::Stopped) if `stop` is set
+    /// meanwhile.
+    pub fn train(
+        &self,
+        size: usize,
+        config: &CapacityConfig,
+        number: usize,
+        stop: &AtomicBool,
+    ) -> Result<Trained, Error> {
+        let kind = self.kind;
+        let training = &self.training[number % self.training.len()];
+        let waiting = self.waiting.as_ref().unwrap_or(&self.test);
+        let rng =
+            &mut stream(config.seed, Purpose::Networks, ((kind as u64) << 32) + size as u64, number as u64);
+        Ok(train(size, config.of(kind), training, waiting, &self.test, rng, stop)?)
+    }
+}

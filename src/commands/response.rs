@@ -1,0 +1,517 @@
+//! `morphcog response`: how far each soft voxel and sensor moves a robot, and what it could be
+//! taught.
+
+use crate::base::Grid;
+use crate::base::error::{Error, ErrorKind};
+use crate::base::hash::sha256_hex;
+use crate::base::observer::{Observer, Work};
+use crate::base::remedy::Remedy;
+use crate::base::stop::check;
+use crate::base::text::counted;
+use crate::base::threads::pool;
+use crate::body::Body;
+use crate::config::train::MOST_RANDOM_IMAGES;
+use crate::config::{Config, DataConfig, MAX_NUMBER};
+use crate::data::dataset::{Dataset, DatasetError, Split};
+use crate::images::training::scarcest;
+use crate::images::whereabouts::{Whereabouts, load_dataset_of, say_transposed, seen};
+use crate::response::estimate::teachable;
+use crate::response::gait::Gait;
+use crate::response::lesson::Example;
+use crate::response::probing;
+use crate::response::probing::Probing;
+use crate::response::regression::{Response, Shown};
+use crate::robots::published;
+use crate::robots::selection::{Selection, Source};
+use crate::store::folder::{check_out, writable};
+use crate::store::images::{DatasetRef, ImageRef};
+use crate::store::names::RESPONSE_JSON;
+use crate::store::response::{
+    EndedBy, FORMAT, FORMAT_VERSION, PICTURES, ResponseFile, RobotResponse, Setting, Taught, Unfinished,
+    pictures,
+};
+use crate::store::results::replaced;
+use crate::store::unwritten::Unwritten;
+use crate::task::direction;
+use crate::task::evaluation::fresh_rollouts_so_far;
+use crate::task::grouping::{Groups, balanced};
+use crate::task::perturbation::Condition;
+use crate::task::protocol::{Protocol, RolloutMode};
+use crate::task::stimulus::StimulusParams;
+use crate::training;
+use crate::training::window::Windows;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
+
+/// Rollouts between two looks at how well the slopes are known, and least number of a robot's: ten
+/// under each of six conditions. Larger ones overshoot what is needed; smaller ones leave cores
+/// idle at their ends.
+pub const BATCH: usize = 60;
+
+/// Most training images of a class by which a task is known. More cost time, and hardly narrow the
+/// interval of what could be taught.
+const IMAGES_PER_CLASS: usize = 1000;
+
+/// Least number of images of a class of a task: designs are solved with half of them, and judged by
+/// the other half.
+const LEAST_PER_CLASS: usize = 4;
+
+/// What to measure, and how.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// The run.json; `None`: the published robots.
+    pub archive: Option<PathBuf>,
+    /// Which of its robots, by name.
+    pub robots: Vec<String>,
+    /// Whether only robots will do that an audit found physical.
+    pub physical_only: bool,
+    /// Two groups of classes, to tell what robots could be taught.
+    pub task: Option<Groups>,
+    /// Keys of the config that a training would have otherwise than the run, as
+    /// `stimulus.margin=5`; only with a task.
+    pub set: Vec<String>,
+    /// Most rollouts of a robot.
+    pub images: usize,
+    /// The relative error of the slopes at which a measurement ends.
+    pub error: f64,
+    /// Seed of the random images; `None`: that of the run, as `train` has it.
+    pub seed: Option<u64>,
+    /// Where the data are, if the command line says.
+    pub data: Option<PathBuf>,
+    /// Where the results go (response.json; CSV and pictures beside it).
+    pub out: PathBuf,
+    /// Number of threads; `None`: one per core.
+    pub threads: Option<usize>,
+}
+
+/// A measurement's end.
+#[derive(Clone, Debug)]
+pub struct Finished {
+    /// The content of response.json.
+    pub file: ResponseFile,
+    /// The pictures of its robots, to be made.
+    pub pictures: Vec<[PathBuf; 2]>,
+    /// Whether a signal stopped it before the last robot.
+    pub stopped: bool,
+    /// Why what was found is not, or not as a whole, in its file, if so.
+    pub unwritten: Option<Error>,
+}
+
+/// A robot to be measured.
+struct Subject {
+    id: String,
+    gait: Gait,
+}
+
+/// Where robots are from.
+struct Provenance {
+    config: Config,
+    run: String,
+    sha256: String,
+    /// The data of the run; none of the published robots.
+    dataset: Option<DatasetRef>,
+    robots: Vec<(String, Body)>,
+}
+
+/// Measures the responses of robots; results are written after every robot, so that stopping keeps
+/// what is finished. A robot that cannot be measured is left out with a warning if others can.
+///
+/// # Errors
+/// What is wrong with archive, robots, data or options.
+pub fn measure(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Result<Finished, Error> {
+    check_numbers(options)?;
+    let provenance = provenance(options)?;
+    let config = &provenance.config;
+    let mut subjects: Vec<Subject> = Vec::new();
+    let mut refused: Vec<Error> = Vec::new();
+    for (id, body) in &provenance.robots {
+        match Gait::of(body) {
+            Some(gait) => subjects.push(Subject { id: id.clone(), gait }),
+            None => refused.push(Error::input(format!(
+                "robot {id}: it has neither soft voxels nor sensors, so no image can move it"
+            ))),
+        }
+    }
+    check_names(options, &subjects)?;
+    let seed = options.seed.unwrap_or(config.seed);
+    let task = task(options, &provenance, seed, observer)?;
+    let probing = Probing::new(&conditions(config, options.images), seed);
+    let pool = pool(options.threads)?;
+    let run_seed = config.seed;
+    let mut file = ResponseFile {
+        format: FORMAT.to_string(),
+        format_version: FORMAT_VERSION,
+        program_version: env!("CARGO_PKG_VERSION").to_string(),
+        run: provenance.run.clone(),
+        run_seed,
+        run_sha256: provenance.sha256.clone(),
+        setting: setting(options, seed, config, &probing, task.as_ref())?,
+        unfinished: Vec::new(),
+        robots: Vec::new(),
+    };
+    let earlier = earlier(options, observer)?;
+    if let Some((path, before)) = earlier.iter().find(|(path, _)| *path == options.out)
+        && before.run_sha256 == provenance.sha256
+        && before.setting.seed != seed
+    {
+        let count = counted(before.robots.len(), "robot of this run is", "robots of this run are");
+        let text = format!(
+            "{}: {count} measured with the random images of seed {}",
+            path.display(),
+            before.setting.seed
+        );
+        let error = Error::input(text).remedy(Remedy::ChooseOut);
+        return Err(error.remedy(Remedy::MeasureWithSeed(before.setting.seed)));
+    }
+    let measuring =
+        Measuring { options, config, probing, task, earlier, run_sha256: &provenance.sha256, seed, stop };
+    let asked: Vec<&str> = subjects.iter().map(|subject| subject.id.as_str()).collect();
+    let drawn = pictures(&options.out, &asked);
+    if !subjects.is_empty() {
+        let known: usize = subjects.iter().map(|subject| measuring.known(&subject.gait).0.len()).sum();
+        let kept = if known > 0 { format!(" ({known} rollouts known from before)") } else { String::new() };
+        let label = format!("measuring {}{kept}:", counted(subjects.len(), "robot", "robots"));
+        observer.begins(&Work::new(label, (subjects.len() * options.images) as u64, "rollouts"));
+    }
+    let mut unwritten = Unwritten::default();
+    let mut stopped = false;
+    for (number, subject) in subjects.iter().enumerate() {
+        let mut displacements = Vec::new();
+        let found = pool.install(|| {
+            measuring.robot(subject, &mut displacements, &mut |rollouts, skipped| {
+                observer.skips(skipped as u64);
+                observer.progress((number * options.images + rollouts) as u64);
+            })
+        });
+        match found {
+            Ok(Some(found)) => file.robots.push(found),
+            Ok(None) => refused.push(Error::input(format!(
+                "robot {}: most of its rollouts with random images are unstable, so its response cannot be measured",
+                subject.id
+            ))),
+            Err(error) if error.kind == ErrorKind::Stopped => {
+                stopped = true;
+                if !displacements.is_empty() {
+                    let (id, body) = (subject.id.clone(), subject.gait.built(&subject.gait.design()));
+                    file.unfinished.push(Unfinished { id, body, displacements });
+                }
+            }
+            Err(error) => return Err(error),
+        }
+        if !file.robots.is_empty() || !file.unfinished.is_empty() {
+            // Another process may have measured robots of this run meanwhile.
+            let before = replaced::<ResponseFile>(&options.out);
+            let whole = before.map(|before| before.map_or_else(|| file.clone(), |b| file.with_others_of(&b)));
+            let is_new = |id: &str| file.robots.iter().any(|robot| robot.id == id);
+            let outdated = asked.iter().zip(&drawn).filter(|(id, _)| is_new(id));
+            let outdated: Vec<[PathBuf; 2]> = outdated.map(|(_, files)| files.clone()).collect();
+            let written = whole.and_then(|whole| whole.write(&options.out, &outdated));
+            unwritten.tried(written, observer)?;
+        }
+        if stopped {
+            break;
+        }
+    }
+    if file.robots.is_empty() && !stopped {
+        return Err(match refused.as_slice() {
+            [one] => one.clone().remedy(Remedy::ChooseRobots(None)),
+            several => {
+                let text =
+                    format!("none of the {} chosen robots can be measured: {}", several.len(), several[0]);
+                Error::input(text).remedy(Remedy::ChooseRobots(None))
+            }
+        });
+    }
+    refused.iter().for_each(|error| observer.warning(&format!("{error}; left out")));
+    let ids: Vec<&str> = file.robots.iter().map(|robot| robot.id.as_str()).collect();
+    let pictures = pictures(&options.out, &ids);
+    Ok(Finished { pictures, file, stopped, unwritten: unwritten.error() })
+}
+
+fn check_numbers(options: &Options) -> Result<(), Error> {
+    let Options { images, error, seed, .. } = options;
+    if !(BATCH..=MOST_RANDOM_IMAGES).contains(images) {
+        let text = format!("expected {BATCH} to {MOST_RANDOM_IMAGES} random images");
+        return Err(Error::argument("images", images, text).advice("with fewer, no slope is known"));
+    }
+    if !(0.0..1.0).contains(error) {
+        return Err(Error::argument("error", error, "expected 0 or more, and below 1"));
+    }
+    if let Some(seed) = seed.filter(|seed| *seed > MAX_NUMBER) {
+        return Err(Error::argument("seed", seed, format!("expected at most {MAX_NUMBER}")));
+    }
+    Ok(())
+}
+
+/// Whether results and pictures can be written, and overwrite nothing of a run.
+fn check_names(options: &Options, subjects: &[Subject]) -> Result<(), Error> {
+    let out = &options.out;
+    check_out(out, options.archive.as_deref().unwrap_or(Path::new("")), RESPONSE_JSON)?;
+    if PICTURES.iter().any(|ending| out.with_extension(ending) == *out) {
+        let text = "expected another ending: the picture beside the results has that name";
+        return Err(Error::argument("out", out.display(), text));
+    }
+    let ids: Vec<&str> = subjects.iter().map(|subject| subject.id.as_str()).collect();
+    pictures(out, &ids).iter().flatten().try_for_each(|picture| writable(picture))
+}
+
+/// The robots that are asked for, each once.
+fn provenance(options: &Options) -> Result<Provenance, Error> {
+    let Some(path) = &options.archive else {
+        let mut robots: Vec<(String, Body)> = Vec::new();
+        for name in &options.robots {
+            let robot = published::find(name)?
+                .ok_or_else(|| Error::input(format!("there is no published robot {name}")))?;
+            if robots.iter().all(|(other, _)| *other != robot.name) {
+                robots.push((robot.name, robot.body));
+            }
+        }
+        return Ok(Provenance {
+            config: published::config()?,
+            run: published::ALL.to_string(),
+            sha256: sha256_hex(published::TEXT.as_bytes()),
+            dataset: None,
+            robots,
+        });
+    };
+    let source = Source::read(path)?;
+    let chosen = Selection::Ids(options.robots.clone()).physical(options.physical_only);
+    let seed = options.seed.unwrap_or(source.run.config.seed);
+    let chosen = chosen.of(std::slice::from_ref(&source), seed)?;
+    let robots = chosen.iter().map(|chosen| (chosen.robot.id.clone(), chosen.robot.body.clone())).collect();
+    let sha256 = source.run.fingerprint();
+    let run = &source.run;
+    Ok(Provenance {
+        config: run.config.clone(),
+        run: run.name.clone(),
+        sha256,
+        dataset: Some(run.dataset.clone()),
+        robots,
+    })
+}
+
+/// The conditions of `train`, as far as there are rollouts for them.
+fn conditions(config: &Config, rollouts: usize) -> Vec<Condition> {
+    config.train.perturbations.conditions().take(rollouts).collect()
+}
+
+/// A task that robots could be taught.
+struct Task {
+    groups: Groups,
+    /// The config that its training would have.
+    config: Config,
+    dataset: Dataset,
+    /// Training images, as many of each class, class by class.
+    images: Vec<ImageRef>,
+}
+
+/// The task that is asked for.
+fn task(
+    options: &Options,
+    provenance: &Provenance,
+    seed: u64,
+    observer: &dyn Observer,
+) -> Result<Option<Task>, Error> {
+    let Some(groups) = &options.task else { return Ok(None) };
+    let config = training::config_of(&provenance.config, groups.classes(), Some(seed), &options.set)?;
+    let mut whereabouts = Whereabouts::given(options.data.as_deref());
+    if let Some(path) = &options.archive {
+        whereabouts = whereabouts.and_of(path);
+    }
+    same_walks(&provenance.config, &config)?;
+    let data = |config: &Config| {
+        let DataConfig { dataset, dir, transpose, builtin, .. } = &config.data;
+        (dataset.clone(), dir.clone(), *transpose, builtin.clone())
+    };
+    let of_run = provenance.dataset.as_ref().filter(|_| data(&config) == data(&provenance.config));
+    let dataset = load_dataset_of(of_run, &config, &whereabouts, &[Split::Train])?;
+    training::check_groups(groups, &dataset)?;
+    say_transposed(&dataset, &config.data, observer);
+    let config = training::sized(
+        config,
+        provenance.dataset.as_ref(),
+        &provenance.config,
+        &dataset,
+        &options.set,
+        observer,
+    );
+    let classes = groups.classes().concat();
+    let per_class = IMAGES_PER_CLASS.min(scarcest(&dataset, &classes, LEAST_PER_CLASS)?);
+    let failed = |error: DatasetError| Error::input(error.to_string());
+    let drawn = dataset.draw(Split::Train, &classes, per_class, seed).map_err(failed)?;
+    let labels = classes.iter().flat_map(|class| std::iter::repeat_n(*class, per_class));
+    let images = labels.zip(drawn).map(|(label, index)| ImageRef { index, label }).collect();
+    let task = Task { groups: groups.clone(), config, dataset, images };
+    // Whatever is wrong with how images are seen is said before anything is measured.
+    task.images.first().map_or(Ok(()), |image| task.seen(&task.config.stimulus, image).map(drop))?;
+    Ok(Some(task))
+}
+
+/// Whether a training would simulate as the run did: what is measured here holds for no other.
+fn same_walks(of_run: &Config, training: &Config) -> Result<(), Error> {
+    let steps = |config: &Config| Protocol { rollout: RolloutMode::Fresh, ..config.protocol.clone() };
+    let differing = [
+        ("physics", of_run.physics != training.physics),
+        ("protocol", steps(of_run) != steps(training)),
+        ("train.perturbations", of_run.train.perturbations != training.train.perturbations),
+    ];
+    match differing.into_iter().find(|(_, differs)| *differs) {
+        None => Ok(()),
+        Some((section, _)) => {
+            let text = "expected keys that say what robots see";
+            Err(Error::argument("set", section, text)
+                .advice("rollouts are those of the run: no other can be measured here"))
+        }
+    }
+}
+
+fn reference(dataset: &Dataset) -> DatasetRef {
+    let train_sha256 = dataset.fingerprint(Split::Train).expect("its images were read just now");
+    DatasetRef { name: dataset.name().to_string(), train_sha256 }
+}
+
+fn setting(
+    options: &Options,
+    seed: u64,
+    config: &Config,
+    probing: &Probing,
+    task: Option<&Task>,
+) -> Result<Setting, Error> {
+    Ok(Setting {
+        seed,
+        images: options.images,
+        error: options.error,
+        dataset: task.map(|task| reference(&task.dataset)),
+        conditions: probing.conditions().to_vec(),
+        control_steps: config.protocol.control_steps,
+        task: task.map(|task| task.groups.to_string()),
+        stimulus: task.map(|task| task.config.stimulus),
+        windows: task.map_or(0, |task| task.config.train.windows),
+    })
+}
+
+impl Task {
+    fn seen(&self, stimulus: &StimulusParams, image: &ImageRef) -> Result<Grid<f64>, Error> {
+        seen(&self.config.body, stimulus, &self.dataset, Split::Train, image.index)
+    }
+
+    /// What a gait could be taught, and under which window.
+    fn taught(
+        &self,
+        gait: &Gait,
+        response: &Response,
+        shown: &[Shown],
+        stop: &AtomicBool,
+    ) -> Result<Option<Taught>, Error> {
+        let config = &self.config;
+        let (mut stimulus, mut margin) = (config.stimulus, None);
+        if config.train.windows > 0 {
+            let windows = Windows::of(config, &self.dataset, &self.images, self.groups.classes())?;
+            let found = windows.best(gait, response, stop, &|_| ())?;
+            stimulus.margin = found.margins;
+            margin = Some(found.margins);
+        }
+        let [first, _] = self.groups.classes();
+        let ways = balanced(self.images.iter().map(|image| image.label), first);
+        let example = |(image, (right, weight)): (&ImageRef, (f64, f64))| {
+            let seen = self.seen(&stimulus, image)?;
+            Ok(Example { right, weight, ..Example::new(gait, &seen, &config.physics) })
+        };
+        let examples = self.images.iter().zip(ways).map(example).collect::<Result<Vec<Example>, Error>>()?;
+        let found = teachable(shown, response.scatter, &examples, direction::THRESHOLD, config.seed, stop)?;
+        Ok(found.map(|teachable| Taught { margin, ..teachable.into() }))
+    }
+}
+
+/// What all robots are measured with.
+struct Measuring<'a> {
+    options: &'a Options,
+    config: &'a Config,
+    probing: Probing,
+    task: Option<Task>,
+    /// What was measured before, and where that is.
+    earlier: Vec<(PathBuf, ResponseFile)>,
+    run_sha256: &'a str,
+    seed: u64,
+    stop: &'a AtomicBool,
+}
+
+/// What was measured before and might be measured again: in the results' file, and beside the run.
+///
+/// # Errors
+/// If the results' file cannot be read.
+fn earlier(options: &Options, observer: &dyn Observer) -> Result<Vec<(PathBuf, ResponseFile)>, Error> {
+    let out = replaced(&options.out)?.map(|file| (options.out.clone(), file));
+    let beside = options.archive.as_deref().map(|archive| archive.with_file_name(RESPONSE_JSON));
+    let beside = beside.filter(|beside| *beside != options.out);
+    let beside = beside.and_then(|path| ResponseFile::found(&path, observer).map(|file| (path, file)));
+    Ok(beside.into_iter().chain(out).collect())
+}
+
+impl Measuring<'_> {
+    /// What is known of a gait: its displacements under the first random images, and how many of
+    /// them are of a measurement that ended.
+    fn known(&self, gait: &Gait) -> (&[Option<f64>], usize) {
+        let conditions = self.probing.conditions();
+        let of_files =
+            self.earlier.iter().map(|(_, file)| file.known(self.run_sha256, self.seed, conditions, gait));
+        // All begin with the same images.
+        of_files.fold((&[], 0), |(known, ended), (other, other_ended)| {
+            (if other.len() > known.len() { other } else { known }, ended.max(other_ended))
+        })
+    }
+
+    /// A robot's response; `None` if most of its rollouts are unstable. `displacements` are those
+    /// under the random images so far, also if it is stopped; `progress` is told how many rollouts
+    /// are done, and how many of those since the last call were not simulated.
+    fn robot(
+        &self,
+        Subject { id, gait }: &Subject,
+        displacements: &mut Vec<Option<f64>>,
+        progress: &mut dyn FnMut(usize, usize),
+    ) -> Result<Option<RobotResponse>, Error> {
+        let Measuring { options, config, probing, stop, .. } = self;
+        let (known, ended) = self.known(gait);
+        let mut shown: Vec<Shown> = Vec::new();
+        // What an earlier measurement ended with costs nothing: it is taken whole, and first. One
+        // that was stopped is gone through batch by batch, as if it had not been.
+        let most = options.images.max(ended);
+        let mut rollouts = 0;
+        loop {
+            let numbers = rollouts..most.min(ended.max(rollouts + BATCH));
+            rollouts = numbers.end;
+            let known = &known[numbers.start.min(known.len())..numbers.end.min(known.len())];
+            shown.extend(probing.shown(gait, &config.physics, numbers, |probe, stimuli, conditions| {
+                let before = displacements.len();
+                displacements.extend(known);
+                let (rolled, _, ended) = fresh_rollouts_so_far(
+                    probe,
+                    &stimuli[known.len()..],
+                    &conditions[known.len()..],
+                    (&config.physics, &config.protocol),
+                    &|_| (),
+                    stop,
+                );
+                displacements.extend(rolled.into_iter().map(Result::ok));
+                ended?;
+                Ok::<_, Error>(displacements[before..].to_vec())
+            })?);
+            progress(rollouts.min(options.images), known.len().min(options.images));
+            check(stop)?;
+            let Some(response) = probing::response(&shown, rollouts) else { return Ok(None) };
+            let ended_by = if response.relative_error() <= options.error {
+                EndedBy::Error
+            } else if rollouts == most {
+                EndedBy::Images
+            } else {
+                continue;
+            };
+            progress(options.images, options.images - rollouts.min(options.images));
+            let taught =
+                self.task.as_ref().map(|task| task.taught(gait, &response, &shown, stop)).transpose()?;
+            let taught = taught.flatten();
+            let displacements = std::mem::take(displacements);
+            return Ok(Some(RobotResponse::new(id, gait, &response, displacements, ended_by, taught)));
+        }
+    }
+}

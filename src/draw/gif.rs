@@ -1,0 +1,276 @@
+//! Animated GIFs of recordings: one palette, and per frame only what changed.
+
+use crate::base::threads::in_pool;
+use crate::draw::colour::Colour;
+use crate::draw::error::{PictureError, write_whole};
+use crate::draw::palette::Palette;
+use crate::draw::panel::present;
+use crate::draw::scene::Look;
+use crate::draw::stage::Stage;
+use crate::draw::walk::Walk;
+use crate::draw::{colour, raster};
+use crate::task::recording::Recording;
+use ::gif::{DisposalMethod, Encoder, Frame, Repeat};
+use rayon::prelude::*;
+use std::path::Path;
+
+/// How an animation is made.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GifOptions {
+    /// Width in pixels ([`stage::WIDTHS`](crate::draw::stage::WIDTHS)); the height follows from the
+    /// body.
+    pub width: u32,
+    /// Frames per second, at most 50 (GIFs count in hundredths of a second, and viewers slow down
+    /// faster ones).
+    pub fps: f64,
+    /// Control steps from one frame to the next, at least 1. There are 50 control steps in a second
+    /// of the robot's time: 1 at 50 frames per second is real time.
+    pub every: usize,
+    /// How the world is drawn.
+    pub look: Look,
+    /// Seconds for which the last frame of a phase is held.
+    pub hold: f64,
+}
+
+impl Default for GifOptions {
+    fn default() -> Self {
+        GifOptions { width: 480, fps: 50.0, every: 1, look: Look::Plain, hold: 0.6 }
+    }
+}
+
+/// Frames whose colours make the palette.
+const SAMPLES: usize = 24;
+/// Shades of a material in the palette: few enough that voxels do not change colour with every
+/// frame.
+const SHADES: u32 = 9;
+/// Frames rendered at a time.
+const BATCH: usize = 32;
+
+/// Writes a recording as an animated GIF that repeats for ever.
+///
+/// # Errors
+/// [`PictureError`] if the recording cannot be drawn, the width is not possible or the file cannot
+/// be written.
+pub fn write(path: &Path, recording: &Recording, options: &GifOptions) -> Result<(), PictureError> {
+    write_whole(path, &encode(recording, options)?)
+}
+
+/// The frames of a recording that are shown: every `every`-th of each phase, and each phase's last.
+pub fn shown(walk: &Walk, every: usize) -> Vec<usize> {
+    let mut frames = Vec::new();
+    for phase in 0..walk.recording().phases.len() {
+        let range = walk.phase_frames(phase);
+        let last = range.end - 1;
+        frames.extend(range.step_by(every.max(1)).filter(|f| *f != last));
+        frames.push(last);
+    }
+    frames
+}
+
+/// The bytes of the GIF.
+///
+/// # Errors
+/// As [`write()`], but for the file.
+pub fn encode(recording: &Recording, options: &GifOptions) -> Result<Vec<u8>, PictureError> {
+    in_pool(|| encoded(recording, options))?
+}
+
+fn encoded(recording: &Recording, options: &GifOptions) -> Result<Vec<u8>, PictureError> {
+    let walk = Walk::new(recording)?;
+    let stage = Stage::new(&walk, options.width)?.crisp().look(options.look);
+    let frames = shown(&walk, options.every);
+    let palette = palette(&walk, &stage, &frames)?;
+    let unchanged = palette.colours().len() as u8;
+    // The last entry is never seen: it stands for "as before".
+    let colours = [palette.colours(), &[[0, 0, 0]]].concat().concat();
+    let failed = |e: ::gif::EncodingError| PictureError::Encode(e.to_string());
+    let (width, height) = (stage.width as u16, stage.height as u16);
+    let mut encoder = Encoder::new(Vec::new(), width, height, &colours).map_err(failed)?;
+    encoder.set_repeat(Repeat::Infinite).map_err(|e| PictureError::Encode(e.to_string()))?;
+    let centiseconds =
+        |seconds: f64| if seconds > 0.0 { (100.0 * seconds).round().min(6e3) as u16 } else { 0 };
+    // Frames last whole hundredths of a second, together as long as they should.
+    let until = |frame: usize| f64::from(centiseconds(1.0)) * frame as f64 / options.fps.max(0.1);
+    let delay = |frame: usize| ((until(frame + 1).round() - until(frame).round()).min(6e3) as u16).max(2);
+    let hold = centiseconds(options.hold);
+    let mut number = 0;
+    let mut before: Vec<u8> = Vec::new();
+    for batch in frames.chunks(BATCH) {
+        // In parallel, but in order; a batch's frames are all the memory it needs.
+        let mut images = vec![before];
+        let batch_images: Vec<_> = batch.par_iter().map(|f| indexed(&walk, &stage, &palette, *f)).collect();
+        for image in batch_images {
+            images.push(image?);
+        }
+        let pairs: Vec<_> = images.windows(2).collect();
+        let encoded = pairs.par_iter().map(|p| difference(&p[0], &p[1], width, height, unchanged));
+        for (f, mut encoded) in batch.iter().zip(encoded.collect::<Vec<_>>()) {
+            let is_last = f + 1 == walk.phase_frames(walk.phase_index(*f)).end;
+            encoded.delay = if is_last { delay(number).max(hold) } else { delay(number) };
+            number += 1;
+            encoder.write_lzw_pre_encoded_frame(&encoded).map_err(failed)?;
+        }
+        before = images.pop().expect("the image before the batch is among them");
+    }
+    encoder.into_inner().map_err(|e| PictureError::Encode(e.to_string()))
+}
+
+/// A single frame as a GIF, which has a third of the bytes of a PNG.
+///
+/// # Errors
+/// As [`encode`].
+pub fn still(walk: &Walk, frame: usize, width: u32) -> Result<Vec<u8>, PictureError> {
+    let stage = Stage::new(walk, width)?.crisp();
+    let palette = palette(walk, &stage, &[frame])?;
+    let failed = |e: ::gif::EncodingError| PictureError::Encode(e.to_string());
+    let (width, height) = (stage.width as u16, stage.height as u16);
+    let buffer = indexed(walk, &stage, &palette, frame)?.into();
+    let mut encoder = Encoder::new(Vec::new(), width, height, &palette.colours().concat()).map_err(failed)?;
+    encoder.write_frame(&Frame { width, height, buffer, ..Frame::default() }).map_err(failed)?;
+    encoder.into_inner().map_err(|e| PictureError::Encode(e.to_string()))
+}
+
+fn palette(walk: &Walk, stage: &Stage, frames: &[usize]) -> Result<Palette, PictureError> {
+    let mut fixed: Vec<Colour> =
+        vec![colour::PAPER, colour::INK, colour::GROUND, colour::TRACE, colour::FAINT, colour::SEAM];
+    if stage.window(0).look == Look::Paper {
+        fixed.extend([colour::GRID, colour::PEG]);
+    }
+    let [small, _, large] = colour::TONE_AREAS;
+    for material in present(&walk.recording().body) {
+        fixed.extend((0..SHADES).map(|k| {
+            colour::shade(material, small + (large - small) / f64::from(SHADES - 1) * f64::from(k))
+        }));
+    }
+    let fixed: Vec<[u8; 3]> = fixed.into_iter().map(|c| c.rgb).collect();
+    let some: Vec<usize> = frames.iter().copied().step_by(frames.len().div_ceil(SAMPLES)).collect();
+    let pictures: Result<Vec<_>, _> = some.par_iter().map(|f| raster::picture(walk, *f, stage)).collect();
+    Ok(Palette::new(&fixed, pictures?.iter().map(|p| p.data())))
+}
+
+fn indexed(walk: &Walk, stage: &Stage, palette: &Palette, frame: usize) -> Result<Vec<u8>, PictureError> {
+    let picture = raster::picture(walk, frame, stage)?;
+    Ok(picture.data().chunks_exact(4).map(|p| palette.index([p[0], p[1], p[2]])).collect())
+}
+
+/// What changed from one image to the next as a compressed frame: the smallest rectangle, in it
+/// `unchanged` where nothing did; or all of the rectangle, if that is shorter.
+fn difference(before: &[u8], now: &[u8], width: u16, height: u16, unchanged: u8) -> Frame<'static> {
+    let row = usize::from(width);
+    let is_changed = |i: usize| before.get(i) != Some(&now[i]);
+    let changed_row = |r: &usize| (r * row..(r + 1) * row).any(is_changed);
+    let changed_column = |c: &usize| (0..usize::from(height)).any(|r| is_changed(r * row + c));
+    let rows = 0..usize::from(height);
+    let columns = 0..row;
+    // Nothing changed: one pixel, unchanged.
+    let top = rows.clone().find(changed_row).unwrap_or(0);
+    let bottom = rows.rev().find(changed_row).unwrap_or(0);
+    let left = columns.clone().find(changed_column).unwrap_or(0);
+    let right = columns.rev().find(changed_column).unwrap_or(0);
+    let rectangle = || (top..=bottom).flat_map(|r| (left..=right).map(move |c| r * row + c));
+    let frame = |pixels: Vec<u8>| {
+        let mut frame = Frame {
+            left: left as u16,
+            top: top as u16,
+            width: (right - left + 1) as u16,
+            height: (bottom - top + 1) as u16,
+            dispose: DisposalMethod::Keep,
+            transparent: Some(unchanged),
+            buffer: pixels.into(),
+            ..Frame::default()
+        };
+        frame.make_lzw_pre_encoded();
+        frame
+    };
+    let sparse = frame(rectangle().map(|i| if is_changed(i) { now[i] } else { unchanged }).collect());
+    let full = frame(rectangle().map(|i| now[i]).collect());
+    if full.buffer.len() < sparse.buffer.len() { full } else { sparse }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::draw::simulated;
+
+    /// Every frame of a GIF as a viewer shows it (RGB bytes), with its delay.
+    fn decode(bytes: &[u8]) -> (u16, u16, Repeat, Vec<(Vec<u8>, u16)>) {
+        let mut decoder = ::gif::DecodeOptions::new().read_info(bytes).unwrap();
+        let (width, height) = (decoder.width(), decoder.height());
+        let palette = decoder.global_palette().unwrap().to_vec();
+        let mut canvas = vec![0; usize::from(width) * usize::from(height) * 3];
+        let mut frames = vec![];
+        while let Some(frame) = decoder.read_next_frame().unwrap() {
+            for (i, index) in frame.buffer.iter().enumerate().filter(|(_, p)| Some(**p) != frame.transparent)
+            {
+                let (r, c) = (i / usize::from(frame.width), i % usize::from(frame.width));
+                let at = (usize::from(frame.top) + r) * usize::from(width) + usize::from(frame.left) + c;
+                canvas[3 * at..3 * at + 3].copy_from_slice(&palette[3 * usize::from(*index)..][..3]);
+            }
+            frames.push((canvas.clone(), frame.delay));
+        }
+        (width, height, decoder.repeat(), frames)
+    }
+
+    #[test]
+    fn a_gif_decodes_to_the_rendered_frames_within_the_palette() {
+        let recording = simulated("3344/1256/5612", 2, 30, true);
+        let walk = Walk::new(&recording).unwrap();
+        let options = GifOptions { width: 320, every: 4, ..GifOptions::default() };
+        let stage = Stage::new(&walk, 320).unwrap().crisp();
+        let (width, height, repeat, frames) = decode(&encode(&recording, &options).unwrap());
+        let shown = shown(&walk, 4);
+        assert_eq!((u32::from(width), u32::from(height)), (stage.width, stage.height));
+        assert_eq!(repeat, Repeat::Infinite);
+        assert_eq!(frames.len(), shown.len());
+        for ((seen, _), f) in frames.iter().zip(&shown) {
+            let full = raster::picture(&walk, *f, &stage).unwrap();
+            let mut far = 0;
+            let pixels = full.data().chunks(4).zip(seen.chunks(3));
+            let mut sum = 0.0;
+            for (a, b) in pixels {
+                let error = (0..3).map(|k| (f64::from(a[k]) - f64::from(b[k])).abs()).fold(0.0, f64::max);
+                sum += error;
+                far += usize::from(error > 24.0);
+            }
+            let count = seen.len() as f64 / 3.0;
+            assert!(sum / count < 2.0 && (far as f64) < 0.002 * count, "frame {f}: {} {far}", sum / count);
+        }
+    }
+
+    #[test]
+    fn phases_play_in_order_and_their_ends_are_held() {
+        let recording = simulated("33/44", 2, 10, true);
+        let walk = Walk::new(&recording).unwrap();
+        assert_eq!(shown(&walk, 4), [0, 4, 8, 10, 11, 15, 19, 21]);
+        assert_eq!(shown(&walk, 0).len(), 22);
+        let options = GifOptions { width: 320, every: 4, fps: 20.0, hold: 0.5, ..GifOptions::default() };
+        let (.., frames) = decode(&encode(&recording, &options).unwrap());
+        let delays: Vec<u16> = frames.iter().map(|f| f.1).collect();
+        assert_eq!(delays, [5, 5, 5, 50, 5, 5, 5, 50]);
+        let thirds = GifOptions { width: 320, every: 4, fps: 30.0, hold: 0.0, ..GifOptions::default() };
+        let delays: Vec<u16> = decode(&encode(&recording, &thirds).unwrap()).3.iter().map(|f| f.1).collect();
+        assert_eq!(delays[..6], [3, 4, 3, 3, 4, 3]);
+    }
+
+    #[test]
+    fn single_frames_still_bodies_and_odd_options_work() {
+        let mut recording = simulated("1", 1, 2, false);
+        recording.frames[1] = recording.frames[0].clone();
+        recording.frames.truncate(2);
+        let options = GifOptions { width: 320, fps: f64::NAN, hold: f64::INFINITY, ..GifOptions::default() };
+        assert_eq!(decode(&encode(&recording, &options).unwrap()).3.len(), 2);
+        recording.frames.truncate(1);
+        assert_eq!(decode(&encode(&recording, &options).unwrap()).3.len(), 1);
+    }
+
+    #[test]
+    fn the_largest_body_thrown_a_million_voxels_away_is_drawn() {
+        let mut recording = simulated(&[&*"3".repeat(64); 64].join("/"), 1, 3, false);
+        for (frame, shift) in recording.frames.iter_mut().zip([0.0, 40.0, 1e6, -1e6]) {
+            frame.points.iter_mut().for_each(|p| p[0] += shift);
+            frame.centre[0] += shift;
+        }
+        let options = GifOptions { every: 1, ..GifOptions::default() };
+        assert_eq!(decode(&encode(&recording, &options).unwrap()).3.len(), 4);
+    }
+}

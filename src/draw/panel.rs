@@ -1,0 +1,316 @@
+//! What stands around the world in a raster picture: stimulus, read-outs, legend, numbers on the
+//! ruler. In pixels, y down.
+
+use crate::base::number;
+use crate::body::{Body, Material};
+use crate::draw::colour::Colour;
+use crate::draw::scene::{Primitive, ruler};
+use crate::draw::stage::Stage;
+use crate::draw::walk::Walk;
+use crate::draw::{colour, fonts};
+use crate::task::judge;
+use crate::task::recording::Seen;
+
+/// Side of the stimulus picture at zoom 1, pixels.
+const STIMULUS: f64 = 84.0;
+/// Width of the legend at zoom 1, pixels.
+const LEGEND: f64 = 116.0;
+/// Distance from the picture's edges at zoom 1, pixels.
+const MARGIN: f64 = 10.0;
+/// Distance of the words from what stands left and right of them at zoom 1, pixels.
+const GAP: f64 = 12.0;
+
+/// Sizes of letters at zoom 1, pixels.
+const LARGE: f64 = 15.0;
+const SMALL: f64 = 11.0;
+/// What a displacement is measured in, and its distance from the number at zoom 1, pixels.
+const UNIT: &str = "voxel lengths";
+const BEFORE_UNIT: f64 = 5.0;
+
+/// Everything around the world at a frame.
+pub fn panel(walk: &Walk, frame: usize, stage: &Stage) -> Vec<Primitive> {
+    let z = stage.zoom;
+    let mut out =
+        vec![Primitive::rectangle([0.0, 0.0], [f64::from(stage.width), stage.panel], colour::PAPER)];
+    let side = stimulus(walk, frame, [MARGIN * z, MARGIN * z], z, &mut out);
+    let (words, mut end) = (MARGIN * z + side[0] + GAP * z, f64::from(stage.width) - MARGIN * z);
+    if stage.has_legend {
+        end -= LEGEND * z;
+        legend(walk, [end, MARGIN * z], z, &mut out);
+        end -= GAP * z;
+    }
+    readouts(walk, frame, [words, MARGIN * z], (end - words) / z, z, &mut out);
+    numbers(walk, frame, stage, &mut out);
+    out
+}
+
+/// Width at zoom 1, pixels, from which on the legend has room beside the words of a walk. The names
+/// of image and robot do not count: they may be of any length, and are cut.
+pub fn least_width(walk: &Walk) -> f64 {
+    let recording = walk.recording();
+    let large = |text: &str| fonts::width(text, LARGE, true);
+    let small = |text: &str| fonts::width(text, SMALL, false);
+    let farthest = (0..walk.len()).map(|frame| walk.displacement(frame).abs()).fold(0.0, f64::max);
+    let distance = large(&format!("← {}", signed(-farthest))) + BEFORE_UNIT + small(UNIT);
+    let ends = (0..recording.phases.len()).map(|phase| walk.phase_frames(phase).end - 1);
+    let time = ends.map(|frame| readout(walk, frame).time).max_by_key(String::len).unwrap_or_default();
+    let judge = recording.judge.as_ref();
+    let sides = judge.iter().flat_map(|j| [(f64::NEG_INFINITY, &j.left), (f64::INFINITY, &j.right)]);
+    let verdicts = sides.map(|(moved, classes)| {
+        let class = classes.first().copied().unwrap_or_default();
+        large(&judge::verdict(judge, moved, class, true))
+    });
+    let words = verdicts.fold(distance.max(small(&time)), f64::max);
+    MARGIN + STIMULUS + GAP + words + GAP + LEGEND + MARGIN
+}
+
+/// Words on a moment of a walk: what every view says.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Readout {
+    /// What the robot sees.
+    pub label: String,
+    /// Control steps of the phase done and all of them, and cycles done.
+    pub time: String,
+    /// Signed distance in the phase, with the direction as an arrow.
+    pub displacement: String,
+    /// What that says ([`judge::verdict`]).
+    pub verdict: String,
+}
+
+/// The words for a frame.
+pub fn readout(walk: &Walk, frame: usize) -> Readout {
+    let frames = walk.phase_frames(walk.phase_index(frame));
+    // A phase that goes on into the next ends with that one's first frame.
+    let goes_on = frames.end < walk.len() && !walk.is_fresh(walk.phase_index(frame) + 1);
+    let last = if goes_on { frames.end } else { frames.end.saturating_sub(1) };
+    let step = frame.saturating_sub(frames.start);
+    let cycles = step as f64 / walk.recording().cycle.max(1) as f64;
+    let d = walk.displacement(frame);
+    let arrow = if d.abs() < 0.005 {
+        ' '
+    } else if d < 0.0 {
+        '←'
+    } else {
+        '→'
+    };
+    let Seen { class, label, .. } = &walk.phase(frame).seen;
+    Readout {
+        label: label.clone(),
+        time: format!("step {step}/{} · cycle {}", last - frames.start, number::fixed(cycles, 1)),
+        displacement: format!("{arrow} {}", signed(d)),
+        verdict: judge::verdict(walk.recording().judge.as_ref(), d, *class, frame + 1 >= frames.end),
+    }
+}
+
+/// A distance with its sign and two decimals; shorter when huge.
+pub fn signed(distance: f64) -> String {
+    let is_short = distance.abs() < 1e5;
+    let text = if is_short { number::signed(distance, 2) } else { format!("{distance:+.1e}") };
+    text.replace('-', "−")
+}
+
+/// The picture as the sensors see it, the sensor voxels framed in their colour. Returns its width
+/// and height.
+fn stimulus(walk: &Walk, frame: usize, [x, y]: [f64; 2], z: f64, out: &mut Vec<Primitive>) -> [f64; 2] {
+    let image = &walk.phase(frame).seen.stimulus;
+    let longest = image.height().max(image.width()) as f64;
+    let cell = (STIMULUS * z / longest).floor().max(1.0);
+    let size = [cell * image.width() as f64, cell * image.height() as f64];
+    let frame_line = Primitive::rectangle([x - z, y - z], [x + size[0] + z, y + size[1] + z], colour::INK);
+    out.push(frame_line);
+    let body = &walk.recording().body;
+    for ((row, column), intensity) in image.iter() {
+        let [left, top] = [x + cell * column as f64, y + cell * row as f64];
+        let [right, bottom] = [left + cell, top + cell];
+        out.push(Primitive::rectangle([left, top], [right, bottom], Colour::gray(*intensity)));
+        let at = |dr: isize, dc: isize| body.at(row as isize + dr, column as isize + dc);
+        let material = at(0, 0);
+        if material.is_sensor() {
+            // The outline of the region of one kind of sensor, inside its cells.
+            let line = (z * 1.0).min(cell / 3.0).max(1.0);
+            let colour = sensor_line(material);
+            let mut side = |a, b| out.push(Primitive::rectangle(a, b, colour));
+            if at(-1, 0) != material {
+                side([left, top], [right, top + line]);
+            }
+            if at(1, 0) != material {
+                side([left, bottom - line], [right, bottom]);
+            }
+            if at(0, -1) != material {
+                side([left, top], [left + line, bottom]);
+            }
+            if at(0, 1) != material {
+                side([right - line, top], [right, bottom]);
+            }
+        }
+    }
+    size
+}
+
+/// Brighter than the voxel: seen on black and on white.
+fn sensor_line(material: Material) -> Colour {
+    if material == Material::SensorShrink { Colour::new(240, 62, 82) } else { Colour::new(38, 186, 120) }
+}
+
+/// The words, none of them wider than there is `room` \[pixels at zoom 1\].
+fn readouts(walk: &Walk, frame: usize, [x, y]: [f64; 2], room: f64, z: f64, out: &mut Vec<Primitive>) {
+    let words = readout(walk, frame);
+    let recording = walk.recording();
+    let mut line = |[dx, dy]: [f64; 2], text: &str, size: f64, bold, colour| {
+        let text = fonts::fitted(text, size, bold, room - dx);
+        let wide = fonts::width(&text, size, bold);
+        out.push(Primitive::Text { text, at: [x + dx * z, y + dy * z], size: size * z, bold, colour });
+        dx + wide
+    };
+    line([0.0, 14.0], &words.label, LARGE, true, colour::INK);
+    line([0.0, 30.0], &words.time, SMALL, false, colour::FAINT);
+    let end = line([0.0, 49.0], &words.displacement, LARGE, true, colour::TRACE);
+    line([end + BEFORE_UNIT, 49.0], UNIT, SMALL, false, colour::FAINT);
+    line([0.0, 67.0], &words.verdict, LARGE, true, colour::INK);
+    let name = format!("robot {}", recording.robot);
+    let (note, colour) = match recording.unstable {
+        true => (format!("{name} · ended unstable"), colour::ALARM),
+        false => (name, colour::FAINT),
+    };
+    line([0.0, 83.0], &note, SMALL, false, colour);
+}
+
+/// The materials that the body has.
+pub fn present(body: &Body) -> impl Iterator<Item = Material> {
+    Material::ALL.into_iter().filter(|m| !m.is_empty() && body.voxels().cells().contains(m))
+}
+
+fn legend(walk: &Walk, [x, y]: [f64; 2], z: f64, out: &mut Vec<Primitive>) {
+    for (k, material) in present(&walk.recording().body).enumerate() {
+        let top = y + 14.0 * k as f64 * z;
+        // Small, at rest with its mark, and large.
+        let (low, high) = (top + 9.0 * z, [x + 4.0 * z, x + 13.0 * z]);
+        for (rgb, left, right) in [
+            (colour::tones(material)[0], x, high[0]),
+            (colour::tones(material)[1], high[0], high[1]),
+            (colour::tones(material)[2], high[1], x + 17.0 * z),
+        ] {
+            out.push(Primitive::rectangle([left, top], [right, low], Colour { rgb, opacity: 255 }));
+        }
+        let [_, rgb, _] = colour::tones(material);
+        let corners = [[high[0], top], [high[1], top], [high[1], low], [high[0], low]];
+        let colour = colour::mark_colour(material, Colour { rgb, opacity: 255 });
+        out.extend(colour::mark(material).iter().map(|line| Primitive::Line {
+            points: line.iter().map(|point| colour::placed(*point, corners)).collect(),
+            width: z,
+            colour,
+            smooth: true,
+        }));
+        out.push(Primitive::Text {
+            text: material.name().to_string(),
+            at: [x + 22.0 * z, top + 8.5 * z],
+            size: SMALL * z,
+            bold: false,
+            colour: colour::INK,
+        });
+    }
+}
+
+fn numbers(walk: &Walk, frame: usize, stage: &Stage, out: &mut Vec<Primitive>) {
+    let z = stage.zoom;
+    let zero = walk.centre(walk.rollout(frame).start)[0];
+    let window = stage.window(frame);
+    let step = if window.scale * 10.0 > 45.0 * z { 10.0 } else { 50.0 };
+    for mark in ruler(&window, zero, step) {
+        let at = stage.to_pixels(frame, [zero + mark, 0.0]);
+        let text = if mark == 0.0 { "0".into() } else { format!("{mark:+}").replace('-', "−") };
+        // The sign hangs over: the digits stand under their tick.
+        let size = SMALL * z;
+        let digits = fonts::width(text.trim_start_matches(['+', '−']), size, false);
+        let left = at[0] - digits / 2.0 - (fonts::width(&text, size, false) - digits);
+        let at = [left.round(), at[1] + 18.0 * z];
+        out.push(Primitive::Text { text, at, size, bold: false, colour: colour::FAINT });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::draw::simulated;
+    use crate::task::judge::Judge;
+
+    #[test]
+    fn readouts_count_steps_of_the_phase_and_agree_with_the_displacement() {
+        for fresh in [false, true] {
+            let recording = simulated("33/44", 2, 100, fresh);
+            let walk = Walk::new(&recording).unwrap();
+            let first = readout(&walk, walk.phase_frames(1).start);
+            assert_eq!(first.time, "step 0/100 · cycle 0.0");
+            assert_eq!(first.displacement.trim(), "0.00");
+            let last = readout(&walk, walk.len() - 1);
+            assert_eq!(last.time, "step 100/100 · cycle 2.0");
+            let walked = recording.phases[1].displacement;
+            let arrow = if walked > 0.0 { "→" } else { "←" };
+            assert_ne!(signed(walked), "0.00");
+            assert_eq!(last.displacement, format!("{arrow} {}", signed(walked)));
+            assert_eq!(readout(&walk, 50).time, "step 50/100 · cycle 1.0");
+        }
+    }
+
+    #[test]
+    fn read_outs_end_before_the_legend_and_verdicts_are_whole_at_every_width() {
+        let mut recording = simulated("3344/5566", 2, 50, true);
+        for (number, frame) in recording.frames.iter_mut().enumerate() {
+            frame.centre[0] -= 0.5 * (number % 51) as f64;
+        }
+        for (left, right, from) in [
+            (vec![0], vec![1], 320),
+            (vec![0, 1, 2], vec![3], 320),
+            ((0..5).collect(), (5..10).collect(), 400),
+        ] {
+            recording.judge = Some(Judge { left, right });
+            let walk = Walk::new(&recording).unwrap();
+            let verdict = readout(&walk, 50).verdict;
+            assert!(verdict.ends_with(": correct"), "{verdict}");
+            let mut with_legend = 0;
+            for width in (320..=1500).chain([2048, 4096]) {
+                let stage = Stage::new(&walk, width).unwrap();
+                let all = panel(&walk, 50, &stage);
+                let texts = all.iter().filter_map(|primitive| match primitive {
+                    Primitive::Text { text, at, size, bold, .. } if at[1] < stage.panel => {
+                        Some((text.as_str(), at[0], at[0] + fonts::width(text, *size, *bold)))
+                    }
+                    _ => None,
+                });
+                let is_of_legend = |text: &str| Material::ALL.iter().any(|m| m.name() == text);
+                let (legend, words): (Vec<_>, Vec<_>) = texts.partition(|(text, ..)| is_of_legend(text));
+                let end = legend
+                    .iter()
+                    .map(|(_, left, _)| left - 22.0 * stage.zoom)
+                    .fold(f64::from(width), f64::min);
+                assert!(words.iter().all(|(.., right)| *right < end), "{width}: {words:?} {end}");
+                let is_whole = words.iter().any(|(text, ..)| *text == verdict)
+                    && words.iter().any(|(text, ..)| *text == UNIT);
+                assert!(is_whole || width < from, "{width}: {words:?}");
+                assert_eq!(legend.is_empty(), !stage.has_legend);
+                with_legend += usize::from(stage.has_legend);
+            }
+            assert!(with_legend > 980, "{with_legend}");
+        }
+    }
+
+    #[test]
+    fn distances_have_a_sign_and_never_a_negative_zero() {
+        assert_eq!([-3.456, -0.001, 2.0].map(signed), ["−3.46", "0.00", "+2.00"]);
+        assert!(signed(-1.0e300).len() < 16 && signed(f64::NAN).len() < 16);
+    }
+
+    #[test]
+    fn sensors_are_framed_in_the_stimulus() {
+        let frames = |body| {
+            let recording = simulated(body, 1, 1, false);
+            let walk = Walk::new(&recording).unwrap();
+            let mut out = vec![];
+            stimulus(&walk, 0, [0.0, 0.0], 1.0, &mut out);
+            let shrinks = sensor_line(Material::SensorShrink);
+            let line = |p: &&Primitive| matches!(p, Primitive::Quad { fill, .. } if *fill == shrinks);
+            out.iter().filter(line).count()
+        };
+        assert_eq!((frames("33/33"), frames("53/33"), frames("55/33")), (0, 4, 6));
+    }
+}

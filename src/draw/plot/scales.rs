@@ -1,0 +1,99 @@
+//! Colours of figures: sets and scales that stay apart for colour-blind eyes.
+
+use crate::draw::colour::Colour;
+
+/// Blue of Okabe & Ito's set.
+pub const BLUE: Colour = Colour::new(0, 114, 178);
+/// Vermillion of Okabe & Ito's set.
+pub const VERMILLION: Colour = Colour::new(213, 94, 0);
+/// Bluish green of Okabe & Ito's set.
+pub const GREEN: Colour = Colour::new(0, 158, 115);
+/// Colours for lines that stand for themselves: Okabe & Ito's set without its yellow.
+pub const SET: [Colour; 6] = [
+    BLUE,
+    VERMILLION,
+    GREEN,
+    Colour::new(204, 121, 167),
+    Colour::new(86, 180, 233),
+    Colour::new(230, 159, 0),
+];
+/// Lines that help the eye.
+pub const GRID: Colour = Colour::new(226, 228, 232);
+/// Lines around cells.
+pub const CELL: Colour = Colour::new(190, 194, 200);
+
+/// Viridis (van der Walt & Smith), from dark to bright.
+const VIRIDIS: [[u8; 3]; 11] = [
+    [0x44, 0x01, 0x54],
+    [0x48, 0x24, 0x75],
+    [0x41, 0x44, 0x87],
+    [0x35, 0x5f, 0x8d],
+    [0x2a, 0x78, 0x8e],
+    [0x21, 0x91, 0x8c],
+    [0x22, 0xa8, 0x84],
+    [0x44, 0xbf, 0x70],
+    [0x7a, 0xd1, 0x51],
+    [0xbd, 0xdf, 0x26],
+    [0xfd, 0xe7, 0x25],
+];
+
+/// Purple over white to green (ColorBrewer's PRGn), the middle for nothing: neither is a muscle's
+/// colour.
+const PURPLE_GREEN: [[u8; 3]; 9] = [
+    [0x76, 0x2a, 0x83],
+    [0x99, 0x70, 0xab],
+    [0xc2, 0xa5, 0xcf],
+    [0xe7, 0xd4, 0xe8],
+    [0xf7, 0xf7, 0xf7],
+    [0xd9, 0xf0, 0xd3],
+    [0xa6, 0xdb, 0xa0],
+    [0x5a, 0xae, 0x61],
+    [0x1b, 0x78, 0x37],
+];
+
+/// Grays from dark to light, for what is below a scale.
+const GRAYS: [[u8; 3]; 2] = [[0x60, 0x62, 0x68], [0xc4, 0xc6, 0xca]];
+
+/// The colour at `t` in [0, 1] of a scale from dark to bright.
+pub fn sequential(t: f64) -> Colour {
+    between(&VIRIDIS, t)
+}
+
+/// The colour at `t` in [−1, 1] of a scale with a middle.
+pub fn diverging(t: f64) -> Colour {
+    between(&PURPLE_GREEN, (t + 1.0) / 2.0)
+}
+
+/// The gray at `t` in [0, 1], from dark to light.
+pub fn below(t: f64) -> Colour {
+    between(&GRAYS, t)
+}
+
+/// Colours in equal steps, those between them mixed.
+fn between(colours: &[[u8; 3]], t: f64) -> Colour {
+    let t = if t.is_nan() { 0.0 } else { t.clamp(0.0, 1.0) } * (colours.len() - 1) as f64;
+    let low = (t.floor() as usize).min(colours.len() - 2);
+    let share = t - low as f64;
+    let mix = |k: usize| {
+        let (a, b) = (f64::from(colours[low][k]), f64::from(colours[low + 1][k]));
+        (a + share * (b - a)).round() as u8
+    };
+    Colour::new(mix(0), mix(1), mix(2))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn scales_hold_their_ends_and_rise_in_brightness() {
+        assert_eq!(sequential(0.0).rgb, VIRIDIS[0]);
+        assert_eq!(sequential(2.0).rgb, VIRIDIS[10]);
+        assert_eq!(sequential(f64::NAN).rgb, VIRIDIS[0]);
+        assert_eq!(diverging(0.0).rgb, [0xf7; 3]);
+        let level =
+            |c: Colour| 0.21 * f64::from(c.rgb[0]) + 0.72 * f64::from(c.rgb[1]) + 0.07 * f64::from(c.rgb[2]);
+        let levels: Vec<f64> = (0..=20).map(|i| level(sequential(f64::from(i) / 20.0))).collect();
+        assert!(levels.windows(2).all(|w| w[0] < w[1]), "{levels:?}");
+    }
+}

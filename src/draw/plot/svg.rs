@@ -1,0 +1,190 @@
+//! [`Canvas`] → SVG elements, without ids, classes or styles.
+
+use crate::base::number;
+use crate::draw::colour::Colour;
+use crate::draw::plot::canvas::{Anchor, Canvas, Element, Ink, Pen, Piece, drawable, printable};
+use std::fmt;
+
+impl Canvas {
+    /// Its elements as SVG.
+    pub fn svg(&self) -> String {
+        self.elements().iter().map(|element| format!("{element}\n")).collect()
+    }
+}
+
+impl fmt::Display for Element {
+    fn fmt(&self, out: &mut fmt::Formatter) -> fmt::Result {
+        match self {
+            Element::Rectangle { at, size, ink } => {
+                let ([x, y], [width, height]) = (at.map(number), size.map(number));
+                write!(
+                    out,
+                    "<rect x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{height}\"{}/>",
+                    attributes(ink)
+                )
+            }
+            Element::Path { pieces, ink } => {
+                let join = if matches!(ink, Ink::Line(_)) { " stroke-linejoin=\"round\"" } else { "" };
+                write!(out, "<path d=\"")?;
+                pieces.iter().try_for_each(|piece| write!(out, "{piece}"))?;
+                write!(out, "\"{}{join}/>", attributes(ink))
+            }
+            Element::Dot { at, radius, fill } => {
+                let ([x, y], radius) = (at.map(number), number(*radius));
+                write!(out, "<circle cx=\"{x}\" cy=\"{y}\" r=\"{radius}\"{}/>", filled(*fill))
+            }
+            Element::Text { at, text, words } => {
+                let [x, y] = at.map(number);
+                let anchor = match words.anchor {
+                    Anchor::Start => "",
+                    Anchor::Middle => " text-anchor=\"middle\"",
+                    Anchor::End => " text-anchor=\"end\"",
+                };
+                let bold = if words.bold { " font-weight=\"bold\"" } else { "" };
+                let turn =
+                    if words.upwards { format!(" transform=\"rotate(-90 {x} {y})\"") } else { String::new() };
+                let (size, fill, text) = (number(words.size), filled(words.colour), escape(text));
+                write!(
+                    out,
+                    "<text x=\"{x}\" y=\"{y}\" font-size=\"{size}\"{anchor}{bold}{turn}{fill}>{text}</text>"
+                )
+            }
+            Element::Faded { opacity, content } => {
+                write!(out, "<g opacity=\"{}\">\n{}</g>", number(*opacity), content.svg())
+            }
+            Element::Clipped { at, size, content } => {
+                let ([x, y], [width, height]) = (at.map(number), size.map(number));
+                // A nested svg clips without an id that a clip path would need.
+                write!(
+                    out,
+                    "<svg x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{height}\" viewBox=\"{x} {y} {width} {height}\" \
+                     overflow=\"hidden\">\n{}</svg>",
+                    content.svg()
+                )
+            }
+        }
+    }
+}
+
+/// Path data.
+impl fmt::Display for Piece {
+    fn fmt(&self, out: &mut fmt::Formatter) -> fmt::Result {
+        let through = |out: &mut fmt::Formatter, points: &[[f64; 2]]| {
+            let letters = std::iter::once('M').chain(std::iter::repeat('L'));
+            let places = points.iter().map(|point| point.map(number));
+            letters.zip(places).try_for_each(|(letter, [x, y])| write!(out, "{letter}{x} {y}"))
+        };
+        match self {
+            Piece::Line(points) => through(out, points),
+            Piece::Polygon(points) => {
+                through(out, points)?;
+                write!(out, "Z")
+            }
+            Piece::Rectangle { at, size } => {
+                let ([x, y], [width, height]) = (at.map(number), size.map(number));
+                write!(out, "M{x} {y}h{width}v{height}h-{width}z")
+            }
+            Piece::Level { from, length } => {
+                let [x, y] = from.map(number);
+                write!(out, "M{x} {y}h{}", number(*length))
+            }
+        }
+    }
+}
+
+/// A number with two decimals at most; what is not finite or absurd becomes something that can be
+/// drawn.
+pub fn number(value: f64) -> String {
+    let text = number::fixed(drawable(value), 2);
+    text.trim_end_matches('0').trim_end_matches('.').to_string()
+}
+
+/// A text as it may stand in XML.
+pub fn escape(text: &str) -> String {
+    let mut out = String::with_capacity(text.len());
+    for letter in text.chars() {
+        match letter {
+            '&' => out.push_str("&amp;"),
+            '<' => out.push_str("&lt;"),
+            '>' => out.push_str("&gt;"),
+            '"' => out.push_str("&quot;"),
+            letter => out.push(printable(letter)),
+        }
+    }
+    out
+}
+
+fn attributes(ink: &Ink) -> String {
+    match ink {
+        Ink::Fill(fill) => filled(*fill),
+        Ink::Line(Pen { colour, width, dashes }) => {
+            let dashes = dashes.map(|lengths| lengths.map(number));
+            let dashes = dashes.map(|[dash, gap]| format!(" stroke-dasharray=\"{dash} {gap}\""));
+            let (stroke, opacity, width) = (colour.hex(), opacity("stroke-opacity", *colour), number(*width));
+            let dashes = dashes.unwrap_or_default();
+            format!(" fill=\"none\" stroke=\"{stroke}\"{opacity} stroke-width=\"{width}\"{dashes}")
+        }
+    }
+}
+
+fn filled(fill: Colour) -> String {
+    format!(" fill=\"{}\"{}", fill.hex(), opacity("fill-opacity", fill))
+}
+
+fn opacity(name: &str, colour: Colour) -> String {
+    match colour.opacity {
+        255 => String::new(),
+        opacity => format!(" {name}=\"{}\"", number(f64::from(opacity) / 255.0)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::draw::colour;
+    use crate::draw::plot::canvas::Words;
+
+    #[test]
+    fn every_element_has_its_svg() {
+        let mut canvas = Canvas::new();
+        let pen = Pen::new(colour::INK.with_opacity(51), 0.5);
+        canvas.rectangle([1.0, 2.0], [3.0, 4.5], colour::PAPER);
+        canvas.frame([1.0, 2.0], [3.0, 4.0], pen.dashed(3.0, 2.0));
+        canvas.line([0.0, 0.0], [1.0, 1.0], pen);
+        let [square, level] = [
+            Piece::Rectangle { at: [1.0, 2.0], size: [3.0, 4.0] },
+            Piece::Level { from: [5.0, 6.0], length: 7.0 },
+        ];
+        canvas
+            .area(vec![square, level, Piece::Polygon(vec![[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]])], colour::INK);
+        canvas.dot([1.0, 2.0], 3.0, colour::INK);
+        canvas.text([1.0, 2.0], "a\n&", Words { upwards: true, ..Words::middle() }.bold());
+        canvas.clipped([1.0, 2.0], [3.0, 4.0], |canvas| {
+            canvas.faded(0.25, |canvas| canvas.text([1.0, 2.0], "b", Words::end()));
+        });
+        let expected = r##"<rect x="1" y="2" width="3" height="4.5" fill="#ffffff"/>
+<rect x="1" y="2" width="3" height="4" fill="none" stroke="#222428" stroke-opacity="0.2" stroke-width="0.5" stroke-dasharray="3 2"/>
+<path d="M0 0L1 1" fill="none" stroke="#222428" stroke-opacity="0.2" stroke-width="0.5" stroke-linejoin="round"/>
+<path d="M1 2h3v4h-3zM5 6h7M0 0L1 0L1 1Z" fill="#222428"/>
+<circle cx="1" cy="2" r="3" fill="#222428"/>
+<text x="1" y="2" font-size="7.2" text-anchor="middle" font-weight="bold" transform="rotate(-90 1 2)" fill="#222428">a\n&amp;</text>
+<svg x="1" y="2" width="3" height="4" viewBox="1 2 3 4" overflow="hidden">
+<g opacity="0.25">
+<text x="1" y="2" font-size="7.2" text-anchor="end" fill="#222428">b</text>
+</g>
+</svg>
+"##;
+        assert_eq!(canvas.svg(), expected);
+    }
+
+    #[test]
+    fn numbers_are_short_and_always_drawable() {
+        assert_eq!([0.0, -0.001, 1.5, 2.0, 3.1459].map(number), ["0", "0", "1.5", "2", "3.15"]);
+        assert_eq!([f64::NAN, f64::INFINITY, -1e300].map(number), ["0", "1000000", "-1000000"]);
+    }
+
+    #[test]
+    fn any_text_is_fit_for_xml() {
+        assert_eq!(escape("a<b>&\"c\u{0}\n"), "a&lt;b&gt;&amp;&quot;c\u{fffd}\u{fffd}");
+    }
+}

@@ -1,0 +1,134 @@
+//! Robots as buttons: a click plays them.
+
+use crate::base::number;
+use crate::base::remedy::Invocation;
+use crate::body::{Body, Material};
+use crate::commands::report::Dossier;
+use crate::draw::colour::{MARK_WIDTH, mark, mark_colour, placed};
+use crate::draw::html::escape;
+use crate::draw::plot::canvas::Piece;
+use crate::draw::plot::robot;
+use crate::draw::report::Spell;
+use crate::draw::report::maps::Rollouts;
+use crate::store::run::Robot;
+use std::collections::BTreeSet;
+use std::fmt::Write;
+
+/// Robots shown of each kind.
+const SHOWN: usize = 5;
+
+/// A button that plays a robot. `look`: its style, what stands before the robot's figures for those
+/// who cannot see it, and whether it is played at first.
+pub(super) fn button(
+    run: usize,
+    (dossier, spell): (&Dossier, Spell),
+    rollouts: &Rollouts,
+    robot: &Robot,
+    (style, name, first): (&str, &str, bool),
+    content: &str,
+) -> String {
+    let about = about(dossier, robot);
+    let rollout = rollouts.id(run, &robot.id).unwrap_or_default();
+    let replay = Invocation::new("replay").option("robot", robot.id.as_str());
+    let command = spell(&replay.option("archive", dossier.path.as_path()));
+    format!(
+        "<button type=\"button\" style=\"{style}\" data-robot=\"{}\" data-rollout=\"{}\" data-about=\"{}\" \
+         data-command=\"{}\" \
+         aria-pressed=\"false\" aria-label=\"{}\" title=\"{}\"{}>{content}</button>",
+        escape(&robot.id),
+        escape(&rollout),
+        escape(&about),
+        escape(&command),
+        escape(&format!("{name}{}{about}", if name.is_empty() { "" } else { ": " })),
+        escape(&about),
+        if first { " data-first" } else { "" }
+    )
+}
+
+/// A robot in a line.
+fn about(dossier: &Dossier, robot: &Robot) -> String {
+    let counts = robot.voxels;
+    let verdict = dossier.findings.audit.as_ref().and_then(|audit| audit.robot(&robot.id));
+    let verdict = verdict.map_or(String::new(), |found| format!("; {}", found.conclusion()));
+    let born = match dossier.run.origin {
+        Some(_) => String::new(),
+        None => format!(", born in generation {}", robot.generation),
+    };
+    format!(
+        "{} ({}), fitness {}: {} muscle, {} sensor, {} voxels in all{born}{verdict}.",
+        robot.id,
+        robot.task,
+        number::fixed(robot.objective, 2),
+        counts.muscle,
+        counts.sensor,
+        counts.total
+    )
+}
+
+/// The fittest robots, and the most different ones.
+pub(super) fn bodies(run: usize, dossier: &Dossier, rollouts: &Rollouts, spell: Spell) -> String {
+    let mut fittest: Vec<&Robot> = dossier.run.elites.iter().collect();
+    fittest.sort_by(|a, b| b.objective.total_cmp(&a.objective));
+    let mut seen = BTreeSet::new();
+    // A training has one robot, and no map from which it would be played.
+    let is_first = dossier.run.origin.is_some();
+    let chosen = fittest.into_iter().take(SHOWN).chain(dossier.most_different(SHOWN + 1));
+    let buttons: String = chosen
+        .filter(|robot| seen.insert(robot.id.clone()))
+        .map(|robot| {
+            let id = escape(&robot.id);
+            // Walks of a training are from raised starts and so on: other ones than those that are played.
+            let walks: Vec<String> = match dossier.run.follows_protocol() {
+                true => robot.displacements.iter().take(4).map(|d| number::signed(*d, 1)).collect(),
+                false => vec![format!("fitness {}", number::fixed(robot.objective, 2))],
+            };
+            let content = format!(
+                "{}<span>{id}</span><small>{}: {}</small>",
+                picture(&robot.body),
+                escape(&robot.task),
+                walks.join(" ")
+            );
+            button(run, (dossier, spell), rollouts, robot, ("", "", is_first), &content)
+        })
+        .collect();
+    format!("<div class=\"bodies\">{buttons}</div>\n")
+}
+
+/// A body's voxels by material.
+fn picture(body: &Body) -> String {
+    let (height, width) = (body.voxels().height(), body.voxels().width());
+    let mut out =
+        format!("<svg viewBox=\"0 0 {width} {height}\" aria-hidden=\"true\" shape-rendering=\"crispEdges\">");
+    for material in Material::ALL.into_iter().filter(|material| *material != Material::Empty) {
+        let mut path = String::new();
+        for ((row, column), _) in body.voxels().iter().filter(|(_, found)| **found == material) {
+            // Text is written to memory, which takes it all.
+            let _ = write!(path, "M{column} {row}h1v1h-1z");
+        }
+        if !path.is_empty() {
+            let _ = write!(out, "<path fill=\"{}\" d=\"{path}\"/>", robot::plain(material).hex());
+            out += &marks(body, material);
+        }
+    }
+    out + "</svg>"
+}
+
+/// The marks on a body's voxels of a material, as one path.
+fn marks(body: &Body, material: Material) -> String {
+    let mut data = String::new();
+    for ((row, column), _) in body.voxels().iter().filter(|(_, found)| **found == material) {
+        let (x, y) = (column as f64, row as f64);
+        let corners = [[x, y], [x + 1.0, y], [x + 1.0, y + 1.0], [x, y + 1.0]];
+        for line in mark(material) {
+            let line = Piece::Line(line.iter().map(|point| placed(*point, corners)).collect());
+            data += &line.to_string();
+        }
+    }
+    if data.is_empty() {
+        return data;
+    }
+    let colour = mark_colour(material, robot::plain(material)).hex();
+    format!(
+        "<path fill=\"none\" stroke=\"{colour}\" stroke-width=\"{MARK_WIDTH}\" shape-rendering=\"auto\" d=\"{data}\"/>"
+    )
+}

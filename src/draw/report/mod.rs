@@ -1,0 +1,157 @@
+//! One self-contained page about runs: what was run, how it came along, an archive whose robots can
+//! be played, and what tests found of them. No network, works from `file://`.
+
+mod bodies;
+pub(crate) mod decisions;
+mod maps;
+pub(crate) mod tables;
+mod team;
+mod words;
+
+use crate::base::remedy::Invocation;
+use crate::commands::report::{Dossier, Findings, Gathered};
+use crate::draw::error::PictureError;
+use crate::draw::html::{escape, fill};
+use crate::draw::plot::Figure;
+use crate::draw::{html, plot};
+use maps::Rollouts;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+const SCRIPT: &str =
+    concat!(include_str!("../drawing.js"), include_str!("../stages.js"), include_str!("report.js"));
+
+/// Spells a command as its users type it.
+pub type Spell<'a> = &'a dyn Fn(&Invocation) -> String;
+
+/// What goes into a page.
+#[derive(Clone, Copy)]
+pub struct Content<'a> {
+    /// What is known.
+    pub gathered: &'a Gathered,
+    /// Most robots of each run that can be played; the fittest of them.
+    pub rollouts: usize,
+    /// Spells the commands that make it all again.
+    pub spell: Spell<'a>,
+}
+
+impl Content<'_> {
+    /// Rollouts that have to be simulated for it.
+    pub fn count(&self) -> usize {
+        let of_runs: usize =
+            self.gathered.runs.iter().map(|dossier| maps::played(dossier, self.rollouts).len()).sum();
+        of_runs + self.gathered.team.as_ref().map_or(0, team::count)
+    }
+
+    /// The page as text; `simulated` gets the number of rollouts simulated so far.
+    ///
+    /// # Errors
+    /// If a rollout cannot be drawn.
+    pub fn page(&self, simulated: &(dyn Fn(u64) + Sync)) -> Result<String, PictureError> {
+        let Gathered { runs, together, team } = self.gathered;
+        let done = AtomicU64::new(0);
+        let simulated = || simulated(done.fetch_add(1, Ordering::Relaxed) + 1);
+        let rollouts = Rollouts::record(self.gathered, self.rollouts, &simulated)?;
+        let mut content = words::contents(runs);
+        if let Some(team) = team {
+            content += &team::section(team, runs, &simulated)?;
+        }
+        if runs.len() > 1 {
+            content += &overview(runs, together);
+        }
+        for (number, dossier) in runs.iter().enumerate() {
+            content += &run(number, dossier, &rollouts, runs.len() > 1, self.spell);
+        }
+        content += &rollouts.elements();
+        let style =
+            [include_str!("../replay.css"), include_str!("../stages.css"), include_str!("report.css")]
+                .concat();
+        let player = serde_json::Value::from(html::player("%ROLLOUT%")).to_string().replace('<', "\\u003c");
+        Ok(fill(
+            include_str!("report.html"),
+            &[
+                ("title", &escape(&words::title(runs))),
+                ("style", &style),
+                ("content", &content),
+                ("player", &player),
+                ("script", SCRIPT),
+            ],
+        ))
+    }
+}
+
+/// A figure in the page, in a column's or a page's width.
+fn figure(figure: &Figure, class: &str) -> String {
+    format!("<figure class=\"figure {class}\">{}</figure>\n", figure.svg())
+}
+
+/// What several runs have in common.
+fn overview(runs: &[Dossier], together: &Findings) -> String {
+    let mut out = "<section id=\"together\">\n<h2>All runs together</h2>\n".to_string();
+    let are_trained = runs.iter().all(|dossier| dossier.run.origin.is_some());
+    out += &if are_trained { tables::trainings(runs) } else { tables::runs(runs) };
+    let progress: Option<Vec<_>> = runs.iter().map(|dossier| dossier.progress.clone()).collect();
+    if let Some(progress) = progress.filter(|_| !are_trained) {
+        out += &format!("<div class=\"figures\">{}</div>\n", figure(&plot::progress(&progress), "column"));
+    }
+    out += &findings(together);
+    out + "</section>\n"
+}
+
+/// A run.
+fn run(
+    number: usize,
+    dossier: &Dossier,
+    rollouts: &Rollouts,
+    is_one_of_several: bool,
+    spell: Spell,
+) -> String {
+    let name = if is_one_of_several { format!("{}: ", words::name(dossier)) } else { String::new() };
+    let heading = |what: &str| format!("<h2>{}{what}</h2>\n", escape(&name));
+    let mut out = format!("<section id=\"run{number}\" data-run=\"{number}\">\n{}", heading("What was run"));
+    out += &tables::about(dossier);
+    if dossier.run.origin.is_some() {
+        // It has one robot, and no archive that came along.
+        out += &heading("The robot");
+        out += &maps::robots(number, dossier, rollouts, spell);
+    } else {
+        out += &heading("Archive");
+        out += &maps::archive(number, dossier, rollouts, spell);
+        out += &heading("The fittest, and the most different");
+        out += "<p>The fittest robots, then those whose bodies differ most from each other. Press one to watch \
+         it above.</p>\n";
+        out += &bodies::bodies(number, dossier, rollouts, spell);
+        let mut figures = String::new();
+        if let Some(progress) = &dossier.progress {
+            figures += &figure(&plot::progress(std::slice::from_ref(progress)), "column");
+        }
+        let tasks = dossier.run.dimensions.tasks.len();
+        figures += &figure(&plot::archive(&dossier.run), if tasks > 1 { "page" } else { "column" });
+        out += &format!("{}<div class=\"figures\">\n{figures}</div>\n", heading("Progress"));
+    }
+    out += &findings(&dossier.findings);
+    out += &heading("Methods");
+    out += &words::methods(dossier);
+    out += &heading("Commands");
+    out += &words::commands(dossier, spell);
+    out + "</section>\n"
+}
+
+/// What tests found.
+fn findings(found: &Findings) -> String {
+    let mut out = String::new();
+    if let Some(report) = found.eval.as_ref().filter(|report| !report.robots.is_empty()) {
+        out += "<h2>Test on held-out images</h2>\n";
+        out += &tables::eval(report);
+        out += &format!("<div class=\"figures\">{}</div>\n", figure(&plot::accuracy(report), "column"));
+    }
+    if let Some(audit) = &found.audit {
+        out += "<h2>Audit</h2>\n";
+        out += &tables::audit(audit);
+    }
+    if let Some(file) = found.capacity.as_ref().filter(|file| !file.tasks.is_empty()) {
+        out += "<h2>Capacity</h2>\n";
+        out += &tables::capacity(file);
+        out += &format!("<div class=\"figures\">{}</div>\n", figure(&plot::capacity(file), "page"));
+    }
+    out
+}

@@ -1,0 +1,321 @@
+//! One frame as drawing primitives in world coordinates (voxel lengths, y up): what all raster
+//! pictures are made of.
+
+use crate::draw::colour;
+use crate::draw::colour::Colour;
+use crate::draw::walk::{Walk, area};
+use std::fmt;
+use std::str::FromStr;
+
+/// How the world is drawn.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Look {
+    /// A ruler on the ground.
+    #[default]
+    Plain,
+    /// As in the paper's videos: the world's grid, and the voxels that the ground is made of.
+    Paper,
+}
+
+impl fmt::Display for Look {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Look::Plain => "plain",
+            Look::Paper => "paper",
+        })
+    }
+}
+
+impl FromStr for Look {
+    type Err = String;
+    fn from_str(text: &str) -> Result<Self, String> {
+        let found = [Look::Plain, Look::Paper].into_iter().find(|look| look.to_string() == text);
+        found.ok_or_else(|| "expected plain or paper".to_string())
+    }
+}
+
+/// Something to draw. Coordinates are the world's (voxel lengths, y up) or pixels (y down), as the
+/// maker says.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Primitive {
+    /// A filled quadrilateral.
+    Quad {
+        /// Its corners in order.
+        corners: [[f64; 2]; 4],
+        /// Its colour.
+        fill: Colour,
+        /// Whether its edges are smoothed; axis-parallel rectangles on whole pixels need not be.
+        smooth: bool,
+    },
+    /// A line through points.
+    Line {
+        /// The points in order.
+        points: Vec<[f64; 2]>,
+        /// Its width as a multiple of the picture's zoom (about a pixel in a small picture).
+        width: f64,
+        /// Its colour.
+        colour: Colour,
+        /// Whether its edges are smoothed.
+        smooth: bool,
+    },
+    /// Words.
+    Text {
+        /// The words.
+        text: String,
+        /// Where they begin on their base line.
+        at: [f64; 2],
+        /// Size of the letters, pixels.
+        size: f64,
+        /// Whether they are bold.
+        bold: bool,
+        /// Their colour.
+        colour: Colour,
+    },
+}
+
+/// Pixels per voxel length from which on materials are marked: smaller marks would be specks.
+const MARKED: f64 = 5.0;
+/// Least width of a mark in pixels; in small voxels it takes more of their width than elsewhere.
+const MARK_PIXELS: f64 = 4.0;
+
+impl Primitive {
+    /// A filled axis-parallel rectangle between two opposite corners.
+    pub fn rectangle(a: [f64; 2], b: [f64; 2], fill: Colour) -> Self {
+        Primitive::Quad { corners: [a, [b[0], a[1]], b, [a[0], b[1]]], fill, smooth: false }
+    }
+
+    /// A line between two points.
+    pub fn line(from: [f64; 2], to: [f64; 2], width: f64, colour: Colour) -> Self {
+        Primitive::Line { points: vec![from, to], width, colour, smooth: true }
+    }
+}
+
+/// A visible part of the world, voxel lengths.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Window {
+    /// Its left edge.
+    pub left: f64,
+    /// Its right edge.
+    pub right: f64,
+    /// Its lower edge, below the ground's surface at 0.
+    pub bottom: f64,
+    /// Its upper edge.
+    pub top: f64,
+    /// Pixels per voxel length: what is too small to see is left out.
+    pub scale: f64,
+    /// Whether voxels have hard edges: fewer colours, so that animations stay small.
+    pub crisp: bool,
+    /// How the world is drawn.
+    pub look: Look,
+}
+
+impl Window {
+    fn shows(&self, points: &[[f64; 2]]) -> bool {
+        let beyond = |outside: &dyn Fn(&[f64; 2]) -> bool| points.iter().all(outside);
+        !(beyond(&|p| p[0] < self.left)
+            || beyond(&|p| p[0] > self.right)
+            || beyond(&|p| p[1] < self.bottom)
+            || beyond(&|p| p[1] > self.top))
+    }
+}
+
+/// The whole numbers of voxel lengths from the ruler's zero that lie in the window, at most about
+/// 10⁴ of them; every `step`-th.
+pub fn ruler(window: &Window, zero: f64, step: f64) -> impl Iterator<Item = f64> + use<> {
+    let first = ((window.left - zero) / step).ceil();
+    let count = ((window.right - zero) / step).floor() - first + 1.0;
+    (0..count.clamp(0.0, 1e4) as u32).map(move |k| (first + f64::from(k)) * step)
+}
+
+/// The world at a frame, from back to front: sky, ground with its ruler, start marks, body, path of
+/// the centre of mass. The ruler's zero is the centre of mass at the start of the rollout.
+pub fn world(walk: &Walk, frame: usize, window: &Window) -> Vec<Primitive> {
+    let mut out = ground(walk, frame, window);
+    out.extend(body(walk, frame, window));
+    out.extend(path(walk, frame, window));
+    out
+}
+
+fn ground(walk: &Walk, frame: usize, window: &Window) -> Vec<Primitive> {
+    let Window { left, right, bottom, top, scale, .. } = *window;
+    let mut out = vec![
+        Primitive::rectangle([left, top], [right, bottom], colour::PAPER),
+        Primitive::rectangle([left, 0.0], [right, bottom], colour::GROUND),
+    ];
+    let zero = walk.centre(walk.rollout(frame).start)[0];
+    if window.look == Look::Paper {
+        grid(window, &mut out);
+    }
+    for (step, depth, line) in [(1.0, 3.0, 1.0), (10.0, 7.0, 1.5)] {
+        // Ticks closer than four pixels would be a gray band.
+        if step * scale >= 4.0 {
+            let tick = |at| Primitive::line([at, 0.0], [at, -depth / scale], line, colour::GROUND_LINE);
+            out.extend(ruler(window, zero, step).map(|mark| tick(zero + mark)));
+        }
+    }
+    out.push(Primitive::line([left, 0.0], [right, 0.0], 1.5, colour::GROUND_LINE));
+    // Where the rollout and (if it goes on) this phase began: dashes of five pixels, five apart.
+    let phase = walk.centre(walk.phase(frame).first_frame)[0];
+    for x in if phase == zero { vec![zero] } else { vec![zero, phase] } {
+        let dash = 5.0 / scale;
+        let count = (top / (2.0 * dash)).clamp(0.0, 1e3) as u32;
+        let dashes = (0..count).map(|k| 2.0 * dash * f64::from(k));
+        out.extend(dashes.map(|y| Primitive::line([x, y], [x, y + dash], 1.0, Colour::gray(0.72))));
+    }
+    out
+}
+
+/// The world's columns and rows, and the ground's voxels, of which only the upper part is seen.
+fn grid(window: &Window, out: &mut Vec<Primitive>) {
+    let Window { left, right, top, scale, .. } = *window;
+    let line = |points| Primitive::Line { points, width: 1.0, colour: colour::GRID, smooth: false };
+    // Closer than five pixels it would be a gray veil: every second line then, every fifth …
+    let step = [1.0, 2.0, 5.0, 10.0].into_iter().find(|step| step * scale >= 5.0).unwrap_or(20.0);
+    out.extend(ruler(window, 0.0, step).map(|x| line(vec![[x, 0.0], [x, top]])));
+    let rows = (top / step).clamp(0.0, 1e3) as u32;
+    out.extend((1..=rows).map(|k| line(vec![[left, step * f64::from(k)], [right, step * f64::from(k)]])));
+    let depth = (8.0 / scale).min(1.0);
+    let gap = (0.5 / scale).max(0.05);
+    let peg = |x: f64| Primitive::rectangle([x + gap, 0.0], [x + step - gap, -depth], colour::PEG);
+    let before = std::iter::once((left / step).floor() * step);
+    out.extend(before.chain(ruler(window, 0.0, step)).map(peg));
+}
+
+fn body(walk: &Walk, frame: usize, window: &Window) -> Vec<Primitive> {
+    let smooth = !window.crisp;
+    let voxels = || walk.voxels(frame).filter(|(_, corners)| window.shows(corners));
+    let quad = |(material, corners)| {
+        let fill = colour::shade(material, area(&corners));
+        Primitive::Quad { corners, fill, smooth }
+    };
+    let mut out: Vec<Primitive> = voxels().map(quad).collect();
+    // The paper's pictures have none.
+    if window.scale >= MARKED && window.look == Look::Plain {
+        out.extend(voxels().flat_map(|(material, corners)| {
+            let colour = colour::mark_colour(material, colour::shade(material, area(&corners)));
+            let width = (colour::MARK_WIDTH * window.scale).max(1.0);
+            let larger = (MARK_PIXELS / (colour::MARK_EXTENT * window.scale)).max(1.0);
+            let line = move |points: &&[[f64; 2]]| Primitive::Line {
+                points: points
+                    .iter()
+                    .map(|point| colour::placed(point.map(|v| larger * v), corners))
+                    .collect(),
+                width,
+                colour,
+                smooth: true,
+            };
+            colour::mark(material).iter().map(line)
+        }));
+    }
+    let seam = if window.crisp { colour::SEAM } else { colour::PAPER.with_opacity(120) };
+    // At small scales the lines would hide the voxels.
+    if window.scale >= 5.0 {
+        let seams = walk.seams(frame).filter(|side| window.shows(side));
+        let line = |points: [[f64; 2]; 2]| Primitive::Line {
+            points: points.to_vec(),
+            width: 1.0,
+            colour: seam,
+            smooth,
+        };
+        out.extend(seams.map(line));
+    }
+    let rim = walk.outline(frame).filter(|side| window.shows(side));
+    let line = |side: [[f64; 2]; 2]| Primitive::Line {
+        points: side.to_vec(),
+        width: 1.2,
+        colour: colour::INK,
+        smooth,
+    };
+    out.extend(rim.map(line));
+    out
+}
+
+fn path(walk: &Walk, frame: usize, window: &Window) -> Vec<Primitive> {
+    let rollout = walk.rollout(frame).start..=frame;
+    let points: Vec<[f64; 2]> = rollout.map(|f| walk.centre(f)).collect();
+    let mut out = Vec::new();
+    // Split where the path leaves the window, so that a long walk costs no more than a short one.
+    for piece in points.chunk_by(|a, b| window.shows(&[*a, *b])).filter(|piece| piece.len() > 1) {
+        let line = |width, colour| Primitive::Line { points: piece.to_vec(), width, colour, smooth: true };
+        out.push(line(3.4, colour::PAPER.with_opacity(170)));
+        out.push(line(1.6, colour::TRACE));
+    }
+    if let Some([x, y]) = points.last() {
+        for (half, fill) in [(4.0, colour::PAPER), (3.0, colour::TRACE)] {
+            let h = half / window.scale;
+            let corners = [[*x, y + h], [x + h, *y], [*x, y - h], [x - h, *y]];
+            out.push(Primitive::Quad { corners, fill, smooth: true });
+        }
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::draw::simulated;
+
+    const WINDOW: Window = Window {
+        left: -10.0,
+        right: 20.0,
+        bottom: -2.0,
+        top: 10.0,
+        scale: 16.0,
+        crisp: false,
+        look: Look::Plain,
+    };
+
+    #[test]
+    fn every_visible_voxel_is_a_quad_with_its_shade() {
+        let recording = simulated("34/56", 1, 40, false);
+        let walk = Walk::new(&recording).unwrap();
+        let scene = world(&walk, 20, &WINDOW);
+        for (material, corners) in walk.voxels(20) {
+            let fill = colour::shade(material, area(&corners));
+            assert!(scene.contains(&Primitive::Quad { corners, fill, smooth: true }), "{material:?}");
+        }
+        let elsewhere = Window { left: 100.0, right: 130.0, ..WINDOW };
+        assert!(body(&walk, 20, &elsewhere).is_empty());
+    }
+
+    #[test]
+    fn the_ruler_counts_from_the_start_and_survives_any_window() {
+        let marks: Vec<f64> = ruler(&WINDOW, 0.5, 10.0).collect();
+        assert_eq!(marks, [-10.0, 0.0, 10.0]);
+        let far = Window { left: 1e6, right: 1e6 + 30.0, ..WINDOW };
+        assert_eq!(ruler(&far, 0.0, 10.0).count(), 4);
+        let broken = Window { left: f64::NAN, right: f64::INFINITY, ..WINDOW };
+        assert!(ruler(&broken, 0.0, 1.0).count() <= 10_000);
+    }
+
+    #[test]
+    fn the_papers_look_has_a_peg_for_every_column_of_the_ground() {
+        let recording = simulated("34/56", 1, 4, false);
+        let walk = Walk::new(&recording).unwrap();
+        let pegs = |window: &Window| {
+            let is_peg = |p: &&Primitive| matches!(p, Primitive::Quad { fill, .. } if *fill == colour::PEG);
+            ground(&walk, 2, window).iter().filter(is_peg).count()
+        };
+        let paper = Window { look: Look::Paper, ..WINDOW };
+        assert_eq!((pegs(&WINDOW), pegs(&paper)), (0, 32));
+        assert!(pegs(&Window { left: f64::NAN, right: f64::INFINITY, ..paper }) <= 10_001);
+        assert_eq!("paper".parse(), Ok(Look::Paper));
+        assert!("pretty".parse::<Look>().is_err());
+    }
+
+    #[test]
+    fn the_path_starts_at_the_last_reset() {
+        let fresh = simulated("33/44", 2, 30, true);
+        let walk = Walk::new(&fresh).unwrap();
+        let lengths = |frame| {
+            let path = path(&walk, frame, &WINDOW);
+            path.iter()
+                .filter_map(|p| match p {
+                    Primitive::Line { points, .. } => Some(points.len()),
+                    Primitive::Quad { .. } | Primitive::Text { .. } => None,
+                })
+                .max()
+        };
+        assert_eq!((lengths(30), lengths(31), lengths(33)), (Some(31), None, Some(3)));
+    }
+}

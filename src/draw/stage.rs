@@ -1,0 +1,231 @@
+//! [`Stage`]: which part of the world a picture shows, and where on it.
+
+use crate::draw::error::PictureError;
+use crate::draw::panel::least_width;
+use crate::draw::scene::{Look, Window};
+use crate::draw::walk::Walk;
+use std::ops::RangeInclusive;
+
+pub use crate::draw::error::WIDTHS;
+
+/// Height of the panel above the world (stimulus, read-outs, legend), in pixels at zoom 1.
+const PANEL: f64 = 104.0;
+/// Height of the ground under its surface, in pixels at zoom 1.
+const GROUND: f64 = 24.0;
+/// Sky left and right of the whole walk, voxel lengths.
+const MARGIN: f64 = 2.5;
+/// Largest and smallest size of a voxel in pixels at zoom 1; a walk that needs smaller ones is
+/// followed.
+const VOXEL: RangeInclusive<f64> = 5.5..=22.0;
+/// Frames before and after over which the camera's path is averaged: a cycle, so that it does not
+/// shake with the body.
+const SMOOTHING: usize = 50;
+
+/// The camera and the layout of a picture: the panel on top, the world below it, the ground at the
+/// lower edge. If the whole recording fits, the view is fixed; else the camera follows the centre
+/// of mass smoothly.
+#[derive(Clone, Debug)]
+pub struct Stage {
+    /// Width of the picture, pixels.
+    pub width: u32,
+    /// Height of the picture, pixels.
+    pub height: u32,
+    /// Size of letters and lines: 1 up to 720 pixels width, then larger as far as there is room for
+    /// the words of the walk.
+    pub zoom: f64,
+    /// Whether there is room for the legend beside these words.
+    pub has_legend: bool,
+    /// Height of the panel, pixels.
+    pub panel: f64,
+    crisp: bool,
+    look: Look,
+    scale: f64,
+    surface: f64,
+    left: Vec<f64>,
+}
+
+impl Stage {
+    /// The stage for a recording in a picture `width` pixels wide; the height follows from the
+    /// body.
+    ///
+    /// # Errors
+    /// [`PictureError::Size`] if the width is not in [`WIDTHS`].
+    pub fn new(walk: &Walk, width: u32) -> Result<Self, PictureError> {
+        if !WIDTHS.contains(&width) {
+            return Err(PictureError::Size { width, height: 0 });
+        }
+        let least = least_width(walk);
+        let zoom = (f64::from(width) / 480.0).round().min((f64::from(width) / least).floor()).max(1.0);
+        let has_legend = f64::from(width) >= least * zoom;
+        let (smallest, largest) = (VOXEL.start() * zoom, VOXEL.end() * zoom);
+        let (first, all) = (walk.extent(0..1), walk.extent(0..walk.len()));
+        let size = (first.right - first.left).clamp(1.0, 128.0);
+        let standing = first.top.clamp(1.0, 128.0);
+        // Room for hops; a body that is thrown higher leaves the picture for a moment.
+        let top = (all.top + 1.0).clamp(standing + 1.5, 1.35 * standing + 2.0);
+        let (left, right) = reach(walk);
+        let fixed = f64::from(width) / (right - left + 2.0 * MARGIN);
+        let highest = 1.2 * f64::from(width) / top;
+        let follow = fixed < smallest.min(highest);
+        let scale =
+            if follow { f64::from(width) / (1.7 * size + 8.0) } else { fixed }.min(highest).min(largest);
+        let panel = PANEL * zoom;
+        let surface = (panel + top * scale).round();
+        let height = (surface + GROUND * zoom) as u32;
+        let middle = if follow {
+            followed(walk, 0.3 * f64::from(width) / scale)
+        } else {
+            vec![(left + right) / 2.0; walk.len()]
+        };
+        // Whole pixels: the ground scrolls without flicker.
+        let snap = |x: f64| ((x * scale - f64::from(width) / 2.0).round()) / scale;
+        let crisp = false;
+        Ok(Stage {
+            width,
+            height,
+            zoom,
+            has_legend,
+            panel,
+            crisp,
+            look: Look::Plain,
+            scale,
+            surface,
+            left: middle.into_iter().map(snap).collect(),
+        })
+    }
+
+    /// The same with hard edges between voxels: fewer colours, so that animations stay small.
+    pub fn crisp(self) -> Self {
+        Stage { crisp: true, ..self }
+    }
+
+    /// The same in another look.
+    pub fn look(self, look: Look) -> Self {
+        Stage { look, ..self }
+    }
+
+    /// Where a point of the world is in the picture of a frame: pixels, y down.
+    pub fn to_pixels(&self, frame: usize, [x, y]: [f64; 2]) -> [f64; 2] {
+        [(x - self.left_edge(frame)) * self.scale, self.surface - y * self.scale]
+    }
+
+    /// The part of the world in the picture of a frame.
+    pub fn window(&self, frame: usize) -> Window {
+        let left = self.left_edge(frame);
+        Window {
+            left,
+            right: left + f64::from(self.width) / self.scale,
+            bottom: (self.surface - f64::from(self.height)) / self.scale,
+            top: (self.surface - self.panel) / self.scale,
+            scale: self.scale,
+            crisp: self.crisp,
+            look: self.look,
+        }
+    }
+
+    fn left_edge(&self, frame: usize) -> f64 {
+        self.left.get(frame).or(self.left.last()).copied().unwrap_or(0.0)
+    }
+}
+
+/// Leftmost and rightmost x of the walk, without a body's last throes: half a body more than the
+/// centres at most.
+fn reach(walk: &Walk) -> (f64, f64) {
+    let all = walk.extent(0..walk.len());
+    let size = walk.recording().body.width() as f64;
+    let centres = (0..walk.len()).map(|f| walk.centre(f)[0]);
+    let (low, high) = centres.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)));
+    (all.left.max(low - size - 2.0).min(low), all.right.min(high + size + 2.0).max(high))
+}
+
+/// The centres' x, averaged twice over [`SMOOTHING`] frames on both sides, each rollout by itself,
+/// and never further than `most` voxel lengths from the centre: a body that is hurled away stays in
+/// view.
+fn followed(walk: &Walk, most: f64) -> Vec<f64> {
+    let mut path: Vec<f64> = (0..walk.len()).map(|f| walk.centre(f)[0]).collect();
+    let mut start = 0;
+    while start < path.len() {
+        let rollout = walk.rollout(start);
+        for _ in 0..2 {
+            smooth(&mut path[rollout.clone()]);
+        }
+        start = rollout.end.max(start + 1);
+    }
+    for (f, x) in path.iter_mut().enumerate() {
+        let centre = walk.centre(f)[0];
+        *x = x.clamp(centre - most, centre + most);
+    }
+    path
+}
+
+fn smooth(path: &mut [f64]) {
+    let mut sums = vec![0.0];
+    sums.extend(path.iter().scan(0.0, |sum, x| {
+        *sum += x;
+        Some(*sum)
+    }));
+    let n = path.len();
+    for (i, x) in path.iter_mut().enumerate() {
+        // Shorter near the ends, and always as far back as forward.
+        let reach = SMOOTHING.min(i).min(n - 1 - i);
+        *x = (sums[i + reach + 1] - sums[i - reach]) / (2 * reach + 1) as f64;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::draw::simulated;
+
+    #[test]
+    fn a_walk_that_fits_has_a_fixed_view_that_holds_all_of_it() {
+        let recording = simulated("3344/5566", 2, 100, true);
+        let walk = Walk::new(&recording).unwrap();
+        let stage = Stage::new(&walk, 480).unwrap();
+        let extent = walk.extent(0..walk.len());
+        assert!((0..walk.len()).all(|f| stage.window(f) == stage.window(0)));
+        let window = stage.window(0);
+        assert!(window.left < extent.left && extent.right < window.right && extent.top < window.top);
+        assert!((stage.to_pixels(0, [window.left, 0.0])[0]).abs() < 1e-6);
+    }
+
+    #[test]
+    fn a_long_walk_is_followed_smoothly_and_stays_in_the_picture() {
+        let mut recording = simulated("3344/5566", 1, 1000, false);
+        for (step, frame) in recording.frames.iter_mut().enumerate() {
+            let shift = 0.3 * step as f64 + 2.0 * (step as f64 / 4.0).sin();
+            frame.points.iter_mut().for_each(|p| p[0] += shift);
+            frame.centre[0] += shift;
+        }
+        let walk = Walk::new(&recording).unwrap();
+        let stage = Stage::new(&walk, 480).unwrap();
+        for f in 0..walk.len() {
+            let x = stage.to_pixels(f, walk.centre(f))[0];
+            assert!((100.0..380.0).contains(&x), "frame {f}: {x}");
+        }
+        let speed = |f: usize| stage.window(f + 1).left - stage.window(f).left;
+        assert!((200..800).all(|f| (0.1..0.5).contains(&speed(f))));
+    }
+
+    #[test]
+    fn any_recording_gives_a_picture_of_modest_size() {
+        for body in ["3", &"3".repeat(64), &["3"; 64].join("/"), &[&*"3".repeat(64); 64].join("/")] {
+            let mut recording = simulated(body, 1, 3, false);
+            for x in [0.0, 1e6, -1e30, f64::NAN] {
+                let moved = [x, x];
+                recording.frames[2].points.iter_mut().for_each(|p| *p = moved);
+                recording.frames[2].centre = moved;
+                let walk = Walk::new(&recording).unwrap();
+                let stage = Stage::new(&walk, 480).unwrap();
+                assert!((120..=800).contains(&stage.height), "{body} {x}: {}", stage.height);
+                let window = stage.window(2);
+                assert!(window.left.is_finite() && window.right > window.left && window.scale >= 1.0);
+                let seen = stage.to_pixels(2, walk.centre(2))[0];
+                assert!((0.0..=480.0).contains(&seen), "{x}: {seen}");
+            }
+        }
+        let recording = simulated("3", 1, 1, false);
+        let walk = Walk::new(&recording).unwrap();
+        assert!(matches!(Stage::new(&walk, 10), Err(PictureError::Size { width: 10, .. })));
+    }
+}

@@ -1,0 +1,180 @@
+//! Images that robots are not trained on: those of the test split, and validation images. The
+//! latter are those of the training split that a run neither is trained on nor chooses its training
+//! images among, drawn by its seed.
+
+use crate::base::error::{Error, ErrorKind};
+use crate::base::random::{Purpose, stream};
+use crate::base::text::counted;
+use crate::config::Config;
+use crate::config::validation::{IMAGES_KEY, LEAST, ValidationConfig};
+use crate::data::dataset::{Dataset, Split};
+use crate::images::training::Training;
+use crate::store::images::{HowMany, ImageRef};
+use crate::store::run::RunFile;
+use crate::store::training::Origin;
+use std::collections::BTreeSet;
+
+/// Indices of all images that a run was trained on, and before that its gaits.
+pub(crate) fn trained_on(run: &RunFile, dataset: &Dataset) -> Result<BTreeSet<usize>, Error> {
+    let mut seen: BTreeSet<usize> =
+        run.origin.iter().flat_map(|origin: &Origin| &origin.trained_on).copied().collect();
+    seen.extend(run.training_images.iter().map(|image| image.index));
+    seen.extend(Training::indices(&run.config, dataset)?);
+    Ok(seen)
+}
+
+/// Of each class the images that are not among those seen.
+fn left(classes: &[u8], seen: &BTreeSet<usize>, dataset: &Dataset) -> Vec<Vec<ImageRef>> {
+    let of_class = |&label: &u8| {
+        let all = dataset.indices_of(Split::Train, label).iter();
+        let free = all.filter(|&index| !seen.contains(index));
+        free.map(|&index| ImageRef { index, label }).collect()
+    };
+    classes.iter().map(of_class).collect()
+}
+
+/// The number of images for which one could ask, evenly divided between the classes.
+fn most(left: &[Vec<ImageRef>]) -> usize {
+    left.iter().map(Vec::len).min().unwrap_or(0) * left.len()
+}
+
+/// How many are to be taken of each class, one or more; `asked` says where so many were asked for.
+///
+/// # Errors
+/// If a class has not as many.
+fn per_class(
+    classes: &[u8],
+    left: &[Vec<ImageRef>],
+    argument: Option<&'static str>,
+    how_many: HowMany,
+) -> Result<usize, Error> {
+    let per_class = match how_many {
+        HowMany::All => 1,
+        HowMany::Evenly(count) => count.div_ceil(left.len().max(1)),
+    };
+    match classes.iter().zip(left).min_by_key(|(_, left)| left.len()) {
+        Some((label, scarcest)) if scarcest.len() < per_class => {
+            let text = format!(
+                "expected {} of class {label} that the run is not trained on, found {}",
+                counted(per_class, "image", "images"),
+                scarcest.len()
+            );
+            let error = match argument {
+                Some(name) => Error { kind: ErrorKind::Input, ..Error::argument(name, how_many, text) },
+                None => Error::input(format!("{IMAGES_KEY} = {how_many}: {text}")).with_key(IMAGES_KEY),
+            };
+            Err(error)
+        }
+        _ => Ok(per_class),
+    }
+}
+
+/// Whether a run that is to choose robots when it ends will have images for that: to be known
+/// before it begins. `before`: on which images its gaits were trained; `key` says how many images of
+/// a class the run itself is trained on.
+///
+/// # Errors
+/// If of a class there are not enough.
+pub(crate) fn check(config: &Config, before: &[usize], key: &str, dataset: &Dataset) -> Result<(), Error> {
+    let ValidationConfig { images, best } = config.validation;
+    if best == 0 {
+        return Ok(());
+    }
+    let mut seen: BTreeSet<usize> = Training::indices(config, dataset)?.into_iter().collect();
+    seen.extend(before);
+    let classes = config.classes();
+    let left = left(&classes, &seen, dataset);
+    per_class(&classes, &left, None, HowMany::Evenly(images)).map(|_| ()).map_err(|error| {
+        let most = most(&left);
+        let fewer = if most >= LEAST { format!("ask for at most {most}, ") } else { String::new() };
+        error.advice(format!("{fewer}train on fewer ({key}), or choose none (validation.best = 0)"))
+    })
+}
+
+/// `count` validation images of some runs of one experiment together, evenly divided between the
+/// classes, which take turns: so are the first of them. Of the same runs, in whichever order, they
+/// are always the same, and fewer of them the first of more. `argument` is the argument that
+/// asks for this number; `None`: the config does.
+///
+/// # Errors
+/// If there are not enough images.
+pub fn images(
+    runs: &[&RunFile],
+    dataset: &Dataset,
+    argument: Option<&'static str>,
+    count: usize,
+) -> Result<Vec<ImageRef>, Error> {
+    let classes = runs.first().map_or(Vec::new(), |run| run.config.classes());
+    images_besides(&BTreeSet::new(), runs, &classes, dataset, argument, HowMany::Evenly(count))
+}
+
+/// The same of these classes, none of these images among them.
+///
+/// # Errors
+/// As of [`images`].
+pub(crate) fn images_besides(
+    besides: &BTreeSet<usize>,
+    runs: &[&RunFile],
+    classes: &[u8],
+    dataset: &Dataset,
+    argument: Option<&'static str>,
+    how_many: HowMany,
+) -> Result<Vec<ImageRef>, Error> {
+    let first = runs.iter().map(|run| &run.config).min_by_key(|config| config.seed);
+    let Some(config) = first else { return Ok(Vec::new()) };
+    let mut seen = besides.clone();
+    for run in runs {
+        seen.extend(trained_on(run, dataset)?);
+    }
+    let left = left(classes, &seen, dataset);
+    let per_class = per_class(classes, &left, argument, how_many).map_err(|error| match most(&left) {
+        0 => error.advice("every image of that class was trained on; show test images"),
+        most => error.advice(format!("ask for at most {most}")),
+    })?;
+    let HowMany::Evenly(count) = how_many else { return Ok(left.concat()) };
+    let draw = |(&label, free): (&u8, Vec<ImageRef>)| -> Vec<ImageRef> {
+        let mut random = stream(config.seed, Purpose::Validation, 0, u64::from(label));
+        random.sample(free.len(), per_class).into_iter().map(|i| free[i]).collect()
+    };
+    let drawn: Vec<Vec<ImageRef>> = classes.iter().zip(left).map(draw).collect();
+    let turns =
+        (0..per_class).flat_map(|turn| drawn.iter().filter_map(move |class| class.get(turn).copied()));
+    Ok(turns.take(count).collect())
+}
+
+/// Test images of these classes, class after class: all of them, or so many, evenly divided between
+/// the classes, of which the first get what is left over.
+///
+/// # Errors
+/// If a class has too few.
+pub(crate) fn test_images(
+    classes: &[u8],
+    dataset: &Dataset,
+    how_many: HowMany,
+    seed: u64,
+) -> Result<Vec<ImageRef>, Error> {
+    let count_of = |class: &&u8| dataset.indices_of(Split::Test, **class).len();
+    if let Some(label) = classes.iter().find(|class| count_of(class) == 0) {
+        let text = format!("{}: there is no test image of class {label}", dataset.name());
+        let there = dataset.classes(Split::Test);
+        return Err(Error::input(text).advice(format!("there are of the classes {there:?}")));
+    }
+    let HowMany::Evenly(count) = how_many else {
+        let of_class = |&label: &u8| {
+            dataset.indices_of(Split::Test, label).iter().map(move |&index| ImageRef { index, label })
+        };
+        return Ok(classes.iter().flat_map(of_class).collect());
+    };
+    let mut images = Vec::new();
+    for (place, &label) in classes.iter().enumerate() {
+        let share = count / classes.len() + usize::from(place < count % classes.len());
+        let drawn = dataset.draw(Split::Test, &[label], share, seed);
+        let drawn = drawn.map_err(|error| {
+            let most = classes.iter().map(|class| count_of(&class)).min().unwrap_or(0);
+            let advice = format!("ask for at most {} images, or for all", most * classes.len());
+            Error::input(error.to_string()).advice(advice)
+        })?;
+        images.extend(drawn.into_iter().map(|index| ImageRef { index, label }));
+    }
+    Ok(images)
+}

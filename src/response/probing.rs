@@ -1,0 +1,75 @@
+//! [`Probing`]: how the response of a gait is measured.
+
+use crate::base::Grid;
+use crate::base::random::{Purpose, stream};
+use crate::body::{Body, Material};
+use crate::response::gait::{Gait, random_image};
+use crate::response::regression::{Response, Shown};
+use crate::sim::Physics;
+use crate::task::perturbation::Condition;
+use std::ops::Range;
+
+/// Random images, numbered from 0, and the conditions under which a gait's probe is shown them by
+/// turns.
+#[derive(Clone, Debug)]
+pub struct Probing {
+    /// Every condition once.
+    conditions: Vec<Condition>,
+    seed: u64,
+}
+
+impl Probing {
+    /// Images shown under these conditions; some may be named repeatedly.
+    pub fn new(conditions: &[Condition], seed: u64) -> Self {
+        let mut once: Vec<Condition> = Vec::new();
+        for condition in conditions {
+            if !once.contains(condition) {
+                once.push(condition.clone());
+            }
+        }
+        Probing { conditions: once, seed }
+    }
+
+    /// The conditions, each once, in the order of their numbers.
+    pub fn conditions(&self) -> &[Condition] {
+        &self.conditions
+    }
+
+    /// Shows a gait's probe the random images with these numbers: what became of each, unstable
+    /// rollouts left out. `roll` simulates: displacements of a body under images and conditions,
+    /// `None` where unstable.
+    ///
+    /// # Errors
+    /// Those of `roll`.
+    pub fn shown<E>(
+        &self,
+        gait: &Gait,
+        physics: &Physics,
+        numbers: Range<usize>,
+        roll: impl FnOnce(&Body, &[Grid<f64>], &[Condition]) -> Result<Vec<Option<f64>>, E>,
+    ) -> Result<Vec<Shown>, E> {
+        let probe = gait.probe();
+        let image = |number: usize| {
+            let mut random = stream(self.seed, Purpose::RandomImages, 0, number as u64);
+            random_image(probe.height(), probe.width(), physics, &mut random)
+        };
+        let condition = |number: usize| number % self.conditions.len();
+        let stimuli: Vec<Grid<f64>> = numbers.clone().map(image).collect();
+        let conditions: Vec<Condition> =
+            numbers.clone().map(|number| self.conditions[condition(number)].clone()).collect();
+        let displacements = roll(&probe, &stimuli, &conditions)?;
+        let design = vec![Material::SensorExpand; gait.places().len()];
+        let shown =
+            numbers.zip(&stimuli).zip(displacements).filter_map(|((number, stimulus), displacement)| {
+                let widths = gait.widths(&design, stimulus, physics);
+                Some(Shown { widths, displacement: displacement?, condition: condition(number) })
+            });
+        Ok(shown.collect())
+    }
+}
+
+/// The response according to the stable rollouts `shown`, out of `rollouts`; `None` if most are
+/// unstable, or too few stable.
+pub fn response(shown: &[Shown], rollouts: usize) -> Option<Response> {
+    if 2 * shown.len() > rollouts { Response::of(shown) } else { None }
+}

@@ -1,0 +1,169 @@
+//! Runs with `fitness = "response"`: what their images are, what a gait is worth, and which configs
+//! there can be.
+
+use crate::base::Grid;
+use crate::base::random::{Purpose, stream};
+use crate::config::evaluation::LEAST_IMAGES;
+use crate::response::gait::random_image;
+use crate::sim::Physics;
+use crate::task::fitness::response_so_far;
+use crate::task::perturbation::{Condition, of_response};
+
+/// Which random images evolution shows: others than a training's, which are 0.
+const OF_EVOLUTION: u64 = 1 << 32;
+
+/// Share of what is to be beaten that a body must show after the first pairs to be shown the
+/// others. With more, chance decides; with less, hopeless ones cost as much as good ones.
+const WORTH_GOING_ON: f64 = 0.5;
+
+/// As many images as there are training images, an even number, in pairs: one whose pixels are
+/// bright, dark or at rest at random, each independently of all others, and its opposite. Pixels
+/// that are the same in all training images stay so: what never changes says nothing.
+pub(crate) fn opposites(stimuli: &[Grid<f64>], physics: &Physics, seed: u64) -> Vec<Grid<f64>> {
+    let Some(first) = stimuli.first() else { return Vec::new() };
+    let changes = Grid::from_fn(first.height(), first.width(), |row, column| {
+        stimuli.iter().any(|other| other[(row, column)] != first[(row, column)])
+    });
+    let pair = |number: u64| {
+        let mut random = stream(seed, Purpose::RandomImages, OF_EVOLUTION, number);
+        let drawn = random_image(first.height(), first.width(), physics, &mut random);
+        [false, true].map(|is_opposite| {
+            Grid::from_fn(first.height(), first.width(), |row, column| {
+                let pixel = drawn[(row, column)];
+                match changes[(row, column)] {
+                    false => first[(row, column)],
+                    // What is at rest is so in both.
+                    true if is_opposite && (pixel == 0.0 || pixel == 1.0) => 1.0 - pixel,
+                    true => pixel,
+                }
+            })
+        })
+    };
+    (0..stimuli.len() as u64 / 2).flat_map(pair).collect()
+}
+
+/// The condition of each image; both images of a pair have the same.
+pub(crate) fn conditions(images: usize) -> Vec<Condition> {
+    of_response()
+        .into_iter()
+        .flat_map(|condition| [condition.clone(), condition])
+        .cycle()
+        .take(images)
+        .collect()
+}
+
+/// Whether a body that is to beat a response is so far from it after the first half of its pairs,
+/// two of each condition at least, that the rest is not worth simulating.
+pub(crate) fn is_left_behind(known: &[Option<f64>], to_beat: f64) -> bool {
+    // Two images a pair; as many pairs of each condition as of the other.
+    let first = (known.len() / 8 * 4).max(LEAST_IMAGES).min(known.len());
+    known[..first].iter().all(Option::is_some)
+        && to_beat > 0.0
+        && response_so_far(known[..first].iter().copied())
+            .is_some_and(|response| response < WORTH_GOING_ON * to_beat)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::base::error::Error;
+    use crate::config::Config;
+    use crate::images::training::Training;
+
+    /// Two classes of built-in digits, six images of each.
+    const CONFIG: &str = "[task]\ngroups = [[0], [1]]\n[data]\ndataset = \"builtin\"\nimages_per_class = 6\n";
+
+    fn config(more: &str, set: &[&str]) -> Result<Config, Error> {
+        let set: Vec<String> = set.iter().map(ToString::to_string).collect();
+        Config::parse(&format!("{CONFIG}{more}"), "a.toml", &set)
+    }
+
+    const RESPONSE: &str = "[evaluation]\nfitness = \"response\"\n";
+
+    #[test]
+    fn images_are_pairs_of_opposites_where_training_images_differ_and_the_same_for_the_same_seed() {
+        let images = |more: &str, seed: &str| {
+            Training::load(&config(more, &[&format!("seed={seed}")]).unwrap(), None).unwrap()
+        };
+        let (plain, random) = (images("", "1"), images(RESPONSE, "1"));
+        assert_eq!(random.images, plain.images);
+        assert_eq!(random.stimuli.len(), 12);
+        let (mut seen, mut changing) = ([0, 0, 0], 0);
+        for (place, first) in plain.stimuli[0].iter() {
+            let changes = plain.stimuli.iter().any(|other| other[place] != *first);
+            changing += usize::from(changes);
+            for pair in random.stimuli.chunks(2) {
+                let (a, b) = (pair[0][place], pair[1][place]);
+                match changes {
+                    true if a == b => seen[2] += 1,
+                    true => {
+                        assert_eq!((a.max(b), a.min(b)), (1.0, 0.0), "{place:?}");
+                        seen[usize::from(a == 1.0)] += 1;
+                    }
+                    false => assert_eq!((a, b), (*first, *first), "{place:?}"),
+                }
+            }
+        }
+        let all = 6.0 * changing as f64;
+        for (seen, expected) in seen.into_iter().zip([0.4, 0.4, 0.2]) {
+            assert!((f64::from(seen) / all - expected).abs() < 0.1, "{seen} of {all}: expected {expected}");
+        }
+        assert!(changing > 20);
+        let opposites = |seed| opposites(&plain.stimuli, &Physics::default(), seed);
+        assert_eq!(opposites(1), random.stimuli);
+        assert_ne!(opposites(2), random.stimuli);
+    }
+
+    #[test]
+    fn every_second_pair_is_shown_from_a_raised_start_without_length_limits() {
+        let [ground, raised] = of_response();
+        let training = Training::load(&config(RESPONSE, &[]).unwrap(), None).unwrap();
+        assert_eq!(
+            training.conditions[..6],
+            [&ground, &ground, &raised, &raised, &ground, &ground].map(Clone::clone)
+        );
+        assert_eq!(training.conditions.len(), 12);
+        let plain = Training::load(&config("", &[]).unwrap(), None).unwrap();
+        assert!(plain.conditions.is_empty());
+    }
+
+    #[test]
+    fn a_body_is_left_behind_by_the_first_half_of_its_pairs_alone() {
+        let known = |d: &[f64]| -> Vec<Option<f64>> {
+            d.iter().map(|d| Some(*d)).chain(std::iter::repeat(None)).take(16).collect()
+        };
+        let pairs = [3.0, -3.0, 2.0, -2.0, -1.0, 1.0, -2.0, 2.0];
+        let response = 4.5_f64.sqrt();
+        assert!(is_left_behind(&known(&pairs), 2.01 * response));
+        assert!(!is_left_behind(&known(&pairs), 1.99 * response) && !is_left_behind(&known(&pairs), -9.0));
+        assert!(!is_left_behind(&known(&pairs[..7]), 1e9));
+        let more: Vec<f64> = pairs.into_iter().chain([900.0, -900.0, 0.0, 0.0]).collect();
+        assert!(is_left_behind(&known(&more), 2.01 * response));
+    }
+
+    #[test]
+    fn what_does_not_go_with_a_response_is_refused_with_its_key() {
+        assert!(config(RESPONSE, &[]).is_ok());
+        assert!(config(RESPONSE, &["data.images_per_class=4"]).is_ok());
+        assert!(config(RESPONSE, &["genome.voxel_mutations=0.5", "genome.voxel_changes=4"]).is_ok());
+        let refused = [
+            ("data.images_per_class=3", "data.images_per_class = 3", "8 or more"),
+            (
+                "data.train_images=[0, 1, 2, 3, 4, 5, 6, 7, 8]",
+                "data.train_images = 9 images",
+                "an even number",
+            ),
+            ("protocol.rollout=\"sequential\"", "protocol.rollout = \"sequential\"", "\"fresh\""),
+        ];
+        for (set, found, expected) in refused {
+            let message = config(RESPONSE, &[set]).unwrap_err().message;
+            assert!(message.contains(found) && message.contains(expected), "{set}: {message}");
+            assert!(message.contains("evaluation.fitness = \"response\""), "{set}: {message}");
+            assert!(config("", &[set]).is_ok(), "{set}: it is no error by itself");
+        }
+        let splits = CONFIG.replace("groups = [[0], [1]]", "splits = [0, 1, 2]");
+        let message = Config::parse(&format!("{splits}{RESPONSE}"), "a.toml", &[]).unwrap_err().message;
+        assert!(message.contains("a.toml:2: task.splits = 3 tasks: "), "{message}");
+        assert!(message.contains("one task, as groups"), "{message}");
+    }
+}

@@ -1,0 +1,4 @@
+//! The robots that an argument selects, and the published ones.
+
+pub mod published;
+pub mod selection;

@@ -1,0 +1,233 @@
+//! `morphcog gallery`: the zero-one robots that the paper's authors published; and robots that were
+//! trained here.
+
+use crate::base::error::Error;
+use crate::base::remedy::{Invocation, Remedy};
+use crate::body::Body;
+use crate::config::{BUILT_IN, Config};
+use crate::data::catalogue;
+use crate::genome::Genome;
+use crate::images::training::Training;
+use crate::qd::Archive;
+use crate::robots::selection::{Selection, Source};
+use crate::shipped::gallery;
+use crate::store::audit::AuditFile;
+use crate::store::images::{DatasetRef, ImageRef};
+use crate::store::names::AUDIT_JSON;
+use crate::store::run::{Dimensions, FORMAT, FORMAT_VERSION, Robot, RunFile};
+use crate::task::direction::Direction;
+use crate::task::judge::Judge;
+use serde::Deserialize;
+use std::path::{Path, PathBuf};
+
+/// The config under which the published robots were evolved.
+const CONFIG: &str = "zero_one_published.toml";
+
+/// What all published robots are called together.
+pub const ALL: &str = "gallery";
+
+/// The list of them.
+pub(crate) const TEXT: &str = include_str!("../../data/gallery.json");
+
+/// The runs of a set that ships with the program, [`gallery::ZERO_ONE`] or [`gallery::TEAM`], each with
+/// its audit, in their order.
+///
+/// # Errors
+/// If there is no such set, or what is built in is damaged (which a test excludes).
+pub fn trained(set: &str) -> Result<Vec<(RunFile, AuditFile)>, Error> {
+    let paths = gallery::runs(set).map_err(Error::other)?;
+    let read =
+        |path: &PathBuf| Ok((RunFile::read(path)?, AuditFile::read(&path.with_file_name(AUDIT_JSON))?));
+    paths.iter().map(read).collect()
+}
+
+/// A published robot.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Published {
+    /// Its name, as published.
+    pub name: String,
+    /// Its published fitness, voxel lengths.
+    pub fitness: f64,
+    /// The way it walks under a zero; under a one it walks the other.
+    pub zero_walks: Direction,
+    /// Its body.
+    pub body: Body,
+}
+
+impl Published {
+    /// What its walks say.
+    pub fn judge(&self) -> Judge {
+        let says = |way| if way == self.zero_walks { vec![0] } else { vec![1] };
+        Judge { left: says(Direction::Left), right: says(Direction::Right) }
+    }
+}
+
+/// All published robots.
+///
+/// # Errors
+/// If the built-in list is damaged (which a test excludes).
+pub fn gallery() -> Result<Vec<Published>, Error> {
+    #[derive(Deserialize)]
+    struct Entry {
+        name: String,
+        published_fitness: f64,
+        zero_walks: String,
+        body: String,
+    }
+    let entries: Vec<Entry> = crate::config::reading::read_json_list(TEXT, "gallery.json")?;
+    let robot = |Entry { name, published_fitness, zero_walks, body }: Entry| {
+        let body = body.parse().map_err(|error| Error::other(format!("gallery.json: {name}: {error}")))?;
+        let zero_walks = if zero_walks == "left" { Direction::Left } else { Direction::Right };
+        Ok(Published { name, fitness: published_fitness, zero_walks, body })
+    };
+    entries.into_iter().map(robot).collect()
+}
+
+/// The published robot of a name, in any case of letters.
+///
+/// # Errors
+/// As [`gallery`].
+pub fn find(name: &str) -> Result<Option<Published>, Error> {
+    Ok(gallery()?.into_iter().find(|robot| robot.name.eq_ignore_ascii_case(name)))
+}
+
+/// How the published robots were evolved.
+///
+/// # Errors
+/// If the built-in config is damaged (which a test excludes).
+pub fn config() -> Result<Config, Error> {
+    let text = BUILT_IN.iter().find(|(name, _)| *name == CONFIG).map_or("", |(_, text)| text);
+    Config::parse(text, CONFIG, &[])
+}
+
+/// Whether a selection, of no archive in particular, means published robots: the word for all of
+/// them, or their names.
+///
+/// # Errors
+/// As [`gallery`].
+pub fn is_meant(selection: &Selection) -> Result<bool, Error> {
+    let Selection::Ids(ids) = selection else { return Ok(false) };
+    if matches!(ids.as_slice(), [word] if word == ALL) {
+        return Ok(true);
+    }
+    let published: Result<Vec<bool>, Error> = ids.iter().map(|id| Ok(find(id)?.is_some())).collect();
+    let published = published?;
+    match published.iter().zip(ids).find(|(is_published, _)| !**is_published) {
+        Some((_, other)) if published.contains(&true) => {
+            let text = format!("there is no published robot {other}");
+            Err(Error::input(text).remedy(Remedy::Run(Invocation::new("gallery"), "lists them")))
+        }
+        other => Ok(other.is_none()),
+    }
+}
+
+/// The error where only physical robots are wanted of the published ones; `text` says what was expected.
+pub(crate) fn not_audited(text: &str) -> Error {
+    let audit = Invocation::new("audit").option("robots", ALL);
+    let error = Error::usage(text.to_string()).about("physical_only");
+    error.remedy(Remedy::Run(audit, "audits those"))
+}
+
+/// Adds what to do where the images of the published robots are missing.
+pub(crate) fn without_mnist(error: Error) -> Error {
+    let fetch = Invocation::new("data fetch").value("mnist");
+    error.remedy(Remedy::Run(fetch, "downloads them")).remedy(Remedy::UseBuiltin)
+}
+
+/// The published robots as a run, for a test. Their genomes were not published: each has the empty
+/// one, and none of their displacements but the fitness.
+///
+/// Those data need not be there if images of another `dataset` are to be shown.
+///
+/// # Errors
+/// If the data are missing or broken, which say what the robots were trained on.
+pub fn source(data: Option<&Path>, dataset: Option<&str>) -> Result<Source, Error> {
+    let config = config()?;
+    let (dataset, training_images) = match dataset.is_some_and(|name| name != config.data.dataset) {
+        true => {
+            let indices = config.data.train_images.iter().flatten();
+            let images = indices.zip(config.classes()).map(|(&index, label)| ImageRef { index, label });
+            let train_sha256 = catalogue::MNIST_CONTENT[0].to_string();
+            (DatasetRef { name: config.data.dataset.clone(), train_sha256 }, images.collect())
+        }
+        false => {
+            let training = Training::load(&config, data).map_err(without_mnist)?;
+            (training.dataset, training.images)
+        }
+    };
+    let robot = |(number, robot): (usize, Published)| {
+        let (left, right) = (-robot.fitness, robot.fitness);
+        let displacements = match robot.zero_walks {
+            Direction::Left => vec![left, right],
+            Direction::Right => vec![right, left],
+        };
+        Robot {
+            id: robot.name,
+            cell: vec![number],
+            task: "0|1".to_string(),
+            objective: robot.fitness,
+            displacements,
+            voxels: robot.body.counts(),
+            generation: 0,
+            parent: None,
+            body: robot.body,
+            genome: Genome::initial(),
+        }
+    };
+    let elites: Vec<Robot> = gallery()?.into_iter().enumerate().map(robot).collect();
+    let run = RunFile {
+        format: FORMAT.to_string(),
+        format_version: FORMAT_VERSION,
+        program_version: env!("CARGO_PKG_VERSION").to_string(),
+        name: ALL.to_string(),
+        dataset,
+        training_images,
+        dimensions: Dimensions::of(&config)?,
+        origin: None,
+        generations: config.generations,
+        stats: Archive::<Robot>::new().stats(1, 0.0),
+        elites,
+        config,
+        read_sha256: None,
+    };
+    Ok(Source { path: PathBuf::from(ALL), run })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::task::margins::Margins;
+    use crate::task::stimulus::StimulusParams;
+    use std::collections::BTreeSet;
+
+    #[test]
+    fn the_gallery_holds_the_five_published_zero_one_robots() {
+        let robots = gallery().unwrap();
+        let names: Vec<&str> = robots.iter().map(|robot| robot.name.as_str()).collect();
+        assert_eq!(names, ["APUKI", "IHSUJ", "QMAXD", "XFJPI", "YJTLA"]);
+        assert!(robots.iter().all(|r| (r.body.height(), r.body.width()) == (14, 14) && r.body.is_valid(3)));
+        assert_eq!(find("xfjpi").unwrap().unwrap().fitness, 17.316384958834874);
+        assert_eq!(find("nobody").unwrap(), None);
+        assert_eq!(config().unwrap().classes(), [0, 1]);
+    }
+
+    #[test]
+    fn the_trained_robots_are_physical_and_live_in_one_world_and_see_alike_but_for_their_windows() {
+        for (set, pairs) in [(gallery::ZERO_ONE, 1), (gallery::TEAM, 45)] {
+            let trained = trained(set).unwrap();
+            let like = |run: &RunFile| {
+                let Config { stimulus, protocol, physics, .. } = &run.config;
+                let stimulus = StimulusParams { margin: Margins::default(), ..*stimulus };
+                let world = (stimulus, protocol.clone(), physics.clone());
+                (run.config.body_spec(), world, run.dataset.clone())
+            };
+            for (run, audit) in &trained {
+                assert_eq!(like(run), like(&trained[0].0));
+                assert_eq!(audit.run_sha256, run.fingerprint());
+                assert!(run.elites.iter().all(|robot| audit.robot(&robot.id).unwrap().is_physical()));
+            }
+            let tasks: BTreeSet<Vec<u8>> = trained.iter().map(|(run, _)| run.config.classes()).collect();
+            assert_eq!(tasks.len(), pairs, "{set}");
+        }
+    }
+}

@@ -1,0 +1,83 @@
+//! Runs that are named, and not found by a path: those that ship with the program
+//! (`gallery:zero_one-1`), and those of the atlas (`atlas:zero_one-1`). Results of such a run do not go
+//! beside it, but to the present folder.
+
+pub mod atlas;
+pub mod gallery;
+
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// Where the text of a file of a named run is.
+pub enum Place {
+    /// In the program.
+    Shipped(&'static str),
+    /// In this file, compressed by gzip.
+    Compressed(PathBuf),
+}
+
+/// The name of a run (`gallery:zero_one-1`) and the file of it in a path; none of other paths.
+fn parts(path: &Path) -> Option<(&str, &str)> {
+    let text = path.to_str()?;
+    let (name, file) = text.split_once(['/', '\\']).unwrap_or((text, ""));
+    [gallery::PREFIX, atlas::PREFIX].iter().any(|prefix| name.starts_with(prefix)).then_some((name, file))
+}
+
+/// Whether a path names a run, or a file of one.
+pub fn is_named(path: &Path) -> bool {
+    parts(path).is_some()
+}
+
+/// Whose a named run is (`gallery`, `atlas`), and its name.
+pub fn name(path: &Path) -> Option<(&str, &str)> {
+    parts(path)?.0.split_once(':')
+}
+
+/// Whose a named run is, and the set that it is of: what is before its seed, or its digits.
+pub fn set(path: &Path) -> Option<(&str, &str)> {
+    let (of, run) = name(path)?;
+    Some((of, run.rsplit_once('-')?.0))
+}
+
+/// The folder of the atlas that a named run of it is in; none of other paths.
+pub fn atlas_of(path: &Path) -> Option<PathBuf> {
+    let (name, _) = parts(path)?;
+    atlas::folder_of(name.strip_prefix(atlas::PREFIX)?)
+}
+
+/// Where a file of a named run is; none of other paths, or if nothing of that name ships with the
+/// program.
+///
+/// # Errors
+/// That the atlas has no such file, and what to do.
+pub fn place(path: &Path) -> Option<io::Result<Place>> {
+    let (name, file) = parts(path)?;
+    match name.strip_prefix(atlas::PREFIX) {
+        Some(run) => Some(atlas::file(run, file).map(Place::Compressed)),
+        None => gallery::text(name, file).map(|text| Ok(Place::Shipped(text))),
+    }
+}
+
+/// The `run.json` of every run that a name means.
+///
+/// # Errors
+/// What ships with the program, if there is no such run of it.
+pub fn runs(path: &Path) -> Result<Vec<PathBuf>, String> {
+    let (name, _) = parts(path).expect("callers ask is_named before");
+    name.strip_prefix(atlas::PREFIX).map_or_else(|| gallery::runs(name), |run| Ok(atlas::runs(run)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_path_of_a_named_run_has_its_name() {
+        let named = |path| name(Path::new(path));
+        assert_eq!(named("gallery:zero_one-1/run.json"), Some(("gallery", "zero_one-1")));
+        assert_eq!(named("atlas:four_digit-2"), Some(("atlas", "four_digit-2")));
+        assert_eq!(named("runs/atlas:four_digit-2"), None);
+        assert_eq!(set(Path::new("gallery:zero_one-1/run.json")), Some(("gallery", "zero_one")));
+        assert_eq!(set(Path::new("runs/atlas:four_digit-2")), None);
+    }
+}

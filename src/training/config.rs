@@ -1,0 +1,187 @@
+//! The config of a training: that of its gaits with another task, and as many images as there are.
+
+use crate::base::error::Error;
+use crate::base::observer::Observer;
+use crate::config::evaluation::EvaluationConfig;
+use crate::config::task::TaskConfig;
+use crate::config::validation::{LEAST, ValidationConfig};
+use crate::config::{BodyConfig, Config, DataConfig, reading};
+use crate::data::dataset::{Dataset, Split};
+use crate::images::held_out;
+use crate::images::training::{Training, scarcest};
+use crate::images::whereabouts::{Whereabouts, part_of_others, size_of};
+use crate::store::images::DatasetRef;
+use crate::task::fitness::Fitness;
+use crate::task::grouping::Groups;
+use crate::task::margins::Margins;
+use crate::task::protocol::{Protocol, RolloutMode};
+use crate::task::stimulus::StimulusParams;
+
+/// Least number of training images of a class.
+const LEAST_PER_CLASS: usize = 2;
+
+/// The config of the run that is made: that of the walkers' run with another task, perhaps another
+/// seed, and the keys that are set.
+///
+/// # Errors
+/// What is wrong with these.
+pub(crate) fn config_of(
+    of_walkers: &Config,
+    groups: &[Vec<u8>; 2],
+    seed: Option<u64>,
+    set: &[String],
+) -> Result<Config, Error> {
+    let evaluation = EvaluationConfig { fitness: Fitness::MeanClipped };
+    let base = Config {
+        seed: seed.unwrap_or(of_walkers.seed),
+        generations: 1,
+        task: TaskConfig { groups: Some(groups.clone()), ..TaskConfig::default() },
+        data: DataConfig { train_images: None, ..of_walkers.data.clone() },
+        protocol: Protocol { rollout: RolloutMode::Fresh, ..of_walkers.protocol.clone() },
+        evaluation,
+        validation: ValidationConfig { best: 1, ..of_walkers.validation },
+        ..of_walkers.clone()
+    };
+    let asked = base.clone();
+    let check = |config: &Config| {
+        fixed(config, &asked).and_then(|()| config.validate()).and_then(|()| enough(config, groups))
+    };
+    let config = reading::changed(base, set, check, |error| error)?;
+    let BodyConfig { height, width, .. } = of_walkers.body;
+    if (config.body.height, config.body.width) != (height, width) {
+        let found = format!("{} × {} voxels", config.body.height, config.body.width);
+        return Err(Error::value("body", found, &format!("{height} × {width}, as the gaits have")));
+    }
+    if config.task != asked.task {
+        return Err(Error::at_key(
+            "task",
+            "expected the groups that are trained to be said once, not as a key, too",
+        ));
+    }
+    if config.seed != asked.seed {
+        return Err(Error::value("seed", config.seed, &format!("{}, as said elsewhere", asked.seed)));
+    }
+    Ok(config)
+}
+
+/// Checks that designs are compared on an image of every class: both groups take turns, of which the
+/// first begins.
+fn enough(config: &Config, [a, b]: &[Vec<u8>; 2]) -> Result<(), Error> {
+    let (found, least) = (config.train.final_images, (2 * a.len()).saturating_sub(1).max(2 * b.len()));
+    match found < least {
+        true => {
+            let expected = format!("{least} or more, for an image of every class");
+            Err(Error::value("train.final_images", found, &expected))
+        }
+        false => Ok(()),
+    }
+}
+
+/// Whether a config has what trainings have, and nothing in its place.
+fn fixed(config: &Config, asked: &Config) -> Result<(), Error> {
+    let fixed = [
+        ("generations", config.generations != asked.generations, "has rounds and challengers"),
+        (
+            "data.images_per_class",
+            config.data.images_per_class != asked.data.images_per_class,
+            "has train.images_per_class",
+        ),
+        ("evaluation", config.evaluation != asked.evaluation, "has a fitness of its own"),
+        ("protocol.rollout", config.protocol.rollout != asked.protocol.rollout, "has fresh rollouts"),
+    ];
+    match fixed.into_iter().find(|(_, is_set, _)| *is_set) {
+        Some((key, _, has)) => Err(Error::at_key(key, format!("expected without: a training {has}"))),
+        None => Ok(()),
+    }
+}
+
+/// The same for a dataset: a margin that was not asked for, but is that of the gaits' own images, is
+/// left out where those have another size. `of_gaits` is what the gaits' config says, and
+/// `their_data` which data those are; none of the published robots.
+pub(crate) fn sized(
+    config: Config,
+    their_data: Option<&DatasetRef>,
+    of_gaits: &Config,
+    dataset: &Dataset,
+    set: &[String],
+    observer: &dyn Observer,
+) -> Config {
+    let is_asked = set.iter().any(|assignment| reading::sets(assignment, "stimulus.margin"));
+    let size = size_of(their_data, &of_gaits.data.dataset, dataset);
+    let (said, shown) = (part_of_others(&config, size, dataset, Split::Train), dataset.size(Split::Train));
+    match (said, size, shown) {
+        (None, ..) => config,
+        (Some(_), Some([height, width]), Some(shown)) if !is_asked => {
+            let margin = config.stimulus.margin;
+            let config = Config {
+                stimulus: StimulusParams { margin: Margins::default(), ..config.stimulus },
+                ..config
+            };
+            observer.warning(&format!(
+                "stimulus.margin = {margin} is for the gaits' images of {height} × {width} pixels: \
+                 of these, robots see {}",
+                config.stimulus.part(shown)
+            ));
+            config
+        }
+        (Some(said), ..) => {
+            observer.warning(&said);
+            config
+        }
+    }
+}
+
+/// The same with as many training images as there are beside those that validate; of few images
+/// fewer validate than the config asks for, too. `before`: what the gaits were trained on.
+///
+/// # Errors
+/// If there are too few to train on, or to validate with.
+pub(crate) fn with_images(
+    config: Config,
+    before: &[usize],
+    dataset: &Dataset,
+    observer: &dyn Observer,
+) -> Result<Config, Error> {
+    let classes = config.classes();
+    let fewest = scarcest(dataset, &classes, LEAST_PER_CLASS)?;
+    let ValidationConfig { images, best } = config.validation;
+    let mut per_class = config.train.images_per_class.min((fewest * 3 / 4).max(1));
+    let mut validation = config.validation;
+    let wanted = images.div_ceil(classes.len());
+    if best > 0 && fewest - per_class < wanted {
+        per_class = per_class.min((fewest * 2 / 3).max(1));
+        let there = (fewest - per_class).min(wanted) * classes.len();
+        // What was asked for by a number of one's own is kept, or refused.
+        let is_asked = images != ValidationConfig::default().images;
+        if !is_asked && (LEAST..images).contains(&there) {
+            observer
+                .warning(&format!("validating on {there} images in place of {images}: there are no more"));
+            validation.images = there;
+        }
+    }
+    let data = DataConfig { images_per_class: per_class, ..config.data.clone() };
+    let config = Config { data, validation, ..config };
+    config.validate()?;
+    held_out::check(&config, before, "train.images_per_class", dataset)?;
+    Ok(config)
+}
+
+/// Checks that the text of two groups means nothing else with the classes of a dataset.
+///
+/// # Errors
+/// If it does; what to write.
+pub(crate) fn check_groups(groups: &Groups, dataset: &Dataset) -> Result<(), Error> {
+    let there = dataset.classes(Split::Train);
+    groups.check_among(&there).map_err(|error| Error::usage(error.to_string()))
+}
+
+/// Whether a run's gaits, when they have evolved, can be trained to tell these groups apart: to be
+/// known before they evolve.
+///
+/// # Errors
+/// If the config, or the images there are, do not allow it.
+pub fn check(evolved: &Config, groups: &[Vec<u8>; 2], whereabouts: &Whereabouts) -> Result<(), Error> {
+    let config = config_of(evolved, groups, None, &[])?;
+    let dataset = whereabouts.load(&config.data, &[Split::Train])?;
+    with_images(config, &Training::indices(evolved, &dataset)?, &dataset, &()).map(|_| ())
+}

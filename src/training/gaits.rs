@@ -1,0 +1,118 @@
+//! The gaits that a training tries, and what is known of them before.
+
+use crate::base::error::Error;
+use crate::base::hash::sha256_hex;
+use crate::base::observer::Observer;
+use crate::base::remedy::Remedy;
+use crate::config::Config;
+use crate::config::train::TrainConfig;
+use crate::data::dataset::{Dataset, Split};
+use crate::images::held_out;
+use crate::images::training::Training;
+use crate::response::gait::Gait;
+use crate::response::probing::Probing;
+use crate::robots::selection::{Selection, Source};
+use crate::store::folder;
+use crate::store::names::RESPONSE_JSON;
+use crate::store::response::ResponseFile;
+use crate::store::run::Robot;
+use crate::store::training::{Batch, Drawn, Elsewhere, Origin};
+use crate::task::protocol::{Protocol, RolloutMode};
+use std::collections::BTreeSet;
+
+/// A gait to be tried.
+pub(super) struct Walker<'a> {
+    pub(super) robot: &'a Robot,
+    pub(super) gait: Gait,
+}
+
+/// Where the walkers are from, and what they were trained on: not for validation.
+pub(super) fn origin(source: &Source, config: &Config, dataset: &Dataset) -> Result<Origin, Error> {
+    let run = &source.run;
+    let sha256 = dataset.fingerprint(Split::Train).expect("a training loads its training images");
+    let all = run.origin.as_ref().map_or(Vec::new(), |origin| origin.elsewhere.clone());
+    let (here, mut elsewhere): (Vec<_>, Vec<_>) =
+        all.into_iter().partition(|other| other.train_sha256 == sha256);
+    let mut trained_on = BTreeSet::new();
+    match sha256 == run.dataset.train_sha256 {
+        true => trained_on = held_out::trained_on(run, dataset)?,
+        // Some day it may be trained on that data again.
+        false => elsewhere.push(Elsewhere::of(run)),
+    }
+    for earlier in here {
+        trained_on.extend(earlier.indices);
+        if let Some(Drawn { classes, images_per_class, seed }) = earlier.drawn {
+            let drawn = dataset.draw(Split::Train, &classes, images_per_class, seed);
+            trained_on.extend(drawn.map_err(|error| Error::input(error.to_string()))?);
+        }
+    }
+    Ok(Origin {
+        name: run.name.clone(),
+        generations: run.generations,
+        sha256: run.fingerprint(),
+        trained_on: trained_on.into_iter().collect(),
+        elsewhere,
+        windows: if config.train.rounds == 0 { 0 } else { config.train.windows },
+    })
+}
+
+/// The gaits of the chosen robots, each once.
+pub(super) fn walkers<'a>(
+    source: &'a Source,
+    robots: &Selection,
+    seed: u64,
+) -> Result<Vec<Walker<'a>>, Error> {
+    let mut walkers: Vec<Walker> = Vec::new();
+    for chosen in robots.of(std::slice::from_ref(source), seed)? {
+        let Some(gait) = Gait::of(&chosen.robot.body) else { continue };
+        if walkers.iter().all(|other| other.gait.probe() != gait.probe()) {
+            walkers.push(Walker { robot: chosen.robot, gait });
+        }
+    }
+    if walkers.is_empty() {
+        let text = format!(
+            "{}: none of the chosen robots has a soft voxel or a sensor: there is nothing to train",
+            source.path.display()
+        );
+        return Err(Error::input(text).remedy(Remedy::ChooseRobots(None)));
+    }
+    Ok(walkers)
+}
+
+/// What `morphcog response` measured of each gait, where it lies beside the run and holds for this
+/// training: what would be simulated again otherwise.
+pub(super) fn measured(
+    source: &Source,
+    config: &Config,
+    probing: &Probing,
+    walkers: &[Walker],
+    observer: &dyn Observer,
+) -> Vec<Batch> {
+    let nothing = || vec![Vec::new(); walkers.len()];
+    // That of a named run is in the present folder, if it was measured.
+    let made = folder::beside(&source.path, RESPONSE_JSON);
+    let path = if made.exists() { made } else { source.path.with_file_name(RESPONSE_JSON) };
+    let of_run = &source.run.config;
+    // A response is measured in fresh rollouts.
+    let protocol = Protocol { rollout: RolloutMode::Fresh, ..of_run.protocol.clone() };
+    if (&config.physics, &config.protocol) != (&of_run.physics, &protocol) {
+        return nothing();
+    }
+    let Some(file) = ResponseFile::found(&path, observer) else { return nothing() };
+    let (run, seed, conditions) = (source.run.fingerprint(), of_run.seed, probing.conditions());
+    walkers.iter().map(|walker| file.known(&run, seed, conditions, &walker.gait).0.to_vec()).collect()
+}
+
+/// Of all that rollouts depend on; more challengers come after those that there were.
+pub(super) fn key(config: &Config, seed_of_gaits: u64, walkers: &[Walker], training: &Training) -> String {
+    let bodies: Vec<String> = walkers.iter().map(|walker| walker.robot.body.to_string()).collect();
+    let images: Vec<usize> = training.images.iter().map(|image| image.index).collect();
+    let train = TrainConfig { challengers: 0, ..config.train };
+    let essence = Config { train, ..config.essence() }.to_toml();
+    let text = format!(
+        "{} {essence} {seed_of_gaits} {bodies:?} {} {images:?}",
+        env!("CARGO_PKG_VERSION"),
+        training.dataset.train_sha256
+    );
+    sha256_hex(text.as_bytes())
+}

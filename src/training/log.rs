@@ -1,0 +1,200 @@
+//! What a training simulates, kept in `training.json`, so that one that goes on has it again.
+
+use crate::base::Grid;
+use crate::base::error::Error;
+use crate::base::files::write_atomically;
+use crate::base::observer::{Observer, Work};
+use crate::base::remedy::Remedy;
+use crate::body::Body;
+use crate::config::Config;
+use crate::store::results;
+use crate::store::training::{Batch, File};
+use crate::task::evaluation::fresh_rollouts_so_far;
+use crate::task::perturbation::Condition;
+use crate::training::rounds::{Plan, Rollouts};
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::time::{Duration, Instant};
+
+/// How often the rollouts are saved. A power cut costs as much.
+const SAVE_EVERY: Duration = Duration::from_secs(5);
+
+/// Rollouts a thread that are simulated before it is looked whether they are to be saved. Fewer let
+/// threads wait for each other more often, and leave fewer to be simulated side by side.
+const PART: usize = 128;
+
+/// What is simulated, and was in sessions before.
+pub(super) struct Log<'a> {
+    path: PathBuf,
+    key: String,
+    batches: Vec<Batch>,
+    /// Batches asked for so far.
+    asked: usize,
+    /// Rollouts in them.
+    pub(super) simulated: usize,
+    /// Rollouts that are in the file, and when it was written.
+    saved: (usize, Instant),
+    /// Rollouts of the work that began last; none if others are counted than rollouts.
+    done: Option<AtomicU64>,
+    /// Whether anything was simulated since it was looked at last.
+    pub(super) has_simulated: Arc<AtomicBool>,
+    pub(super) stop: &'a AtomicBool,
+    observer: &'a dyn Observer,
+}
+
+impl<'a> Log<'a> {
+    pub(super) fn open(
+        path: PathBuf,
+        key: String,
+        stop: &'a AtomicBool,
+        observer: &'a dyn Observer,
+    ) -> Result<Self, Error> {
+        let mut batches = Vec::new();
+        if path.exists() {
+            let name = path.display().to_string();
+            let file: File = results::read(&path, None).map_err(|error| error.remedy(Remedy::Replace))?;
+            if file.key != key {
+                let text = format!(
+                    "{name}: expected the training that began here: other robots, images or settings"
+                );
+                let error = Error::usage(text).advice("go on with those");
+                return Err(error.remedy(Remedy::ChooseOut).remedy(Remedy::Replace));
+            }
+            if file.checksum.is_none() {
+                observer.warning(&format!("{name}: it has no checksum, so damage to it would go unnoticed"));
+            }
+            batches = file.rollouts;
+        }
+        let saved = (count(&batches), Instant::now());
+        let has_simulated = Arc::default();
+        Ok(Log {
+            path,
+            key,
+            batches,
+            asked: 0,
+            simulated: 0,
+            saved,
+            done: None,
+            has_simulated,
+            stop,
+            observer,
+        })
+    }
+
+    /// Work begins whose rollouts are counted.
+    pub(super) fn begins(&mut self, label: String, rollouts: usize) {
+        self.observer.begins(&Work::new(label, rollouts as u64, "rollouts"));
+        self.done = Some(AtomicU64::new(0));
+    }
+
+    /// A round begins, or, where there are none, the look at the robot as it is.
+    pub(super) fn begins_round(&mut self, robot: &str, number: usize, plan: &Plan) {
+        match plan.rounds {
+            0 => self.begins(format!("{robot}: as it is:"), plan.images),
+            rounds => self.begins(format!("{robot}: round {number} of {rounds}:"), plan.images),
+        }
+    }
+
+    /// Work begins of which each challenger is told by itself.
+    pub(super) fn begins_challenges(&mut self, challengers: usize) {
+        self.observer.begins(&Work::new("refining:".to_string(), challengers as u64, "challengers"));
+        self.done = None;
+    }
+
+    /// So many rollouts are done, of which `simulated` took time.
+    fn rolled(&self, count: u64, simulated: u64) {
+        if simulated > 0 {
+            self.has_simulated.store(true, Ordering::Relaxed);
+        }
+        if let Some(done) = &self.done {
+            self.observer.skips(count - simulated);
+            self.observer.progress(done.fetch_add(count, Ordering::Relaxed) + count);
+        }
+    }
+
+    /// Rollouts of a body under stimuli and conditions; the first are `known`.
+    pub(super) fn rollouts(
+        &mut self,
+        body: &Body,
+        (stimuli, conditions): (&[Grid<f64>], &[Condition]),
+        known: &[Option<f64>],
+        config: &Config,
+    ) -> Result<Batch, Error> {
+        let number = self.asked;
+        self.asked += 1;
+        self.simulated += stimuli.len();
+        let begun = match self.batches.get(number) {
+            Some(batch) if batch.len() == stimuli.len() => {
+                self.rolled(batch.len() as u64, 0);
+                return Ok(batch.clone());
+            }
+            // It was stopped within its last batch.
+            Some(batch) if batch.len() < stimuli.len() && number + 1 == self.batches.len() => {
+                self.batches.pop()
+            }
+            Some(batch) => {
+                let (path, wanted, found) = (self.path.display(), stimuli.len(), batch.len());
+                let text = format!("{path}: rollouts {number}: expected {wanted}, found {found}");
+                return Err(Error::input(text).remedy(Remedy::Replace));
+            }
+            None => None,
+        };
+        let setting = (&config.physics, &config.protocol);
+        self.batches.push(begun.unwrap_or_else(|| known[..known.len().min(stimuli.len())].to_vec()));
+        self.rolled(self.batches[number].len() as u64, 0);
+        // A part at a time: what is stopped goes on after the last one.
+        let part = PART * rayon::current_num_threads();
+        while self.batches[number].len() < stimuli.len() {
+            let begin = self.batches[number].len();
+            let end = stimuli.len().min(begin + part);
+            let (stimuli, conditions) = (&stimuli[begin..end], &conditions[begin..end]);
+            let told = |count| self.rolled(count, 1);
+            let (found, _, ended) =
+                fresh_rollouts_so_far(body, stimuli, conditions, setting, &told, self.stop);
+            self.batches[number].extend(found.into_iter().map(Result::ok));
+            ended.map_err(|_| stopped())?;
+            if self.saved.1.elapsed() >= SAVE_EVERY {
+                self.save()?;
+            }
+        }
+        Ok(self.batches[number].clone())
+    }
+
+    pub(super) fn save(&mut self) -> Result<(), Error> {
+        let rollouts = count(&self.batches);
+        if self.saved.0 == rollouts && self.path.exists() {
+            return Ok(());
+        }
+        let file = File::new(self.key.clone(), self.batches.clone());
+        let text = serde_json::to_string(&file).expect("numbers are finite and keys are text") + "\n";
+        write_atomically(&self.path, text.as_bytes()).map_err(|error| Error::writing(&self.path, &error))?;
+        self.saved = (rollouts, Instant::now());
+        Ok(())
+    }
+}
+
+fn count(batches: &[Batch]) -> usize {
+    batches.iter().map(Vec::len).sum()
+}
+
+pub(super) fn stopped() -> Error {
+    Error::stopped("stopped; what was simulated is saved".to_string()).remedy(Remedy::RepeatResuming)
+}
+
+/// Rollouts that are kept.
+pub(super) struct Kept<'a, 'b> {
+    pub(super) config: &'a Config,
+    pub(super) conditions: &'a [Condition],
+    pub(super) log: &'a mut Log<'b>,
+}
+
+impl Rollouts for Kept<'_, '_> {
+    type Error = Error;
+
+    fn roll(&mut self, body: &Body, stimuli: &[Grid<f64>], conditions: &[usize]) -> Result<Batch, Error> {
+        let conditions: Vec<Condition> =
+            conditions.iter().map(|number| self.conditions[*number].clone()).collect();
+        self.log.rollouts(body, (stimuli, &conditions), &[], self.config)
+    }
+}

@@ -1,0 +1,230 @@
+//! `morphcog train`: the gaits of an archive are taught to tell two groups of images apart.
+//!
+//! [`teach`](crate::training::rounds) says how. Everything that is simulated is kept in `training.json`
+//! beside `run.json`; a training that goes on takes from there what was simulated before, so that
+//! it ends with the same bits.
+
+mod config;
+mod gaits;
+mod log;
+pub mod race;
+pub mod rounds;
+mod trainer;
+pub(crate) mod window;
+
+pub use config::check;
+pub(crate) use config::{check_groups, config_of, sized, with_images};
+
+use crate::base::error::Error;
+use crate::base::files::write_atomically;
+use crate::base::observer::Observer;
+use crate::base::remedy::Remedy;
+use crate::base::text::counted;
+use crate::base::threads::pool;
+use crate::config::Config;
+use crate::data::dataset::Split;
+use crate::images::training::Training;
+use crate::images::whereabouts;
+use crate::images::whereabouts::Whereabouts;
+use crate::qd::{Archive, DescriptorSpace, Elite};
+use crate::response::probing::Probing;
+use crate::robots::selection::{Selection, Source, VALIDATED};
+use crate::search::validation;
+use crate::store::folder::{IfExists, RunFolder};
+use crate::store::images::ImageRef;
+use crate::store::metrics::{Metrics, Totals};
+use crate::store::names::{ELITES, RUN_JSON, TRAINING_JSON};
+use crate::store::run::{Dimensions, FORMAT, FORMAT_VERSION, Robot, RunFile};
+use crate::store::training::Origin;
+use crate::store::validation::Validated;
+use crate::task::grouping::Groups;
+use crate::training::rounds::Taught;
+use gaits::{Walker, key, measured, origin, walkers};
+use log::Log;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
+use std::time::Instant;
+use trainer::Trainer;
+
+/// What to train and where to.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// The run.json whose robots walk.
+    pub archive: PathBuf,
+    /// Which of them are tried; the one that can be taught most is taught.
+    pub robots: Selection,
+    /// The two groups of classes.
+    pub groups: Groups,
+    /// Seed of all chance; `None`: that of the run.
+    pub seed: Option<u64>,
+    /// Keys of the config that differ from those of the run, as `train.rounds=10`.
+    pub set: Vec<String>,
+    /// Name of the run that is made.
+    pub name: String,
+    /// Its folder.
+    pub out: PathBuf,
+    /// What to do if there is a run in it.
+    pub if_exists: IfExists,
+    /// Where the data are, if the command line says.
+    pub data: Option<PathBuf>,
+    /// Number of threads; `None`: one per core.
+    pub threads: Option<usize>,
+}
+
+/// How a training ended.
+#[derive(Clone, Debug)]
+pub struct Finished {
+    /// The run as it stands in `run.json`.
+    pub run: RunFile,
+    /// Rollouts simulated in all, validation left out.
+    pub rollouts: usize,
+    /// Height and width of the training images.
+    pub size: [usize; 2],
+    /// How the robot did on validation images; `None` if that was stopped.
+    pub validated: Option<Vec<Validated>>,
+}
+
+/// Trains a robot, and validates it.
+///
+/// # Errors
+/// What is wrong with archive, options, data or folder; that it was stopped (the same with
+/// [`IfExists::Resume`] goes on). Nothing that was there is lost.
+pub fn train(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Result<Finished, Error> {
+    if options.robots.validated().is_some() {
+        let text = "expected another selection: gaits have no task to validate";
+        let error = Error::argument("robots", VALIDATED, text);
+        return Err(error.remedy(Remedy::ChooseRobots(Some("top:4"))));
+    }
+    let source = Source::read(&options.archive)?;
+    let whereabouts = Whereabouts::given(options.data.as_deref())
+        .and_of_resumed(options.if_exists, &options.out.join(RUN_JSON))
+        .and_of(&options.archive);
+    let config = config_of(&source.run.config, options.groups.classes(), options.seed, &options.set)?;
+    let dataset = whereabouts.load(&config.data, &[Split::Train])?;
+    check_groups(&options.groups, &dataset)?;
+    whereabouts::say_transposed(&dataset, &config.data, observer);
+    let of_gaits = &source.run;
+    let config = sized(config, Some(&of_gaits.dataset), &of_gaits.config, &dataset, &options.set, observer);
+    let origin = origin(&source, &config, &dataset)?;
+    let config = with_images(config, &origin.trained_on, &dataset, observer)?;
+    let mut training = Training::of(&config, &dataset)?;
+    let classes = training.images.iter().map(|image| image.label);
+    training.conditions = config.train.perturbations.of(classes);
+    let mut walkers = walkers(&source, &options.robots, config.seed)?;
+    if config.train.rounds == 0 {
+        // One of them is refined as it is: the fittest, the first of several.
+        walkers.sort_by(|a, b| b.robot.objective.total_cmp(&a.robot.objective));
+    }
+    // A gait's response is the same for every task and every seed of a training.
+    let probing = Probing::new(&training.conditions, source.run.config.seed);
+    let measured = measured(&source, &config, &probing, &walkers, observer);
+    let [log, run] = [TRAINING_JSON, RUN_JSON].map(|name| options.out.join(name));
+    if options.if_exists == IfExists::Resume && run.exists() && !log.exists() {
+        let text = format!("{}: the run in this folder is no training", options.out.display());
+        return Err(Error::occupied(text).remedy(Remedy::ChooseOut).remedy(Remedy::Replace));
+    }
+    apart(&options.out, &source.path)?;
+    let folder = RunFolder::open(&options.out, options.if_exists, stop, observer)?;
+    let write = |name: &str, content: &[u8]| {
+        let path = folder.path().join(name);
+        write_atomically(&path, content).map_err(|error| Error::writing(&path, &error))
+    };
+    let key = key(&config, source.run.config.seed, &walkers, &training);
+    let mut log = Log::open(log, key, stop, observer)?;
+    folder.write_config(&config)?;
+    whereabouts::remember(&folder, &dataset)?;
+    let pool = pool(options.threads)?;
+    let began = Instant::now();
+    let (gaits, images) = (walkers.len(), training.images.len());
+    observer.note(&format!(
+        "training in {}: {}, {images} training images",
+        folder.path().display(),
+        counted(gaits, "gait", "gaits")
+    ));
+    let trainer = Trainer { config: &config, dataset: &dataset, training: &training, probing, measured };
+    let taught = pool.install(|| trainer.train(&walkers, &mut log, observer));
+    // What was simulated is kept, however it ended.
+    log.save()?;
+    let (walker, config, taught) = taught?;
+    let run = run_file(options, &config, &training, origin, walker, &taught)?;
+    let seconds = began.elapsed().as_secs_f64();
+    let totals = Totals { evaluations: 1, simulated: log.simulated as u64, seconds, ..Totals::default() };
+    let csv = run.to_csv();
+    let mut metrics = Metrics::open(folder.path(), 0)?;
+    metrics.write(0, &run.stats, &totals)?;
+    metrics.flush()?;
+    write(ELITES, &csv)?;
+    write(RUN_JSON, run.to_json().as_bytes())?;
+    let archive = folder.path().join(RUN_JSON);
+    let validated = match config.validation.best {
+        0 => Some(Vec::new()),
+        _ => validation::at_end(&archive, &dataset, &pool, stop, observer)?,
+    };
+    let size = dataset.size(Split::Train).expect("a training loads its training images");
+    Ok(Finished { run, rollouts: log.simulated, size, validated })
+}
+
+/// Whether a training has a folder of its own: that of its gaits would be lost.
+fn apart(out: &Path, archive: &Path) -> Result<(), Error> {
+    let of_gaits = archive.parent().map(|folder| Path::new(".").join(folder));
+    let [out_now, of_gaits] =
+        [Some(out), of_gaits.as_deref()].map(|folder| folder.and_then(|folder| folder.canonicalize().ok()));
+    if out_now.is_some() && out_now == of_gaits {
+        let text = "expected another folder: the gaits are in this one";
+        return Err(Error::argument("out", out.display(), text));
+    }
+    Ok(())
+}
+
+/// The run with the robot that was taught.
+fn run_file(
+    options: &Options,
+    config: &Config,
+    training: &Training,
+    origin: Origin,
+    walker: &Walker,
+    taught: &Taught,
+) -> Result<RunFile, Error> {
+    let body = taught.body.clone();
+    let genome = walker.robot.genome.with_body(&body).map_err(|error| Error::other(error.to_string()))?;
+    let training_images: Vec<ImageRef> = taught.shown.iter().map(|image| training.images[*image]).collect();
+    let grouping = config.grouping()?.with_fitness(config.evaluation.fitness);
+    let answers =
+        crate::store::images::answers(&training_images, taught.displacements.iter().copied().map(Some));
+    let score = grouping.score(&answers);
+    let mut robot = Robot {
+        id: genome.id(),
+        cell: Vec::new(),
+        task: grouping.tasks()[score.task].name(),
+        objective: score.fitness,
+        displacements: taught.displacements.clone(),
+        voxels: body.counts(),
+        generation: 0,
+        parent: Some(walker.robot.id.clone()),
+        body,
+        genome,
+    };
+    robot.cell = robot.bins();
+    let dimensions = Dimensions::of(config)?;
+    let space = DescriptorSpace::voxel_counts(grouping.tasks().len());
+    let cell = space.index(&robot.cell).expect("bins of voxel counts are a cell of one task's archive");
+    let mut archive = Archive::new();
+    let elite = Elite { cell, objective: robot.objective, solution: robot };
+    archive.insert(elite).map_err(|error| Error::other(error.to_string()))?;
+    let stats = archive.stats(dimensions.possible_cells, config.archive.qd_offset);
+    Ok(RunFile {
+        format: FORMAT.to_string(),
+        format_version: FORMAT_VERSION,
+        program_version: env!("CARGO_PKG_VERSION").to_string(),
+        name: options.name.clone(),
+        config: config.clone(),
+        dataset: training.dataset.clone(),
+        training_images,
+        dimensions,
+        origin: Some(origin),
+        generations: 1,
+        stats,
+        elites: archive.elites().map(|elite| elite.solution.clone()).collect(),
+        read_sha256: None,
+    })
+}

@@ -1,0 +1,228 @@
+//! A training's course: every gait is taught in one round, the best goes on.
+
+use crate::base::error::Error;
+use crate::base::number;
+use crate::base::observer::{Observer, Work};
+use crate::base::remedy::Remedy;
+use crate::base::text::counted;
+use crate::config::Config;
+use crate::config::train::TrainConfig;
+use crate::data::dataset::{Dataset, Split};
+use crate::images::training::Training;
+use crate::images::whereabouts::see;
+use crate::response::gait::Gait;
+use crate::response::lesson::Example;
+use crate::response::probing::{Probing, response};
+use crate::response::regression::Response;
+use crate::store::images::ImageRef;
+use crate::store::training::Batch;
+use crate::task::grouping::balanced;
+use crate::task::perturbation::Condition;
+use crate::training::gaits::Walker;
+use crate::training::log::{Kept, Log, stopped};
+use crate::training::race::Challenge;
+use crate::training::rounds::{Image, Plan, Round, Taught, Teacher};
+use crate::training::window::{Found, Windows};
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+
+/// What all gaits are trained with.
+pub(super) struct Trainer<'a> {
+    pub(super) config: &'a Config,
+    pub(super) dataset: &'a Dataset,
+    pub(super) training: &'a Training,
+    pub(super) probing: Probing,
+    /// Displacements of each gait with random images that are known before.
+    pub(super) measured: Vec<Batch>,
+}
+
+impl Trainer<'_> {
+    /// Measures a gait's response; `None` if most of its rollouts are unstable.
+    fn response(
+        &self,
+        gait: &Gait,
+        measured: &[Option<f64>],
+        log: &mut Log,
+    ) -> Result<Option<Response>, Error> {
+        let Trainer { config, probing, .. } = self;
+        let count = config.train.random_images;
+        let shown = probing.shown(gait, &config.physics, 0..count, |probe, stimuli, conditions| {
+            log.rollouts(probe, (stimuli, conditions), measured, config)
+        })?;
+        Ok(response(&shown, count))
+    }
+
+    /// The config with the window under which a gait could be taught most.
+    fn with_window(
+        &self,
+        walker: &Walker,
+        response: &Response,
+        log: &Log,
+        observer: &dyn Observer,
+    ) -> Result<Config, Error> {
+        let Trainer { config, training, .. } = self;
+        let (count, robot) = (config.train.windows, &walker.robot.id);
+        let mut with = (*config).clone();
+        with.train.windows = 0;
+        if count == 0 {
+            return Ok(with);
+        }
+        observer.begins(&Work::new(format!("{robot}: windows:"), count as u64, "windows"));
+        let windows = Windows::of(config, self.dataset, &training.images, self.groups())?;
+        let told = |tried: usize| observer.progress(tried as u64);
+        let found = windows.best(&walker.gait, response, log.stop, &told).map_err(|_| stopped())?;
+        report_window(observer, robot, &found, count);
+        with.stimulus.margin = found.margins;
+        Ok(with)
+    }
+
+    fn groups(&self) -> &[Vec<u8>; 2] {
+        self.config.task.groups.as_ref().expect("a training has two groups")
+    }
+
+    /// The training images as a gait sees them by a config; both groups weigh the same.
+    fn images(&self, gait: &Gait, config: &Config) -> Result<Vec<Image>, Error> {
+        let Trainer { training, probing, .. } = self;
+        let all = probing.conditions();
+        let [first, _] = self.groups();
+        let ways = balanced(training.images.iter().map(|image| image.label), first);
+        let image = |((image, condition), (right, weight)): ((&ImageRef, &Condition), (f64, f64))| {
+            let stimulus = see(config, self.dataset, Split::Train, image.index)?;
+            let condition = all.iter().position(|other| other == condition).expect("it is one of all");
+            let example = Example { right, weight, ..Example::new(gait, &stimulus, &config.physics) };
+            Ok(Image { stimulus, class: image.label, example, condition })
+        };
+        training.images.iter().zip(&training.conditions).zip(ways).map(image).collect()
+    }
+
+    fn plan(&self) -> Plan {
+        let train = &self.config.train;
+        Plan {
+            seed: self.config.seed,
+            rounds: train.rounds,
+            images: train.images,
+            final_images: train.final_images,
+            challengers: train.challengers,
+            min_muscles: self.config.body.min_muscles,
+        }
+    }
+
+    /// Teaches all gaits in one round, and goes on with the one that could be taught most.
+    pub(super) fn train<'w>(
+        &self,
+        walkers: &'w [Walker<'w>],
+        log: &mut Log,
+        observer: &dyn Observer,
+    ) -> Result<(&'w Walker<'w>, Config, Taught), Error> {
+        let plan = self.plan();
+        let Trainer { config, probing, .. } = self;
+        let mut best: Option<(&Walker, Config, Teacher)> = None;
+        for (walker, measured) in walkers.iter().zip(&self.measured) {
+            let (gait, robot) = (&walker.gait, &walker.robot.id);
+            log.begins(format!("{robot}: response:"), self.config.train.random_images);
+            let Some(response) = self.response(gait, measured, log)? else { continue };
+            report_response(observer, &walker.robot.id, gait, &response);
+            let seeing = match plan.rounds {
+                // It keeps its own sensors, which are for the images as it sees them.
+                0 => Config { train: TrainConfig { windows: 0, ..config.train }, ..(*config).clone() },
+                _ => self.with_window(walker, &response, log, observer)?,
+            };
+            let images = self.images(gait, &seeing)?;
+            let mut teacher = Teacher::new(gait, &response, images, plan, &config.physics);
+            let conditions = probing.conditions();
+            log.begins_round(robot, 1, &plan);
+            let mut rollouts = Kept { config, conditions, log };
+            if plan.rounds == 0 {
+                let fitness = teacher.own(&mut rollouts)?;
+                report_own(observer, &walker.robot.id, fitness);
+                best = Some((walker, seeing, teacher));
+                break;
+            }
+            report_round(observer, &walker.robot.id, &teacher.round(&mut rollouts)?, &plan);
+            if best.as_ref().is_none_or(|(_, _, best)| teacher.predicted() > best.predicted()) {
+                best = Some((walker, seeing, teacher));
+            }
+        }
+        let Some((walker, seeing, mut teacher)) = best else {
+            let text = "none of the chosen robots is stable with random images: there is nothing to train";
+            return Err(Error::input(text.to_string()).remedy(Remedy::ChooseRobots(None)));
+        };
+        let mut rollouts = Kept { config, conditions: probing.conditions(), log };
+        for number in 2..=plan.rounds {
+            rollouts.log.begins_round(&walker.robot.id, number, &plan);
+            let round = teacher.round(&mut rollouts)?;
+            report_round(observer, &walker.robot.id, &round, &plan);
+        }
+        let challengers = teacher.challengers();
+        rollouts.log.begins_challenges(challengers);
+        let has_simulated = Arc::clone(&rollouts.log.has_simulated);
+        has_simulated.store(false, Ordering::Relaxed);
+        let told = |challenge: &Challenge| {
+            // One that was kept by an earlier session took no time.
+            if !has_simulated.swap(false, Ordering::Relaxed) {
+                observer.skips(1);
+            }
+            report_challenge(observer, challenge, challengers);
+        };
+        Ok((walker, seeing, teacher.finish(&mut rollouts, told)?))
+    }
+}
+
+fn report_response(observer: &dyn Observer, robot: &str, gait: &Gait, response: &Response) {
+    let places = counted(gait.places().len(), "soft voxel or sensor", "soft voxels and sensors");
+    let share = number::explained(response.r_squared);
+    let noise = number::fixed(response.noise, 1);
+    observer.note(&format!(
+        "{robot}: {share} % of its response is explained by {places}; the rest is {noise} voxel lengths"
+    ));
+}
+
+fn report_window(observer: &dyn Observer, robot: &str, found: &Found, tried: usize) {
+    let Found { margins, predicted, predicted_before } = found;
+    let [after, before] = [predicted, predicted_before].map(|fitness| number::fixed(*fitness, 2));
+    observer.note(&format!(
+        "{robot}: of {tried} windows, stimulus.margin = {margins} is predicted to be best: fitness {after}, before {before}"
+    ));
+    observer.finding(
+        "window",
+        &serde_json::json!({
+            "robot": robot, "windows": tried, "margin": margins, "predicted": predicted,
+            "predicted_before": predicted_before,
+        }),
+    );
+}
+
+fn report_own(observer: &dyn Observer, robot: &str, fitness: f64) {
+    observer.note(&format!("{robot}: fitness {} as it is", number::fixed(fitness, 2)));
+    observer.finding("own", &serde_json::json!({ "robot": robot, "fitness": fitness }));
+}
+
+fn report_round(observer: &dyn Observer, robot: &str, round: &Round, plan: &Plan) {
+    let Round { round, predicted, measured, off, changed, rollouts } = round;
+    let [p, m] = [predicted, measured].map(|fitness| number::fixed(*fitness, 2));
+    observer.note(&format!("{robot}: round {round} of {}: fitness {m}, predicted {p}", plan.rounds));
+    observer.finding(
+        "round",
+        &serde_json::json!({
+            "robot": robot, "round": round, "rollouts": rollouts, "predicted": predicted, "measured": measured,
+            "off": off,
+            "changed": changed,
+        }),
+    );
+}
+
+fn report_challenge(observer: &dyn Observer, challenge: &Challenge, challengers: usize) {
+    let Challenge { number, other_gait, shown, fitness, won } = challenge;
+    let what = if *other_gait { "another gait" } else { "other sensors" };
+    if *won {
+        let fitness = number::fixed(*fitness, 3);
+        observer.note(&format!("challenger {number} of {challengers}: {what}: fitness {fitness}"));
+    }
+    observer.progress(*number as u64);
+    observer.finding(
+        "challenge",
+        &serde_json::json!({
+            "challenger": number, "other_gait": other_gait, "images": shown, "fitness": fitness, "won": won,
+        }),
+    );
+}
