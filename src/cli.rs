@@ -28,10 +28,9 @@ use crate::cli::output::console::Console;
 use crate::cli::output::pictures::Format;
 use crate::cli::output::reporters::Reporter;
 use crate::cli::output::{pictures, summary};
-use crate::commands::one_by_one::Named;
 use crate::commands::plan::{PAPER_TOML, Plan};
 use crate::commands::schema::{self, Schema};
-use crate::commands::{bench, data, eval, one_by_one, replay, simulate};
+use crate::commands::{bench, data, eval, replay, simulate};
 use crate::config;
 use crate::config::Config;
 use crate::data::catalogue::Catalogue;
@@ -40,9 +39,12 @@ use crate::data::fetch::{FetchError, FetchOptions, Program, fetch};
 use crate::data::files::{FilesError, places};
 use crate::draw::sheet;
 use crate::draw::sheet::SheetError;
+use crate::robots;
 use crate::robots::published;
 use crate::robots::selection::{BEST, Selection};
 use crate::search::evolve;
+use crate::search::one_by_one;
+use crate::search::one_by_one::Named;
 use crate::shipped::gallery;
 use crate::sim::{FloatEnvironment, InstructionSet};
 use crate::store::capacity::CapacityFile;
@@ -202,30 +204,11 @@ fn replay_best(folder: &Path, shown: replay::Options, console: &Console) -> Resu
 }
 
 fn run_eval(args: EvalArgs, console: &Console, ranks: Ranks) -> Result<(), Error> {
-    let (archives, robots) = (args.archives.paths(), selected(args.robots)?.unwrap_or(Selection::All));
-    let of_gallery = archives.is_empty() && published::is_meant(&robots)?;
-    if of_gallery && args.physical_only {
-        let text = "--physical-only: expected robots of an archive, not published ones";
-        return Err(published::not_audited(text));
-    }
-    let archives = match archives.is_empty() {
-        true if of_gallery => Vec::new(),
-        true => vec![folder::newest_run()?],
-        false => archives,
-    };
-    if !of_gallery {
-        choice::say_simulated(&archives, console);
-    }
-    let name = eval::own_name(args.split);
-    let beside = || match of_gallery {
-        true => Path::new(&format!("gallery-{name}")).to_path_buf(),
-        false => folder::beside_all(&archives, name),
-    };
+    let chosen = selected(args.robots)?.unwrap_or(Selection::All);
+    let (archives, robots) = robots::archives(args.archives.paths(), chosen)?;
+    choice::say_simulated(&archives, console);
+    let beside = || folder::beside_all(&archives, eval::own_name(args.split));
     let out = args.out.unwrap_or_else(beside);
-    let robots = match robots {
-        Selection::Ids(ids) if of_gallery && ids.iter().any(|id| id == published::ALL) => Selection::All,
-        robots => robots,
-    };
     let options = eval::Options {
         robots: robots.physical(args.physical_only),
         images: args.images,
@@ -285,8 +268,8 @@ fn run_replay(args: ReplayArgs, console: &Console) -> Result<(), Error> {
         data: data.clone(),
     };
     let Named { archive, robot } = the_one(&search, console)?;
-    let folder = pictures::folder(archive.as_deref(), &robot)?;
-    let options = replay::Options { robot, physical_only, archive, images, data, dataset };
+    let folder = pictures::folder(&archive);
+    let options = replay::Options { robot, physical_only, archive: Some(archive), images, data, dataset };
     if is_first_look {
         console.info(&format!("no run under runs/: the best body of {}", gallery::ZERO_ONE));
     }

@@ -12,7 +12,7 @@ use morphcog::base::stop::Stopped;
 use morphcog::base::threads::{MOST_THREADS, pool};
 use morphcog::body::{Body, Material};
 use morphcog::cli::output::progress::{Recent, Words, count_line, generation_line};
-use morphcog::commands::{audit, eval, one_by_one, replay};
+use morphcog::commands::{audit, eval, replay};
 use morphcog::config;
 use morphcog::config::audit::Criteria;
 use morphcog::data::dataset::{Dataset, DatasetError, Split};
@@ -20,6 +20,7 @@ use morphcog::data::files::places;
 use morphcog::draw::walk::Walk;
 use morphcog::draw::{gif, html};
 use morphcog::robots::selection::Selection;
+use morphcog::search::one_by_one;
 use morphcog::search::{evolve, held_out_run};
 use morphcog::shipped;
 use morphcog::sim::{FloatEnvironment, InstructionSet, Physics, Start, System};
@@ -491,7 +492,7 @@ impl RunData {
                 }
             };
             let options = audit::Options {
-                source: audit::Source::Archive(self.place.clone()),
+                archive: self.place.clone(),
                 robots,
                 seed: 1,
                 criteria: Criteria::default(),

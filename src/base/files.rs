@@ -1,8 +1,6 @@
 //! Writing files so that nothing is ever half-written, and reading texts that end.
 
 use crate::base::ownership::{self, folder_of};
-use crate::shipped::{self, Place};
-use flate2::read::MultiGzDecoder;
 use std::ffi::{OsStr, OsString};
 use std::fs::{DirEntry, File, Metadata};
 use std::io::{self, Read, Write};
@@ -70,17 +68,12 @@ pub fn read_bytes(path: &Path) -> io::Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// Reads a text, also one of a [named] run.
+/// Reads a text.
 ///
 /// # Errors
-/// As [`open_file`]; if it is no UTF-8; if it has more than 256 megabytes.
+/// As [`open_file`] and [`read_limited`].
 pub fn read_text(path: &Path) -> io::Result<String> {
-    let source: Box<dyn Read> = match shipped::place(path).transpose()? {
-        Some(Place::Shipped(text)) => return Ok(text.to_string()),
-        Some(Place::Compressed(file)) => Box::new(MultiGzDecoder::new(open_file(&file)?)),
-        None => Box::new(open_file(path)?),
-    };
-    read_limited(source)
+    read_limited(open_file(path)?)
 }
 
 /// Reads a text that the user wrote and named: it may come through a pipe, as from `<(…)` of a
@@ -127,11 +120,6 @@ pub fn home_expanded(path: &Path) -> PathBuf {
         (Ok(below), Some(home)) if !home.as_os_str().is_empty() => home.join(below),
         _ => path.to_path_buf(),
     }
-}
-
-/// Whether there is a file, on the disk or of a [named] run.
-pub fn exists(path: &Path) -> bool {
-    shipped::place(path).map_or_else(|| path.exists(), |place| place.is_ok())
 }
 
 /// Writes a file as a whole or not at all: to a temporary name in the same folder, synced, then

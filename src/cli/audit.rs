@@ -12,15 +12,14 @@ use crate::cli::output::reporters::Reporter;
 use crate::cli::output::verdicts;
 use crate::cli::values::{seed, threads};
 use crate::commands::audit;
-use crate::commands::audit::{Finished, Options, Source};
+use crate::commands::audit::{Finished, Options};
 use crate::config::audit::Criteria;
-use crate::robots::published;
-use crate::robots::selection;
+use crate::robots;
 use crate::robots::selection::Selection;
 use crate::search::validation;
 use crate::store::folder;
 use crate::store::names::AUDIT_JSON;
-use crate::store::run::different;
+use crate::store::run::{StoredRun, different};
 use clap::Args;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
@@ -75,44 +74,26 @@ pub(super) struct AuditArgs {
 pub(super) fn run(args: AuditArgs, console: &Console, ranks: Ranks) -> Result<(), Error> {
     let criteria = Criteria::load(args.criteria.as_deref(), &args.set)?;
     let stop = signals::stop_flag()?;
-    let (archives, chosen) = (&args.archives.paths(), selected(args.robots.clone())?);
-    let chosen = chosen.unwrap_or(Selection::All);
-    let sources = sources(archives, &chosen)?;
-    let of_archives = sources.iter().filter_map(|source| match source {
-        Source::Archive(path) => Some(path),
-        Source::Gallery => None,
-    });
-    let of_archives: Vec<&PathBuf> = of_archives.collect();
-    if !of_archives.is_empty() {
-        choice::say_simulated(of_archives, console);
-    }
+    let chosen = selected(args.robots.clone())?.unwrap_or(Selection::All);
+    let (archives, chosen) = robots::archives(args.archives.paths(), chosen)?;
+    choice::say_simulated(&archives, console);
     // Which robots to audit is known for all runs before the first rollout.
-    let asked = match archives.is_empty() {
-        true => vec![Some(chosen)],
-        false => {
-            let runs: Result<Vec<_>, Error> =
-                archives.iter().map(|path| selection::Source::read(path)).collect();
-            let runs = runs?;
-            different(runs.iter().map(|source| (source.path.as_path(), &source.run)))?;
-            chosen.of_each(&runs, args.seed)?
-        }
-    };
-    if sources.len() > 1 && args.out.is_some() {
+    let runs: Vec<StoredRun> = archives.iter().map(|path| robots::open(path)).collect::<Result<_, _>>()?;
+    different(runs.iter().map(|source| (source.path.as_path(), &source.run)))?;
+    let asked = chosen.of_each(&runs, args.seed)?;
+    if archives.len() > 1 && args.out.is_some() {
         let text = "--out: expected with one --archive only; of several, each gets an audit.json beside it";
         return Err(Error::usage(text.to_string()));
     }
-    for (source, robots) in sources.into_iter().zip(asked) {
+    for (archive, robots) in archives.into_iter().zip(asked) {
         let Some(robots) = robots else { continue };
-        let beside = match &source {
-            Source::Archive(path) => folder::beside(path, AUDIT_JSON),
-            Source::Gallery => Path::new("gallery-audit.json").to_path_buf(),
-        };
-        let robots = match (&source, robots.validated()) {
-            (Source::Archive(path), Some(best)) => validated(&args, (path, best), &stop, ranks, console)?,
-            _ => robots,
+        let beside = folder::beside(&archive, AUDIT_JSON);
+        let robots = match robots.validated() {
+            Some(best) => validated(&args, (&archive, best), &stop, ranks, console)?,
+            None => robots,
         };
         let options = Options {
-            source,
+            archive,
             robots,
             seed: args.seed,
             criteria: criteria.clone(),
@@ -176,15 +157,4 @@ fn validated(
         return Err(Error::stopped(text.to_string()).remedy(Remedy::Repeat));
     };
     Ok(Selection::Ids(found.into_iter().map(|robot| robot.id).collect()))
-}
-
-/// The archives, or the gallery if that is what the robots are named from.
-fn sources(archives: &[PathBuf], robots: &Selection) -> Result<Vec<Source>, Error> {
-    if !archives.is_empty() {
-        return Ok(archives.iter().cloned().map(Source::Archive).collect());
-    }
-    if published::is_meant(robots)? {
-        return Ok(vec![Source::Gallery]);
-    }
-    Ok(vec![Source::Archive(folder::newest_run()?)])
 }

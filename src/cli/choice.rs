@@ -7,10 +7,10 @@ use crate::base::stop::NEVER;
 use crate::base::text::counted;
 use crate::cli::output::console::Console;
 use crate::cli::output::reporters::Reporter;
-use crate::commands::one_by_one;
-use crate::commands::one_by_one::Named;
-use crate::robots::published;
+use crate::robots;
 use crate::robots::selection::Selection;
+use crate::search::one_by_one;
+use crate::search::one_by_one::Named;
 use crate::shipped;
 use crate::store::folder;
 use crate::store::run::RunFile;
@@ -65,9 +65,8 @@ pub(super) fn selected(mut given: Vec<Selection>) -> Result<Option<Selection>, E
 
 /// The robots of a selection, for a command that looks at them one by one.
 pub(super) fn one_by_one(search: &one_by_one::Options, console: &Console) -> Result<Vec<Named>, Error> {
-    if !(search.archives.is_empty() && published::is_meant(&search.robots)?) {
-        say_simulated(&search.archives, console);
-    }
+    let (archives, _) = robots::archives(search.archives.clone(), search.robots.clone())?;
+    say_simulated(&archives, console);
     // Only a search on validation images is stopped in an orderly way: signals end all else at
     // once.
     let observer = Reporter::new(console);

@@ -130,14 +130,14 @@ mod tests {
     use super::*;
     use crate::response::gait::Gait;
     use crate::response::probing::Probing;
-    use crate::robots::selection::Source;
     use crate::store::names::RESPONSE_JSON;
     use crate::store::response::ResponseFile;
+    use crate::store::run::StoredRun;
 
     #[test]
     fn the_response_that_ships_with_the_gaits_is_what_the_training_begins_with() {
         let archive = folder::first_run(PathBuf::from(gallery::GAITS)).unwrap();
-        let Source { run, .. } = Source::read(&archive).unwrap();
+        let StoredRun { run, .. } = StoredRun::read(&archive).unwrap();
         let set = LITTLE.map(str::to_string);
         let config = training::config_of(&run.config, &[vec![0], vec![1]], Some(1), &set).unwrap();
         assert_eq!((config.data.dataset.as_str(), config.train.random_images), ("builtin", 600));

@@ -7,11 +7,11 @@ use crate::cli::output::console::Console;
 use crate::cli::output::figures;
 use crate::cli::output::figures::{Kind, Wanted};
 use crate::cli::values::{MOST, offering, seed, whole};
-use crate::commands::one_by_one;
-use crate::commands::one_by_one::Named;
 use crate::commands::replay::{Options, Shown};
 use crate::draw::plot::Background;
 use crate::robots::selection::{BEST, Selection};
+use crate::search::one_by_one;
+use crate::search::one_by_one::Named;
 use clap::Args;
 use std::path::PathBuf;
 

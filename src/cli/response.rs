@@ -9,17 +9,17 @@ use crate::cli::output::console::Console;
 use crate::cli::output::reporters::Reporter;
 use crate::cli::output::responses;
 use crate::cli::values::{MOST, decimal, seed, threads, whole};
-use crate::commands::one_by_one;
-use crate::commands::one_by_one::Named;
 use crate::commands::response;
 use crate::commands::response::Options;
-use crate::robots::published;
+use crate::robots;
 use crate::robots::selection::{BEST, Selection};
+use crate::search::one_by_one;
+use crate::search::one_by_one::Named;
 use crate::store::folder;
 use crate::store::names::RESPONSE_JSON;
 use crate::task::grouping::Groups;
 use clap::Args;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 pub(super) const EXAMPLES: &str = "\
 Examples:
@@ -84,27 +84,17 @@ pub(super) struct ResponseArgs {
 
 pub(super) fn run(args: ResponseArgs, console: &Console) -> Result<(), Error> {
     let robots = selected(args.robots)?.unwrap_or(Selection::Ids(vec![BEST.to_string()]));
-    let archive = match args.archive {
-        None if published::is_meant(&robots)? => None,
-        None => Some(folder::newest_run()?),
-        given => given,
-    };
-    if archive.is_none() && args.physical_only {
-        let text = "--physical-only: expected robots of an archive, not published ones";
-        return Err(published::not_audited(text));
-    }
+    let (archives, robots) = robots::archives(args.archive.into_iter().collect(), robots)?;
+    let [archive] = archives.try_into().expect("one is named, or else there is one");
     let search = one_by_one::Options {
         robots,
-        archives: archive.iter().cloned().collect(),
+        archives: vec![archive.clone()],
         physical_only: args.physical_only,
         seed: args.seed.unwrap_or(1),
         data: args.data.clone(),
     };
     let robots = choice::one_by_one(&search, console)?;
-    let beside = || match &archive {
-        Some(path) => folder::beside(path, RESPONSE_JSON),
-        None => Path::new(&format!("gallery-{RESPONSE_JSON}")).to_path_buf(),
-    };
+    let out = args.out.unwrap_or_else(|| folder::beside(&archive, RESPONSE_JSON));
     let options = Options {
         robots: robots.into_iter().map(|Named { robot, .. }| robot).collect(),
         physical_only: args.physical_only,
@@ -114,7 +104,7 @@ pub(super) fn run(args: ResponseArgs, console: &Console) -> Result<(), Error> {
         error: args.error,
         seed: args.seed,
         data: args.data,
-        out: args.out.unwrap_or_else(beside),
+        out,
         threads: args.threads.map(usize::from),
         archive,
     };

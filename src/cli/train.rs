@@ -184,7 +184,7 @@ pub(super) fn trained(options: &Options, stop: &AtomicBool, console: &Console) -
         out: archive.with_file_name(AUDIT_JSON),
         threads: options.threads,
         ranks: Ranks::ALONE,
-        source: audit::Source::Archive(archive.clone()),
+        archive: archive.clone(),
     };
     let audited = audit::audit(&options, stop, &Reporter::new(console))?;
     verdicts::audit(console, &audited, &options.out);

@@ -14,8 +14,8 @@ use crate::config::audit::Criteria;
 use crate::data::dataset::Split;
 use crate::images::training::Training;
 use crate::images::whereabouts::{Whereabouts, load_dataset_of, see};
+use crate::robots;
 use crate::robots::published;
-use crate::robots::selection;
 use crate::robots::selection::Selection;
 use crate::sim::{Energy, StepError, System};
 use crate::store::audit::{AuditFile, PerturbedRollout, RobotAudit};
@@ -42,21 +42,12 @@ const BATCH: usize = 8;
 /// Most training images of a class that a robot is audited on: it sees each some twenty times.
 const IMAGES_PER_CLASS: usize = 16;
 
-/// Whose robots are audited.
-#[derive(Clone, Debug)]
-pub enum Source {
-    /// Those of a run.json.
-    Archive(PathBuf),
-    /// The published ones.
-    Gallery,
-}
-
 /// What to audit, and how.
 #[derive(Clone, Debug)]
 pub struct Options {
-    /// Where the robots are from.
-    pub source: Source,
-    /// Which of them; of the gallery all, or names.
+    /// The run.json.
+    pub archive: PathBuf,
+    /// Which of its robots.
     pub robots: Selection,
     /// Seed of `random:N`.
     pub seed: u64,
@@ -128,11 +119,9 @@ pub fn audit(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> R
     }
     file.add_known(&options.out);
     let mut shipped = None;
-    if let Source::Archive(path) = &options.source
-        && options.out == folder::beside(path, AUDIT_JSON)
-    {
+    if options.out == folder::beside(&options.archive, AUDIT_JSON) {
         // What came with a named run; of another run this is the same file.
-        let (with_it, before) = (path.with_file_name(AUDIT_JSON), file.robots.len());
+        let (with_it, before) = (options.archive.with_file_name(AUDIT_JSON), file.robots.len());
         file.add_known(&with_it);
         shipped = Some(with_it).filter(|_| file.robots.len() > before);
     }
@@ -198,59 +187,33 @@ struct Opened {
 }
 
 fn open(options: &Options) -> Result<Opened, Error> {
-    let data = options.data.as_deref();
-    match &options.source {
-        Source::Gallery => {
-            check_out(&options.out, Path::new(""), AUDIT_JSON)?;
-            let source = published::source(data, None)?;
-            let config = source.run.config.clone();
-            let training = Training::load(&config, data)?;
-            let all = published::gallery()?;
-            let order: Vec<String> = all.iter().map(|robot| robot.name.clone()).collect();
-            let is_asked = |name: &str| match &options.robots {
-                Selection::Ids(ids) if !ids.iter().any(|id| id == published::ALL) => {
-                    ids.iter().any(|id| id.eq_ignore_ascii_case(name))
-                }
-                _ => true,
-            };
-            let subject = |robot: published::Published| Subject {
-                id: robot.name,
-                task: "0|1".to_string(),
-                body: robot.body,
-                known: None,
-            };
-            let subjects = all.into_iter().filter(|robot| is_asked(&robot.name)).map(subject).collect();
-            let file = AuditFile::new("gallery", source.run.fingerprint(), order.len(), &options.criteria);
-            Ok(Opened { config, fitness: Fitness::Min, training, subjects, order, file })
-        }
-        Source::Archive(path) => {
-            let source = selection::Source::read(path)?;
-            source.has_task()?;
-            let run = &source.run;
-            check_out(&options.out, path, AUDIT_JSON)?;
-            let whereabouts = Whereabouts::given(data).and_of(path);
-            let training = training_of(run, path, &whereabouts)?;
-            // A training may have shown images otherwise than the protocol says, which is what is
-            // judged.
-            let is_known = run.follows_protocol() && training.images == run.training_images;
-            let subject = |robot: &Robot| Subject {
-                id: robot.id.clone(),
-                task: robot.task.clone(),
-                body: robot.body.clone(),
-                known: is_known.then(|| robot.displacements.clone()),
-            };
-            let mut subjects: Vec<Subject> = Vec::new();
-            for chosen in options.robots.of(std::slice::from_ref(&source), options.seed)? {
-                if subjects.iter().all(|other| other.id != chosen.robot.id) {
-                    subjects.push(subject(chosen.robot));
-                }
-            }
-            let order: Vec<String> = run.elites.iter().map(|robot| robot.id.clone()).collect();
-            let file = AuditFile::new(&run.name, run.fingerprint(), order.len(), &options.criteria);
-            let (config, fitness) = (run.config.clone(), run.fitness());
-            Ok(Opened { config, fitness, training, subjects, order, file })
+    let path = &options.archive;
+    let source = robots::open(path)?;
+    source.has_task()?;
+    let run = &source.run;
+    check_out(&options.out, path, AUDIT_JSON)?;
+    let whereabouts = Whereabouts::given(options.data.as_deref()).and_of(path);
+    let training = training_of(run, path, &whereabouts)?;
+    // A training may have shown images otherwise than the protocol says, which is what is judged;
+    // of published robots only the fitness is known.
+    let is_known =
+        run.follows_protocol() && training.images == run.training_images && *path != published::archive();
+    let subject = |robot: &Robot| Subject {
+        id: robot.id.clone(),
+        task: robot.task.clone(),
+        body: robot.body.clone(),
+        known: is_known.then(|| robot.displacements.clone()),
+    };
+    let mut subjects: Vec<Subject> = Vec::new();
+    for chosen in options.robots.of(std::slice::from_ref(&source), options.seed)? {
+        if subjects.iter().all(|other| other.id != chosen.robot.id) {
+            subjects.push(subject(chosen.robot));
         }
     }
+    let order: Vec<String> = run.elites.iter().map(|robot| robot.id.clone()).collect();
+    let file = AuditFile::new(&run.name, run.fingerprint(), order.len(), &options.criteria);
+    let (config, fitness) = (run.config.clone(), run.fitness());
+    Ok(Opened { config, fitness, training, subjects, order, file })
 }
 
 /// The images a run's robots were evolved on, of each class the first few. Of other data, verdicts

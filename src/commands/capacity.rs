@@ -13,7 +13,6 @@ use crate::base::threads::pool;
 use crate::baseline::{Kind, Pooling, Trained, curve};
 use crate::commands::capacity::images::{Images, Task};
 use crate::config::capacity::CapacityConfig;
-use crate::robots::published;
 use crate::store::audit::AuditFile;
 use crate::store::capacity::{CapacityFile, Curve, FORMAT, FORMAT_VERSION, Point, TaskCapacity};
 use crate::store::eval::{EvalFile, RobotReport};
@@ -314,10 +313,6 @@ fn robots<'a>(report: &'a EvalFile, options: &Options) -> Result<Vec<&'a RobotRe
     }
     if !options.physical_only {
         return Ok(report.robots.iter().collect());
-    }
-    if report.runs.iter().any(|run| run.name == published::ALL) {
-        let text = "expected an evaluation of robots of an archive, not of published ones";
-        return Err(published::not_audited(text));
     }
     let folder = options.eval.parent().unwrap_or(Path::new(""));
     let audit = |run: &RunRef| match &run.archive {

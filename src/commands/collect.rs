@@ -8,12 +8,12 @@ use crate::commands::plot::Progress;
 use crate::commands::tasks::steps::test_of;
 use crate::commands::tasks::task::another;
 use crate::commands::tasks::{Place, Status, Task};
-use crate::robots::selection::Source;
 use crate::store::audit::AuditFile;
 use crate::store::eval::EvalFile;
 use crate::store::images::HeldOut;
 use crate::store::names::{METRICS, RUN_JSON};
 use crate::store::run::RunFile;
+use crate::store::run::StoredRun;
 use crate::store::task::State;
 use crate::store::validation::ranking;
 use serde::Serialize;
@@ -111,7 +111,7 @@ pub fn collect(
             all.rows.push(row(None));
             continue;
         }
-        let source = Source::read(&archive)?;
+        let source = StoredRun::read(&archive)?;
         let run = &source.run;
         let differing = task.differing(run);
         if !differing.is_empty() {
@@ -151,7 +151,7 @@ struct Found {
 
 impl Found {
     /// What the plan asks for, or what was found without it; nothing by other settings than the plan's.
-    fn of(task: &Task, source: &Source, place: &Place, warn: &dyn Fn(&str)) -> Result<Self, Error> {
+    fn of(task: &Task, source: &StoredRun, place: &Place, warn: &dyn Fn(&str)) -> Result<Self, Error> {
         let run = &source.run;
         let left_out = |text: &str| warn(&format!("{text}; left out"));
         let told = |error: Error| left_out(&error.to_string());
@@ -220,7 +220,12 @@ impl Found {
 }
 
 /// Whether a test is the plan's; `left_out` is told in what it is another.
-fn is_planned_test(found: &EvalFile, source: &Source, test: &eval::Options, left_out: &dyn Fn(&str)) -> bool {
+fn is_planned_test(
+    found: &EvalFile,
+    source: &StoredRun,
+    test: &eval::Options,
+    left_out: &dyn Fn(&str),
+) -> bool {
     let path = test.out.display();
     let differing = eval::differing(found, test, source.run.config.physics.cycle_steps);
     if !differing.is_empty() {

@@ -14,8 +14,8 @@ use crate::config::validation::LEAST;
 use crate::config::{Config, TaskConfig};
 use crate::data::dataset::{Dataset, Split};
 use crate::images::whereabouts::{Whereabouts, load_dataset_of, part_of_others, say_transposed, size_of};
-use crate::robots::published;
-use crate::robots::selection::{Chosen, Selection, Source};
+use crate::robots;
+use crate::robots::selection::{Chosen, Selection};
 use crate::search::held_out_run::{HeldOutRun, control_steps, task_of};
 use crate::search::validation;
 use crate::store::audit::{AuditFile, RobotAudit};
@@ -24,6 +24,7 @@ use crate::store::folder::check_out;
 use crate::store::images::{HeldOut, HowMany};
 use crate::store::names::{EVAL_JSON, EVAL_VALIDATION_JSON};
 use crate::store::results::{self, replaced, write_with_table};
+use crate::store::run::StoredRun;
 use crate::store::run::different;
 use crate::store::unwritten::Unwritten;
 use crate::store::validation::Validated;
@@ -85,8 +86,8 @@ pub fn eval(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Re
     if let Some(name) = opened.other {
         say_transposed(dataset, &config.data.of(name), observer);
     }
-    let size = size_of(Some(&sources[0].run.dataset), &config.data.dataset, dataset);
-    let part = |source: &Source| part_of_others(&source.run.config, size, dataset, options.split.split());
+    let size = size_of(&sources[0].run.dataset, &config.data.dataset, dataset);
+    let part = |source: &StoredRun| part_of_others(&source.run.config, size, dataset, options.split.split());
     sources.iter().find_map(part).iter().for_each(|text| observer.warning(text));
     let robots = skilled(options.robots.of(sources, options.seed)?, grouping, observer)?;
     let shown = HeldOutImages::draw(config, sources, dataset, options)?;
@@ -191,7 +192,11 @@ pub(crate) fn differing(
 ///
 /// # Errors
 /// If robots cannot be chosen.
-pub(crate) fn is_of_robots(known: &EvalFile, sources: &[Source], options: &Options) -> Result<bool, Error> {
+pub(crate) fn is_of_robots(
+    known: &EvalFile,
+    sources: &[StoredRun],
+    options: &Options,
+) -> Result<bool, Error> {
     let of_run = |run: usize| known.robots.iter().filter(move |robot| robot.run == run);
     if options.robots.validated().is_some() {
         // Validation images choose the same robots again, of those that are physical now.
@@ -222,11 +227,11 @@ pub(crate) fn is_of_robots(known: &EvalFile, sources: &[Source], options: &Optio
 }
 
 /// How the robots of some runs see images together, and all their tasks.
-fn together(sources: &[Source]) -> Result<(Config, Grouping), Error> {
+fn together(sources: &[StoredRun]) -> Result<(Config, Grouping), Error> {
     // Several trainings may have found different windows: what takes no body is on what they see
     // together.
     let configs = || sources.iter().map(|source| &source.run.config);
-    let config = Config::together(configs()).expect("there is a run, or the published robots");
+    let config = Config::together(configs()).expect("there is a run");
     let task = TaskConfig::together(configs().map(|config| &config.task));
     let config = Config { task: task.expect("the tasks of all runs were compared"), ..config };
     let grouping = config.grouping()?;
@@ -235,7 +240,7 @@ fn together(sources: &[Source]) -> Result<(Config, Grouping), Error> {
 
 /// What a test is about, but for its robots and images.
 struct Opened<'o> {
-    sources: Vec<Source>,
+    sources: Vec<StoredRun>,
     /// With what all robots see together.
     config: Config,
     grouping: Grouping,
@@ -297,7 +302,12 @@ impl<'o> Opened<'o> {
 }
 
 /// The data of a run, and of those that are tested with it.
-fn own(run: &Source, config: &Config, whereabouts: &Whereabouts, splits: &[Split]) -> Result<Dataset, Error> {
+fn own(
+    run: &StoredRun,
+    config: &Config,
+    whereabouts: &Whereabouts,
+    splits: &[Split],
+) -> Result<Dataset, Error> {
     load_dataset_of(Some(&run.run.dataset), config, whereabouts, splits).map_err(|error| {
         let named = if error.remedies.is_empty() { error.remedy(Remedy::NameData) } else { error };
         named.remedy(Remedy::ShowOtherDataset)
@@ -307,7 +317,7 @@ fn own(run: &Source, config: &Config, whereabouts: &Whereabouts, splits: &[Split
 /// What all robots are tested with.
 struct Testing<'a> {
     options: &'a Options,
-    sources: &'a [Source],
+    sources: &'a [StoredRun],
     grouping: &'a Grouping,
     shown: &'a HeldOutImages<'a>,
 }
@@ -366,13 +376,10 @@ impl Testing<'_> {
     }
 }
 
-/// The runs, if they can be tested together and their results written; the published robots, if none
-/// is named.
-fn sources(options: &Options) -> Result<Vec<Source>, Error> {
-    let sources: Vec<Source> = match options.archives.as_slice() {
-        [] => vec![published::source(options.data.as_deref(), options.dataset.as_deref())?],
-        archives => archives.iter().map(|path| Source::read(path)).collect::<Result<_, _>>()?,
-    };
+/// The runs, if they can be tested together and their results written.
+fn sources(options: &Options) -> Result<Vec<StoredRun>, Error> {
+    let sources: Vec<StoredRun> =
+        options.archives.iter().map(|path| robots::open(path)).collect::<Result<_, _>>()?;
     for source in &sources {
         source.has_task()?;
         check_out(&options.out, &source.path, own_name(options.split))?;
@@ -432,7 +439,7 @@ pub fn own_name(split: HeldOut) -> &'static str {
 
 /// Whether robots of two runs can be tested together: what they are shown, and where they live, is
 /// the same. They may look at different windows of it, and tell the same classes apart in other ways.
-fn same_setting(first: &Source, other: &Source) -> Result<(), Error> {
+fn same_setting(first: &StoredRun, other: &StoredRun) -> Result<(), Error> {
     let (a, b) = (&first.run.config, &other.run.config);
     let of_data = |config: &Config| (config.data.dataset.clone(), config.data.builtin.clone());
     let differing = [

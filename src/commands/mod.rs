@@ -7,7 +7,6 @@ pub mod capacity;
 pub mod collect;
 pub mod data;
 pub mod eval;
-pub mod one_by_one;
 pub mod plan;
 pub mod plot;
 pub mod replay;

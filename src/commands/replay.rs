@@ -1,7 +1,6 @@
 //! `morphcog replay`: record a robot's rollout, for the pictures.
 
 use crate::base::error::Error;
-use crate::base::number;
 use crate::base::remedy::{Invocation, Remedy};
 use crate::base::text::counted;
 use crate::body::Body;
@@ -9,9 +8,9 @@ use crate::config::{Config, DataConfig};
 use crate::data::dataset::Split;
 use crate::images::training::Training;
 use crate::images::whereabouts::{Whereabouts, load_dataset_of, see};
+use crate::robots;
 use crate::robots::published;
-use crate::robots::selection::{Selection, Source};
-use crate::store::folder;
+use crate::robots::selection::Selection;
 use crate::store::images::{DatasetRef, ImageRef};
 use crate::task::judge::Judge;
 use crate::task::protocol::RolloutMode;
@@ -126,27 +125,18 @@ pub fn subject(options: &Options) -> Result<Subject, Error> {
     if let Some(dataset) = &options.dataset {
         config.data = config.data.of(dataset);
     }
-    let whereabouts = Whereabouts::given(options.data.as_deref());
-    let whereabouts = match &found.archive {
-        Some(path) => whereabouts.and_of(path),
-        None => whereabouts,
-    };
-    // Published robots come without images of their own.
-    let offer = |error: Error| match found.published {
-        true => published::without_mnist(error),
-        false => error,
-    };
+    let whereabouts = Whereabouts::given(options.data.as_deref()).and_of(&found.archive);
     let (asks, mut shown) = (!options.images.is_empty(), options.images.clone());
     if shown.is_empty() {
         let own = if options.dataset.is_none() { found.training.as_slice() } else { &[] };
         let all = match own {
             [] => {
-                let train = whereabouts.load(&config.data, &[Split::Train]).map_err(offer)?;
+                let train = whereabouts.load(&config.data, &[Split::Train])?;
                 // No more than are shown: another dataset may have fewer.
                 let is_shown = |per_class: &usize| per_class * config.classes().len() <= MAX_IMAGES;
                 let images_per_class = Some(config.data.images_per_class).filter(is_shown).unwrap_or(1);
                 let data = DataConfig { images_per_class, ..config.data.clone() };
-                Training::of(&Config { data, ..config.clone() }, &train).map_err(offer)?.images
+                Training::of(&Config { data, ..config.clone() }, &train)?.images
             }
             own => own.to_vec(),
         };
@@ -160,7 +150,7 @@ pub fn subject(options: &Options) -> Result<Subject, Error> {
     let wanted: Vec<Split> =
         Split::ALL.into_iter().filter(|split| shown.iter().any(|image| image.split == *split)).collect();
     let own = found.dataset.as_ref().filter(|own| own.name == config.data.dataset);
-    let dataset = load_dataset_of(own, config, &whereabouts, &wanted).map_err(offer)?;
+    let dataset = load_dataset_of(own, config, &whereabouts, &wanted)?;
     let mut images = Vec::new();
     for Shown { split, index } in shown {
         let label = dataset.label(split, index).map_err(|error| match (&options.archive, asks) {
@@ -205,7 +195,7 @@ fn some(images: &[ImageRef]) -> Vec<ImageRef> {
 /// A robot and how it is simulated.
 #[derive(Clone, Debug)]
 pub struct Found {
-    /// Its id, or its name in the gallery.
+    /// Its id.
     pub name: String,
     /// Its body.
     pub body: Body,
@@ -219,19 +209,15 @@ pub struct Found {
     pub about: Vec<(String, String)>,
     /// What its walks say.
     judge: Option<Judge>,
-    /// The run.json it is from; none of a published one.
-    archive: Option<PathBuf>,
-    published: bool,
+    /// The run.json it is from.
+    pub archive: PathBuf,
 }
 
 impl Found {
     /// Whose picture it is, in a line: robot, run and seed.
     pub fn title(&self) -> String {
         let word = |key: &str| self.about.iter().find(|(word, _)| word == key).map_or("", |(_, value)| value);
-        match self.published {
-            true => format!("robot {}, published with the paper", self.name),
-            false => format!("robot {}, {}", word("Robot"), word("From")),
-        }
+        format!("robot {}, {}", word("Robot"), word("From"))
     }
 }
 
@@ -240,38 +226,10 @@ impl Found {
 /// # Errors
 /// What is wrong with robot or archive.
 pub fn find(options: &Options) -> Result<Found, Error> {
-    if options.archive.is_none()
-        && let Some(robot) = published::find(&options.robot)?
-    {
-        if options.physical_only {
-            let text = "expected a robot of an archive, not a published one";
-            return Err(published::not_audited(text));
-        }
-        let about = vec![
-            ("Robot".to_string(), robot.name.clone()),
-            ("From".to_string(), "the robots published with the paper".to_string()),
-            ("Task".to_string(), "0|1".to_string()),
-            ("Published fitness".to_string(), format!("{} voxel lengths", number::fixed(robot.fitness, 2))),
-        ];
-        let judge = Some(robot.judge());
-        let (name, body, config) = (robot.name, robot.body, published::config()?);
-        return Ok(Found {
-            name,
-            body,
-            config,
-            training: Vec::new(),
-            dataset: None,
-            about,
-            judge,
-            archive: None,
-            published: true,
-        });
-    }
-    let archive = match &options.archive {
-        Some(path) => path.clone(),
-        None => folder::newest_run()?,
-    };
-    let source = Source::read(&archive)?;
+    let ids = Selection::Ids(vec![options.robot.clone()]);
+    let (archives, _) = robots::archives(options.archive.iter().cloned().collect(), ids)?;
+    let [archive] = archives.try_into().expect("one is named, or else there is one");
+    let source = robots::open(&archive)?;
     let robots = Selection::Ids(vec![options.robot.clone()]).physical(options.physical_only);
     let robots = robots.of(std::slice::from_ref(&source), 0);
     let robots = robots.map_err(|error| {
@@ -285,7 +243,7 @@ pub fn find(options: &Options) -> Result<Found, Error> {
     let (robot, run) = (robots[0].robot, &source.run);
     let about = vec![
         ("Robot".to_string(), robot.id.clone()),
-        ("From".to_string(), format!("{}, seed {}", run.name, run.config.seed)),
+        ("From".to_string(), published::provenance(&run.name, run.config.seed)),
         ("Task".to_string(), robot.task.clone()),
         ("Fitness".to_string(), run.in_units(robot.objective)),
         ("Born".to_string(), format!("generation {}", robot.generation)),
@@ -298,8 +256,7 @@ pub fn find(options: &Options) -> Result<Found, Error> {
         dataset: Some(run.dataset.clone()),
         about,
         judge: run.judge(robot),
-        archive: Some(archive),
-        published: false,
+        archive,
         config: run.config.clone(),
     })
 }

@@ -1,7 +1,6 @@
 //! `morphcog report`: gathers what is known of runs, for a page.
 
 use crate::base::error::Error;
-use crate::base::files::exists;
 use crate::base::remedy::Remedy;
 use crate::commands::plot::Progress;
 use crate::commands::replay;
@@ -9,6 +8,7 @@ use crate::config::Config;
 use crate::data::dataset::Split;
 use crate::images::whereabouts::{Whereabouts, load_dataset_of, see};
 use crate::search::held_out_run::control_steps;
+use crate::shipped::exists;
 use crate::store::audit::AuditFile;
 use crate::store::capacity::CapacityFile;
 use crate::store::eval::EvalFile;

@@ -15,13 +15,14 @@ use crate::commands::{audit, capacity, eval, plan, table};
 use crate::config::Config;
 use crate::data::dataset::Split;
 use crate::images::whereabouts::Whereabouts;
-use crate::robots::selection::{Chosen, Selection, Source};
+use crate::robots::selection::{Chosen, Selection};
 use crate::search::held_out_run;
 use crate::store::audit::{AuditFile, Verdict};
 use crate::store::capacity::CapacityFile;
 use crate::store::eval::EvalFile;
 use crate::store::images::{HeldOut, HowMany};
 use crate::store::names::{AUDIT_JSON, RUN_JSON};
+use crate::store::run::StoredRun;
 use crate::task::direction;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -106,7 +107,7 @@ pub fn reproduce(options: &Options, stop: &AtomicBool, observer: &dyn Observer) 
     }
     for task in &tasks {
         let folder = place.out.join(&task.name);
-        let differing = task.differing(&Source::read(&folder.join(RUN_JSON))?.run);
+        let differing = task.differing(&StoredRun::read(&folder.join(RUN_JSON))?.run);
         if !differing.is_empty() {
             return Err(another(&folder, &differing));
         }
@@ -144,8 +145,8 @@ impl Job<'_> {
     /// All steps of an experiment; its rows of the table and its networks, or `None` if stopped.
     fn experiment(&self, name: &str, config: &Config) -> Result<Option<Experienced>, Error> {
         let of_seed =
-            |seed: &u64| Source::read(&self.place.out.join(format!("{name}-seed{seed}")).join(RUN_JSON));
-        let sources: Vec<Source> = self.plan.seeds.iter().map(of_seed).collect::<Result<_, _>>()?;
+            |seed: &u64| StoredRun::read(&self.place.out.join(format!("{name}-seed{seed}")).join(RUN_JSON));
+        let sources: Vec<StoredRun> = self.plan.seeds.iter().map(of_seed).collect::<Result<_, _>>()?;
         let Some((chosen, audited)) = self.chosen(&sources)? else { return Ok(None) };
         let (tasks, grouping) = (&sources[0].run.dimensions.tasks, config.grouping()?);
         let tasks: Vec<&String> = tasks
@@ -184,7 +185,7 @@ impl Job<'_> {
     /// physical or there are no more. If they are too few, the first of those take part, too, that
     /// are not found to exploit the simulator: the paper, which sorted out by eye, kept such. With
     /// them, counts by task. `None` if stopped.
-    fn chosen<'s>(&self, sources: &'s [Source]) -> Result<Option<Drawn<'s>>, Error> {
+    fn chosen<'s>(&self, sources: &'s [StoredRun]) -> Result<Option<Drawn<'s>>, Error> {
         let all = Selection::All.of(sources, 0)?;
         let grouping = sources[0].run.config.grouping()?;
         let (mut chosen, mut counts) = (Vec::new(), BTreeMap::new());
@@ -220,7 +221,11 @@ impl Job<'_> {
     }
 
     /// The verdicts on some robots; `None` if stopped.
-    fn audited(&self, sources: &[Source], robots: &[Chosen]) -> Result<Option<Vec<Option<Verdict>>>, Error> {
+    fn audited(
+        &self,
+        sources: &[StoredRun],
+        robots: &[Chosen],
+    ) -> Result<Option<Vec<Option<Verdict>>>, Error> {
         let mut files: BTreeMap<usize, AuditFile> = BTreeMap::new();
         for (number, source) in sources.iter().enumerate() {
             let own = robots.iter().filter(|chosen| chosen.source == number);
@@ -229,7 +234,7 @@ impl Job<'_> {
                 continue;
             }
             let options = audit::Options {
-                source: audit::Source::Archive(source.path.clone()),
+                archive: source.path.clone(),
                 robots: Selection::Ids(ids),
                 seed: 0,
                 criteria: self.plan.audit.clone(),
@@ -255,7 +260,7 @@ impl Job<'_> {
         &self,
         name: &str,
         path: &Path,
-        sources: &[Source],
+        sources: &[StoredRun],
         chosen: &[Chosen],
     ) -> Result<Option<EvalFile>, Error> {
         let ids: Vec<(usize, String)> = chosen.iter().map(|c| (c.source, c.robot.id.clone())).collect();

@@ -3,7 +3,6 @@
 
 use crate::base::Grid;
 use crate::base::error::{Error, ErrorKind};
-use crate::base::hash::sha256_hex;
 use crate::base::observer::{Observer, Work};
 use crate::base::remedy::Remedy;
 use crate::base::stop::check;
@@ -21,8 +20,8 @@ use crate::response::lesson::Example;
 use crate::response::probing;
 use crate::response::probing::Probing;
 use crate::response::regression::{Response, Shown};
-use crate::robots::published;
-use crate::robots::selection::{Selection, Source};
+use crate::robots;
+use crate::robots::selection::Selection;
 use crate::store::folder::{check_out, writable};
 use crate::store::images::{DatasetRef, ImageRef};
 use crate::store::names::RESPONSE_JSON;
@@ -40,7 +39,7 @@ use crate::task::protocol::{Protocol, RolloutMode};
 use crate::task::stimulus::StimulusParams;
 use crate::training;
 use crate::training::window::Windows;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
 
 /// Rollouts between two looks at how well the slopes are known, and least number of a robot's: ten
@@ -59,8 +58,8 @@ const LEAST_PER_CLASS: usize = 4;
 /// What to measure, and how.
 #[derive(Clone, Debug)]
 pub struct Options {
-    /// The run.json; `None`: the published robots.
-    pub archive: Option<PathBuf>,
+    /// The run.json.
+    pub archive: PathBuf,
     /// Which of its robots, by name.
     pub robots: Vec<String>,
     /// Whether only robots will do that an audit found physical.
@@ -108,8 +107,8 @@ struct Provenance {
     config: Config,
     run: String,
     sha256: String,
-    /// The data of the run; none of the published robots.
-    dataset: Option<DatasetRef>,
+    /// The data of the run.
+    dataset: DatasetRef,
     robots: Vec<(String, Body)>,
 }
 
@@ -246,7 +245,7 @@ fn check_numbers(options: &Options) -> Result<(), Error> {
 /// Whether results and pictures can be written, and overwrite nothing of a run.
 fn check_names(options: &Options, subjects: &[Subject]) -> Result<(), Error> {
     let out = &options.out;
-    check_out(out, options.archive.as_deref().unwrap_or(Path::new("")), RESPONSE_JSON)?;
+    check_out(out, &options.archive, RESPONSE_JSON)?;
     if PICTURES.iter().any(|ending| out.with_extension(ending) == *out) {
         let text = "expected another ending: the picture beside the results has that name";
         return Err(Error::argument("out", out.display(), text));
@@ -257,24 +256,8 @@ fn check_names(options: &Options, subjects: &[Subject]) -> Result<(), Error> {
 
 /// The robots that are asked for, each once.
 fn provenance(options: &Options) -> Result<Provenance, Error> {
-    let Some(path) = &options.archive else {
-        let mut robots: Vec<(String, Body)> = Vec::new();
-        for name in &options.robots {
-            let robot = published::find(name)?
-                .ok_or_else(|| Error::input(format!("there is no published robot {name}")))?;
-            if robots.iter().all(|(other, _)| *other != robot.name) {
-                robots.push((robot.name, robot.body));
-            }
-        }
-        return Ok(Provenance {
-            config: published::config()?,
-            run: published::ALL.to_string(),
-            sha256: sha256_hex(published::TEXT.as_bytes()),
-            dataset: None,
-            robots,
-        });
-    };
-    let source = Source::read(path)?;
+    let path = &options.archive;
+    let source = robots::open(path)?;
     let chosen = Selection::Ids(options.robots.clone()).physical(options.physical_only);
     let seed = options.seed.unwrap_or(source.run.config.seed);
     let chosen = chosen.of(std::slice::from_ref(&source), seed)?;
@@ -285,7 +268,7 @@ fn provenance(options: &Options) -> Result<Provenance, Error> {
         config: run.config.clone(),
         run: run.name.clone(),
         sha256,
-        dataset: Some(run.dataset.clone()),
+        dataset: run.dataset.clone(),
         robots,
     })
 }
@@ -314,27 +297,18 @@ fn task(
 ) -> Result<Option<Task>, Error> {
     let Some(groups) = &options.task else { return Ok(None) };
     let config = training::config_of(&provenance.config, groups.classes(), Some(seed), &options.set)?;
-    let mut whereabouts = Whereabouts::given(options.data.as_deref());
-    if let Some(path) = &options.archive {
-        whereabouts = whereabouts.and_of(path);
-    }
+    let whereabouts = Whereabouts::given(options.data.as_deref()).and_of(&options.archive);
     same_walks(&provenance.config, &config)?;
     let data = |config: &Config| {
         let DataConfig { dataset, dir, transpose, builtin, .. } = &config.data;
         (dataset.clone(), dir.clone(), *transpose, builtin.clone())
     };
-    let of_run = provenance.dataset.as_ref().filter(|_| data(&config) == data(&provenance.config));
+    let of_run = Some(&provenance.dataset).filter(|_| data(&config) == data(&provenance.config));
     let dataset = load_dataset_of(of_run, &config, &whereabouts, &[Split::Train])?;
     training::check_groups(groups, &dataset)?;
     say_transposed(&dataset, &config.data, observer);
-    let config = training::sized(
-        config,
-        provenance.dataset.as_ref(),
-        &provenance.config,
-        &dataset,
-        &options.set,
-        observer,
-    );
+    let config =
+        training::sized(config, &provenance.dataset, &provenance.config, &dataset, &options.set, observer);
     let classes = groups.classes().concat();
     let per_class = IMAGES_PER_CLASS.min(scarcest(&dataset, &classes, LEAST_PER_CLASS)?);
     let failed = |error: DatasetError| Error::input(error.to_string());
@@ -442,8 +416,7 @@ struct Measuring<'a> {
 /// If the results' file cannot be read.
 fn earlier(options: &Options, observer: &dyn Observer) -> Result<Vec<(PathBuf, ResponseFile)>, Error> {
     let out = replaced(&options.out)?.map(|file| (options.out.clone(), file));
-    let beside = options.archive.as_deref().map(|archive| archive.with_file_name(RESPONSE_JSON));
-    let beside = beside.filter(|beside| *beside != options.out);
+    let beside = Some(options.archive.with_file_name(RESPONSE_JSON)).filter(|beside| *beside != options.out);
     let beside = beside.and_then(|path| ResponseFile::found(&path, observer).map(|file| (path, file)));
     Ok(beside.into_iter().chain(out).collect())
 }

@@ -8,9 +8,9 @@ use crate::base::remedy::{Invocation, Remedy};
 use crate::commands::tasks::task::selection;
 use crate::commands::tasks::{AuditStep, EvalStep, Run, Steps, Task, Training};
 use crate::config::{Config, Settings, flatten, reading};
-use crate::robots::selection::Source;
 use crate::shipped;
 use crate::store::folder::{self, one_run};
+use crate::store::run::StoredRun;
 use crate::task::grouping::{Groups, groups_text};
 use crate::training;
 use schemars::JsonSchema;
@@ -74,7 +74,7 @@ struct Setting {
 enum Base {
     /// The config's name, and what stands before the plan's changes.
     Evolve(String, Box<Config>),
-    Train(PathBuf, Box<Source>),
+    Train(PathBuf, Box<StoredRun>),
 }
 
 impl SweepPlan {
@@ -265,7 +265,7 @@ impl SweepPlan {
             let archive = if is_named { archive.clone() } else { folder.join(home_expanded(archive)) };
             let archive = one_run(archive).map_err(|text| Error::at_key("archive", text))?;
             let source =
-                Source::read(&archive).map_err(|error| error.in_place("archive").with_key("archive"))?;
+                StoredRun::read(&archive).map_err(|error| error.in_place("archive").with_key("archive"))?;
             let archive = match is_named {
                 true => archive,
                 false => std::path::absolute(&archive).map_err(|error| Error::reading(&archive, &error))?,

@@ -15,13 +15,14 @@ use crate::config::Config;
 use crate::data::dataset::{Dataset, Split};
 use crate::images::held_out::{images_besides, test_images};
 use crate::images::whereabouts::{Whereabouts, load_dataset_of, part_of_others, see, see_all};
-use crate::robots::selection::{BEST, Chosen, Selection, Source, VALIDATED};
+use crate::robots::selection::{BEST, Chosen, Selection, VALIDATED};
 use crate::search::held_out_run::{CYCLES, HeldOutRun, control_steps, task_of};
 use crate::store::eval::Trial;
 use crate::store::folder::check_out;
 use crate::store::images::{HeldOut, HowMany, ImageRef};
 use crate::store::names::{TEAM_JSON, TEAM_VALIDATION_JSON};
 use crate::store::results::{self, replaced};
+use crate::store::run::StoredRun;
 use crate::store::run::different;
 use crate::store::team::{FORMAT, FORMAT_VERSION, Member, TeamBaselines, TeamFile};
 use crate::store::unwritten::Unwritten;
@@ -74,7 +75,7 @@ pub struct Finished {
 /// If robots and classes do not go together; what is wrong with archive, data or selection.
 pub fn team(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Result<Finished, Error> {
     let archives = options.archives.iter();
-    let sources = archives.map(|path| Source::read(path)).collect::<Result<Vec<Source>, Error>>()?;
+    let sources = archives.map(|path| StoredRun::read(path)).collect::<Result<Vec<StoredRun>, Error>>()?;
     let Some(first) = sources.first() else {
         let text = "expected the runs whose robots are the team";
         return Err(Error::input(text.to_string()).about("archive"));
@@ -172,7 +173,7 @@ pub fn team(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Re
 }
 
 /// Whether robots of two runs were trained on the same data.
-fn same_data(first: &Source, other: &Source) -> Result<(), Error> {
+fn same_data(first: &StoredRun, other: &StoredRun) -> Result<(), Error> {
     let (a, b) = (&first.run, &other.run);
     if a.dataset == b.dataset && a.config.data.builtin == b.config.data.builtin {
         return Ok(());
@@ -183,7 +184,7 @@ fn same_data(first: &Source, other: &Source) -> Result<(), Error> {
 }
 
 /// The robots of the team: those that are named from all runs together, else of each run by itself.
-fn chosen<'a>(options: &Options, sources: &'a [Source]) -> Result<Vec<Chosen<'a>>, Error> {
+fn chosen<'a>(options: &Options, sources: &'a [StoredRun]) -> Result<Vec<Chosen<'a>>, Error> {
     if options.robots.validated().is_some() {
         let text = "expected another selection: a team does not choose by images";
         return Err(Error::argument("robots", VALIDATED, text)
@@ -229,7 +230,7 @@ pub fn own_name(split: HeldOut) -> &'static str {
 }
 
 /// The two groups that a robot tells apart.
-fn split_of(source: &Source, chosen: &Chosen) -> Result<grouping::Split, Error> {
+fn split_of(source: &StoredRun, chosen: &Chosen) -> Result<grouping::Split, Error> {
     let grouping = source.run.config.grouping()?;
     let text =
         || format!("{}: robot {} walks the same way for every class", source.path.display(), chosen.robot.id);
@@ -261,7 +262,7 @@ fn covered(robots: &[Chosen], splits: &[grouping::Split], classes: &[u8]) -> Res
 /// Images of the training split that no run was trained on and no robot was chosen by.
 fn validation_images(
     options: &Options,
-    sources: &[Source],
+    sources: &[StoredRun],
     classes: &[u8],
     dataset: &Dataset,
 ) -> Result<Vec<ImageRef>, Error> {
@@ -300,7 +301,7 @@ fn write(options: &Options, file: &TeamFile, observer: &dyn Observer) -> Result<
 /// pair of classes that a robot tells apart, on its own.
 fn baselines(
     file: &TeamFile,
-    (sources, robots, splits): (&[Source], &[Chosen], &[grouping::Split]),
+    (sources, robots, splits): (&[StoredRun], &[Chosen], &[grouping::Split]),
     dataset: &Dataset,
     split: Split,
 ) -> Result<Option<TeamBaselines>, Error> {

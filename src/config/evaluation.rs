@@ -4,13 +4,10 @@
 use crate::base::error::Error;
 use crate::body::{Body, key};
 use crate::config::Config;
-use crate::task::fitness::Fitness;
+use crate::task::fitness::{Fitness, LEAST_IMAGES};
 use crate::task::protocol::RolloutMode;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-
-/// Fewest images that a response is measured under: two pairs in each condition, to differ.
-pub(crate) const LEAST_IMAGES: usize = 8;
 
 /// How robots are evaluated: section `[evaluation]`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]

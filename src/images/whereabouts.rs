@@ -3,13 +3,14 @@
 
 use crate::base::Grid;
 use crate::base::error::Error;
-use crate::base::files::{home_expanded, read_text, write_atomically};
+use crate::base::files::{home_expanded, write_atomically};
 use crate::base::observer::Observer;
 use crate::base::remedy::Remedy;
 use crate::config::{BodyConfig, Config, DataConfig, reading};
 use crate::data::dataset::{BUILTIN, Dataset, Split};
 use crate::data::files;
 use crate::data::files::{Place, default_folder, places};
+use crate::shipped::read_text;
 use crate::store::folder::{IfExists, RunFolder};
 use crate::store::images::{DatasetRef, ImageRef};
 use crate::store::names::DATA_FOLDER;
@@ -233,9 +234,8 @@ pub(crate) fn say_transposed(dataset: &Dataset, config: &DataConfig, observer: &
 /// Height and width of the images that a run was made with, as far as that is known: those of the
 /// dataset that is loaded, if the run was made with it, or of one that is published. `data` is none
 /// of the published robots.
-pub(crate) fn size_of(data: Option<&DatasetRef>, name: &str, loaded: &Dataset) -> Option<[usize; 2]> {
-    let is_it = data.is_some_and(|data| loaded.fingerprint(Split::Train) == Some(data.train_sha256.clone()));
-    match is_it {
+pub(crate) fn size_of(data: &DatasetRef, name: &str, loaded: &Dataset) -> Option<[usize; 2]> {
+    match loaded.fingerprint(Split::Train).as_ref() == Some(&data.train_sha256) {
         true => loaded.size(Split::Train),
         false => files::published_size(name),
     }

@@ -3,9 +3,9 @@
 
 use crate::base::Grid;
 use crate::base::random::{Purpose, stream};
-use crate::config::evaluation::LEAST_IMAGES;
 use crate::response::gait::random_image;
 use crate::sim::Physics;
+use crate::task::fitness::LEAST_IMAGES;
 use crate::task::fitness::response_so_far;
 use crate::task::perturbation::{Condition, of_response};
 

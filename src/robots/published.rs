@@ -7,13 +7,12 @@ use crate::body::Body;
 use crate::config::{BUILT_IN, Config};
 use crate::data::catalogue;
 use crate::genome::Genome;
-use crate::images::training::Training;
 use crate::qd::Archive;
-use crate::robots::selection::{Selection, Source};
+use crate::robots::selection::Selection;
 use crate::shipped::gallery;
 use crate::store::audit::AuditFile;
 use crate::store::images::{DatasetRef, ImageRef};
-use crate::store::names::AUDIT_JSON;
+use crate::store::names::{AUDIT_JSON, RUN_JSON};
 use crate::store::run::{Dimensions, FORMAT, FORMAT_VERSION, Robot, RunFile};
 use crate::task::direction::Direction;
 use crate::task::judge::Judge;
@@ -121,40 +120,29 @@ pub fn is_meant(selection: &Selection) -> Result<bool, Error> {
     }
 }
 
-/// The error where only physical robots are wanted of the published ones; `text` says what was expected.
-pub(crate) fn not_audited(text: &str) -> Error {
-    let audit = Invocation::new("audit").option("robots", ALL);
-    let error = Error::usage(text.to_string()).about("physical_only");
-    error.remedy(Remedy::Run(audit, "audits those"))
+/// Says where robots come from: the name of their run and its seed, or that they were published.
+pub fn provenance(run: &str, seed: u64) -> String {
+    match run == ALL {
+        true => "published with the paper".to_string(),
+        false => format!("{run}, seed {seed}"),
+    }
 }
 
-/// Adds what to do where the images of the published robots are missing.
-pub(crate) fn without_mnist(error: Error) -> Error {
-    let fetch = Invocation::new("data fetch").value("mnist");
-    error.remedy(Remedy::Run(fetch, "downloads them")).remedy(Remedy::UseBuiltin)
+/// Returns the archive that the published robots are in.
+pub(crate) fn archive() -> PathBuf {
+    Path::new(gallery::PUBLISHED).join(RUN_JSON)
 }
 
-/// The published robots as a run, for a test. Their genomes were not published: each has the empty
-/// one, and none of their displacements but the fitness.
-///
-/// Those data need not be there if images of another `dataset` are to be shown.
+/// Makes a run of the published robots. Their genomes were not published: each has the empty one,
+/// and plus or minus its fitness as displacements.
 ///
 /// # Errors
-/// If the data are missing or broken, which say what the robots were trained on.
-pub fn source(data: Option<&Path>, dataset: Option<&str>) -> Result<Source, Error> {
+/// If what is built in is damaged (which a test excludes).
+pub(crate) fn run() -> Result<RunFile, Error> {
     let config = config()?;
-    let (dataset, training_images) = match dataset.is_some_and(|name| name != config.data.dataset) {
-        true => {
-            let indices = config.data.train_images.iter().flatten();
-            let images = indices.zip(config.classes()).map(|(&index, label)| ImageRef { index, label });
-            let train_sha256 = catalogue::MNIST_CONTENT[0].to_string();
-            (DatasetRef { name: config.data.dataset.clone(), train_sha256 }, images.collect())
-        }
-        false => {
-            let training = Training::load(&config, data).map_err(without_mnist)?;
-            (training.dataset, training.images)
-        }
-    };
+    let indices = config.data.train_images.iter().flatten();
+    let training_images =
+        indices.zip(config.classes()).map(|(&index, label)| ImageRef { index, label }).collect();
     let robot = |(number, robot): (usize, Published)| {
         let (left, right) = (-robot.fitness, robot.fitness);
         let displacements = match robot.zero_walks {
@@ -174,23 +162,22 @@ pub fn source(data: Option<&Path>, dataset: Option<&str>) -> Result<Source, Erro
             genome: Genome::initial(),
         }
     };
-    let elites: Vec<Robot> = gallery()?.into_iter().enumerate().map(robot).collect();
-    let run = RunFile {
+    let train_sha256 = catalogue::MNIST_CONTENT[0].to_string();
+    Ok(RunFile {
         format: FORMAT.to_string(),
         format_version: FORMAT_VERSION,
         program_version: env!("CARGO_PKG_VERSION").to_string(),
         name: ALL.to_string(),
-        dataset,
+        dataset: DatasetRef { name: config.data.dataset.clone(), train_sha256 },
         training_images,
         dimensions: Dimensions::of(&config)?,
         origin: None,
         generations: config.generations,
         stats: Archive::<Robot>::new().stats(1, 0.0),
-        elites,
+        elites: gallery()?.into_iter().enumerate().map(robot).collect(),
         config,
         read_sha256: None,
-    };
-    Ok(Source { path: PathBuf::from(ALL), run })
+    })
 }
 
 #[cfg(test)]

@@ -6,45 +6,13 @@ use crate::base::remedy::{Invocation, Remedy};
 use crate::base::text::counted;
 use crate::store::audit::AuditFile;
 use crate::store::folder;
-use crate::store::run::{Robot, RunFile};
+use crate::store::run::{Robot, StoredRun};
 use crate::store::validation::{Validated, ranking};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::str::FromStr;
 
 /// The word for the best robot.
 pub const BEST: &str = "best";
-
-/// A run, and where it lies.
-#[derive(Clone, Debug)]
-pub struct Source {
-    /// Its run.json; what else is known of its robots lies beside it.
-    pub path: PathBuf,
-    /// Its content.
-    pub run: RunFile,
-}
-
-impl Source {
-    /// Reads a run.json.
-    ///
-    /// # Errors
-    /// As [`RunFile::read`].
-    pub fn read(path: &Path) -> Result<Self, Error> {
-        Ok(Source { path: path.to_path_buf(), run: RunFile::read(path)? })
-    }
-
-    /// Whether its robots tell images apart.
-    ///
-    /// # Errors
-    /// If they are gaits, which have no task yet; what teaches them one.
-    pub(crate) fn has_task(&self) -> Result<(), Error> {
-        if !self.run.config.measures_response() {
-            return Ok(());
-        }
-        let text = format!("{}: these are gaits, which tell no images apart yet", self.path.display());
-        let train = Invocation::new("train").option("archive", folder::archive(&self.path));
-        Err(Error::input(text).remedy(Remedy::Run(train.option("task", "4|9"), "trains one")))
-    }
-}
 
 /// A robot, and the run it is of, by its place among several.
 #[derive(Clone, Copy, Debug)]
@@ -150,8 +118,8 @@ impl Selection {
     /// # Errors
     /// If there is no robot, or no single one, of an id; if only physical ones are asked for, and
     /// they are not known.
-    pub fn of<'a>(&self, sources: &'a [Source], seed: u64) -> Result<Vec<Chosen<'a>>, Error> {
-        let robots = |(source, from): (usize, &'a Source)| {
+    pub fn of<'a>(&self, sources: &'a [StoredRun], seed: u64) -> Result<Vec<Chosen<'a>>, Error> {
+        let robots = |(source, from): (usize, &'a StoredRun)| {
             from.run.elites.iter().map(move |robot| Chosen { source, robot })
         };
         let mut fittest: Vec<Chosen> = sources.iter().enumerate().flat_map(robots).collect();
@@ -170,7 +138,7 @@ impl Selection {
     ///
     /// # Errors
     /// As [`Selection::of`].
-    pub fn of_each(&self, sources: &[Source], seed: u64) -> Result<Vec<Option<Selection>>, Error> {
+    pub fn of_each(&self, sources: &[StoredRun], seed: u64) -> Result<Vec<Option<Selection>>, Error> {
         if sources.len() < 2 || self.validated().is_some() {
             return Ok(vec![Some(self.clone()); sources.len()]);
         }
@@ -184,7 +152,7 @@ impl Selection {
     fn among<'a>(
         &self,
         fittest: Vec<Chosen<'a>>,
-        sources: &'a [Source],
+        sources: &'a [StoredRun],
         seed: u64,
     ) -> Result<Vec<Chosen<'a>>, Error> {
         let by_task = || {
@@ -245,7 +213,7 @@ impl Selection {
 ///
 /// # Errors
 /// If a file of rankings cannot be read.
-fn best<'a>(fittest: &[Chosen<'a>], sources: &'a [Source]) -> Result<Option<Chosen<'a>>, Error> {
+fn best<'a>(fittest: &[Chosen<'a>], sources: &'a [StoredRun]) -> Result<Option<Chosen<'a>>, Error> {
     let rankings: Result<Vec<Option<Vec<Validated>>>, Error> = sources.iter().map(ranking).collect();
     let rankings: Option<Vec<Vec<Validated>>> = rankings?.into_iter().collect();
     let mut first: Option<(Chosen, f64)> = None;
@@ -289,11 +257,11 @@ pub(crate) fn by_id<'a>(robots: &[Chosen<'a>], id: &str) -> Result<Vec<Chosen<'a
 }
 
 /// The file of verdicts on a run.
-fn path(source: &Source) -> PathBuf {
+fn path(source: &StoredRun) -> PathBuf {
     AuditFile::path(&source.path)
 }
 
-fn audits(sources: &[Source]) -> Result<Vec<AuditFile>, Error> {
+fn audits(sources: &[StoredRun]) -> Result<Vec<AuditFile>, Error> {
     sources.iter().map(|source| AuditFile::of_run(&source.run, &source.path)).collect()
 }
 
@@ -301,7 +269,7 @@ fn audits(sources: &[Source]) -> Result<Vec<AuditFile>, Error> {
 ///
 /// # Errors
 /// As of [`AuditFile::of_run`].
-pub(crate) fn all_audited(robots: &[Chosen], sources: &[Source]) -> Result<bool, Error> {
+pub(crate) fn all_audited(robots: &[Chosen], sources: &[StoredRun]) -> Result<bool, Error> {
     let audits = audits(sources)?;
     Ok(robots.iter().all(|chosen| audits[chosen.source].robot(&chosen.robot.id).is_some()))
 }
@@ -310,7 +278,7 @@ pub(crate) fn all_audited(robots: &[Chosen], sources: &[Source]) -> Result<bool,
 pub(crate) fn physical<'a>(
     selection: &Selection,
     fittest: Vec<Chosen<'a>>,
-    sources: &'a [Source],
+    sources: &'a [StoredRun],
 ) -> Result<Vec<Chosen<'a>>, Error> {
     let audits = audits(sources)?;
     let name = |chosen: &Chosen| path(&sources[chosen.source]).display().to_string();
@@ -363,7 +331,7 @@ pub(crate) fn physical<'a>(
 /// If one that comes before them has not been, or none of a task is physical.
 pub(crate) fn first_physical<'a>(
     ranked: Vec<(&'a Robot, Validated)>,
-    source: &Source,
+    source: &StoredRun,
     count: usize,
 ) -> Result<Vec<(&'a Robot, Validated)>, Error> {
     let path = path(source);
@@ -407,11 +375,11 @@ mod tests {
     use super::*;
     use crate::store::samples;
 
-    fn source(robots: &[(&str, f64)]) -> Source {
-        Source { path: PathBuf::from("run.json"), run: samples::run(robots) }
+    fn source(robots: &[(&str, f64)]) -> StoredRun {
+        StoredRun { path: PathBuf::from("run.json"), run: samples::run(robots) }
     }
 
-    fn of(text: &str, seed: u64, sources: &[Source]) -> Result<Vec<String>, Error> {
+    fn of(text: &str, seed: u64, sources: &[StoredRun]) -> Result<Vec<String>, Error> {
         let robots = Selection::from_str(text).unwrap().of(sources, seed)?;
         Ok(robots.into_iter().map(|chosen| chosen.robot.id.clone()).collect())
     }
@@ -448,7 +416,7 @@ mod tests {
     #[test]
     fn robots_of_several_runs_are_named_run_by_run_and_a_wrong_name_is_known_before_the_first() {
         let runs = [source(&[("aa10", 1.0), ("ab20", 3.0)]), source(&[("b300", 2.0), ("b3ff", 4.0)])];
-        let each = |text: &str, runs: &[Source]| Selection::from_str(text).unwrap().of_each(runs, 1);
+        let each = |text: &str, runs: &[StoredRun]| Selection::from_str(text).unwrap().of_each(runs, 1);
         let ids = |ids: &[&str]| Some(Selection::Ids(ids.iter().map(ToString::to_string).collect()));
         assert_eq!(each("b3f,aa", &runs).unwrap(), [ids(&["aa10"]), ids(&["b3ff"])]);
         assert_eq!(each("top:1", &runs).unwrap(), [None, ids(&["b3ff"])]);

@@ -3,5 +3,6 @@
 
 pub mod evolve;
 pub mod held_out_run;
+pub mod one_by_one;
 pub mod resume;
 pub mod validation;

@@ -14,12 +14,13 @@ use crate::config::validation::ValidationConfig;
 use crate::data::dataset::{Dataset, Split};
 use crate::images::held_out::images;
 use crate::images::whereabouts::{Whereabouts, load_dataset_of, see_all};
-use crate::robots::selection::{Chosen, Selection, Source, first_physical};
+use crate::robots::selection::{Chosen, Selection, first_physical};
 use crate::search::held_out_run;
 use crate::search::held_out_run::HeldOutRun;
 use crate::store::eval::{RobotReport, Trial};
 use crate::store::images::ImageRef;
 use crate::store::names::VALIDATION_JSON;
+use crate::store::run::StoredRun;
 use crate::store::run::{Robot, RunFile};
 use crate::store::validation::{FORMAT, Ranking, Validated, ValidationFile};
 use crate::task::direction;
@@ -81,7 +82,7 @@ pub fn validate(
     stop: &AtomicBool,
     observer: &dyn Observer,
 ) -> Result<Option<Vec<Validated>>, Error> {
-    let source = Source::read(&options.archive)?;
+    let source = StoredRun::read(&options.archive)?;
     let config = &source.run.config;
     let count = options.best.unwrap_or(config.validation.best);
     let whereabouts = Whereabouts::given(options.data.as_deref()).and_of(&source.path);
@@ -102,12 +103,12 @@ pub(crate) fn at_end(
     stop: &AtomicBool,
     observer: &dyn Observer,
 ) -> Result<Option<Vec<Validated>>, Error> {
-    let source = Source::read(archive)?;
+    let source = StoredRun::read(archive)?;
     ranked(&source, source.run.config.validation.best, dataset, pool, stop, observer)
 }
 
 fn ranked(
-    source: &Source,
+    source: &StoredRun,
     count: usize,
     dataset: &Dataset,
     pool: &rayon::ThreadPool,
@@ -133,7 +134,7 @@ fn ranked(
 /// # Errors
 /// As of [`best`] and [`first_physical`].
 pub(crate) fn chosen<'a>(
-    sources: &'a [Source],
+    sources: &'a [StoredRun],
     robots: &[Chosen<'a>],
     selection: &Selection,
     dataset: &Dataset,
@@ -165,7 +166,7 @@ pub(crate) fn chosen<'a>(
 /// # Errors
 /// If there are not enough images, or the result cannot be kept.
 pub(crate) fn best<'a>(
-    source: &'a Source,
+    source: &'a StoredRun,
     dataset: &Dataset,
     grouping: &Grouping,
     robots: Vec<&'a Robot>,
@@ -226,7 +227,8 @@ fn is_own(run: &RunFile, robots: &[&Robot], wanted: &Wanted, control_steps: u32)
     let ValidationConfig { images, best } = run.config.validation;
     let Ok(grouping) = run.config.grouping() else { return false };
     let all = run.elites.iter().filter(|robot| held_out_run::task_of(&grouping, robot).is_some()).count();
-    let usual = (images, direction::THRESHOLD, held_out_run::control_steps(&run.config, held_out_run::CYCLES));
+    let usual =
+        (images, direction::THRESHOLD, held_out_run::control_steps(&run.config, held_out_run::CYCLES));
     (wanted.images, wanted.threshold, control_steps) == usual
         && (best == 0 || wanted.count == best)
         && robots.len() == all

@@ -1,13 +1,13 @@
 //! [`Catalogue`]: the robots that can be watched: published ones, and those of archives.
 
 use crate::base::error::Error;
-use crate::base::files::read_text;
 use crate::body::{Body, VoxelCounts};
 use crate::config::Config;
 use crate::robots::published;
 use crate::serve::course::Course;
 use crate::serve::refusal::Refusal;
 use crate::shipped::gallery;
+use crate::shipped::read_text;
 use crate::sim::Physics;
 use crate::store::audit::AuditFile;
 use crate::store::images::DatasetRef;

@@ -1,7 +1,7 @@
 //! [`Course`]: how a run went so far, for the page's curves.
 
 use crate::base::error::Error;
-use crate::base::files::exists;
+use crate::shipped::exists;
 use crate::store::folder;
 use crate::store::metrics::{Moment, moments};
 use crate::store::names::METRICS;

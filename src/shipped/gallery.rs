@@ -2,10 +2,14 @@
 //! one, `gallery:zero_one` all of a set. Their files are read as if they lay in a folder of that name.
 //! They are there with the feature `gallery`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// How a name of shipped runs begins.
 pub const PREFIX: &str = "gallery:";
+
+/// The run of the robots that the paper's authors published. It has no files:
+/// `robots::published` makes it from their list.
+pub const PUBLISHED: &str = "gallery:";
 
 /// Robots that tell zeros from ones, the best run first: what is shown where there are no others.
 pub const ZERO_ONE: &str = "gallery:zero_one";
@@ -99,6 +103,9 @@ pub fn text(name: &str, file: &str) -> Option<&'static str> {
 /// # Errors
 /// What there is, if there is no run of that name.
 pub fn runs(name: &str) -> Result<Vec<PathBuf>, String> {
+    if name == PUBLISHED {
+        return Ok(vec![Path::new(PUBLISHED).join("run.json")]);
+    }
     runs_of(SETS, name)
 }
 

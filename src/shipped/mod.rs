@@ -5,11 +5,14 @@
 pub mod atlas;
 pub mod gallery;
 
+use crate::base::files::{self, open_file, read_limited};
+use flate2::read::MultiGzDecoder;
+
 use std::io;
 use std::path::{Path, PathBuf};
 
 /// Where the text of a file of a named run is.
-pub enum Place {
+enum Place {
     /// In the program.
     Shipped(&'static str),
     /// In this file, compressed by gzip.
@@ -45,17 +48,31 @@ pub fn atlas_of(path: &Path) -> Option<PathBuf> {
     atlas::folder_of(name.strip_prefix(atlas::PREFIX)?)
 }
 
-/// Where a file of a named run is; none of other paths, or if nothing of that name ships with the
-/// program.
-///
-/// # Errors
-/// That the atlas has no such file, and what to do.
-pub fn place(path: &Path) -> Option<io::Result<Place>> {
+/// Returns the place of a file of a named run; `None` for other paths, and if nothing of that name
+/// ships with the program.
+fn place(path: &Path) -> Option<io::Result<Place>> {
     let (name, file) = parts(path)?;
     match name.strip_prefix(atlas::PREFIX) {
         Some(run) => Some(atlas::file(run, file).map(Place::Compressed)),
         None => gallery::text(name, file).map(|text| Ok(Place::Shipped(text))),
     }
+}
+
+/// Reads a text file of a run, named or on the disk.
+///
+/// # Errors
+/// As [`files::read_text`]; if the atlas has no such file, with what to do.
+pub fn read_text(path: &Path) -> io::Result<String> {
+    match place(path).transpose()? {
+        Some(Place::Shipped(text)) => Ok(text.to_string()),
+        Some(Place::Compressed(file)) => read_limited(MultiGzDecoder::new(open_file(&file)?)),
+        None => files::read_text(path),
+    }
+}
+
+/// Returns true if there is such a file, of a named run or on the disk.
+pub fn exists(path: &Path) -> bool {
+    place(path).map_or_else(|| path.exists(), |place| place.is_ok())
 }
 
 /// The `run.json` of every run that a name means.

@@ -1,12 +1,12 @@
 //! `audit.json` and `audit.csv`: the verdicts on a run's robots, beside its `run.json`.
 
 use crate::base::error::Error;
-use crate::base::files::exists;
 use crate::base::hash;
 use crate::base::ranges;
 use crate::base::remedy::{Invocation, Remedy, Value};
 use crate::base::table;
 use crate::config::audit::Criteria;
+use crate::shipped::exists;
 use crate::sim::Energy;
 use crate::store::folder;
 use crate::store::names::AUDIT_JSON;

@@ -10,9 +10,9 @@ use crate::base::table;
 use crate::config::Config;
 use crate::data::dataset;
 use crate::data::dataset::Dataset;
-use crate::robots::selection::Source;
 use crate::store::images::{DatasetRef, HeldOut, ImageRef};
 use crate::store::results::{self, Stored};
+use crate::store::run::StoredRun;
 use crate::store::run::{Robot, RunFile};
 use crate::store::setting::{RunRef, Setting};
 use crate::store::validation::Validated;
@@ -294,7 +294,7 @@ impl EvalFile {
 
     /// Of robots of these runs; together they see images and have tasks as a config says.
     pub(crate) fn new(
-        (sources, together): (&[Source], &Config),
+        (sources, together): (&[StoredRun], &Config),
         (selected, split, seed, threshold): (String, HeldOut, u64, f64),
         control_steps: u32,
         images: &[ImageRef],

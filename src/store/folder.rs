@@ -1,12 +1,13 @@
 //! A run's folder: made, locked, and never overwritten by accident.
 
 use crate::base::error::Error;
-use crate::base::files::{check_file, check_writable, read_text, remove_half_written, write_atomically};
+use crate::base::files::{check_file, check_writable, remove_half_written, write_atomically};
 use crate::base::observer::Observer;
 use crate::base::remedy::Value;
 use crate::base::remedy::{Invocation, Remedy};
 use crate::config::Config;
 use crate::shipped;
+use crate::shipped::read_text;
 use crate::store::lock;
 use crate::store::lock::Lock;
 use crate::store::names::{
@@ -340,6 +341,8 @@ pub fn name(run_json: &Path) -> String {
 /// present folder.
 pub fn beside(archive: &Path, name: &str) -> PathBuf {
     match shipped::name(archive) {
+        // The published robots have no name besides.
+        Some((of, "")) => PathBuf::from(format!("{of}-{name}")),
         Some((of, run)) => PathBuf::from(format!("{of}-{run}-{name}")),
         None => archive.with_file_name(name),
     }

@@ -1,11 +1,12 @@
 //! `metrics.csv`: a line per generation, with pyribs' names.
 
 use crate::base::error::Error;
-use crate::base::files::{read_bytes, read_text, write_atomically};
+use crate::base::files::{read_bytes, write_atomically};
 use crate::base::ownership;
 use crate::base::ranges;
 use crate::base::remedy::{Invocation, Remedy};
 use crate::qd::ArchiveStats;
+use crate::shipped::read_text;
 use crate::store::names::METRICS;
 use crate::store::run::RunFile;
 use crate::task::evaluation::Evaluation;

@@ -1,7 +1,6 @@
 //! `response.json` and `response.csv`: the responses of robots' gaits, beside the run's `run.json`.
 
 use crate::base::error::Error;
-use crate::base::files::exists;
 use crate::base::number::is_zero;
 use crate::base::observer::Observer;
 use crate::base::ranges;
@@ -10,6 +9,7 @@ use crate::body::Body;
 use crate::response::estimate::{Estimate, Teachable};
 use crate::response::gait::Gait;
 use crate::response::regression::Response;
+use crate::shipped::exists;
 use crate::store::images::DatasetRef;
 use crate::store::results::{self, Stored, by_lines, write_with_table};
 use crate::task::margins::Margins;

@@ -2,12 +2,13 @@
 //! long lists line by line.
 
 use crate::base::error::Error;
-use crate::base::files::{read_bytes, read_text, write_atomically};
+use crate::base::files::{read_bytes, write_atomically};
 use crate::base::hash::{sha256_hex, short};
 use crate::base::observer::Observer;
 use crate::base::ownership;
 use crate::base::remedy::{Invocation, Remedy};
 use crate::config::reading;
+use crate::shipped::read_text;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::io;

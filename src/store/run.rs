@@ -2,17 +2,18 @@
 //! read.
 
 use crate::base::error::Error;
-use crate::base::files::read_text;
 use crate::base::hash::sha256_hex;
 use crate::base::number;
 use crate::base::ranges;
-use crate::base::remedy::Remedy;
+use crate::base::remedy::{Invocation, Remedy};
 use crate::base::table;
 use crate::body::{Body, VoxelCounts};
 use crate::config::Config;
 use crate::genome::Genome;
 use crate::qd::descriptor::{count_bin, possible_cells};
 use crate::qd::{Archive, ArchiveStats, DescriptorSpace, Elite};
+use crate::shipped::read_text;
+use crate::store::folder;
 use crate::store::images::{DatasetRef, ImageRef, answers};
 use crate::store::results::{self, Stored, by_lines};
 use crate::store::training::Origin;
@@ -23,7 +24,7 @@ use crate::task::score::Answer;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// What `run.json` calls itself.
 pub const FORMAT: &str = "morphcog-run";
@@ -383,6 +384,38 @@ pub fn different<'a>(runs: impl IntoIterator<Item = (&'a Path, &'a RunFile)>) ->
     Ok(())
 }
 
+/// A run, and where it lies.
+#[derive(Clone, Debug)]
+pub struct StoredRun {
+    /// Its run.json; what else is known of its robots lies beside it.
+    pub path: PathBuf,
+    /// Its content.
+    pub run: RunFile,
+}
+
+impl StoredRun {
+    /// Reads a run.json.
+    ///
+    /// # Errors
+    /// As [`RunFile::read`].
+    pub fn read(path: &Path) -> Result<Self, Error> {
+        Ok(StoredRun { path: path.to_path_buf(), run: RunFile::read(path)? })
+    }
+
+    /// Whether its robots tell images apart.
+    ///
+    /// # Errors
+    /// If they are gaits, which have no task yet; what teaches them one.
+    pub(crate) fn has_task(&self) -> Result<(), Error> {
+        if !self.run.config.measures_response() {
+            return Ok(());
+        }
+        let text = format!("{}: these are gaits, which tell no images apart yet", self.path.display());
+        let train = Invocation::new("train").option("archive", folder::archive(&self.path));
+        Err(Error::input(text).remedy(Remedy::Run(train.option("task", "4|9"), "trains one")))
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -410,8 +443,7 @@ mod tests {
 
     #[test]
     fn an_empty_archive_is_told_with_its_file() {
-        let source =
-            crate::robots::selection::Source { path: "runs/a/run.json".into(), run: samples::run(&[]) };
+        let source = StoredRun { path: "runs/a/run.json".into(), run: samples::run(&[]) };
         let error = crate::robots::selection::Selection::All.of(&[source], 1).unwrap_err();
         assert!(error.message.starts_with("runs/a/run.json: "), "{error}");
     }

@@ -7,11 +7,11 @@ use crate::config::validation::ValidationConfig;
 use crate::config::{ArchiveConfig, BodyConfig, CheckpointConfig, Config, DataConfig, TaskConfig};
 use crate::genome::MutationParams;
 use crate::qd::EmitterParams;
-use crate::robots::selection::Source;
 use crate::sim::Physics;
 use crate::store::folder;
 use crate::store::images::ImageRef;
 use crate::store::run::RunFile;
+use crate::store::run::StoredRun;
 use crate::task::evaluation::Savings;
 use crate::task::protocol::Protocol;
 use crate::task::stimulus::StimulusParams;
@@ -52,7 +52,7 @@ pub struct Setting {
 }
 
 impl RunRef {
-    pub(crate) fn of(source: &Source) -> Self {
+    pub(crate) fn of(source: &StoredRun) -> Self {
         let run = &source.run;
         RunRef {
             name: run.name.clone(),

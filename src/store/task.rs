@@ -1,8 +1,9 @@
 //! `task.json`: how far a task of a sweep is, in its run folder.
 
 use crate::base::error::Error;
-use crate::base::files::{read_text, write_atomically};
+use crate::base::files::write_atomically;
 use crate::config::{Settings, reading};
+use crate::shipped::read_text;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::path::Path;

@@ -1,8 +1,9 @@
 //! Trainings of networks, kept beside the results so that none is done twice.
 
 use crate::base::error::Error;
-use crate::base::files::{exists, write_atomically};
+use crate::base::files::write_atomically;
 use crate::baseline::Trained;
+use crate::shipped::exists;
 use crate::store::results::{self, Stored};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;

@@ -1,13 +1,13 @@
 //! `validation.json`: the robots of a run that were chosen on validation images.
 
 use crate::base::error::Error;
-use crate::base::files::exists;
 use crate::base::ranges;
 use crate::base::remedy::{Invocation, Remedy};
 use crate::config::validation::ValidationConfig;
-use crate::robots::selection::Source;
+use crate::shipped::exists;
 use crate::store::names::VALIDATION_JSON;
 use crate::store::results::{self, Stored};
+use crate::store::run::StoredRun;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -124,7 +124,7 @@ impl ValidationFile {
 ///
 /// # Errors
 /// If the file that says so cannot be read.
-pub(crate) fn ranking(source: &Source) -> Result<Option<Vec<Validated>>, Error> {
+pub(crate) fn ranking(source: &StoredRun) -> Result<Option<Vec<Validated>>, Error> {
     let ValidationConfig { images, best } = source.run.config.validation;
     let file = ValidationFile::read(&source.path.with_file_name(VALIDATION_JSON))?;
     let is_of = |file: &ValidationFile| file.run_sha256 == source.run.fingerprint();
@@ -142,7 +142,7 @@ pub(crate) fn ranking(source: &Source) -> Result<Option<Vec<Validated>>, Error> 
 ///
 /// # Errors
 /// If it cannot be read.
-pub(crate) fn shown(source: &Source) -> Result<Option<usize>, Error> {
+pub(crate) fn shown(source: &StoredRun) -> Result<Option<usize>, Error> {
     let Some(file) = ValidationFile::read(&source.path.with_file_name(VALIDATION_JSON))? else {
         return Ok(None);
     };

@@ -5,6 +5,9 @@ use crate::task::perturbation::CONDITIONS_OF_RESPONSE;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+/// Fewest images under which a response is measured: two pairs in each condition.
+pub(crate) const LEAST_IMAGES: usize = 8;
+
 /// Margin at which an answer is as good as can be, for [`Fitness::MeanClipped`] \[voxel lengths\].
 /// With less, a small change turns many answers; with more, bodies that walk far count more than
 /// bodies that are correct.

@@ -97,10 +97,10 @@ fn fixed(config: &Config, asked: &Config) -> Result<(), Error> {
 
 /// The same for a dataset: a margin that was not asked for, but is that of the gaits' own images, is
 /// left out where those have another size. `of_gaits` is what the gaits' config says, and
-/// `their_data` which data those are; none of the published robots.
+/// `their_data` which data those are.
 pub(crate) fn sized(
     config: Config,
-    their_data: Option<&DatasetRef>,
+    their_data: &DatasetRef,
     of_gaits: &Config,
     dataset: &Dataset,
     set: &[String],

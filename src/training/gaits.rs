@@ -11,11 +11,12 @@ use crate::images::held_out;
 use crate::images::training::Training;
 use crate::response::gait::Gait;
 use crate::response::probing::Probing;
-use crate::robots::selection::{Selection, Source};
+use crate::robots::selection::Selection;
 use crate::store::folder;
 use crate::store::names::RESPONSE_JSON;
 use crate::store::response::ResponseFile;
 use crate::store::run::Robot;
+use crate::store::run::StoredRun;
 use crate::store::training::{Batch, Drawn, Elsewhere, Origin};
 use crate::task::protocol::{Protocol, RolloutMode};
 use std::collections::BTreeSet;
@@ -27,7 +28,7 @@ pub(super) struct Walker<'a> {
 }
 
 /// Where the walkers are from, and what they were trained on: not for validation.
-pub(super) fn origin(source: &Source, config: &Config, dataset: &Dataset) -> Result<Origin, Error> {
+pub(super) fn origin(source: &StoredRun, config: &Config, dataset: &Dataset) -> Result<Origin, Error> {
     let run = &source.run;
     let sha256 = dataset.fingerprint(Split::Train).expect("a training loads its training images");
     let all = run.origin.as_ref().map_or(Vec::new(), |origin| origin.elsewhere.clone());
@@ -58,7 +59,7 @@ pub(super) fn origin(source: &Source, config: &Config, dataset: &Dataset) -> Res
 
 /// The gaits of the chosen robots, each once.
 pub(super) fn walkers<'a>(
-    source: &'a Source,
+    source: &'a StoredRun,
     robots: &Selection,
     seed: u64,
 ) -> Result<Vec<Walker<'a>>, Error> {
@@ -82,7 +83,7 @@ pub(super) fn walkers<'a>(
 /// What `morphcog response` measured of each gait, where it lies beside the run and holds for this
 /// training: what would be simulated again otherwise.
 pub(super) fn measured(
-    source: &Source,
+    source: &StoredRun,
     config: &Config,
     probing: &Probing,
     walkers: &[Walker],

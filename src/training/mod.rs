@@ -28,12 +28,13 @@ use crate::images::whereabouts;
 use crate::images::whereabouts::Whereabouts;
 use crate::qd::{Archive, DescriptorSpace, Elite};
 use crate::response::probing::Probing;
-use crate::robots::selection::{Selection, Source, VALIDATED};
+use crate::robots::selection::{Selection, VALIDATED};
 use crate::search::validation;
 use crate::store::folder::{IfExists, RunFolder};
 use crate::store::images::ImageRef;
 use crate::store::metrics::{Metrics, Totals};
 use crate::store::names::{ELITES, RUN_JSON, TRAINING_JSON};
+use crate::store::run::StoredRun;
 use crate::store::run::{Dimensions, FORMAT, FORMAT_VERSION, Robot, RunFile};
 use crate::store::training::Origin;
 use crate::store::validation::Validated;
@@ -95,7 +96,7 @@ pub fn train(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> R
         let error = Error::argument("robots", VALIDATED, text);
         return Err(error.remedy(Remedy::ChooseRobots(Some("top:4"))));
     }
-    let source = Source::read(&options.archive)?;
+    let source = StoredRun::read(&options.archive)?;
     let whereabouts = Whereabouts::given(options.data.as_deref())
         .and_of_resumed(options.if_exists, &options.out.join(RUN_JSON))
         .and_of(&options.archive);
@@ -104,7 +105,7 @@ pub fn train(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> R
     check_groups(&options.groups, &dataset)?;
     whereabouts::say_transposed(&dataset, &config.data, observer);
     let of_gaits = &source.run;
-    let config = sized(config, Some(&of_gaits.dataset), &of_gaits.config, &dataset, &options.set, observer);
+    let config = sized(config, &of_gaits.dataset, &of_gaits.config, &dataset, &options.set, observer);
     let origin = origin(&source, &config, &dataset)?;
     let config = with_images(config, &origin.trained_on, &dataset, observer)?;
     let mut training = Training::of(&config, &dataset)?;

@@ -1,18 +1,17 @@
 //! What `morphcog plot` makes: figures as SVG and PNG.
 
 use crate::base::error::Error;
-use crate::base::files::exists;
 use crate::base::remedy::{Invocation, Remedy};
 use crate::cli::output::console::Console;
 use crate::cli::output::sweeps;
-use crate::commands::one_by_one::Named;
 use crate::commands::plot::Progress;
 use crate::commands::replay;
 use crate::commands::replay::{Found, Options};
 use crate::draw::error::write_whole;
 use crate::draw::plot;
 use crate::draw::plot::{Background, Figure, PRINT};
-use crate::robots::published;
+use crate::search::one_by_one::Named;
+use crate::shipped::exists;
 use crate::store::capacity::CapacityFile;
 use crate::store::eval::EvalFile;
 use crate::store::folder;
@@ -181,7 +180,7 @@ pub fn make(console: &Console, wanted: &Wanted) -> Result<Vec<PathBuf>, Error> {
             different(archives.iter().map(PathBuf::as_path).zip(&runs))?;
         }
         let made = |path: &PathBuf| -> Result<Made, Error> {
-            let stem = stem(Some(path), wanted.kind, &result_name(wanted.kind, path));
+            let stem = stem(path, wanted.kind, &result_name(wanted.kind, path));
             Ok(Made { figure: of_run(wanted.kind, path)?, stem })
         };
         let all = archives.iter().map(made).collect::<Result<Vec<_>, _>>()?;
@@ -263,22 +262,16 @@ fn too_short(path: &Path, run: &RunFile, generations: usize) -> Error {
     }
 }
 
-/// `plot-<kind>[-robot]` beside a run.json, or here.
-fn stem(archive: Option<&Path>, kind: Kind, robot: &str) -> PathBuf {
+/// `plot-<kind>[-robot]` beside a run.json.
+fn stem(archive: &Path, kind: Kind, robot: &str) -> PathBuf {
     let name = if robot.is_empty() { format!("plot-{kind}") } else { format!("plot-{kind}-{robot}") };
-    archive.map_or_else(|| PathBuf::from(&name), |path| folder::beside(path, &name))
+    folder::beside(archive, &name)
 }
 
 fn of_robot(wanted: &Wanted, named: &Named) -> Result<Made, Error> {
     let Named { archive, robot } = named.clone();
-    let options = Options { robot, archive, ..wanted.options.clone() };
-    // Without an archive it is a published robot, or one of the newest run.
-    let beside = match &options.archive {
-        None if published::find(&options.robot)?.is_none() => Some(folder::newest_run()?),
-        given => given.clone(),
-    };
-    let archive = beside.as_deref();
-    let made = |found: &Found, figure| Made { figure, stem: stem(archive, wanted.kind, &found.name) };
+    let options = Options { robot, archive: Some(archive.clone()), ..wanted.options.clone() };
+    let made = |found: &Found, figure| Made { figure, stem: stem(&archive, wanted.kind, &found.name) };
     if wanted.kind == Kind::Body {
         let found = replay::find(&options)?;
         return Ok(made(&found, plot::body(&found.body, &found.title())));

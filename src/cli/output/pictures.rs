@@ -10,7 +10,6 @@ use crate::draw::scene::Look;
 use crate::draw::stage::Stage;
 use crate::draw::walk::Walk;
 use crate::draw::{gif, html, raster};
-use crate::robots::published;
 use crate::shipped;
 use crate::store::folder;
 use std::fmt;
@@ -117,20 +116,12 @@ impl Wanted {
     }
 }
 
-/// The default place of a robot's pictures: beside its run.json; for a published robot, the present
-/// folder.
-///
-/// # Errors
-/// If there is no run.
-pub fn folder(archive: Option<&Path>, robot: &str) -> Result<PathBuf, Error> {
-    let archive = match archive {
-        Some(path) => path.to_path_buf(),
-        None if published::find(robot)?.is_some() => return Ok(PathBuf::new()),
-        None => folder::newest_run()?,
-    };
-    match shipped::is_named(&archive) {
-        true => Ok(PathBuf::new()),
-        false => Ok(archive.parent().unwrap_or(Path::new("")).to_path_buf()),
+/// Returns the default folder of a robot's pictures: that of its run.json, or, for a named run,
+/// the present one.
+pub fn folder(archive: &Path) -> PathBuf {
+    match shipped::is_named(archive) {
+        true => PathBuf::new(),
+        false => archive.parent().unwrap_or(Path::new("")).to_path_buf(),
     }
 }
 

@@ -93,10 +93,7 @@ fn row(robot: &RobotResponse, is_taught: bool, has_window: bool) -> Vec<String> 
 pub fn pictures(console: &Console, finished: &Finished) -> Result<(), PictureError> {
     let Finished { file, pictures, .. } = finished;
     for (robot, [svg, png]) in file.robots.iter().zip(pictures) {
-        let of = match file.run == published::ALL {
-            true => format!("robot {}, published with the paper", robot.id),
-            false => format!("robot {}, {}, seed {}", robot.id, file.run, file.run_seed),
-        };
+        let of = format!("robot {}, {}", robot.id, published::provenance(&file.run, file.run_seed));
         let figure = plot::response(robot, file.setting.task.as_deref(), &of);
         write_whole(svg, figure.svg().as_bytes())?;
         write_whole(png, &figure.print()?)?;

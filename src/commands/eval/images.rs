@@ -10,10 +10,10 @@ use crate::images::held_out;
 use crate::images::held_out::images_besides;
 use crate::images::training::Training;
 use crate::images::whereabouts::{see, see_all};
-use crate::robots::selection::Source;
 use crate::store::eval::Baselines;
 use crate::store::images::{HeldOut, ImageRef};
 use crate::store::run::RunFile;
+use crate::store::run::StoredRun;
 use crate::store::validation::shown as shown_for_validation;
 use crate::task::grouping;
 use std::borrow::Cow;
@@ -41,7 +41,7 @@ impl<'a> HeldOutImages<'a> {
     /// If there are not enough images, or not one of each class is asked for.
     pub fn draw(
         config: &'a Config,
-        sources: &[Source],
+        sources: &[StoredRun],
         dataset: &'a Dataset,
         options: &'a Options,
     ) -> Result<Self, Error> {
@@ -56,7 +56,7 @@ impl<'a> HeldOutImages<'a> {
             HeldOut::Validation => {
                 let runs: Vec<_> = sources.iter().map(|source| &source.run).collect();
                 // Now, or before: those of `validation.json`.
-                let count = |source: &Source| match options.robots.validated() {
+                let count = |source: &StoredRun| match options.robots.validated() {
                     Some(_) => Ok(Some(options.validation.unwrap_or(config.validation.images))),
                     None => shown_for_validation(source),
                 };
@@ -92,7 +92,7 @@ impl<'a> HeldOutImages<'a> {
     /// If an image cannot be drawn or seen.
     pub fn baselines<'t>(
         &self,
-        sources: &[Source],
+        sources: &[StoredRun],
         tasks: impl Iterator<Item = (&'t str, &'t grouping::Split)>,
     ) -> Result<BTreeMap<String, Baselines>, Error> {
         let seen = |images: &[ImageRef]| -> Result<Vec<(Grid<f64>, u8)>, Error> {
@@ -169,9 +169,9 @@ fn labelled(list: &[(Grid<f64>, u8)]) -> Vec<Labelled<'_>> {
 
 /// Validation images that robots of each run are chosen by, as many of them as `count` says of each.
 pub(crate) fn chosen_by(
-    sources: &[Source],
+    sources: &[StoredRun],
     dataset: &Dataset,
-    count: impl Fn(&Source) -> Result<Option<usize>, Error>,
+    count: impl Fn(&StoredRun) -> Result<Option<usize>, Error>,
 ) -> Result<BTreeSet<usize>, Error> {
     let mut all = BTreeSet::new();
     for source in sources {

@@ -166,7 +166,7 @@ fn steps(task: &Task, place: &Place, stop: &AtomicBool, observer: &dyn Observer)
             robots => robots,
         };
         let options = audit::Options {
-            source: audit::Source::Archive(archive.clone()),
+            archive: archive.clone(),
             robots,
             seed: 1,
             criteria: step.criteria.clone(),

@@ -1,6 +1,5 @@
 //! The words of a report: its title, a methods paragraph, and the commands that make it again.
 
-use crate::base::files::exists;
 use crate::base::hash::short;
 use crate::base::number;
 use crate::base::number::percent;
@@ -14,6 +13,7 @@ use crate::data::dataset::BUILTIN;
 use crate::draw::html::escape;
 use crate::draw::report::Spell;
 use crate::search::held_out_run;
+use crate::shipped::exists;
 use crate::store::capacity::CapacityFile;
 use crate::store::eval::Mean;
 use crate::store::images::{HowMany, ImageRef};

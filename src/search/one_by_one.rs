@@ -4,10 +4,10 @@
 use crate::base::error::Error;
 use crate::base::observer::Observer;
 use crate::base::remedy::Remedy;
-use crate::robots::published;
-use crate::robots::selection::{Selection, Source, first_physical};
+use crate::robots;
+use crate::robots::selection::{Selection, first_physical};
 use crate::search::validation;
-use crate::store::folder;
+use crate::store::run::StoredRun;
 use crate::store::run::{Robot, different};
 use crate::store::validation::Validated;
 use std::path::PathBuf;
@@ -33,9 +33,9 @@ pub struct Options {
 /// A robot, by name.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Named {
-    /// The archive it is of; none: a published one, or of the newest run.
-    pub archive: Option<PathBuf>,
-    /// Its id, the beginning of one, "best", or a published robot's name.
+    /// The archive it is of.
+    pub archive: PathBuf,
+    /// Its id, the beginning of one, or "best".
     pub robot: String,
 }
 
@@ -44,26 +44,18 @@ pub struct Named {
 /// # Errors
 /// If there are none such, or a signal stopped the search for the best on validation images.
 pub fn named(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Result<Vec<Named>, Error> {
-    let Options { robots, archives, seed, .. } = options;
-    let of_gallery = archives.is_empty() && published::is_meant(robots)?;
-    let one = |robot: &String| Named { archive: archives.first().cloned(), robot: robot.clone() };
-    match robots {
-        Selection::Ids(ids) if of_gallery && ids.iter().any(|id| id == published::ALL) => {
-            let all = published::gallery()?;
-            return Ok(all.into_iter().map(|robot| Named { archive: None, robot: robot.name }).collect());
-        }
-        Selection::Ids(ids) if archives.len() < 2 => return Ok(ids.iter().map(one).collect()),
-        _ => {}
+    let Options { seed, .. } = options;
+    let (archives, robots) = robots::archives(options.archives.clone(), options.robots.clone())?;
+    if let (Selection::Ids(ids), [archive]) = (&robots, &archives[..]) {
+        let one = |robot: &String| Named { archive: archive.clone(), robot: robot.clone() };
+        return Ok(ids.iter().map(one).collect());
     }
-    let paths = if archives.is_empty() { vec![folder::newest_run()?] } else { archives.clone() };
-    let sources: Vec<Source> = paths.iter().map(|path| Source::read(path)).collect::<Result<_, _>>()?;
+    let sources: Vec<StoredRun> = archives.iter().map(|path| robots::open(path)).collect::<Result<_, _>>()?;
     different(sources.iter().map(|source| (source.path.as_path(), &source.run)))?;
-    let name = |source: &Source, robot: &Robot| Named {
-        archive: Some(source.path.clone()),
-        robot: robot.id.clone(),
-    };
+    let name =
+        |source: &StoredRun, robot: &Robot| Named { archive: source.path.clone(), robot: robot.id.clone() };
     let Some(count) = robots.validated() else {
-        let chosen = robots.clone().physical(options.physical_only).of(&sources, *seed)?;
+        let chosen = robots.physical(options.physical_only).of(&sources, *seed)?;
         return Ok(chosen.iter().map(|chosen| name(&sources[chosen.source], chosen.robot)).collect());
     };
     let mut all = Vec::new();
@@ -77,7 +69,7 @@ pub fn named(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> R
 /// The best of each task of a run on validation images, this many.
 fn ranked<'a>(
     options: &Options,
-    source: &'a Source,
+    source: &'a StoredRun,
     count: usize,
     stop: &AtomicBool,
     observer: &dyn Observer,
