@@ -6,6 +6,7 @@ mod processor;
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use morphcog::base::Grid;
 use morphcog::base::random::{Purpose, stream};
+use morphcog::base::session::Session;
 use morphcog::base::stop::NEVER;
 use morphcog::body::Body;
 use morphcog::commands::bench;
@@ -21,7 +22,6 @@ use morphcog::task::evaluation::{Job, Savings, evaluate};
 use morphcog::task::rollout::{fresh_rollout, fresh_rollouts_of};
 use processor::Processor;
 use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
 
 /// The paper's bodies and rollouts, on built-in digits.
 const OVERRIDES: [&str; 5] = [
@@ -100,8 +100,17 @@ fn evaluations(criterion: &mut Criterion) {
         for threads in [1, 2] {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads start");
             group.bench_function(format!("{name}, {threads} threads"), |bencher| {
-                let run =
-                    || evaluate(&jobs, &images, &[], &config.physics, &config.protocol, savings, &NEVER);
+                let run = || {
+                    evaluate(
+                        &jobs,
+                        &images,
+                        &[],
+                        &config.physics,
+                        &config.protocol,
+                        savings,
+                        &Session::default(),
+                    )
+                };
                 bencher.iter(|| pool.install(run));
             });
         }
@@ -115,11 +124,8 @@ fn bookkeeping(criterion: &mut Criterion) {
         name: "bench".to_string(),
         out: folder.path().join("run"),
         if_exists: IfExists::Refuse,
-        data: None,
-        threads: None,
-        ranks: morphcog::base::ranks::Ranks::ALONE,
     };
-    let run: RunFile = evolve(&options, &AtomicBool::new(false), &()).expect("the run ends").run;
+    let run: RunFile = evolve(&options, &Session::default()).expect("the run ends").run;
     let mut known_bodies = KnownBodies::default();
     for i in 0..600_000_u128 {
         known_bodies.insert((i * 0x9E37_79B9_7F4A_7C15_F39C_C060_5CED_C834).to_le_bytes());

@@ -7,7 +7,7 @@
 use morphcog::base::clock::thread_time;
 use morphcog::base::random::{Purpose, stream};
 use morphcog::base::ranks::{Ranks, owners};
-use morphcog::base::stop::NEVER;
+use morphcog::base::session::Session;
 use morphcog::body::Body;
 use morphcog::config::Config;
 use morphcog::data::dataset::Split;
@@ -17,7 +17,6 @@ use morphcog::search::evolve::{Options, evolve};
 use morphcog::store::folder::IfExists;
 use morphcog::store::run::RunFile;
 use morphcog::task::evaluation::{Evaluation, Job, Outcome, evaluate};
-use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
 /// Numbers of ranks.
@@ -99,11 +98,8 @@ fn measure(overrides: &[&str], before: u64, measured: u64) -> Vec<Vec<Piece>> {
             name: "scaling".to_string(),
             out: folder.path().join("run"),
             if_exists: IfExists::Resume,
-            data: None,
-            threads: None,
-            ranks: Ranks::ALONE,
         };
-        evolve(&options, &AtomicBool::new(false), &()).expect("the run ends").run
+        evolve(&options, &Session::default()).expect("the run ends").run
     };
     let dataset = Whereabouts::given(None).load(&config.data, &[Split::Train]).expect("digits are drawn");
     let training = Training::of(&config, &dataset).expect("there are images");
@@ -128,8 +124,9 @@ fn measure(overrides: &[&str], before: u64, measured: u64) -> Vec<Vec<Piece>> {
                 let stimuli = &training.stimuli;
                 pool.install(|| {
                     let began = thread_time();
-                    let mut found = evaluate(&job, stimuli, &[], physics, protocol, config.savings, &NEVER)
-                        .expect("nothing stops it");
+                    let mut found =
+                        evaluate(&job, stimuli, &[], physics, protocol, config.savings, &Session::default())
+                            .expect("nothing stops it");
                     let seconds = (thread_time() - began).as_secs_f64();
                     let rollouts = found.remove(0).simulated;
                     Some(Piece { voxels: body.counts().total as u64, seconds, rollouts })

@@ -22,6 +22,7 @@ mod values;
 use crate::base::error::{Error, ErrorKind};
 use crate::base::ranks::Ranks;
 use crate::base::remedy::Remedy;
+use crate::base::session::Session;
 use crate::base::text::counted;
 use crate::base::{signals, threads};
 use crate::cli::output::console::Console;
@@ -57,7 +58,6 @@ use choice::{Runs, selected};
 use clap::CommandFactory;
 pub use process::{called, main};
 use std::path::{Path, PathBuf};
-use std::sync::atomic::AtomicBool;
 
 /// Runs a command.
 ///
@@ -143,6 +143,32 @@ pub fn run(cli: Cli, console: &Console, ranks: Ranks) -> Result<(), Error> {
     }
 }
 
+/// Threads, images and processes that the command line gives to a session.
+#[derive(Clone)]
+struct Resources {
+    threads: Option<u16>,
+    data: Option<PathBuf>,
+    ranks: Ranks,
+}
+
+impl Resources {
+    /// Returns those of one process.
+    fn of(threads: Option<u16>, data: Option<PathBuf>) -> Self {
+        Resources { threads, data, ranks: Ranks::ALONE }
+    }
+}
+
+/// Runs a command in a session that signals stop and that reports to the terminal.
+fn in_session<T>(
+    console: &Console,
+    Resources { threads, data, ranks }: Resources,
+    work: impl FnOnce(&Session) -> Result<T, Error>,
+) -> Result<T, Error> {
+    let (stop, reporter) = (signals::stop_flag()?, Reporter::new(console));
+    let session = Session::new(&stop, &reporter).threads(threads.map(usize::from)).ranks(ranks).data(data);
+    work(&session)
+}
+
 fn run_evolve(args: EvolveArgs, console: &Console, ranks: Ranks) -> Result<(), Error> {
     let mut set = args.set;
     set.extend(args.seed.map(|seed| format!("seed={seed}")));
@@ -155,15 +181,13 @@ fn run_evolve(args: EvolveArgs, console: &Console, ranks: Ranks) -> Result<(), E
         (_, true) => IfExists::Overwrite,
         _ => IfExists::Refuse,
     };
-    let threads = args.threads.map(usize::from);
-    let (data, place) = (args.data.clone(), out.clone());
-    let options = evolve::Options { config, name, out: place, if_exists, data, threads, ranks };
-    let training = args.train.then(|| train::after_evolution(&options)).transpose()?;
-    let stop = signals::stop_flag()?;
-    let finished = {
-        let reporter = Reporter::new(console);
-        evolve::evolve(&options, &stop, &reporter)?
+    let with = || Resources { ranks, ..Resources::of(args.threads, args.data.clone()) };
+    let options = evolve::Options { config, name, out: out.clone(), if_exists };
+    let training = match args.train {
+        true => Some(in_session(console, with(), |session| train::after_evolution(&options, session))?),
+        false => None,
     };
+    let finished = in_session(console, with(), |session| evolve::evolve(&options, session))?;
     summary::evolution(console, &finished, &out, training.is_some());
     if !finished.validated.is_empty() {
         summary::validation(console, &finished.validated);
@@ -183,11 +207,9 @@ fn run_evolve(args: EvolveArgs, console: &Console, ranks: Ranks) -> Result<(), E
         return Ok(());
     }
     if let Some(training) = &training {
-        train::trained(training, &stop, console)?;
+        train::trained(training, with(), console)?;
     }
     let out = training.map_or(out, |training| training.out);
-    // Nothing is left to be saved: from here on a signal ends the process.
-    drop(stop);
     if args.replay && ranks.leads() {
         let shown = replay::Options { data: args.data, ..replay::Options::default() };
         replay_best(&out, shown, console)?;
@@ -217,19 +239,17 @@ fn run_eval(args: EvalArgs, console: &Console, ranks: Ranks) -> Result<(), Error
         seed: args.seed,
         threshold: args.threshold,
         cycles: args.cycles,
-        data: args.data,
         dataset: args.dataset,
-        threads: args.threads.map(usize::from),
-        ranks,
         out,
         archives,
     };
-    test(&options, &*signals::stop_flag()?, console)
+    test(&options, Resources { ranks, ..Resources::of(args.threads, args.data) }, console)
 }
 
 /// Tests robots, and says how they did.
-fn test(options: &eval::Options, stop: &AtomicBool, console: &Console) -> Result<(), Error> {
-    let eval::Finished { file: report, unwritten } = eval::eval(options, stop, &Reporter::new(console))?;
+fn test(options: &eval::Options, with: Resources, console: &Console) -> Result<(), Error> {
+    let eval::Finished { file: report, unwritten } =
+        in_session(console, with, |session| eval::eval(options, session))?;
     let capacity = CapacityFile::of(&report, &options.out);
     let written = unwritten.is_none().then_some(options.out.as_path());
     summary::evaluation(console, &report, capacity.as_ref(), written);
@@ -260,14 +280,8 @@ fn run_replay(args: ReplayArgs, console: &Console) -> Result<(), Error> {
         true => vec![folder::first_run(PathBuf::from(gallery::ZERO_ONE)).map_err(Error::other)?],
         false => args.archive.map_or(Vec::new(), |Runs(paths)| paths),
     };
-    let search = one_by_one::Options {
-        robots: args.robot,
-        archives,
-        physical_only,
-        seed: args.seed,
-        data: data.clone(),
-    };
-    let Named { archive, robot } = the_one(&search, console)?;
+    let search = one_by_one::Options { robots: args.robot, archives, physical_only, seed: args.seed };
+    let Named { archive, robot } = the_one(&search, data.clone(), console)?;
     let folder = pictures::folder(&archive);
     let options = replay::Options { robot, physical_only, archive: Some(archive), images, data, dataset };
     if is_first_look {
@@ -299,7 +313,7 @@ fn show(path: &Path) -> Result<(), Error> {
 }
 
 /// The robot that is to be watched.
-fn the_one(search: &one_by_one::Options, console: &Console) -> Result<Named, Error> {
+fn the_one(search: &one_by_one::Options, data: Option<PathBuf>, console: &Console) -> Result<Named, Error> {
     // What is more than one for certain needs no search.
     let many = |these: String, first: &str| {
         let text = format!("--robot: expected one robot to watch, these are {these}");
@@ -309,7 +323,7 @@ fn the_one(search: &one_by_one::Options, console: &Console) -> Result<Named, Err
     if let Some(count) = search.robots.validated().filter(|&count| count > 1) {
         return many(format!("up to {count} of each task"), "best-validation:1");
     }
-    let found = choice::one_by_one(search, console)?;
+    let found = choice::one_by_one(search, data, console)?;
     match found.as_slice() {
         [one] => Ok(one.clone()),
         several => {
@@ -323,7 +337,9 @@ fn the_one(search: &one_by_one::Options, console: &Console) -> Result<Named, Err
 
 fn run_simulate(args: &SimulateArgs, console: &Console) -> Result<(), Error> {
     match &args.out {
-        Some(path) => simulate::to_file(&args.scenario, args.points, path, &*signals::stop_flag()?),
+        Some(path) => {
+            simulate::to_file(&args.scenario, args.points, path, &Session::new(&*signals::stop_flag()?, &()))
+        }
         None => {
             let scenario = simulate::Scenario::read(&args.scenario)?;
             let written = |row: String| {
@@ -349,7 +365,8 @@ fn run_data(command: DataCommand, console: &Console) -> Result<(), Error> {
             let catalogue = Catalogue::named(&dataset).map_err(|error| Error::usage(error.to_string()))?;
             let options = FetchOptions { to, mirror, force };
             let stop = signals::stop_flag()?;
-            let fetched = fetch(&catalogue, &options, &Program::ALL, &stop, &Reporter::new(console));
+            let fetched =
+                fetch(&catalogue, &options, &Program::ALL, &Session::new(&stop, &Reporter::new(console)));
             if matches!(fetched, Err(FetchError::Stopped(_))) {
                 // Whole files stay, and there is nothing else to save.
                 stop.end_process();

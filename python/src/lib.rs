@@ -7,7 +7,7 @@ use morphcog::base::Grid;
 use morphcog::base::error::{Error, ErrorKind};
 use morphcog::base::hash::sha256_hex;
 use morphcog::base::observer::{Generation, Observer, Work};
-use morphcog::base::ranks::Ranks;
+use morphcog::base::session::Session;
 use morphcog::base::stop::Stopped;
 use morphcog::base::threads::{MOST_THREADS, pool};
 use morphcog::body::{Body, Material};
@@ -453,14 +453,11 @@ impl RunData {
             seed: 1,
             threshold: direction::THRESHOLD,
             cycles: held_out_run::CYCLES,
-            data,
             dataset: None,
             out: folder::beside(&self.place, eval::own_name(split)),
-            threads: None,
-            ranks: Ranks::ALONE,
         };
-        let unwritten = heard(py, listener, |stop, observer| {
-            eval::eval(&options, stop, observer).map(|finished| finished.unwritten)
+        let unwritten = heard(py, listener, (None, data), |session| {
+            eval::eval(&options, session).map(|finished| finished.unwritten)
         })?;
         written(unwritten, &options.out)
     }
@@ -476,7 +473,7 @@ impl RunData {
         let _environment = entered()?;
         let robots: Selection = parsed("robots", robots)?;
         let out = folder::beside(&self.place, AUDIT_JSON);
-        let unwritten = heard(py, listener, |stop, observer| {
+        let unwritten = heard(py, listener, (None, data), |session| {
             let robots = match robots.validated() {
                 None => robots,
                 Some(_) => {
@@ -485,9 +482,8 @@ impl RunData {
                         archives: vec![self.place.clone()],
                         physical_only: false,
                         seed: 1,
-                        data: data.clone(),
                     };
-                    let found = one_by_one::named(&search, stop, observer)?;
+                    let found = one_by_one::named(&search, session)?;
                     Selection::Ids(found.into_iter().map(|named| named.robot).collect())
                 }
             };
@@ -497,12 +493,9 @@ impl RunData {
                 seed: 1,
                 criteria: Criteria::default(),
                 fresh: false,
-                data,
                 out: out.clone(),
-                threads: None,
-                ranks: Ranks::ALONE,
             };
-            audit::audit(&options, stop, observer).map(|finished| finished.unwritten)
+            audit::audit(&options, session).map(|finished| finished.unwritten)
         })?;
         written(unwritten, &out)
     }
@@ -533,10 +526,15 @@ impl RunData {
 fn heard<T: Send>(
     py: Python,
     listener: &Bound<PyAny>,
-    work: impl FnOnce(&AtomicBool, &dyn Observer) -> Result<T, Error> + Send,
+    (threads, data): (Option<usize>, Option<PathBuf>),
+    work: impl FnOnce(&Session) -> Result<T, Error> + Send,
 ) -> PyResult<T> {
     let heard = Heard::new();
-    let found = watched_and(py, |_| heard.pass_on(listener), |stop| work(stop, &heard))?;
+    let found = watched_and(
+        py,
+        |_| heard.pass_on(listener),
+        |stop| work(&Session::new(stop, &heard).threads(threads).data(data)),
+    )?;
     found.map_err(|error| raised(&error))
 }
 
@@ -577,10 +575,9 @@ fn evolve_run(
         (_, true) => IfExists::Overwrite,
         _ => IfExists::Refuse,
     };
-    let ranks = Ranks::ALONE;
-    let options = evolve::Options { config, name, out: out.clone(), if_exists, data, threads, ranks };
-    let unwritten = heard(py, listener, |stop, observer| {
-        evolve::evolve(&options, stop, observer).map(|finished| finished.unwritten)
+    let options = evolve::Options { config, name, out: out.clone(), if_exists };
+    let unwritten = heard(py, listener, (threads, data), |session| {
+        evolve::evolve(&options, session).map(|finished| finished.unwritten)
     })?;
     match unwritten {
         Some(error) => Err(raised(&error)),
@@ -697,7 +694,8 @@ fn displacements<'py>(
     let pool = pool(threads).map_err(|error| raised(&error))?;
     let walked = watched(py, |stop| {
         let walk = |body: &Body| -> Result<Vec<f64>, Stopped> {
-            let (found, _) = fresh_rollouts(body, &images, &[], (&physics, &protocol), &|_| (), stop)?;
+            let (found, _) =
+                fresh_rollouts(body, &images, &[], (&physics, &protocol), &|_| (), &Session::new(stop, &()))?;
             Ok(found.into_iter().map(|walk| walk.unwrap_or(f64::NAN)).collect())
         };
         pool.install(|| bodies.par_iter().with_max_len(1).map(walk).collect::<Result<Vec<_>, Stopped>>())

@@ -12,6 +12,7 @@ pub mod random;
 pub(crate) mod ranges;
 pub mod ranks;
 pub mod remedy;
+pub mod session;
 pub mod shell;
 pub mod signals;
 pub mod statistics;

@@ -2,11 +2,11 @@
 
 use crate::base::Grid;
 use crate::base::random::Stream;
-use crate::base::stop::{Stopped, check};
+use crate::base::session::Session;
+use crate::base::stop::Stopped;
 use crate::baseline::network::{Network, Patches, Shape, cross_entropy};
 use crate::baseline::settings::{Hyperparameters, Kind, Trained, Watch};
 use nalgebra::DVector;
-use std::sync::atomic::AtomicBool;
 
 /// Images with their groups (0 or 1), prepared for networks of a kind.
 #[derive(Clone, Debug)]
@@ -60,11 +60,11 @@ fn test(
     network: &mut Network,
     samples: &Samples,
     watch: Watch,
-    stop: &AtomicBool,
+    session: &Session,
 ) -> Result<(f64, f64), Stopped> {
     let (mut correct, mut loss) = (0, 0.0);
     for (image, group) in &samples.images {
-        check(stop)?;
+        session.check()?;
         let outputs = network.forward(image);
         correct += usize::from(usize::from(outputs[1] > outputs[0]) == *group);
         loss += cross_entropy(outputs, *group).0;
@@ -116,7 +116,7 @@ pub fn train(
     waiting: &Samples,
     test_set: &Samples,
     rng: &mut Stream,
-    stop: &AtomicBool,
+    session: &Session,
 ) -> Result<Trained, Stopped> {
     let Hyperparameters { epochs, patience, watch, .. } = *hyper;
     let mut network = Network::new(Shape { size, ..training.shape }, rng);
@@ -134,7 +134,7 @@ pub fn train(
         for chosen in rng.sample(count, count).chunks(batch) {
             gradient.fill(0.0);
             for (image, group) in chosen.iter().map(|index| &training.images[*index]) {
-                check(stop)?;
+                session.check()?;
                 let (_, by_outputs) = cross_entropy(network.forward(image), *group);
                 let by_outputs = by_outputs.map(|derivative| derivative / chosen.len() as f64);
                 network.backward(image, by_outputs, &mut gradient);
@@ -142,7 +142,7 @@ pub fn train(
             adam.step(network.parameters_mut(), &gradient);
         }
         done += 1;
-        let (accuracy, value) = test(&mut network, waiting, watch, stop)?;
+        let (accuracy, value) = test(&mut network, waiting, watch, session)?;
         present = Some(accuracy);
         if best.as_ref().is_none_or(|(least, _)| value > *least) {
             (best, waited) = (Some((value, hyper.restore_best.then(|| network.parameters().clone()))), 0);
@@ -156,7 +156,7 @@ pub fn train(
     }
     let accuracy = match present.filter(|_| std::ptr::eq(waiting, test_set)) {
         Some(known) => known,
-        None => test(&mut network, test_set, Watch::Accuracy, stop)?.0,
+        None => test(&mut network, test_set, Watch::Accuracy, session)?.0,
     };
     Ok(Trained { accuracy, epochs: done, parameters })
 }
@@ -165,7 +165,8 @@ pub fn train(
 mod tests {
     use super::*;
     use crate::base::random::{Purpose, stream};
-    use crate::base::stop::NEVER;
+
+    use std::sync::atomic::AtomicBool;
 
     /// Noisy images that are brighter above, or below.
     fn samples(seed: u64, count: usize, kind: Kind, hyper: &Hyperparameters) -> Samples {
@@ -186,7 +187,7 @@ mod tests {
     fn trained(kind: Kind, hyper: &Hyperparameters, seed: u64) -> Trained {
         let [learn, test] = [(1, 12), (2, 150)].map(|(seed, count)| samples(seed, count, kind, hyper));
         let rng = &mut stream(seed, Purpose::Networks, 1, 0);
-        train(8, hyper, &learn, &test, &test, rng, &NEVER).unwrap()
+        train(8, hyper, &learn, &test, &test, rng, &Session::default()).unwrap()
     }
 
     #[test]
@@ -260,7 +261,7 @@ mod tests {
                 std::thread::sleep(std::time::Duration::from_millis(50));
                 stop.store(true, std::sync::atomic::Ordering::Relaxed);
             });
-            train(8, &hyper, &learn, &test, &test, rng, &stop)
+            train(8, &hyper, &learn, &test, &test, rng, &Session::new(&stop, &()))
         });
         assert_eq!(ended, Err(Stopped));
         assert!(begin.elapsed().as_secs() < 5, "{:?}", begin.elapsed());

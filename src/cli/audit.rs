@@ -3,14 +3,13 @@
 use crate::base::error::Error;
 use crate::base::ranks::Ranks;
 use crate::base::remedy::Remedy;
-use crate::base::signals;
 use crate::base::text::counted;
 use crate::cli::choice;
 use crate::cli::choice::{Archives, ROBOTS, selected};
 use crate::cli::output::console::Console;
-use crate::cli::output::reporters::Reporter;
 use crate::cli::output::verdicts;
 use crate::cli::values::{seed, threads};
+use crate::cli::{Resources, in_session};
 use crate::commands::audit;
 use crate::commands::audit::{Finished, Options};
 use crate::config::audit::Criteria;
@@ -22,7 +21,6 @@ use crate::store::names::AUDIT_JSON;
 use crate::store::run::{StoredRun, different};
 use clap::Args;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::AtomicBool;
 
 pub(super) const EXAMPLES: &str = "\
 Examples:
@@ -73,7 +71,6 @@ pub(super) struct AuditArgs {
 
 pub(super) fn run(args: AuditArgs, console: &Console, ranks: Ranks) -> Result<(), Error> {
     let criteria = Criteria::load(args.criteria.as_deref(), &args.set)?;
-    let stop = signals::stop_flag()?;
     let chosen = selected(args.robots.clone())?.unwrap_or(Selection::All);
     let (archives, chosen) = robots::archives(args.archives.paths(), chosen)?;
     choice::say_simulated(&archives, console);
@@ -89,7 +86,7 @@ pub(super) fn run(args: AuditArgs, console: &Console, ranks: Ranks) -> Result<()
         let Some(robots) = robots else { continue };
         let beside = folder::beside(&archive, AUDIT_JSON);
         let robots = match robots.validated() {
-            Some(best) => validated(&args, (&archive, best), &stop, ranks, console)?,
+            Some(best) => validated(&args, (&archive, best), ranks, console)?,
             None => robots,
         };
         let options = Options {
@@ -98,12 +95,10 @@ pub(super) fn run(args: AuditArgs, console: &Console, ranks: Ranks) -> Result<()
             seed: args.seed,
             criteria: criteria.clone(),
             fresh: args.fresh,
-            data: args.data.clone(),
             out: args.out.clone().unwrap_or(beside),
-            threads: args.threads.map(usize::from),
-            ranks,
         };
-        let finished = audit::audit(&options, &stop, &Reporter::new(console))?;
+        let with = Resources { ranks, ..Resources::of(args.threads, args.data.clone()) };
+        let finished = in_session(console, with, |session| audit::audit(&options, session))?;
         say_known(&finished, &options.out, console);
         verdicts::audit(console, &finished, &options.out);
         if let Some(error) = finished.unwritten {
@@ -140,17 +135,12 @@ fn say_known(finished: &Finished, out: &Path, console: &Console) {
 fn validated(
     args: &AuditArgs,
     (archive, best): (&Path, usize),
-    stop: &AtomicBool,
     ranks: Ranks,
     console: &Console,
 ) -> Result<Selection, Error> {
-    let options = validation::Options {
-        archive: archive.to_path_buf(),
-        best: Some(best),
-        data: args.data.clone(),
-        threads: args.threads.map(usize::from),
-    };
-    let found = validation::validate(&options, stop, &Reporter::new(console))?;
+    let options = validation::Options { archive: archive.to_path_buf(), best: Some(best) };
+    let with = Resources { ranks, ..Resources::of(args.threads, args.data.clone()) };
+    let found = in_session(console, with, |session| validation::validate(&options, session))?;
     let all_know = ranks.all(found.is_some());
     let Some(found) = found.filter(|_| all_know) else {
         let text = "stopped before the robots were chosen; nothing is audited";

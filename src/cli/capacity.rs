@@ -2,11 +2,10 @@
 
 use crate::base::error::Error;
 use crate::base::remedy::Remedy;
-use crate::base::signals;
 use crate::cli::output::console::Console;
 use crate::cli::output::networks;
-use crate::cli::output::reporters::Reporter;
 use crate::cli::values::threads;
+use crate::cli::{Resources, in_session};
 use crate::commands::capacity;
 use crate::commands::capacity::Options;
 use crate::config::capacity::CapacityConfig;
@@ -67,13 +66,11 @@ pub(super) fn run(args: CapacityArgs, console: &Console) -> Result<(), Error> {
     let options = Options {
         config: CapacityConfig::load(args.config.as_deref(), &set)?,
         physical_only: args.physical_only,
-        data: args.data,
         out: args.out.unwrap_or_else(|| CapacityFile::beside(&eval)),
-        threads: args.threads.map(usize::from),
         eval,
     };
-    let stop = signals::stop_flag()?;
-    let finished = capacity::capacity(&options, &stop, &Reporter::new(console))?;
+    let with = Resources::of(args.threads, args.data);
+    let finished = in_session(console, with, |session| capacity::capacity(&options, session))?;
     let capacity::Finished { file, unwritten } = finished;
     networks::capacity(console, &file, unwritten.is_none().then_some(options.out.as_path()));
     if let Some(error) = unwritten {

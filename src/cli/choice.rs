@@ -2,11 +2,12 @@
 //! of help.
 
 use crate::base::error::Error;
-use crate::base::signals;
+use crate::base::session::Session;
 use crate::base::stop::NEVER;
 use crate::base::text::counted;
 use crate::cli::output::console::Console;
 use crate::cli::output::reporters::Reporter;
+use crate::cli::{Resources, in_session};
 use crate::robots;
 use crate::robots::selection::Selection;
 use crate::search::one_by_one;
@@ -64,15 +65,20 @@ pub(super) fn selected(mut given: Vec<Selection>) -> Result<Option<Selection>, E
 }
 
 /// The robots of a selection, for a command that looks at them one by one.
-pub(super) fn one_by_one(search: &one_by_one::Options, console: &Console) -> Result<Vec<Named>, Error> {
+pub(super) fn one_by_one(
+    search: &one_by_one::Options,
+    data: Option<PathBuf>,
+    console: &Console,
+) -> Result<Vec<Named>, Error> {
     let (archives, _) = robots::archives(search.archives.clone(), search.robots.clone())?;
     say_simulated(&archives, console);
     // Only a search on validation images is stopped in an orderly way: signals end all else at
     // once.
-    let observer = Reporter::new(console);
     match search.robots.validated() {
-        Some(_) => one_by_one::named(search, &*signals::stop_flag()?, &observer),
-        None => one_by_one::named(search, &NEVER, &observer),
+        Some(_) => {
+            in_session(console, Resources::of(None, data), |session| one_by_one::named(search, session))
+        }
+        None => one_by_one::named(search, &Session::new(&NEVER, &Reporter::new(console)).data(data)),
     }
 }
 

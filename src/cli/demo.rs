@@ -1,13 +1,11 @@
 //! `morphcog demo`: its words, and what it calls.
 
 use crate::base::error::{Error, ErrorKind};
-use crate::base::ranks::Ranks;
 use crate::base::remedy::Remedy;
-use crate::base::signals;
 use crate::cli::output::console::Console;
-use crate::cli::output::reporters::Reporter;
 use crate::cli::output::summary;
 use crate::cli::values::{seed, threads};
+use crate::cli::{Resources, in_session};
 use crate::cli::{replay_best, test};
 use crate::commands::replay::Shown;
 use crate::commands::{eval, replay};
@@ -74,7 +72,6 @@ pub(super) struct DemoArgs {
 }
 
 pub(super) fn run(args: DemoArgs, console: &Console) -> Result<(), Error> {
-    let threads = args.threads.map(usize::from);
     let options = training::Options {
         archive: folder::first_run(PathBuf::from(gallery::GAITS)).map_err(Error::other)?,
         robots: Selection::Ids(vec![BEST.to_string()]),
@@ -84,14 +81,14 @@ pub(super) fn run(args: DemoArgs, console: &Console) -> Result<(), Error> {
         name: "demo".to_string(),
         out: args.out.clone(),
         if_exists: if args.force { IfExists::Overwrite } else { IfExists::Resume },
-        data: None,
-        threads,
     };
-    let stop = signals::stop_flag()?;
+    let with = Resources::of(args.threads, None);
     let finished =
-        training::train(&options, &stop, &Reporter::new(console)).map_err(|error| match error.kind {
-            ErrorKind::Stopped => error.remedy(Remedy::Repeat),
-            _ => error,
+        in_session(console, with.clone(), |session| training::train(&options, session)).map_err(|error| {
+            match error.kind {
+                ErrorKind::Stopped => error.remedy(Remedy::Repeat),
+                _ => error,
+            }
         })?;
     summary::training(console, &finished, &options.out);
     let archive = options.out.join(RUN_JSON);
@@ -105,14 +102,9 @@ pub(super) fn run(args: DemoArgs, console: &Console) -> Result<(), Error> {
         seed: args.seed,
         threshold: THRESHOLD,
         cycles: CYCLES,
-        data: None,
         dataset: None,
-        threads,
-        ranks: Ranks::ALONE,
     };
-    test(&tested, &stop, console)?;
-    // Nothing is left to be saved: from here on a signal ends the process.
-    drop(stop);
+    test(&tested, with, console)?;
     let shown = replay::Options { images: new_digits()?, ..replay::Options::default() };
     replay_best(&options.out, shown, console)
 }

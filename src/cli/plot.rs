@@ -92,9 +92,9 @@ pub(super) fn run(args: PlotArgs, console: &Console) -> Result<(), Error> {
         }
         robots => {
             let robots = robots.unwrap_or(Selection::Ids(vec![BEST.to_string()]));
-            let (archives, data) = (archives.clone(), data.clone());
-            let search = one_by_one::Options { robots, archives, physical_only, seed: args.seed, data };
-            choice::one_by_one(&search, console)?
+            let archives = archives.clone();
+            let search = one_by_one::Options { robots, archives, physical_only, seed: args.seed };
+            choice::one_by_one(&search, data.clone(), console)?
         }
     };
     let wanted = Wanted {

@@ -3,15 +3,15 @@
 use crate::base::error::Error;
 use crate::base::remedy::Remedy;
 use crate::base::shell::quoted;
-use crate::base::signals;
+use crate::cli::in_session;
 use crate::cli::output::console::Console;
 use crate::cli::output::networks;
-use crate::cli::output::reporters::Reporter;
 use crate::cli::tasks::{Command, What, Where, asked, ended};
 use crate::cli::values::decimal;
 use crate::commands::plan::{PAPER_TOML, Plan};
 use crate::commands::reproduce;
 use crate::commands::reproduce::Options;
+use crate::commands::tasks::Place;
 use clap::Args;
 use std::path::{Path, PathBuf};
 
@@ -52,14 +52,14 @@ pub(super) struct ReproduceArgs {
 pub(super) fn run(args: ReproduceArgs, console: &Console) -> Result<(), Error> {
     let plan = Plan::load(&args.plan, &args.set)?;
     let tasks = reproduce::tasks(&plan, args.scale)?;
-    let place = args.place.place(&args.out);
+    let place = Place { out: args.out.clone() };
     let name = if Plan::is_built_in(&args.plan) { args.plan.clone() } else { absolute(&args.plan)? };
     let mut words = ["reproduce", &name, "--scale", &args.scale.to_string()].map(quoted).to_vec();
     words.extend(args.set.iter().flat_map(|set| ["--set".to_string(), quoted(set)]));
     if asked(
         &args.what,
         &tasks,
-        &Command { words, name: "reproduce", tasks: &tasks, place: &place },
+        &Command { words, name: "reproduce", tasks: &tasks, place: &place, with: &args.place },
         console,
     )? {
         if args.what.list || args.what.slurm {
@@ -70,8 +70,7 @@ pub(super) fn run(args: ReproduceArgs, console: &Console) -> Result<(), Error> {
     }
     let jobs = args.place.jobs.map(usize::from);
     let options = Options { plan, scale: args.scale, place, jobs };
-    let stop = signals::stop_flag()?;
-    let finished = reproduce::reproduce(&options, &stop, &Reporter::new(console))?;
+    let finished = in_session(console, args.place.with(), |session| reproduce::reproduce(&options, session))?;
     ended(&finished.runs, tasks.len())?;
     if finished.stopped {
         let text = "stopped; what is done so far is kept".to_string();

@@ -1,14 +1,13 @@
 //! `morphcog response`: its words, and what it calls.
 
 use crate::base::error::Error;
-use crate::base::signals;
 use crate::base::text::counted;
 use crate::cli::choice;
 use crate::cli::choice::{ROBOTS, run_json, selected};
 use crate::cli::output::console::Console;
-use crate::cli::output::reporters::Reporter;
 use crate::cli::output::responses;
 use crate::cli::values::{MOST, decimal, seed, threads, whole};
+use crate::cli::{Resources, in_session};
 use crate::commands::response;
 use crate::commands::response::Options;
 use crate::robots;
@@ -91,9 +90,8 @@ pub(super) fn run(args: ResponseArgs, console: &Console) -> Result<(), Error> {
         archives: vec![archive.clone()],
         physical_only: args.physical_only,
         seed: args.seed.unwrap_or(1),
-        data: args.data.clone(),
     };
-    let robots = choice::one_by_one(&search, console)?;
+    let robots = choice::one_by_one(&search, args.data.clone(), console)?;
     let out = args.out.unwrap_or_else(|| folder::beside(&archive, RESPONSE_JSON));
     let options = Options {
         robots: robots.into_iter().map(|Named { robot, .. }| robot).collect(),
@@ -103,13 +101,11 @@ pub(super) fn run(args: ResponseArgs, console: &Console) -> Result<(), Error> {
         images: args.images,
         error: args.error,
         seed: args.seed,
-        data: args.data,
         out,
-        threads: args.threads.map(usize::from),
         archive,
     };
-    let stop = signals::stop_flag()?;
-    let finished = response::measure(&options, &stop, &Reporter::new(console))?;
+    let with = Resources::of(args.threads, args.data);
+    let finished = in_session(console, with, |session| response::measure(&options, session))?;
     responses::response(console, &finished, &options.out);
     if let Some(error) = finished.unwritten {
         return Err(error);

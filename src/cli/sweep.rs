@@ -2,13 +2,13 @@
 
 use crate::base::error::Error;
 use crate::base::shell::{in_shell, quoted};
-use crate::base::signals;
 use crate::base::text::counted;
+use crate::cli::in_session;
 use crate::cli::output::console::Console;
-use crate::cli::output::reporters::Reporter;
 use crate::cli::output::sweeps;
 use crate::cli::tasks::{Command, What, Where, asked, ended, refused, warn_of_gaits};
 use crate::commands::sweep::SweepPlan;
+use crate::commands::tasks::Place;
 use crate::commands::{collect, tasks};
 use crate::store::folder;
 use clap::Args;
@@ -69,11 +69,16 @@ pub(super) fn run(args: SweepArgs, console: &Console) -> Result<(), Error> {
     let tasks = plan.tasks(&args.plan).map_err(|errors| refused(errors, console))?;
     let name = args.plan.file_stem().map_or("sweep".to_string(), |stem| stem.to_string_lossy().into_owned());
     let out = args.out.unwrap_or_else(|| Path::new(folder::RUNS).join(&name));
-    let place = args.place.place(&out);
+    let place = Place { out: out.clone() };
     let absolute = std::path::absolute(&args.plan).map_err(|error| Error::reading(&args.plan, &error))?;
     let mut words = vec!["sweep".to_string(), in_shell(&absolute)];
     words.extend(args.set.iter().flat_map(|set| ["--set".to_string(), quoted(set)]));
-    if asked(&args.what, &tasks, &Command { words, name: &name, tasks: &tasks, place: &place }, console)? {
+    if asked(
+        &args.what,
+        &tasks,
+        &Command { words, name: &name, tasks: &tasks, place: &place, with: &args.place },
+        console,
+    )? {
         return Ok(());
     }
     tasks::check_folders(&tasks, &place).map_err(|errors| refused(errors, console))?;
@@ -84,9 +89,9 @@ pub(super) fn run(args: SweepArgs, console: &Console) -> Result<(), Error> {
         return sweeps::collected(console, &name, &collected, &status, &out);
     }
     warn_of_gaits(&tasks, console);
-    let stop = signals::stop_flag()?;
     let jobs = args.place.jobs.map(usize::from);
-    let summary = tasks::run_all(&tasks, &place, jobs, &stop, &Reporter::new(console))?;
+    let summary =
+        in_session(console, args.place.with(), |session| tasks::run_all(&tasks, &place, jobs, session))?;
     ended(&summary, tasks.len())?;
     console.line(&format!("{} done, in {}", counted(tasks.len(), "task is", "tasks are"), out.display()));
     console.suggest("next:", &format!("morphcog sweep {} --collect", in_shell(&args.plan)));

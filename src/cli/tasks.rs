@@ -3,11 +3,10 @@
 use crate::base::error::Error;
 use crate::base::remedy::Remedy;
 use crate::base::shell::{in_shell, quoted};
-use crate::base::signals;
 use crate::cli::output::console::Console;
-use crate::cli::output::reporters::Reporter;
 use crate::cli::output::sweeps;
 use crate::cli::values::{MOST, threads, whole};
+use crate::cli::{Resources, in_session};
 use crate::cli::{choice, process};
 use crate::commands::tasks;
 use crate::commands::tasks::{Place, Run, Summary, Task};
@@ -59,9 +58,9 @@ pub(super) struct Where {
 }
 
 impl Where {
-    /// The place of tasks.
-    pub(super) fn place(&self, out: &Path) -> Place {
-        Place { out: out.to_path_buf(), data: self.data.clone(), threads: self.threads.map(usize::from) }
+    /// Returns what a session of tasks works with.
+    pub(super) fn with(&self) -> Resources {
+        Resources::of(self.threads, self.data.clone())
     }
 }
 
@@ -76,6 +75,8 @@ pub(super) struct Command<'a> {
     pub(super) tasks: &'a [Task],
     /// Where.
     pub(super) place: &'a Place,
+    /// With what.
+    pub(super) with: &'a Where,
 }
 
 impl Command<'_> {
@@ -92,7 +93,7 @@ impl Command<'_> {
         words.extend(["--out".to_string(), in_shell(&absolute(&self.place.out)?)]);
         let environment =
             std::env::var_os("MORPHCOG_DATA").filter(|value| !value.is_empty()).map(PathBuf::from);
-        if let Some(data) = self.place.data.clone().or(environment).or_else(|| self.data_here()) {
+        if let Some(data) = self.with.data.clone().or(environment).or_else(|| self.data_here()) {
             words.extend(["--data".to_string(), in_shell(&absolute(&data)?)]);
         }
         if let Some(atlas) = self.tasks.iter().find_map(Task::atlas) {
@@ -113,7 +114,7 @@ impl Command<'_> {
     }
 
     fn list(&self, count: usize, console: &Console) -> Result<(), Error> {
-        let (line, threads) = (self.line()?, self.place.threads.unwrap_or(1));
+        let (line, threads) = (self.line()?, self.with.threads.unwrap_or(1));
         (1..=count)
             .for_each(|number| console.command(&format!("{line} --threads {threads} --task {number}")));
         Ok(())
@@ -124,7 +125,7 @@ impl Command<'_> {
         let out = &self.place.out;
         std::fs::create_dir_all(out).map_err(|error| Error::writing(out, &error))?;
         let out = std::path::absolute(out).map_err(|error| Error::reading(out, &error))?;
-        let (name, line, threads) = (self.name, self.line()?, self.place.threads.unwrap_or(1));
+        let (name, line, threads) = (self.name, self.line()?, self.with.threads.unwrap_or(1));
         let (name, log) = (quoted(name), out.join("slurm-%a.log"));
         // Slurm reads its own lines, and no shell's escapes.
         if [name.as_str(), &in_shell(&log)].iter().any(|word| word.starts_with('$')) {
@@ -211,10 +212,9 @@ pub(super) fn asked(
             return Err(Error::usage(text));
         };
         tasks::check_folders(std::slice::from_ref(task), place).map_err(|errors| refused(errors, console))?;
-        tasks::check_data(std::iter::once((number, task)), place)?;
+        tasks::check_data(std::iter::once((number, task)), place, command.with.data.as_deref())?;
         warn_of_gaits(std::slice::from_ref(task), console);
-        let stop = signals::stop_flag()?;
-        tasks::run(task, place, &stop, &Reporter::new(console))?;
+        in_session(console, command.with.with(), |session| tasks::run(task, place, session))?;
         console.line(&format!("task {number} ({}): done", task.name));
     } else if what.list {
         command.list(tasks.len(), console)?;

@@ -2,14 +2,13 @@
 
 use crate::base::error::Error;
 use crate::base::remedy::Remedy;
-use crate::base::signals;
 use crate::base::text::counted;
 use crate::cli::choice;
 use crate::cli::choice::{Archives, selected};
 use crate::cli::output::console::Console;
-use crate::cli::output::reporters::Reporter;
 use crate::cli::output::teams;
 use crate::cli::values::{held_out, seed, threads};
+use crate::cli::{Resources, in_session};
 use crate::commands::team;
 use crate::commands::team::Options;
 use crate::robots::selection::{BEST, Selection};
@@ -87,13 +86,12 @@ pub(super) fn run(args: TeamArgs, console: &Console) -> Result<(), Error> {
         images: args.images,
         split: args.split,
         seed: args.seed,
-        data: args.data,
         out: args.out.unwrap_or_else(|| folder::beside_all(&archives, team::own_name(args.split))),
-        threads: args.threads.map(usize::from),
         archives,
     };
-    let stop = signals::stop_flag()?;
-    let team::Finished { file, unwritten } = team::team(&options, &stop, &Reporter::new(console))?;
+    let with = Resources::of(args.threads, args.data);
+    let team::Finished { file, unwritten } =
+        in_session(console, with, |session| team::team(&options, session))?;
     teams::team(console, &file, unwritten.is_none().then_some(options.out.as_path()))?;
     if let Some(error) = unwritten {
         return Err(error);

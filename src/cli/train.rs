@@ -1,16 +1,15 @@
 //! `morphcog train`: its words, and what it calls.
 
 use crate::base::error::Error;
-use crate::base::ranks::Ranks;
 use crate::base::remedy::Remedy;
+use crate::base::session::Session;
 use crate::base::shell::in_shell;
-use crate::base::signals;
 use crate::cli::choice;
 use crate::cli::choice::{ROBOTS, run_json, selected};
 use crate::cli::output::console::Console;
-use crate::cli::output::reporters::Reporter;
 use crate::cli::output::{summary, verdicts};
 use crate::cli::values::{seed, threads};
+use crate::cli::{Resources, in_session};
 use crate::commands::audit;
 use crate::config::audit::Criteria;
 use crate::images::whereabouts::Whereabouts;
@@ -25,7 +24,6 @@ use crate::training;
 use crate::training::{Finished, Options};
 use clap::Args;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::AtomicBool;
 
 pub(super) const EXAMPLES: &str = "\
 Examples:
@@ -93,20 +91,9 @@ pub(super) fn run(args: TrainArgs, console: &Console) -> Result<(), Error> {
         (_, true) => IfExists::Overwrite,
         _ => IfExists::Refuse,
     };
-    let options = Options {
-        archive,
-        robots,
-        groups: args.task,
-        seed: args.seed,
-        set: args.set,
-        name,
-        out,
-        if_exists,
-        data: args.data,
-        threads: args.threads.map(usize::from),
-    };
-    let stop = signals::stop_flag()?;
-    trained(&options, &stop, console)
+    let options =
+        Options { archive, robots, groups: args.task, seed: args.seed, set: args.set, name, out, if_exists };
+    trained(&options, Resources::of(args.threads, args.data), console)
 }
 
 /// Gaits that are tried if nothing else is said.
@@ -128,9 +115,9 @@ fn name(archive: &Path, [a, b]: &[Vec<u8>; 2], seed: Option<u64>) -> String {
 /// # Errors
 /// If the config has not two groups, or none that can be trained; if several processes were to share
 /// it, or its folder holds a run already.
-pub(super) fn after_evolution(evolution: &evolve::Options) -> Result<Options, Error> {
-    let evolve::Options { config, out, if_exists, data, threads, ranks, .. } = evolution;
-    if ranks.size() > 1 {
+pub(super) fn after_evolution(evolution: &evolve::Options, session: &Session) -> Result<Options, Error> {
+    let evolve::Options { config, out, if_exists, .. } = evolution;
+    if session.ranks.size() > 1 {
         let text = "--train: expected one process: several cannot share a training".to_string();
         return Err(Error::usage(text).advice("evolve first, then morphcog train without mpirun"));
     }
@@ -142,7 +129,7 @@ pub(super) fn after_evolution(evolution: &evolve::Options) -> Result<Options, Er
     let name = name(&archive, groups, None);
     let of_training = out.with_file_name(&name);
     // What would stop the training is said before gaits evolve for an hour.
-    let whereabouts = Whereabouts::given(data.as_deref()).and_of_resumed(*if_exists, &archive);
+    let whereabouts = Whereabouts::given(session.folder()).and_of_resumed(*if_exists, &archive);
     training::check(config, groups, &whereabouts)?;
     if *if_exists == IfExists::Refuse {
         folder::vacant(&of_training)?;
@@ -156,15 +143,13 @@ pub(super) fn after_evolution(evolution: &evolve::Options) -> Result<Options, Er
         set: Vec::new(),
         name,
         if_exists: *if_exists,
-        data: data.clone(),
-        threads: *threads,
     })
 }
 
 /// Trains, validates and audits, and says how it went.
-pub(super) fn trained(options: &Options, stop: &AtomicBool, console: &Console) -> Result<(), Error> {
+pub(super) fn trained(options: &Options, with: Resources, console: &Console) -> Result<(), Error> {
     choice::say_simulated([&options.archive], console);
-    let finished = training::train(options, stop, &Reporter::new(console))?;
+    let finished = in_session(console, with.clone(), |session| training::train(options, session))?;
     let Finished { validated, .. } = &finished;
     summary::training(console, &finished, &options.out);
     let Some(validated) = validated else {
@@ -180,13 +165,10 @@ pub(super) fn trained(options: &Options, stop: &AtomicBool, console: &Console) -
         seed: 1,
         criteria: Criteria::load(None, &[])?,
         fresh: false,
-        data: options.data.clone(),
         out: archive.with_file_name(AUDIT_JSON),
-        threads: options.threads,
-        ranks: Ranks::ALONE,
         archive: archive.clone(),
     };
-    let audited = audit::audit(&options, stop, &Reporter::new(console))?;
+    let audited = in_session(console, with, |session| audit::audit(&options, session))?;
     verdicts::audit(console, &audited, &options.out);
     if let Some(error) = audited.unwritten {
         return Err(error);

@@ -2,12 +2,11 @@
 
 use crate::analysis::verdict::Behaviour;
 use crate::base::error::Error;
-use crate::base::observer::{Observer, Work};
-use crate::base::ranks::Ranks;
+use crate::base::observer::Work;
 use crate::base::remedy::Remedy;
+use crate::base::session::Session;
 use crate::base::stop::Stopped;
 use crate::base::text::counted;
-use crate::base::threads::pool;
 use crate::body::Body;
 use crate::config::Config;
 use crate::config::audit::Criteria;
@@ -34,7 +33,7 @@ use crate::task::rollout::walk;
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Robots that are simulated side by side; finished ones are saved after this many.
 const BATCH: usize = 8;
@@ -55,14 +54,8 @@ pub struct Options {
     pub criteria: Criteria,
     /// Whether robots are audited again of which there are verdicts.
     pub fresh: bool,
-    /// Where the data are, if the command line says.
-    pub data: Option<PathBuf>,
     /// Where the verdicts go (audit.json; audit.csv beside it).
     pub out: PathBuf,
-    /// Number of threads; `None`: one per core.
-    pub threads: Option<usize>,
-    /// The processes that do it together; each calls [`audit`] with the same options.
-    pub ranks: Ranks,
 }
 
 /// An audit's end.
@@ -105,8 +98,8 @@ struct Trial {
 ///
 /// # Errors
 /// What is wrong with archive, data, selection or criteria.
-pub fn audit(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Result<Finished, Error> {
-    let Opened { config, fitness, training, subjects, order, mut file } = open(options)?;
+pub fn audit(options: &Options, session: &Session) -> Result<Finished, Error> {
+    let Opened { config, fitness, training, subjects, order, mut file } = open(options, session)?;
     let grouping = config.grouping()?.with_fitness(fitness);
     let trial = Trial { grouping, training, criteria: options.criteria.clone(), config };
     if let Some(earlier) = replaced::<AuditFile>(&options.out)?
@@ -130,17 +123,17 @@ pub fn audit(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> R
     let open: Vec<Subject> = subjects.into_iter().filter(is_open).collect();
     let known = asked.len() - open.len();
     let rollouts: usize = open.iter().map(|subject| 1 + trial.perturbations(subject).len()).sum();
-    let rollouts = rollouts.div_ceil(options.ranks.size());
+    let rollouts = rollouts.div_ceil(session.ranks.size());
     let label = format!("auditing {}:", counted(open.len(), "robot", "robots"));
-    observer.begins(&Work::new(label, rollouts as u64, "rollouts"));
-    let pool = pool(options.threads)?;
+    session.observer.begins(&Work::new(label, rollouts as u64, "rollouts"));
+    let pool = session.pool()?;
     let done = AtomicU64::new(0);
     let mut unwritten = Unwritten::default();
-    let ranks = options.ranks;
+    let ranks = session.ranks;
     for batch in open.chunks(BATCH * ranks.size()) {
         let own = batch.par_iter().enumerate().filter(|(place, _)| place % ranks.size() == ranks.rank());
         let own: Vec<Option<RobotAudit>> =
-            pool.install(|| own.map(|(_, subject)| trial.robot(subject, stop, &done, observer)).collect());
+            pool.install(|| own.map(|(_, subject)| trial.robot(subject, session, &done)).collect());
         let mut shares: Vec<_> = ranks.share(own).into_iter().map(Vec::into_iter).collect();
         let next =
             |place: usize| shares[place % ranks.size()].next().expect("a rank audits all of its share");
@@ -150,7 +143,7 @@ pub fn audit(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> R
             let walked = found.as_ref().map(|found| &found.displacements);
             if subject.known.is_some() && walked.is_some_and(|walked| *walked != subject.known) {
                 let text = "walks otherwise here than its run says: another version of the program made that";
-                observer.warning(&format!("{}: {text}", subject.id));
+                session.observer.warning(&format!("{}: {text}", subject.id));
             }
         }
         for found in found.into_iter().flatten() {
@@ -161,14 +154,14 @@ pub fn audit(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> R
         file.add_known(&options.out);
         file.robots.sort_by_key(|robot| order.iter().position(|id| *id == robot.id));
         if ranks.leads() && !file.robots.is_empty() {
-            unwritten.tried(file.write(&options.out), observer)?;
+            unwritten.tried(file.write(&options.out), session)?;
         }
         if stopped {
             return Ok(Finished { file, asked, known, shipped, stopped, unwritten: unwritten.error() });
         }
     }
     if ranks.leads() {
-        unwritten.tried(file.write(&options.out), observer)?;
+        unwritten.tried(file.write(&options.out), session)?;
     }
     Ok(Finished { file, asked, known, shipped, stopped: false, unwritten: unwritten.error() })
 }
@@ -186,13 +179,13 @@ struct Opened {
     file: AuditFile,
 }
 
-fn open(options: &Options) -> Result<Opened, Error> {
+fn open(options: &Options, session: &Session) -> Result<Opened, Error> {
     let path = &options.archive;
     let source = robots::open(path)?;
     source.has_task()?;
     let run = &source.run;
     check_out(&options.out, path, AUDIT_JSON)?;
-    let whereabouts = Whereabouts::given(options.data.as_deref()).and_of(path);
+    let whereabouts = Whereabouts::given(session.folder()).and_of(path);
     let training = training_of(run, path, &whereabouts)?;
     // A training may have shown images otherwise than the protocol says, which is what is judged;
     // of published robots only the fitness is known.
@@ -243,15 +236,9 @@ impl Trial {
     }
 
     /// One robot's audit; `None` if stopped before its end.
-    fn robot(
-        &self,
-        subject: &Subject,
-        stop: &AtomicBool,
-        done: &AtomicU64,
-        observer: &dyn Observer,
-    ) -> Option<RobotAudit> {
+    fn robot(&self, subject: &Subject, session: &Session, done: &AtomicU64) -> Option<RobotAudit> {
         let count = |rollouts: usize| {
-            observer.progress(done.fetch_add(rollouts as u64, Ordering::Relaxed) + rollouts as u64);
+            session.observer.progress(done.fetch_add(rollouts as u64, Ordering::Relaxed) + rollouts as u64);
         };
         let setting = Setting {
             body: subject.body.clone(),
@@ -261,7 +248,9 @@ impl Trial {
         };
         let system = Arc::new(System::new(&setting.body, setting.physics.clone()));
         let plain =
-            StepError::outcome(walk(&system, &setting.protocol, &setting.stimuli, true, stop)).ok()?.ok();
+            StepError::outcome(walk(&system, &setting.protocol, &setting.stimuli, true, session.stop))
+                .ok()?
+                .ok();
         count(1);
         let (displacements, energy) = plain.map_or((None, Energy::default()), |(d, e)| (Some(d), e));
         let classes: Vec<u8> = self.training.images.iter().map(|image| image.label).collect();
@@ -276,7 +265,7 @@ impl Trial {
             displacements.clone().unwrap_or(still),
         );
         let rollout = |perturbation: &Perturbation| {
-            let walked = displacements_in(&perturbation.apply(&setting), stop).ok()?;
+            let walked = displacements_in(&perturbation.apply(&setting), session).ok()?;
             let walked = walked.map(|displacements| perturbation.undo(displacements));
             count(1);
             Some(behaviour.compare(perturbation.name(), perturbation.kind(), walked))
@@ -291,7 +280,7 @@ impl Trial {
                 rollouts?.into_iter().zip(&perturbations).filter(counts).map(|(rollout, _)| rollout).collect()
             }
             false => {
-                observer.skips(perturbations.len() as u64);
+                session.observer.skips(perturbations.len() as u64);
                 count(perturbations.len());
                 Vec::new()
             }
@@ -315,14 +304,14 @@ impl Trial {
 }
 
 /// Displacements in a setting; `None` if a rollout is unstable.
-fn displacements_in(setting: &Setting, stop: &AtomicBool) -> Result<Option<Vec<f64>>, Stopped> {
+fn displacements_in(setting: &Setting, session: &Session) -> Result<Option<Vec<f64>>, Stopped> {
     let Setting { body, physics, protocol, stimuli } = setting;
     if protocol.rollout == RolloutMode::Fresh {
-        let (found, _) = fresh_rollouts(body, stimuli, &[], (physics, protocol), &|_| (), stop)?;
+        let (found, _) = fresh_rollouts(body, stimuli, &[], (physics, protocol), &|_| (), session)?;
         return Ok(found.into_iter().map(Result::ok).collect());
     }
     let system = Arc::new(System::new(body, physics.clone()));
-    let walked = StepError::outcome(walk(&system, protocol, stimuli, false, stop))?;
+    let walked = StepError::outcome(walk(&system, protocol, stimuli, false, session.stop))?;
     Ok(walked.ok().map(|(displacements, _)| displacements))
 }
 
@@ -336,6 +325,7 @@ mod tests {
     use crate::store::audit::Verdict;
     use crate::store::images::{DatasetRef, ImageRef};
     use crate::task::protocol::{Protocol, RolloutMode};
+    use std::sync::atomic::AtomicBool;
 
     /// Two images, of classes 0 and 1, the first dark and the second bright, each in a fresh
     /// rollout of five cycles.
@@ -359,7 +349,7 @@ mod tests {
         let body: Body = body.parse().unwrap();
         let trial = trial(body.height(), body.width(), physics);
         let subject = Subject { id: "x".to_string(), task: task.to_string(), body, known: None };
-        trial.robot(&subject, &AtomicBool::new(false), &AtomicU64::new(0), &()).unwrap()
+        trial.robot(&subject, &Session::default(), &AtomicU64::new(0)).unwrap()
     }
 
     /// Muscles of one phase above, of the other below, a soft front and a rigid foot: it walks to
@@ -392,7 +382,9 @@ mod tests {
         let body: Body = WALKER.parse().unwrap();
         let trial = trial(body.height(), body.width(), Physics::default());
         let subject = Subject { id: "x".to_string(), task: "same way".to_string(), body, known: None };
-        assert!(trial.robot(&subject, &AtomicBool::new(true), &AtomicU64::new(0), &()).is_none());
+        assert!(
+            trial.robot(&subject, &Session::new(&AtomicBool::new(true), &()), &AtomicU64::new(0)).is_none()
+        );
     }
 
     #[test]
@@ -406,7 +398,7 @@ mod tests {
             vec![image(0.0, 0.0), image(1.0, 0.0), image(0.0, 1.0), image(1.0, 1.0), image(0.0, 0.5)];
         let Trial { config, .. } = trial(4, 6, Physics::default());
         let setting = Setting { body, physics: config.physics, protocol: config.protocol, stimuli };
-        let displacements = displacements_in(&setting, &NEVER).unwrap().unwrap();
+        let displacements = displacements_in(&setting, &Session::default()).unwrap().unwrap();
         let system = Arc::new(System::new(&setting.body, setting.physics.clone()));
         let (all, _) = walk(&system, &setting.protocol, &setting.stimuli, true, &NEVER).unwrap();
         assert_eq!(displacements, all);
@@ -415,7 +407,7 @@ mod tests {
             protocol: Protocol { rollout: RolloutMode::Sequential, ..setting.protocol.clone() },
             ..setting
         };
-        let displacements = displacements_in(&sequential, &NEVER).unwrap().unwrap();
+        let displacements = displacements_in(&sequential, &Session::default()).unwrap().unwrap();
         assert_eq!(displacements.len(), 5);
         assert_ne!(displacements[0], displacements[2], "what comes later begins elsewhere");
     }

@@ -5,11 +5,11 @@ pub(crate) mod images;
 
 use crate::base::error::{Error, ErrorKind};
 use crate::base::hash::sha256_hex;
-use crate::base::observer::{Observer, Work};
+use crate::base::observer::Work;
 use crate::base::remedy::{Invocation, Remedy};
+use crate::base::session::Session;
 use crate::base::statistics::standard_deviation;
 use crate::base::text::counted;
-use crate::base::threads::pool;
 use crate::baseline::{Kind, Pooling, Trained, curve};
 use crate::commands::capacity::images::{Images, Task};
 use crate::config::capacity::CapacityConfig;
@@ -27,7 +27,7 @@ use crate::store::unwritten::Unwritten;
 use crate::task::grouping::{self, Group};
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Endings of the figure beside the results.
 pub const FIGURES: [&str; 2] = ["svg", "png"];
@@ -41,12 +41,8 @@ pub struct Options {
     pub config: CapacityConfig,
     /// Whether only robots count that an audit found physical.
     pub physical_only: bool,
-    /// Where the data are, if the command line says.
-    pub data: Option<PathBuf>,
     /// Where the results go (capacity.json; others beside it).
     pub out: PathBuf,
-    /// Number of threads; `None`: one per core.
-    pub threads: Option<usize>,
 }
 
 /// How it ended.
@@ -63,9 +59,9 @@ pub struct Finished {
 ///
 /// # Errors
 /// What is wrong with the evaluation, the data or the settings.
-pub fn capacity(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Result<Finished, Error> {
+pub fn capacity(options: &Options, session: &Session) -> Result<Finished, Error> {
     let report = EvalFile::read(&options.eval)?;
-    let setting = comparable(&report, options, observer)?;
+    let setting = comparable(&report, options, session)?;
     let config = &options.config;
     kernel_fits(config, setting)?;
     check_out(&options.out, &options.eval, CAPACITY_JSON)?;
@@ -75,7 +71,7 @@ pub fn capacity(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -
     }
     replaced::<CapacityFile>(&options.out)?;
     let robots = robots(&report, options)?;
-    let images = Images::of(&report, setting, options)?;
+    let images = Images::of(&report, setting, options, session)?;
     let grouping = setting.task.grouping()?;
     let of_split = |split: &grouping::Split| -> Vec<&RobotReport> {
         robots.iter().copied().filter(|robot| split.is_called(&robot.task)).collect()
@@ -89,9 +85,8 @@ pub fn capacity(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -
         known,
         unkept: Unwritten::default(),
         done: AtomicU64::new(0),
-        pool: pool(options.threads)?,
-        stop,
-        observer,
+        pool: session.pool()?,
+        session,
     };
     networks.begin(&splits);
     let mut file = CapacityFile {
@@ -122,21 +117,17 @@ pub fn capacity(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -
             accuracy,
             curves,
         });
-        unwritten.tried(write(options, &file), observer)?;
+        unwritten.tried(write(options, &file), session)?;
     }
     // What was found before it was stopped is better than nothing.
     if file.stopped && !file.tasks.is_empty() {
-        unwritten.tried(write(options, &file), observer)?;
+        unwritten.tried(write(options, &file), session)?;
     }
     Ok(Finished { file, unwritten: unwritten.error().or(networks.unkept.error()) })
 }
 
 /// What the robots of an evaluation saw and did, if networks can be trained for the same.
-fn comparable<'a>(
-    report: &'a EvalFile,
-    options: &Options,
-    observer: &dyn Observer,
-) -> Result<&'a Setting, Error> {
+fn comparable<'a>(report: &'a EvalFile, options: &Options, session: &Session) -> Result<&'a Setting, Error> {
     let name = options.eval.display();
     let Some(setting) = &report.setting else {
         let text = format!("{name}: expected \"setting\": an earlier version wrote it");
@@ -165,10 +156,12 @@ fn comparable<'a>(
         && let Ok(run) = RunFile::read(&options.eval.with_file_name(RUN_JSON))
         && run.fingerprint() != of.sha256
     {
-        observer.warning(&format!("{name}: stale: the run beside it is another one, or has gone on since"));
+        session
+            .observer
+            .warning(&format!("{name}: stale: the run beside it is another one, or has gone on since"));
     }
     if report.stopped {
-        observer.warning(&format!("{name}: the evaluation was stopped before its last robot"));
+        session.observer.warning(&format!("{name}: the evaluation was stopped before its last robot"));
     }
     Ok(setting)
 }
@@ -204,9 +197,8 @@ struct Networks<'a> {
     unkept: Unwritten,
     /// Trainings that are done.
     done: AtomicU64,
-    pool: rayon::ThreadPool,
-    stop: &'a AtomicBool,
-    observer: &'a dyn Observer,
+    pool: &'a rayon::ThreadPool,
+    session: &'a Session<'a>,
 }
 
 impl Networks<'_> {
@@ -227,7 +219,7 @@ impl Networks<'_> {
         let total = (splits.len() * per_task) as u64;
         let kept = if before > 0 { format!(" ({before} known from before)") } else { String::new() };
         let label = format!("training {}{kept}:", counted(total, "network", "networks"));
-        self.observer.begins(&Work { label, total, known: before, unit: "trainings" });
+        self.session.observer.begins(&Work { label, total, known: before, unit: "trainings" });
         self.done.store(before, Ordering::Relaxed);
     }
 
@@ -253,11 +245,11 @@ impl Networks<'_> {
     /// Trains the networks of a size that are not known yet, and keeps them; whether it was not
     /// stopped.
     fn train(&mut self, samples: &Task, key: &str, size: usize) -> Result<bool, Error> {
-        let Networks { config, stop, observer, done, pool, .. } = &*self;
+        let Networks { config, session, done, pool, .. } = &*self;
         let open = self.known.of(key, size).len()..config.trainings;
         let train = |number: usize| {
-            let trained = samples.train(size, config, number, stop)?;
-            observer.progress(done.fetch_add(1, Ordering::Relaxed) + 1);
+            let trained = samples.train(size, config, number, session)?;
+            session.observer.progress(done.fetch_add(1, Ordering::Relaxed) + 1);
             Ok(trained)
         };
         let trained: Vec<Result<Trained, Error>> = pool.install(|| open.into_par_iter().map(train).collect());
@@ -275,7 +267,7 @@ impl Networks<'_> {
         }
         if !finished.is_empty() {
             self.known.extend(key, size, &finished);
-            self.unkept.tried(self.known.write(), self.observer)?;
+            self.unkept.tried(self.known.write(), self.session)?;
         }
         Ok(goes_on)
     }

@@ -3,12 +3,11 @@
 pub(crate) mod images;
 
 use crate::base::error::Error;
-use crate::base::observer::{Observer, Work};
+use crate::base::observer::Work;
 use crate::base::ranges::MOST;
-use crate::base::ranks::Ranks;
 use crate::base::remedy::Remedy;
+use crate::base::session::Session;
 use crate::base::text::counted;
-use crate::base::threads::pool;
 use crate::commands::eval::images::HeldOutImages;
 use crate::config::validation::LEAST;
 use crate::config::{Config, TaskConfig};
@@ -32,7 +31,6 @@ use crate::task::grouping::Grouping;
 use crate::task::protocol::MAX_STEPS;
 use crate::task::stimulus::StimulusParams;
 use std::path::PathBuf;
-use std::sync::atomic::{AtomicBool, AtomicU64};
 
 /// What to evaluate, and on what.
 #[derive(Clone, Debug)]
@@ -54,16 +52,10 @@ pub struct Options {
     pub threshold: f64,
     /// Actuation cycles per image.
     pub cycles: u32,
-    /// Where the data are, if the command line says.
-    pub data: Option<PathBuf>,
     /// Another dataset than the runs', whose test images are shown.
     pub dataset: Option<String>,
     /// Where the results go (eval.json; eval.csv beside it).
     pub out: PathBuf,
-    /// Number of threads; `None`: one per core.
-    pub threads: Option<usize>,
-    /// The processes that do it together; each calls [`eval`] with the same options.
-    pub ranks: Ranks,
 }
 
 /// An evaluation's end.
@@ -80,25 +72,23 @@ pub struct Finished {
 ///
 /// # Errors
 /// What is wrong with archive, data or selection.
-pub fn eval(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Result<Finished, Error> {
-    let opened = Opened::new(options)?;
+pub fn eval(options: &Options, session: &Session) -> Result<Finished, Error> {
+    let opened = Opened::new(options, session)?;
     let Opened { sources, config, grouping, wanted, dataset, steps, .. } = &opened;
     if let Some(name) = opened.other {
-        say_transposed(dataset, &config.data.of(name), observer);
+        say_transposed(dataset, &config.data.of(name), session);
     }
     let size = size_of(&sources[0].run.dataset, &config.data.dataset, dataset);
     let part = |source: &StoredRun| part_of_others(&source.run.config, size, dataset, options.split.split());
-    sources.iter().find_map(part).iter().for_each(|text| observer.warning(text));
-    let robots = skilled(options.robots.of(sources, options.seed)?, grouping, observer)?;
+    sources.iter().find_map(part).iter().for_each(|text| session.observer.warning(text));
+    let robots = skilled(options.robots.of(sources, options.seed)?, grouping, session)?;
     let shown = HeldOutImages::draw(config, sources, dataset, options)?;
     let mut report = opened.report(options, &shown);
     let tasks = robots
         .iter()
         .filter_map(|Chosen { robot, .. }| Some((robot.task.as_str(), task_of(grouping, robot)?)));
     report.baselines = shown.baselines(sources, tasks)?;
-    let pool = pool(options.threads)?;
-    let walker =
-        || HeldOutRun { config, control_steps: *steps, pool: &pool, stop, observer, done: AtomicU64::new(0) };
+    let walker = || HeldOutRun::new(config, *steps, 0, session);
     let (robots, scores): (Vec<Chosen>, Vec<Validated>) = match wanted {
         None => (robots, Vec::new()),
         Some(wanted) => {
@@ -108,7 +98,7 @@ pub fn eval(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Re
             let of_runs = others.as_ref().unwrap_or(dataset);
             let best =
                 validation::chosen(sources, &robots, &options.robots, of_runs, grouping, wanted, &walker)?;
-            let all_know = options.ranks.all(best.is_some());
+            let all_know = session.ranks.all(best.is_some());
             let Some(best) = best.filter(|_| all_know) else {
                 report.stopped = true;
                 return Ok(Finished { file: report, unwritten: None });
@@ -122,10 +112,10 @@ pub fn eval(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Re
         counted(count, "robot", "robots"),
         counted(images, "image", "images")
     );
-    let own_share = count.div_ceil(options.ranks.size());
-    observer.begins(&Work::new(label, (own_share * images) as u64, "rollouts"));
-    let testing = Testing { options, sources, grouping, shown: &shown };
-    let unwritten = testing.test(&robots, scores, &walker(), &mut report)?;
+    let own_share = count.div_ceil(session.ranks.size());
+    session.observer.begins(&Work::new(label, (own_share * images) as u64, "rollouts"));
+    let testing = Testing { session, options, sources, grouping, shown: &shown };
+    let unwritten = testing.test(&robots, scores, &walker()?, &mut report)?;
     Ok(Finished { file: report, unwritten: unwritten.error() })
 }
 
@@ -134,9 +124,9 @@ pub fn eval(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Re
 ///
 /// # Errors
 /// As of [`eval`].
-pub(crate) fn known(options: &Options) -> Result<Option<EvalFile>, Error> {
+pub(crate) fn known(options: &Options, session: &Session) -> Result<Option<EvalFile>, Error> {
     let Ok(known) = EvalFile::read(&options.out) else { return Ok(None) };
-    let opened = Opened::new(options)?;
+    let opened = Opened::new(options, session)?;
     let shown = HeldOutImages::draw(&opened.config, &opened.sources, &opened.dataset, options)?;
     let is_it = !known.stopped
         && known.head() == opened.report(options, &shown)
@@ -256,7 +246,7 @@ struct Opened<'o> {
 }
 
 impl<'o> Opened<'o> {
-    fn new(options: &'o Options) -> Result<Self, Error> {
+    fn new(options: &'o Options, session: &Session) -> Result<Self, Error> {
         let threshold = options.threshold;
         if !(0.0..=MOST).contains(&threshold) {
             return Err(Error::argument("threshold", threshold, "expected 0 or more voxel lengths"));
@@ -269,7 +259,7 @@ impl<'o> Opened<'o> {
             let text = "expected with test images only: validation images are of the runs' own data";
             return Err(Error::usage(text.to_string()).about("dataset"));
         }
-        let mut whereabouts = Whereabouts::given(options.data.as_deref());
+        let mut whereabouts = Whereabouts::given(session.folder());
         for archive in &options.archives {
             whereabouts = whereabouts.and_of(archive);
         }
@@ -316,6 +306,7 @@ fn own(
 
 /// What all robots are tested with.
 struct Testing<'a> {
+    session: &'a Session<'a>,
     options: &'a Options,
     sources: &'a [StoredRun],
     grouping: &'a Grouping,
@@ -332,8 +323,8 @@ impl Testing<'_> {
         walker: &HeldOutRun,
         report: &mut EvalFile,
     ) -> Result<Unwritten, Error> {
-        let Testing { options, sources, grouping, shown } = self;
-        let Options { ranks, threshold, .. } = options;
+        let Testing { session, options, sources, grouping, shown } = self;
+        let (ranks, threshold) = (session.ranks, &options.threshold);
         let mut scores = scores.into_iter();
         let mut left = robots.len();
         report.stopped = left > 0;
@@ -364,9 +355,8 @@ impl Testing<'_> {
                 report.conclude();
             }
             if ranks.leads() && report.robots.len() > before {
-                let written =
-                    make_room(options, report, walker.observer).and_then(|()| write(options, report));
-                unwritten.tried(written, walker.observer)?;
+                let written = make_room(options, report, session).and_then(|()| write(options, report));
+                unwritten.tried(written, session)?;
             }
             if is_stopped {
                 break;
@@ -413,7 +403,7 @@ fn wanted(options: &Options, config: &Config) -> Result<Option<validation::Wante
 fn skilled<'a>(
     robots: Vec<Chosen<'a>>,
     grouping: &Grouping,
-    observer: &dyn Observer,
+    session: &Session,
 ) -> Result<Vec<Chosen<'a>>, Error> {
     let (robots, unskilled): (Vec<Chosen>, Vec<Chosen>) =
         robots.into_iter().partition(|chosen| task_of(grouping, chosen.robot).is_some());
@@ -424,7 +414,7 @@ fn skilled<'a>(
     if let Some(chosen) = unskilled.first() {
         let count = counted(unskilled.len(), "robot that walks", "robots that walk");
         let id = &chosen.robot.id;
-        observer.warning(&format!("left out: {count} the same way for every class ({id} …)"));
+        session.observer.warning(&format!("left out: {count} the same way for every class ({id} …)"));
     }
     Ok(robots)
 }
@@ -462,10 +452,10 @@ fn same_setting(first: &StoredRun, other: &StoredRun) -> Result<(), Error> {
 }
 
 /// Sets the results of another test aside, if they are in the file.
-fn make_room(options: &Options, report: &EvalFile, observer: &dyn Observer) -> Result<(), Error> {
+fn make_room(options: &Options, report: &EvalFile, session: &Session) -> Result<(), Error> {
     let validated = |file: &EvalFile| file.robots.first()?.validation.as_ref().map(|of| of.images);
     let is_same = |known: EvalFile| known.head() == report.head() && validated(&known) == validated(report);
-    results::make_room(&options.out, || EvalFile::read(&options.out).is_ok_and(is_same), observer)
+    results::make_room(&options.out, || EvalFile::read(&options.out).is_ok_and(is_same), session)
 }
 
 fn write(options: &Options, report: &EvalFile) -> Result<(), Error> {

@@ -1,9 +1,8 @@
 //! `morphcog reproduce`: the whole paper at a chosen scale, from the first generation to its table.
 
 use crate::base::error::Error;
-use crate::base::observer::Observer;
 use crate::base::random::{Purpose, stream};
-use crate::base::ranks::Ranks;
+use crate::base::session::Session;
 use crate::base::text::counted;
 use crate::commands::plan::Plan;
 use crate::commands::table::Row;
@@ -26,7 +25,7 @@ use crate::store::run::StoredRun;
 use crate::task::direction;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::Ordering;
 
 /// What to reproduce, and where to.
 #[derive(Clone, Debug)]
@@ -88,17 +87,17 @@ pub fn tasks(plan: &Plan, scale: f64) -> Result<Vec<Task>, Error> {
 ///
 /// # Errors
 /// Of what is wrong.
-pub fn reproduce(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Result<Finished, Error> {
+pub fn reproduce(options: &Options, session: &Session) -> Result<Finished, Error> {
     let tasks = tasks(&options.plan, options.scale)?;
     let place = &options.place;
     tasks::check_folders(&tasks, place).map_err(|mut refused| refused.swap_remove(0))?;
     let plan = options.plan.at(options.scale);
     let experiments = plan.experiments()?;
     for (_, config) in &experiments {
-        let dataset = Whereabouts::given(place.data.as_deref()).load(&config.data, &Split::ALL)?;
+        let dataset = Whereabouts::given(session.folder()).load(&config.data, &Split::ALL)?;
         check_test(config, &dataset, HowMany::Evenly(plan.images), "images")?;
     }
-    let runs = tasks::run_all(&tasks, place, options.jobs, stop, observer)?;
+    let runs = tasks::run_all(&tasks, place, options.jobs, session)?;
     let (rows, capacities) = (Vec::new(), Vec::new());
     let stopped = runs.done < tasks.len();
     let mut finished = Finished { runs, rows, files: Vec::new(), capacities, stopped, unwritten: None };
@@ -112,7 +111,7 @@ pub fn reproduce(options: &Options, stop: &AtomicBool, observer: &dyn Observer) 
             return Err(another(&folder, &differing));
         }
     }
-    let job = Job { place, plan: &plan, stop, observer };
+    let job = Job { place, plan: &plan, session };
     for (name, config) in &experiments {
         let Some((found, networks)) = job.experiment(name, config)? else {
             return Ok(Finished { stopped: true, ..finished });
@@ -137,8 +136,7 @@ type Experienced = (Vec<Row>, Option<(PathBuf, CapacityFile)>);
 struct Job<'a> {
     place: &'a Place,
     plan: &'a Plan,
-    stop: &'a AtomicBool,
-    observer: &'a dyn Observer,
+    session: &'a Session<'a>,
 }
 
 impl Job<'_> {
@@ -158,21 +156,21 @@ impl Job<'_> {
             (row.physical, row.audited) = audited.get(&row.task).copied().unwrap_or((0, 0));
         }
         if chosen.is_empty() {
-            self.observer.note(&format!("{name}: every robot exploits the simulator: nothing to test"));
+            self.session
+                .observer
+                .note(&format!("{name}: every robot exploits the simulator: nothing to test"));
             return Ok(Some((rows, None)));
         }
         let path = self.place.out.join(format!("{name}-eval.json"));
         let Some(report) = self.tested(name, &path, &sources, &chosen)? else { return Ok(None) };
-        self.observer.note(&format!("{name}: networks"));
+        self.session.observer.note(&format!("{name}: networks"));
         let options = capacity::Options {
             eval: path.clone(),
             config: self.plan.capacity.clone(),
             physical_only: false,
-            data: self.place.data.clone(),
             out: self.place.out.join(format!("{name}-capacity.json")),
-            threads: self.place.threads,
         };
-        let finished = capacity::capacity(&options, self.stop, self.observer)?;
+        let finished = capacity::capacity(&options, self.session)?;
         let file = written(finished.file, finished.unwritten)?;
         if file.stopped {
             return Ok(None);
@@ -199,7 +197,9 @@ impl Job<'_> {
                     break;
                 }
                 let drawn: Vec<Chosen> = turn.iter().map(|&index| of_task[index]).collect();
-                self.observer.note(&format!("{task}: audit of {}", counted(drawn.len(), "robot", "robots")));
+                self.session
+                    .observer
+                    .note(&format!("{task}: audit of {}", counted(drawn.len(), "robot", "robots")));
                 let Some(verdicts) = self.audited(sources, &drawn)? else { return Ok(None) };
                 for (candidate, verdict) in drawn.into_iter().zip(verdicts) {
                     if physical.len() >= self.plan.robots {
@@ -239,12 +239,9 @@ impl Job<'_> {
                 seed: 0,
                 criteria: self.plan.audit.clone(),
                 fresh: false,
-                data: self.place.data.clone(),
                 out: source.path.with_file_name(AUDIT_JSON),
-                threads: self.place.threads,
-                ranks: Ranks::ALONE,
             };
-            let finished = audit::audit(&options, self.stop, self.observer)?;
+            let finished = audit::audit(&options, self.session)?;
             let file = written(finished.file, finished.unwritten)?;
             if finished.stopped {
                 return Ok(None);
@@ -277,23 +274,20 @@ impl Job<'_> {
             seed: 1,
             threshold: direction::THRESHOLD,
             cycles: held_out_run::CYCLES,
-            data: self.place.data.clone(),
             dataset: None,
             out: path.to_path_buf(),
-            threads: self.place.threads,
-            ranks: Ranks::ALONE,
         };
-        if let Some(known) = eval::known(&options)? {
+        if let Some(known) = eval::known(&options, self.session)? {
             return Ok(Some(known));
         }
-        self.observer.note(&format!(
+        self.session.observer.note(&format!(
             "{name}: {} on {} test images",
             counted(chosen.len(), "robot", "robots"),
             self.plan.images
         ));
-        let finished = eval::eval(&options, self.stop, self.observer)?;
+        let finished = eval::eval(&options, self.session)?;
         let report = written(finished.file, finished.unwritten)?;
-        let is_whole = !report.stopped && !self.stop.load(Ordering::Relaxed);
+        let is_whole = !report.stopped && !self.session.stop.load(Ordering::Relaxed);
         Ok(is_whole.then_some(report))
     }
 }

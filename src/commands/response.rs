@@ -3,11 +3,10 @@
 
 use crate::base::Grid;
 use crate::base::error::{Error, ErrorKind};
-use crate::base::observer::{Observer, Work};
+use crate::base::observer::Work;
 use crate::base::remedy::Remedy;
-use crate::base::stop::check;
+use crate::base::session::Session;
 use crate::base::text::counted;
-use crate::base::threads::pool;
 use crate::body::Body;
 use crate::config::train::MOST_RANDOM_IMAGES;
 use crate::config::{Config, DataConfig, MAX_NUMBER};
@@ -40,7 +39,6 @@ use crate::task::stimulus::StimulusParams;
 use crate::training;
 use crate::training::window::Windows;
 use std::path::PathBuf;
-use std::sync::atomic::AtomicBool;
 
 /// Rollouts between two looks at how well the slopes are known, and least number of a robot's: ten
 /// under each of six conditions. Larger ones overshoot what is needed; smaller ones leave cores
@@ -75,12 +73,8 @@ pub struct Options {
     pub error: f64,
     /// Seed of the random images; `None`: that of the run, as `train` has it.
     pub seed: Option<u64>,
-    /// Where the data are, if the command line says.
-    pub data: Option<PathBuf>,
     /// Where the results go (response.json; CSV and pictures beside it).
     pub out: PathBuf,
-    /// Number of threads; `None`: one per core.
-    pub threads: Option<usize>,
 }
 
 /// A measurement's end.
@@ -117,7 +111,7 @@ struct Provenance {
 ///
 /// # Errors
 /// What is wrong with archive, robots, data or options.
-pub fn measure(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Result<Finished, Error> {
+pub fn measure(options: &Options, session: &Session) -> Result<Finished, Error> {
     check_numbers(options)?;
     let provenance = provenance(options)?;
     let config = &provenance.config;
@@ -133,9 +127,9 @@ pub fn measure(options: &Options, stop: &AtomicBool, observer: &dyn Observer) ->
     }
     check_names(options, &subjects)?;
     let seed = options.seed.unwrap_or(config.seed);
-    let task = task(options, &provenance, seed, observer)?;
+    let task = task(options, &provenance, seed, session)?;
     let probing = Probing::new(&conditions(config, options.images), seed);
-    let pool = pool(options.threads)?;
+    let pool = session.pool()?;
     let run_seed = config.seed;
     let mut file = ResponseFile {
         format: FORMAT.to_string(),
@@ -148,7 +142,7 @@ pub fn measure(options: &Options, stop: &AtomicBool, observer: &dyn Observer) ->
         unfinished: Vec::new(),
         robots: Vec::new(),
     };
-    let earlier = earlier(options, observer)?;
+    let earlier = earlier(options, session)?;
     if let Some((path, before)) = earlier.iter().find(|(path, _)| *path == options.out)
         && before.run_sha256 == provenance.sha256
         && before.setting.seed != seed
@@ -163,14 +157,14 @@ pub fn measure(options: &Options, stop: &AtomicBool, observer: &dyn Observer) ->
         return Err(error.remedy(Remedy::MeasureWithSeed(before.setting.seed)));
     }
     let measuring =
-        Measuring { options, config, probing, task, earlier, run_sha256: &provenance.sha256, seed, stop };
+        Measuring { options, config, probing, task, earlier, run_sha256: &provenance.sha256, seed, session };
     let asked: Vec<&str> = subjects.iter().map(|subject| subject.id.as_str()).collect();
     let drawn = pictures(&options.out, &asked);
     if !subjects.is_empty() {
         let known: usize = subjects.iter().map(|subject| measuring.known(&subject.gait).0.len()).sum();
         let kept = if known > 0 { format!(" ({known} rollouts known from before)") } else { String::new() };
         let label = format!("measuring {}{kept}:", counted(subjects.len(), "robot", "robots"));
-        observer.begins(&Work::new(label, (subjects.len() * options.images) as u64, "rollouts"));
+        session.observer.begins(&Work::new(label, (subjects.len() * options.images) as u64, "rollouts"));
     }
     let mut unwritten = Unwritten::default();
     let mut stopped = false;
@@ -178,8 +172,8 @@ pub fn measure(options: &Options, stop: &AtomicBool, observer: &dyn Observer) ->
         let mut displacements = Vec::new();
         let found = pool.install(|| {
             measuring.robot(subject, &mut displacements, &mut |rollouts, skipped| {
-                observer.skips(skipped as u64);
-                observer.progress((number * options.images + rollouts) as u64);
+                session.observer.skips(skipped as u64);
+                session.observer.progress((number * options.images + rollouts) as u64);
             })
         });
         match found {
@@ -205,7 +199,7 @@ pub fn measure(options: &Options, stop: &AtomicBool, observer: &dyn Observer) ->
             let outdated = asked.iter().zip(&drawn).filter(|(id, _)| is_new(id));
             let outdated: Vec<[PathBuf; 2]> = outdated.map(|(_, files)| files.clone()).collect();
             let written = whole.and_then(|whole| whole.write(&options.out, &outdated));
-            unwritten.tried(written, observer)?;
+            unwritten.tried(written, session)?;
         }
         if stopped {
             break;
@@ -221,7 +215,7 @@ pub fn measure(options: &Options, stop: &AtomicBool, observer: &dyn Observer) ->
             }
         });
     }
-    refused.iter().for_each(|error| observer.warning(&format!("{error}; left out")));
+    refused.iter().for_each(|error| session.observer.warning(&format!("{error}; left out")));
     let ids: Vec<&str> = file.robots.iter().map(|robot| robot.id.as_str()).collect();
     let pictures = pictures(&options.out, &ids);
     Ok(Finished { pictures, file, stopped, unwritten: unwritten.error() })
@@ -293,11 +287,11 @@ fn task(
     options: &Options,
     provenance: &Provenance,
     seed: u64,
-    observer: &dyn Observer,
+    session: &Session,
 ) -> Result<Option<Task>, Error> {
     let Some(groups) = &options.task else { return Ok(None) };
     let config = training::config_of(&provenance.config, groups.classes(), Some(seed), &options.set)?;
-    let whereabouts = Whereabouts::given(options.data.as_deref()).and_of(&options.archive);
+    let whereabouts = Whereabouts::given(session.folder()).and_of(&options.archive);
     same_walks(&provenance.config, &config)?;
     let data = |config: &Config| {
         let DataConfig { dataset, dir, transpose, builtin, .. } = &config.data;
@@ -306,9 +300,9 @@ fn task(
     let of_run = Some(&provenance.dataset).filter(|_| data(&config) == data(&provenance.config));
     let dataset = load_dataset_of(of_run, &config, &whereabouts, &[Split::Train])?;
     training::check_groups(groups, &dataset)?;
-    say_transposed(&dataset, &config.data, observer);
+    say_transposed(&dataset, &config.data, session);
     let config =
-        training::sized(config, &provenance.dataset, &provenance.config, &dataset, &options.set, observer);
+        training::sized(config, &provenance.dataset, &provenance.config, &dataset, &options.set, session);
     let classes = groups.classes().concat();
     let per_class = IMAGES_PER_CLASS.min(scarcest(&dataset, &classes, LEAST_PER_CLASS)?);
     let failed = |error: DatasetError| Error::input(error.to_string());
@@ -375,13 +369,13 @@ impl Task {
         gait: &Gait,
         response: &Response,
         shown: &[Shown],
-        stop: &AtomicBool,
+        session: &Session,
     ) -> Result<Option<Taught>, Error> {
         let config = &self.config;
         let (mut stimulus, mut margin) = (config.stimulus, None);
         if config.train.windows > 0 {
             let windows = Windows::of(config, &self.dataset, &self.images, self.groups.classes())?;
-            let found = windows.best(gait, response, stop, &|_| ())?;
+            let found = windows.best(gait, response, session, &|_| ())?;
             stimulus.margin = found.margins;
             margin = Some(found.margins);
         }
@@ -392,7 +386,8 @@ impl Task {
             Ok(Example { right, weight, ..Example::new(gait, &seen, &config.physics) })
         };
         let examples = self.images.iter().zip(ways).map(example).collect::<Result<Vec<Example>, Error>>()?;
-        let found = teachable(shown, response.scatter, &examples, direction::THRESHOLD, config.seed, stop)?;
+        let found =
+            teachable(shown, response.scatter, &examples, direction::THRESHOLD, config.seed, session)?;
         Ok(found.map(|teachable| Taught { margin, ..teachable.into() }))
     }
 }
@@ -407,17 +402,17 @@ struct Measuring<'a> {
     earlier: Vec<(PathBuf, ResponseFile)>,
     run_sha256: &'a str,
     seed: u64,
-    stop: &'a AtomicBool,
+    session: &'a Session<'a>,
 }
 
 /// What was measured before and might be measured again: in the results' file, and beside the run.
 ///
 /// # Errors
 /// If the results' file cannot be read.
-fn earlier(options: &Options, observer: &dyn Observer) -> Result<Vec<(PathBuf, ResponseFile)>, Error> {
+fn earlier(options: &Options, session: &Session) -> Result<Vec<(PathBuf, ResponseFile)>, Error> {
     let out = replaced(&options.out)?.map(|file| (options.out.clone(), file));
     let beside = Some(options.archive.with_file_name(RESPONSE_JSON)).filter(|beside| *beside != options.out);
-    let beside = beside.and_then(|path| ResponseFile::found(&path, observer).map(|file| (path, file)));
+    let beside = beside.and_then(|path| ResponseFile::found(&path, session).map(|file| (path, file)));
     Ok(beside.into_iter().chain(out).collect())
 }
 
@@ -443,7 +438,7 @@ impl Measuring<'_> {
         displacements: &mut Vec<Option<f64>>,
         progress: &mut dyn FnMut(usize, usize),
     ) -> Result<Option<RobotResponse>, Error> {
-        let Measuring { options, config, probing, stop, .. } = self;
+        let Measuring { options, config, probing, session, .. } = self;
         let (known, ended) = self.known(gait);
         let mut shown: Vec<Shown> = Vec::new();
         // What an earlier measurement ended with costs nothing: it is taken whole, and first. One
@@ -463,14 +458,14 @@ impl Measuring<'_> {
                     &conditions[known.len()..],
                     (&config.physics, &config.protocol),
                     &|_| (),
-                    stop,
+                    session,
                 );
                 displacements.extend(rolled.into_iter().map(Result::ok));
                 ended?;
                 Ok::<_, Error>(displacements[before..].to_vec())
             })?);
             progress(rollouts.min(options.images), known.len().min(options.images));
-            check(stop)?;
+            session.check()?;
             let Some(response) = probing::response(&shown, rollouts) else { return Ok(None) };
             let ended_by = if response.relative_error() <= options.error {
                 EndedBy::Error
@@ -481,7 +476,7 @@ impl Measuring<'_> {
             };
             progress(options.images, options.images - rollouts.min(options.images));
             let taught =
-                self.task.as_ref().map(|task| task.taught(gait, &response, &shown, stop)).transpose()?;
+                self.task.as_ref().map(|task| task.taught(gait, &response, &shown, session)).transpose()?;
             let taught = taught.flatten();
             let displacements = std::mem::take(displacements);
             return Ok(Some(RobotResponse::new(id, gait, &response, displacements, ended_by, taught)));

@@ -3,7 +3,7 @@
 use crate::base::Grid;
 use crate::base::error::{Error, ErrorKind};
 use crate::base::files::{read_given, read_limited, write_whole};
-use crate::base::stop::check;
+use crate::base::session::Session;
 use crate::body::Body;
 use crate::config::reading;
 use crate::sim::{Physics, Start, System, World};
@@ -14,7 +14,6 @@ use serde::{Deserialize, Deserializer};
 use std::fmt;
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
-use std::sync::atomic::AtomicBool;
 
 /// A body, what it sees, and for how long.
 #[derive(Debug, Deserialize)]
@@ -260,7 +259,7 @@ pub fn simulate(
 /// # Errors
 /// As [`Scenario::read`] and [`simulate`], and if the file cannot be written, or is the scenario's; if
 /// it was stopped: the file is then as it was.
-pub fn to_file(from: &Path, points: bool, path: &Path, stop: &AtomicBool) -> Result<(), Error> {
+pub fn to_file(from: &Path, points: bool, path: &Path, session: &Session) -> Result<(), Error> {
     let scenario = &Scenario::read(from)?;
     if path.exists() && path.canonicalize().ok() == from.canonicalize().ok() {
         let text = "expected another name: this would overwrite the scenario";
@@ -272,7 +271,7 @@ pub fn to_file(from: &Path, points: bool, path: &Path, stop: &AtomicBool) -> Res
     let written = write_whole(path, |file| {
         let (mut file, mut failed) = (BufWriter::new(file), None);
         outcome = simulate(scenario, points, |line| {
-            if let Err(stopped) = check(stop) {
+            if let Err(stopped) = session.check() {
                 failed = Some(io::Error::new(io::ErrorKind::Interrupted, stopped));
                 return Err(stopped.into());
             }

@@ -4,10 +4,10 @@
 use crate::analysis::votes::{Accuracy, Ballot, CLIP};
 use crate::base::Grid;
 use crate::base::error::Error;
-use crate::base::observer::{Observer, Work};
+use crate::base::observer::Work;
 use crate::base::remedy::Remedy;
+use crate::base::session::Session;
 use crate::base::text::counted;
-use crate::base::threads::pool;
 use crate::baseline::linear::{Labelled, Linear, Moments};
 use crate::baseline::nearest::nearest;
 use crate::commands::eval::images::chosen_by;
@@ -33,7 +33,6 @@ use crate::task::judge::Judge;
 use rayon::prelude::*;
 use std::collections::BTreeSet;
 use std::path::PathBuf;
-use std::sync::atomic::{AtomicBool, AtomicU64};
 
 /// Who is in the team, and what it is shown.
 #[derive(Clone, Debug)]
@@ -51,12 +50,8 @@ pub struct Options {
     pub split: HeldOut,
     /// Seed of what is drawn: images, and robots with `random:N`.
     pub seed: u64,
-    /// Where the data are, if the command line says.
-    pub data: Option<PathBuf>,
     /// Where the results go (team.json; team.csv beside it).
     pub out: PathBuf,
-    /// Number of threads; `None`: one per core.
-    pub threads: Option<usize>,
 }
 
 /// A test's end.
@@ -73,7 +68,7 @@ pub struct Finished {
 ///
 /// # Errors
 /// If robots and classes do not go together; what is wrong with archive, data or selection.
-pub fn team(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Result<Finished, Error> {
+pub fn team(options: &Options, session: &Session) -> Result<Finished, Error> {
     let archives = options.archives.iter();
     let sources = archives.map(|path| StoredRun::read(path)).collect::<Result<Vec<StoredRun>, Error>>()?;
     let Some(first) = sources.first() else {
@@ -87,7 +82,7 @@ pub fn team(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Re
     }
     different(sources.iter().map(|source| (source.path.as_path(), &source.run)))?;
     let robots = chosen(options, &sources)?;
-    let mut whereabouts = Whereabouts::given(options.data.as_deref());
+    let mut whereabouts = Whereabouts::given(session.folder());
     for archive in &options.archives {
         whereabouts = whereabouts.and_of(archive);
     }
@@ -95,7 +90,7 @@ pub fn team(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Re
     let dataset = load_dataset_of(Some(&first.run.dataset), config, &whereabouts, &Split::ALL)?;
     let (size, split) = (dataset.size(Split::Train), options.split.split());
     let said = sources.iter().find_map(|other| part_of_others(&other.run.config, size, &dataset, split));
-    said.iter().for_each(|text| observer.warning(text));
+    said.iter().for_each(|text| session.observer.warning(text));
     let classes = classes(options, &dataset)?;
     let splits = robots.iter().map(|chosen| split_of(&sources[chosen.source], chosen));
     let splits = splits.collect::<Result<Vec<grouping::Split>, Error>>()?;
@@ -143,8 +138,8 @@ pub fn team(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Re
         counted(robots.len(), "robot", "robots")
     );
     let [total, mut done] = [robots.len(), before].map(|robots| (robots * images.len()) as u64);
-    observer.begins(&Work { label, total, known: done, unit: "rollouts" });
-    let (pool, mut unwritten) = (pool(options.threads)?, Unwritten::default());
+    session.observer.begins(&Work { label, total, known: done, unit: "rollouts" });
+    let (pool, mut unwritten) = (session.pool()?, Unwritten::default());
     for (place, (chosen, of_robot)) in robots.iter().zip(&splits).enumerate() {
         if members[place].is_some() {
             continue;
@@ -152,8 +147,7 @@ pub fn team(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Re
         let run = &sources[chosen.source].run;
         let stimuli = see_all(&run.config, &dataset, split, &images)?;
         let control_steps = control_steps(&run.config, CYCLES);
-        let (config, done_before) = (&run.config, AtomicU64::new(done));
-        let walker = HeldOutRun { config, control_steps, pool: &pool, stop, observer, done: done_before };
+        let walker = HeldOutRun::new(&run.config, control_steps, done, session)?;
         let Some((displacements, _)) = walker.rollouts(chosen.robot, &stimuli) else {
             file.members = members.into_iter().flatten().collect();
             return Ok(Finished { file, unwritten: unwritten.error() });
@@ -163,12 +157,12 @@ pub fn team(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Re
             Trial { run, robot: chosen.robot, split: of_robot, images: &images, threshold: THRESHOLD };
         members[place] = Some(Member::new(&trial, &hashes[chosen.source], displacements));
         file.members = members.iter().flatten().cloned().collect();
-        unwritten.tried(write(options, &file, observer), observer)?;
+        unwritten.tried(write(options, &file, session), session)?;
     }
     file.members = members.into_iter().flatten().collect();
     file.baselines = pool.install(|| baselines(&file, (&sources, &robots, &splits), &dataset, split))?;
     file.answers = Some(file.decided());
-    unwritten.tried(write(options, &file, observer), observer)?;
+    unwritten.tried(write(options, &file, session), session)?;
     Ok(Finished { file, unwritten: unwritten.error() })
 }
 
@@ -291,9 +285,9 @@ fn known(options: &Options, now: &TeamFile) -> Result<Vec<Member>, Error> {
 }
 
 /// Writes what is known so far; the results of another test that are in the file are set aside.
-fn write(options: &Options, file: &TeamFile, observer: &dyn Observer) -> Result<(), Error> {
+fn write(options: &Options, file: &TeamFile, session: &Session) -> Result<(), Error> {
     let is_same = || TeamFile::read(&options.out).is_ok_and(|known| is_same(&known, file));
-    results::make_room(&options.out, is_same, observer)?;
+    results::make_room(&options.out, is_same, session)?;
     file.write(&options.out)
 }
 

@@ -5,9 +5,10 @@
 use crate::base::error::{Error, is_full};
 use crate::base::files::{read_bytes, write_atomically};
 use crate::base::hash::sha256_hex;
-use crate::base::observer::{Observer, Work};
+use crate::base::observer::Work;
 use crate::base::remedy::Remedy;
-use crate::base::stop::{self, Stopped};
+use crate::base::session::Session;
+use crate::base::stop::Stopped;
 use crate::base::threads;
 use crate::data::catalogue::{Catalogue, RemoteFile};
 use crate::data::files::default_folder;
@@ -15,7 +16,6 @@ use crate::data::idx;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
-use std::sync::atomic::AtomicBool;
 use std::sync::mpsc::{self, Receiver, RecvTimeoutError};
 use std::time::{Duration, Instant};
 
@@ -243,8 +243,7 @@ pub fn fetch(
     catalogue: &Catalogue,
     options: &FetchOptions,
     programs: &[Program],
-    stop: &AtomicBool,
-    observer: &dyn Observer,
+    session: &Session,
 ) -> Result<Vec<Fetched>, FetchError> {
     let folder = options.to.clone().unwrap_or_else(|| default_folder(&catalogue.name));
     let mirrors = options.mirror.as_ref().map_or(catalogue.mirrors.as_slice(), std::slice::from_ref);
@@ -265,7 +264,7 @@ pub fn fetch(
     std::fs::create_dir_all(&folder).map_err(|source| disk(&folder, source))?;
     let bring = |remote: &RemoteFile| -> Result<Fetched, FetchError> {
         let program = program.expect("without one, nothing is missing");
-        let (url, bytes) = from_any(program, mirrors, remote, stop, observer)?.map_err(|attempts| {
+        let (url, bytes) = from_any(program, mirrors, remote, session)?.map_err(|attempts| {
             FetchError::Mirrors { file: remote.name.clone(), folder: folder.clone(), attempts }
         })?;
         let file = folder.join(&remote.name);
@@ -330,20 +329,19 @@ fn from_any(
     program: Program,
     mirrors: &[String],
     remote: &RemoteFile,
-    stop: &AtomicBool,
-    observer: &dyn Observer,
+    session: &Session,
 ) -> Result<Downloaded, Stopped> {
     let mut attempts = Vec::new();
     for mirror in mirrors {
         let url = address(mirror, remote);
-        observer.begins(&Work::new(remote.name.clone(), remote.bytes, "bytes"));
-        let downloaded = download(program, &url, remote, stop, observer);
+        session.observer.begins(&Work::new(remote.name.clone(), remote.bytes, "bytes"));
+        let downloaded = download(program, &url, remote, session);
         // A signal from the keyboard ends the program, too.
-        stop::check(stop)?;
+        session.check()?;
         match downloaded {
             Ok(bytes) => {
                 if !attempts.is_empty() {
-                    observer.warning(&format!("{}: {}", remote.name, tried(&attempts)));
+                    session.observer.warning(&format!("{}: {}", remote.name, tried(&attempts)));
                 }
                 return Ok(Ok((url, bytes)));
             }
@@ -369,8 +367,7 @@ fn download(
     program: Program,
     url: &str,
     remote: &RemoteFile,
-    stop: &AtomicBool,
-    observer: &dyn Observer,
+    session: &Session,
 ) -> Result<Vec<u8>, AttemptError> {
     let scheme = url.split("://").next().unwrap_or_default().to_ascii_lowercase();
     if !["http", "https"].contains(&scheme.as_str()) {
@@ -390,8 +387,8 @@ fn download(
             Err(RecvTimeoutError::Timeout) => (),
             Err(RecvTimeoutError::Disconnected) => break,
         }
-        observer.progress(bytes.len() as u64);
-        if stop::check(stop).is_err() {
+        session.observer.progress(bytes.len() as u64);
+        if session.check().is_err() {
             return Err(failed(Stopped.to_string()));
         }
         if begin.elapsed() > LONGEST {

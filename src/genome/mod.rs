@@ -11,7 +11,8 @@ mod voxels;
 
 use crate::base::hash;
 use crate::base::random::Stream;
-use crate::base::stop::{NEVER, Stopped, check};
+use crate::base::session::Session;
+use crate::base::stop::Stopped;
 use crate::body::{Body, BodyError};
 pub use cppn::Cppn;
 pub use edits::{EditError, Edits};
@@ -19,7 +20,6 @@ pub use file::CppnError;
 pub use params::MutationParams;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use std::sync::atomic::AtomicBool;
 pub use voxels::other_voxel;
 
 /// What evolution varies: a network that describes a body, and single voxels in which the body
@@ -155,7 +155,7 @@ impl Genome {
         params: &MutationParams,
         rng: &mut Stream,
     ) -> Result<(Genome, Body), GenomeError> {
-        self.offspring_unless(spec, params, rng, &NEVER)
+        self.offspring_unless(spec, params, rng, &Session::default())
     }
 
     /// The same, unless `stop` is set meanwhile.
@@ -167,17 +167,17 @@ impl Genome {
         spec: BodySpec,
         params: &MutationParams,
         rng: &mut Stream,
-        stop: &AtomicBool,
+        session: &Session,
     ) -> Result<(Genome, Body), GenomeError> {
         // Without voxel mutations nothing is drawn, and runs are what they were before there were
         // any.
         if params.voxel_mutations == 0.0 || rng.unit() >= params.voxel_mutations {
-            return self.with_mutated_network(spec, params, rng, stop);
+            return self.with_mutated_network(spec, params, rng, session);
         }
         let described = self.cppn.express(spec.height, spec.width)?;
-        match self.with_voxels_changed(&described, spec, params, rng, stop) {
+        match self.with_voxels_changed(&described, spec, params, rng, session) {
             // No valid body was hit in all those draws.
-            Err(GenomeError::NoValidBody { .. }) => self.with_mutated_network(spec, params, rng, stop),
+            Err(GenomeError::NoValidBody { .. }) => self.with_mutated_network(spec, params, rng, session),
             changed => changed,
         }
     }
@@ -187,7 +187,7 @@ impl Genome {
         spec: BodySpec,
         params: &MutationParams,
         rng: &mut Stream,
-        stop: &AtomicBool,
+        session: &Session,
     ) -> Result<(Genome, Body), GenomeError> {
         let BodySpec { height, width, min_muscles } = spec;
         let mutations = if min_muscles > height.saturating_mul(width) { 0 } else { MAX_MUTATIONS };
@@ -196,7 +196,7 @@ impl Genome {
             // What is quick is done all the same: a run that is stopped as it begins has its
             // folder.
             if number % MUTATIONS_AT_ONCE == 0 {
-                check(stop)?;
+                session.check()?;
             }
             genome.mutate(params, rng);
             let body = genome.body(height, width)?;
@@ -216,7 +216,7 @@ impl Genome {
         params: &MutationParams,
         rng: &mut Stream,
     ) -> Result<(Genome, Body), GenomeError> {
-        Genome::random_unless(spec, params, rng, &NEVER)
+        Genome::random_unless(spec, params, rng, &Session::default())
     }
 
     /// The same, unless `stop` is set meanwhile.
@@ -227,9 +227,9 @@ impl Genome {
         spec: BodySpec,
         params: &MutationParams,
         rng: &mut Stream,
-        stop: &AtomicBool,
+        session: &Session,
     ) -> Result<(Genome, Body), GenomeError> {
-        Genome::initial().with_mutated_network(spec, params, rng, stop)
+        Genome::initial().with_mutated_network(spec, params, rng, session)
     }
 }
 

@@ -2,10 +2,9 @@
 
 use crate::base::Grid;
 use crate::base::random::Stream;
-use crate::base::stop::check;
+use crate::base::session::Session;
 use crate::body::{Body, Material};
 use crate::genome::{BodySpec, Edits, Genome, GenomeError, MAX_MUTATIONS, MutationParams};
-use std::sync::atomic::AtomicBool;
 
 impl Genome {
     /// A copy with as many voxels changed as is drawn ([`MutationParams::voxel_changes`]), with its
@@ -16,14 +15,14 @@ impl Genome {
         spec: BodySpec,
         params: &MutationParams,
         rng: &mut Stream,
-        stop: &AtomicBool,
+        session: &Session,
     ) -> Result<(Genome, Body), GenomeError> {
         let most_changes = usize::from(params.voxel_changes);
         let doublings = most_changes.next_power_of_two().ilog2() as usize;
         let changes = if doublings > 0 { most_changes.min(1 << rng.below(doublings + 1)) } else { 1 };
-        let (mut edits, mut body) = one_voxel_changed(&self.edits, described, spec, rng, stop)?;
+        let (mut edits, mut body) = one_voxel_changed(&self.edits, described, spec, rng, session)?;
         for _ in 1..changes {
-            (edits, body) = one_voxel_changed(&edits, described, spec, rng, stop)?;
+            (edits, body) = one_voxel_changed(&edits, described, spec, rng, session)?;
         }
         Ok((Genome { cppn: self.cppn.clone(), edits }, body))
     }
@@ -43,12 +42,12 @@ fn one_voxel_changed(
     described: &Body,
     spec: BodySpec,
     rng: &mut Stream,
-    stop: &AtomicBool,
+    session: &Session,
 ) -> Result<(Edits, Body), GenomeError> {
     let BodySpec { height, width, min_muscles } = spec;
     let now = edits.apply(described);
     for _ in 0..MAX_MUTATIONS {
-        check(stop)?;
+        session.check()?;
         let (place, material) = other_voxel(&now, rng);
         let mut edits = edits.clone();
         edits.set(place, material, described.voxels()[place]);

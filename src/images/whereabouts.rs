@@ -4,8 +4,8 @@
 use crate::base::Grid;
 use crate::base::error::Error;
 use crate::base::files::{home_expanded, write_atomically};
-use crate::base::observer::Observer;
 use crate::base::remedy::Remedy;
+use crate::base::session::Session;
 use crate::config::{BodyConfig, Config, DataConfig, reading};
 use crate::data::dataset::{BUILTIN, Dataset, Split};
 use crate::data::files;
@@ -221,9 +221,9 @@ pub fn load_dataset_of(
 }
 
 /// Says so if images are transposed by their names alone: who stored them upright wants to know.
-pub(crate) fn say_transposed(dataset: &Dataset, config: &DataConfig, observer: &dyn Observer) {
+pub(crate) fn say_transposed(dataset: &Dataset, config: &DataConfig, session: &Session) {
     if config.transpose.is_none() && dataset.is_transposed() {
-        observer.note(&format!(
+        session.observer.note(&format!(
             "{}: EMNIST stores its images mirrored and turned, so they are transposed; \
              data.transpose = false leaves them as they are",
             dataset.name()

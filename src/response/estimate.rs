@@ -5,13 +5,13 @@
 //! and images and judged by the other (cross-fitting).
 
 use crate::base::random::{Purpose, stream};
-use crate::base::stop::{Stopped, check};
+use crate::base::session::Session;
+use crate::base::stop::Stopped;
 use crate::body::Material;
 use crate::response::lesson::{Example, Lesson};
 use crate::response::regression::{Response, Shown};
 use crate::task::fitness::ENOUGH;
 use std::f64::consts::{PI, SQRT_2};
-use std::sync::atomic::AtomicBool;
 
 /// Standard errors on either side of a 95 % interval.
 const INTERVAL: f64 = 1.96;
@@ -74,12 +74,12 @@ pub fn teachable(
     examples: &[Example],
     threshold: f64,
     seed: u64,
-    stop: &AtomicBool,
+    session: &Session,
 ) -> Result<Option<Teachable>, Stopped> {
     let Some(halves) = Half::both(shown, examples) else { return Ok(None) };
     let mut estimates = Vec::new();
     for (number, (own, other)) in (0..).zip([(&halves[0], &halves[1]), (&halves[1], &halves[0])]) {
-        check(stop)?;
+        session.check()?;
         let design = own.solved(seed, number);
         estimates.push(other.judged(&design, scatter, threshold));
     }
@@ -233,10 +233,11 @@ mod tests {
     use super::*;
     use crate::base::Grid;
     use crate::base::random::Stream;
-    use crate::base::stop::NEVER;
+
     use crate::body::Body;
     use crate::response::gait::Gait;
     use crate::sim::Physics;
+    use std::sync::atomic::AtomicBool;
 
     const THRESHOLD: f64 = 3.0;
 
@@ -330,7 +331,8 @@ mod tests {
             let mut planted = Planted::new(40, 4.0, 6.0, seed);
             let (shown, examples) = (planted.shown(240), planted.examples(400));
             let scatter = Response::of(&shown).unwrap().scatter;
-            let found = teachable(&shown, scatter, &examples, THRESHOLD, seed, &NEVER).unwrap().unwrap();
+            let found =
+                teachable(&shown, scatter, &examples, THRESHOLD, seed, &Session::default()).unwrap().unwrap();
             let halves = Half::both(&shown, &examples).unwrap();
             let others = planted.examples(2000);
             let truths = [0, 1].map(|half| {
@@ -355,7 +357,8 @@ mod tests {
         for seed in 0..20 {
             let mut planted = Planted::new(40, 0.0, 6.0, seed);
             let (shown, examples) = (planted.shown(200), planted.examples(200));
-            let found = teachable(&shown, 6.0, &examples, THRESHOLD, seed, &NEVER).unwrap().unwrap();
+            let found =
+                teachable(&shown, 6.0, &examples, THRESHOLD, seed, &Session::default()).unwrap().unwrap();
             fitness += found.fitness.value / 20.0;
             let [low, high] = found.fitness.interval();
             inside += usize::from(low <= 0.0 && 0.0 <= high);
@@ -369,11 +372,11 @@ mod tests {
     fn a_few_rollouts_say_nothing() {
         let mut planted = Planted::new(5, 1.0, 1.0, 1);
         let (shown, examples) = (planted.shown(19), planted.examples(20));
-        assert_eq!(teachable(&shown, 1.0, &examples, THRESHOLD, 1, &NEVER), Ok(None));
-        assert_eq!(teachable(&[], 1.0, &examples, THRESHOLD, 1, &NEVER), Ok(None));
+        assert_eq!(teachable(&shown, 1.0, &examples, THRESHOLD, 1, &Session::default()), Ok(None));
+        assert_eq!(teachable(&[], 1.0, &examples, THRESHOLD, 1, &Session::default()), Ok(None));
         let enough = planted.shown(20);
-        assert!(teachable(&enough, 1.0, &examples, THRESHOLD, 1, &NEVER).unwrap().is_some());
+        assert!(teachable(&enough, 1.0, &examples, THRESHOLD, 1, &Session::default()).unwrap().is_some());
         let stop = AtomicBool::new(true);
-        assert_eq!(teachable(&enough, 1.0, &examples, THRESHOLD, 1, &stop), Err(Stopped));
+        assert_eq!(teachable(&enough, 1.0, &examples, THRESHOLD, 1, &Session::new(&stop, &())), Err(Stopped));
     }
 }

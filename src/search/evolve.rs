@@ -2,12 +2,11 @@
 
 use crate::base::error::{Error, ErrorKind};
 use crate::base::files::write_atomically;
-use crate::base::observer::{Generation, Observer};
+use crate::base::observer::Generation;
 use crate::base::random::{Purpose, stream};
-use crate::base::ranks::Ranks;
 use crate::base::remedy::{Invocation, Remedy};
-use crate::base::stop::{Stopped, check};
-use crate::base::threads::pool;
+use crate::base::session::Session;
+use crate::base::stop::Stopped;
 use crate::body::Body;
 use crate::config::Config;
 use crate::data::dataset::Split;
@@ -30,7 +29,6 @@ use crate::task::evaluation::{Evaluation, Job, MayWin, Outcome, evaluate};
 use crate::task::grouping::Grouping;
 use rayon::prelude::*;
 use std::path::PathBuf;
-use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
 /// What to evolve and where to.
@@ -44,12 +42,6 @@ pub struct Options {
     pub out: PathBuf,
     /// What to do if there is a run in it.
     pub if_exists: IfExists,
-    /// Where the data are, if the command line says.
-    pub data: Option<PathBuf>,
-    /// Number of threads; `None`: one per core.
-    pub threads: Option<usize>,
-    /// The processes that do it together; each calls [`evolve`] with the same options.
-    pub ranks: Ranks,
 }
 
 /// How a session of a run ended.
@@ -89,7 +81,7 @@ impl Finished {
 ///
 /// # Errors
 /// What is wrong with config, data or folder; nothing that was there is lost.
-pub fn evolve(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Result<Finished, Error> {
+pub fn evolve(options: &Options, session: &Session) -> Result<Finished, Error> {
     let config = &options.config;
     let resumes = options.if_exists == IfExists::Resume;
     // Load, and check all that can be known before anything is written.
@@ -98,18 +90,19 @@ pub fn evolve(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> 
         return Err(Error::occupied(text)
             .remedy(Remedy::Run(Invocation::new("train").switch("resume", true), "goes on with it")));
     }
-    let whereabouts = Whereabouts::given(options.data.as_deref())
-        .and_of_resumed(options.if_exists, &options.out.join(RUN_JSON));
+    let whereabouts =
+        Whereabouts::given(session.folder()).and_of_resumed(options.if_exists, &options.out.join(RUN_JSON));
     let dataset = whereabouts.load(&config.data, &[Split::Train])?;
-    whereabouts::say_transposed(&dataset, &config.data, observer);
+    whereabouts::say_transposed(&dataset, &config.data, session);
     let size = dataset.size(Split::Train).expect("its training images were loaded just now");
     let training = Training::of(config, &dataset)?;
     held_out::check(config, &[], "data.images_per_class", &dataset)?;
-    let mutations = Mutations { seed: config.seed, spec: config.body_spec(), params: &config.genome, stop };
+    let mutations =
+        Mutations { seed: config.seed, spec: config.body_spec(), params: &config.genome, session };
     let first = mutations.random_immigrant(0, 0).map_err(unmade);
     // Open. Only the leading rank has a folder.
-    let ranks = options.ranks;
-    let open = || RunFolder::open(&options.out, options.if_exists, stop, observer);
+    let ranks = session.ranks;
+    let open = || RunFolder::open(&options.out, options.if_exists, session);
     let opened = first.and_then(|_| ranks.leads().then(open).transpose());
     // Every rank must vote, or the others block.
     let is_stopped = matches!(&opened, Err(error) if error.kind == ErrorKind::Stopped);
@@ -118,7 +111,9 @@ pub fn evolve(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> 
     }
     let folder = opened?;
     let saved = match &folder {
-        Some(folder) if resumes => resume::saved(folder, config, &training, |text| observer.warning(&text))?,
+        Some(folder) if resumes => {
+            resume::saved(folder, config, &training, |text| session.observer.warning(&text))?
+        }
         _ => None,
     };
     let saved = ranks.from_lead(saved);
@@ -126,14 +121,14 @@ pub fn evolve(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> 
         folder.write_config(config)?;
         whereabouts::remember(folder, &dataset)?;
     }
-    let pool = pool(options.threads)?;
-    let mut run = Run::new(options, training, saved)?;
+    let pool = session.pool()?;
+    let mut run = Run::new(options, session, training, saved)?;
     let mut files = match folder {
-        Some(folder) => Some(Files { metrics: metrics(&folder, run.generation, observer)?, folder }),
+        Some(folder) => Some(Files { metrics: metrics(&folder, run.generation, session)?, folder }),
         None => None,
     };
     // Evolve.
-    pool.install(|| run.evolve(&mutations, &mut files, stop, observer)).map_err(goes_on)?;
+    pool.install(|| run.evolve(&mutations, &mut files, session)).map_err(goes_on)?;
     // Write, and choose robots.
     let (file, totals) = (run.file(), run.totals());
     let is_whole = run.generation >= config.generations;
@@ -153,7 +148,7 @@ pub fn evolve(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> 
     let validated = match chooses {
         true => {
             let archive = files.folder.path().join(RUN_JSON);
-            validation::at_end(&archive, &dataset, &pool, stop, observer)?
+            validation::at_end(&archive, &dataset, session)?
         }
         false => Some(Vec::new()),
     };
@@ -163,11 +158,11 @@ pub fn evolve(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> 
 }
 
 /// The run's metrics.csv, to go on after a generation.
-fn metrics(folder: &RunFolder, generation: u64, observer: &dyn Observer) -> Result<Metrics, Error> {
+fn metrics(folder: &RunFolder, generation: u64, session: &Session) -> Result<Metrics, Error> {
     let metrics = Metrics::open(folder.path(), generation)?;
     if metrics.missing > 0 {
         let (path, missing) = (folder.path().join(METRICS).display().to_string(), metrics.missing);
-        observer.warning(&format!("{path}: {missing} of {generation} generations are missing in it"));
+        session.observer.warning(&format!("{path}: {missing} of {generation} generations are missing in it"));
     }
     Ok(metrics)
 }
@@ -204,6 +199,7 @@ fn goes_on(error: Error) -> Error {
 /// A run under way.
 struct Run<'a> {
     options: &'a Options,
+    session: &'a Session<'a>,
     training: Training,
     grouping: Grouping,
     space: DescriptorSpace,
@@ -220,7 +216,12 @@ struct Run<'a> {
 type Child = (u64, Option<usize>, Robot);
 
 impl<'a> Run<'a> {
-    fn new(options: &'a Options, training: Training, saved: Option<Checkpoint>) -> Result<Self, Error> {
+    fn new(
+        options: &'a Options,
+        session: &'a Session,
+        training: Training,
+        saved: Option<Checkpoint>,
+    ) -> Result<Self, Error> {
         let config = &options.config;
         let (archive, known, totals, generation) = match saved {
             Some(Checkpoint { run, totals, known_bodies }) => {
@@ -231,6 +232,7 @@ impl<'a> Run<'a> {
         let grouping = config.grouping()?.with_fitness(config.evaluation.fitness);
         Ok(Run {
             options,
+            session,
             training,
             space: DescriptorSpace::voxel_counts(grouping.tasks().len()),
             dimensions: Dimensions::of(config)?,
@@ -249,14 +251,13 @@ impl<'a> Run<'a> {
         &mut self,
         mutations: &Mutations,
         files: &mut Option<Files>,
-        stop: &AtomicBool,
-        observer: &dyn Observer,
+        session: &Session,
     ) -> Result<(), Error> {
         let config = &self.options.config;
         let verb = if self.generation > 0 { "going on with" } else { "evolving in" };
         let (out, dataset) = (self.options.out.display(), &self.training.dataset.name);
-        observer.note(&format!("{verb} {out}; images from {dataset}: {}", self.training.listed()));
-        observer.generation(&self.progress());
+        session.observer.note(&format!("{verb} {out}; images from {dataset}: {}", self.training.listed()));
+        session.observer.generation(&self.progress());
         let every = Duration::try_from_secs_f64(config.checkpoint.seconds).unwrap_or(Duration::MAX);
         if let Some(files) = files.as_mut().filter(|_| self.generation == 0) {
             // Somebody who watches the folder sees at once what has begun.
@@ -265,14 +266,14 @@ impl<'a> Run<'a> {
         let [mut saved, mut flushed] = [Instant::now(); 2];
         let mut cost = Duration::ZERO;
         while self.generation < config.generations {
-            match self.next_generation(mutations, stop) {
+            match self.next_generation(mutations, session) {
                 Err(error) if error.kind == ErrorKind::Stopped => break,
                 done => done?,
             }
             if let Some(files) = files {
                 files.metrics.write(self.generation - 1, &self.stats(), &self.totals())?;
             }
-            observer.generation(&self.progress());
+            session.observer.generation(&self.progress());
             let Some(files) = files else { continue };
             let is_due = saved.elapsed() >= every.max(cost * MOST_SHARE);
             if is_due || self.generation.is_multiple_of(config.checkpoint.generations) {
@@ -293,10 +294,10 @@ impl<'a> Run<'a> {
     ///
     /// # Errors
     /// Of kind [`ErrorKind::Stopped`] if it was stopped meanwhile: all is then as it was before.
-    fn next_generation(&mut self, mutations: &Mutations, stop: &AtomicBool) -> Result<(), Error> {
+    fn next_generation(&mut self, mutations: &Mutations, session: &Session) -> Result<(), Error> {
         let proposals = self.search.ask(self.generation);
         let make = |&proposal: &Proposal| {
-            check(stop)?;
+            session.check()?;
             self.search.make(proposal, mutations).map_err(unmade)
         };
         let robots = proposals.par_iter().map(make).collect::<Result<Vec<Robot>, Error>>();
@@ -306,7 +307,7 @@ impl<'a> Run<'a> {
         let count = children.len() as u64;
         let (fresh, new) = self.unknown(children);
         let saved = (count - fresh.len() as u64) * self.training.stimuli.len() as u64;
-        let evaluations = match self.scored(&fresh, stop) {
+        let evaluations = match self.scored(&fresh, session) {
             Ok(evaluations) => evaluations,
             Err(error) => {
                 new.iter().for_each(|key| self.known.remove(key));
@@ -341,7 +342,7 @@ impl<'a> Run<'a> {
     }
 
     /// Shows the training images to children, or, where a response is measured, to their probes.
-    fn scored(&self, children: &[Child], stop: &AtomicBool) -> Result<Vec<Evaluation>, Error> {
+    fn scored(&self, children: &[Child], session: &Session) -> Result<Vec<Evaluation>, Error> {
         let config = &self.options.config;
         let Training { stimuli, conditions, .. } = &self.training;
         let probes: Vec<Body> = match config.measures_response() {
@@ -353,10 +354,11 @@ impl<'a> Run<'a> {
         let mut jobs: Vec<Job> = jobs.collect();
         jobs.iter_mut().zip(&probes).for_each(|(job, probe)| job.body = probe);
         let (physics, protocol) = (&config.physics, &config.protocol);
-        let ranks = self.options.ranks;
+        let ranks = self.session.ranks;
         let sizes: Vec<u64> = jobs.iter().map(|job| job.body.counts().total as u64).collect();
-        let evaluate =
-            |jobs: &[Job]| evaluate(jobs, stimuli, conditions, physics, protocol, config.savings, stop).ok();
+        let evaluate = |jobs: &[Job]| {
+            evaluate(jobs, stimuli, conditions, physics, protocol, config.savings, session).ok()
+        };
         // A generation that one rank drops is dropped by all.
         Ok(ranks.scatter_gather(jobs, &sizes, evaluate).ok_or(Stopped)?)
     }
@@ -364,7 +366,7 @@ impl<'a> Run<'a> {
     /// What this rank made, if all ranks made theirs.
     fn together<T>(&self, own: Result<T, Error>) -> Result<T, Error> {
         let is_made = own.is_ok();
-        let are_made = self.options.ranks.share(is_made);
+        let are_made = self.session.ranks.share(is_made);
         let own = own?;
         if are_made.contains(&false) { Err(Stopped.into()) } else { Ok(own) }
     }
@@ -513,7 +515,7 @@ struct Mutations<'a> {
     spec: BodySpec,
     params: &'a MutationParams,
     /// Once set, no more are made.
-    stop: &'a AtomicBool,
+    session: &'a Session<'a>,
 }
 
 /// A robot that has not walked yet.
@@ -545,12 +547,12 @@ impl Variation<Robot> for Mutations<'_> {
 
     fn random_immigrant(&self, generation: u64, child: u64) -> Result<Robot, GenomeError> {
         let rng = &mut stream(self.seed, Purpose::RandomImmigrant, generation, child);
-        Ok(unevaluated(Genome::random_unless(self.spec, self.params, rng, self.stop)?, generation, None))
+        Ok(unevaluated(Genome::random_unless(self.spec, self.params, rng, self.session)?, generation, None))
     }
 
     fn offspring(&self, parent: &Robot, generation: u64, child: u64) -> Result<Robot, GenomeError> {
         let rng = &mut stream(self.seed, Purpose::Mutation, generation, child);
-        let made = parent.genome.offspring_unless(self.spec, self.params, rng, self.stop)?;
+        let made = parent.genome.offspring_unless(self.spec, self.params, rng, self.session)?;
         Ok(unevaluated(made, generation, Some(parent)))
     }
 }

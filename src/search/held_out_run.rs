@@ -1,14 +1,16 @@
 //! Robots are shown held-out images, as in the paper's test: each in a fresh rollout.
 
 use crate::base::Grid;
-use crate::base::observer::{Observer, Work};
+use crate::base::error::Error;
+use crate::base::observer::Work;
+use crate::base::session::Session;
 use crate::base::text::counted;
 use crate::config::Config;
 use crate::store::run::Robot;
 use crate::task::evaluation::fresh_rollouts;
 use crate::task::grouping::{self, Grouping};
 use crate::task::protocol::{Protocol, RolloutMode};
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Actuation cycles per image in the paper's test.
 pub const CYCLES: u32 = 10;
@@ -28,14 +30,25 @@ pub(crate) struct HeldOutRun<'a> {
     pub config: &'a Config,
     /// Of one showing.
     pub control_steps: u32,
-    pub pool: &'a rayon::ThreadPool,
-    pub stop: &'a AtomicBool,
-    pub observer: &'a dyn Observer,
+    pool: &'a rayon::ThreadPool,
+    pub session: &'a Session<'a>,
     /// Showings so far.
-    pub done: AtomicU64,
+    done: AtomicU64,
 }
 
-impl HeldOutRun<'_> {
+impl<'a> HeldOutRun<'a> {
+    /// Of robots of a config, each image for so many control steps; `done` rollouts were counted
+    /// before.
+    pub fn new(
+        config: &'a Config,
+        control_steps: u32,
+        done: u64,
+        session: &'a Session<'a>,
+    ) -> Result<Self, Error> {
+        let pool = session.pool()?;
+        Ok(HeldOutRun { config, control_steps, pool, session, done: AtomicU64::new(done) })
+    }
+
     /// A validation begins: number of robots, of images for the best of them, and of simulations in
     /// all.
     pub fn validating(&self, robots: usize, images: usize, showings: u64) {
@@ -44,14 +57,14 @@ impl HeldOutRun<'_> {
             counted(robots, "robot", "robots"),
             counted(images, "image", "images")
         );
-        self.observer.begins(&Work::new(label, showings, "rollouts"));
+        self.session.observer.begins(&Work::new(label, showings, "rollouts"));
     }
 
     /// The displacement under each image (`None`: unstable), and the number of rollouts it took:
     /// images that show the sensors the same pixels share a rollout. `None` if stopped before the
     /// end.
     pub fn rollouts(&self, robot: &Robot, stimuli: &[Grid<f64>]) -> Option<(Vec<Option<f64>>, usize)> {
-        let HeldOutRun { config, stop, observer, done, .. } = self;
+        let HeldOutRun { config, session, done, .. } = self;
         let protocol = Protocol {
             rollout: RolloutMode::Fresh,
             control_steps: self.control_steps,
@@ -59,12 +72,12 @@ impl HeldOutRun<'_> {
         };
         let told = |count: u64| {
             // One rollout stands for all of them.
-            observer.skips(count - 1);
-            observer.progress(done.fetch_add(count, Ordering::Relaxed) + count);
+            session.observer.skips(count - 1);
+            session.observer.progress(done.fetch_add(count, Ordering::Relaxed) + count);
         };
-        let found = self
-            .pool
-            .install(|| fresh_rollouts(&robot.body, stimuli, &[], (&config.physics, &protocol), &told, stop));
+        let found = self.pool.install(|| {
+            fresh_rollouts(&robot.body, stimuli, &[], (&config.physics, &protocol), &told, session)
+        });
         let (displacements, simulated) = found.ok()?;
         Some((displacements.into_iter().map(Result::ok).collect(), simulated))
     }

@@ -2,8 +2,8 @@
 //! which archives.
 
 use crate::base::error::Error;
-use crate::base::observer::Observer;
 use crate::base::remedy::Remedy;
+use crate::base::session::Session;
 use crate::robots;
 use crate::robots::selection::{Selection, first_physical};
 use crate::search::validation;
@@ -11,7 +11,6 @@ use crate::store::run::StoredRun;
 use crate::store::run::{Robot, different};
 use crate::store::validation::Validated;
 use std::path::PathBuf;
-use std::sync::atomic::AtomicBool;
 
 /// Which robots, and of which archives.
 #[derive(Clone, Debug)]
@@ -25,9 +24,6 @@ pub struct Options {
     pub physical_only: bool,
     /// Seed of what is drawn.
     pub seed: u64,
-    /// Where the data are, if the command line says; only a selection on validation images needs
-    /// them.
-    pub data: Option<PathBuf>,
 }
 
 /// A robot, by name.
@@ -43,7 +39,7 @@ pub struct Named {
 ///
 /// # Errors
 /// If there are none such, or a signal stopped the search for the best on validation images.
-pub fn named(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Result<Vec<Named>, Error> {
+pub fn named(options: &Options, session: &Session) -> Result<Vec<Named>, Error> {
     let Options { seed, .. } = options;
     let (archives, robots) = robots::archives(options.archives.clone(), options.robots.clone())?;
     if let (Selection::Ids(ids), [archive]) = (&robots, &archives[..]) {
@@ -60,7 +56,7 @@ pub fn named(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> R
     };
     let mut all = Vec::new();
     for source in &sources {
-        let best = ranked(options, source, count, stop, observer)?;
+        let best = ranked(options, source, count, session)?;
         all.extend(best.iter().map(|(robot, _)| name(source, robot)));
     }
     Ok(all)
@@ -71,18 +67,12 @@ fn ranked<'a>(
     options: &Options,
     source: &'a StoredRun,
     count: usize,
-    stop: &AtomicBool,
-    observer: &dyn Observer,
+    session: &Session,
 ) -> Result<Vec<(&'a Robot, Validated)>, Error> {
     // Some will not be physical: then among those that are known at the run's end.
     let known = if options.physical_only { source.run.config.validation.best } else { 0 };
-    let search = validation::Options {
-        archive: source.path.clone(),
-        best: Some(count.max(known)),
-        data: options.data.clone(),
-        threads: None,
-    };
-    let Some(best) = validation::validate(&search, stop, observer)? else {
+    let search = validation::Options { archive: source.path.clone(), best: Some(count.max(known)) };
+    let Some(best) = validation::validate(&search, session)? else {
         let text = "stopped before the robots were chosen; nothing is shown";
         return Err(Error::stopped(text.to_string()).remedy(Remedy::Repeat));
     };

@@ -7,8 +7,7 @@
 use crate::base::error::{Error, ErrorKind};
 use crate::base::files::write_atomically;
 use crate::base::hash::sha256_hex;
-use crate::base::observer::Observer;
-use crate::base::threads::pool;
+use crate::base::session::Session;
 use crate::config::Config;
 use crate::config::validation::ValidationConfig;
 use crate::data::dataset::{Dataset, Split};
@@ -29,7 +28,6 @@ use crate::task::grouping::Grouping;
 use std::collections::BTreeMap;
 use std::mem::replace;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, AtomicU64};
 
 /// A round of the choice: robots of a task that are shown more images than before.
 struct Round {
@@ -66,10 +64,6 @@ pub struct Options {
     pub archive: PathBuf,
     /// How many of each task; `None`: as the config says.
     pub best: Option<usize>,
-    /// Where the data are, if the command line says.
-    pub data: Option<PathBuf>,
-    /// Number of threads; `None`: one per core.
-    pub threads: Option<usize>,
 }
 
 /// Chooses the best robots of a run on the images of its section `[validation]`, as `eval` does it,
@@ -77,18 +71,13 @@ pub struct Options {
 ///
 /// # Errors
 /// What is wrong with run or data, or that there are not enough images.
-pub fn validate(
-    options: &Options,
-    stop: &AtomicBool,
-    observer: &dyn Observer,
-) -> Result<Option<Vec<Validated>>, Error> {
+pub fn validate(options: &Options, session: &Session) -> Result<Option<Vec<Validated>>, Error> {
     let source = StoredRun::read(&options.archive)?;
     let config = &source.run.config;
     let count = options.best.unwrap_or(config.validation.best);
-    let whereabouts = Whereabouts::given(options.data.as_deref()).and_of(&source.path);
+    let whereabouts = Whereabouts::given(session.folder()).and_of(&source.path);
     let dataset = load_dataset_of(Some(&source.run.dataset), config, &whereabouts, &[Split::Train])?;
-    let pool = pool(options.threads)?;
-    ranked(&source, count, &dataset, &pool, stop, observer)
+    ranked(&source, count, &dataset, session)
 }
 
 /// The same when a run ends, for as many robots as its config asks for, on data that are loaded
@@ -99,26 +88,22 @@ pub fn validate(
 pub(crate) fn at_end(
     archive: &Path,
     dataset: &Dataset,
-    pool: &rayon::ThreadPool,
-    stop: &AtomicBool,
-    observer: &dyn Observer,
+    session: &Session,
 ) -> Result<Option<Vec<Validated>>, Error> {
     let source = StoredRun::read(archive)?;
-    ranked(&source, source.run.config.validation.best, dataset, pool, stop, observer)
+    ranked(&source, source.run.config.validation.best, dataset, session)
 }
 
 fn ranked(
     source: &StoredRun,
     count: usize,
     dataset: &Dataset,
-    pool: &rayon::ThreadPool,
-    stop: &AtomicBool,
-    observer: &dyn Observer,
+    session: &Session,
 ) -> Result<Option<Vec<Validated>>, Error> {
     let config = &source.run.config;
     let grouping = config.grouping()?;
     let control_steps = held_out_run::control_steps(config, held_out_run::CYCLES);
-    let walker = HeldOutRun { config, control_steps, pool, stop, observer, done: AtomicU64::new(0) };
+    let walker = HeldOutRun::new(config, control_steps, 0, session)?;
     let chosen = Selection::Validated(count).of(std::slice::from_ref(source), 0)?;
     let skilled = |robot: &&Robot| held_out_run::task_of(&grouping, robot).is_some();
     let robots = chosen.iter().map(|chosen| chosen.robot).filter(skilled).collect();
@@ -140,7 +125,7 @@ pub(crate) fn chosen<'a>(
     dataset: &Dataset,
     grouping: &Grouping,
     wanted: &Wanted,
-    walker: &impl Fn() -> HeldOutRun<'a>,
+    walker: &impl Fn() -> Result<HeldOutRun<'a>, Error>,
 ) -> Result<Option<Vec<(Chosen<'a>, Validated)>>, Error> {
     let mut all = Vec::new();
     for (number, source) in sources.iter().enumerate() {
@@ -151,7 +136,7 @@ pub(crate) fn chosen<'a>(
         let count =
             if is_physical { wanted.count.max(source.run.config.validation.best) } else { wanted.count };
         let searched = Wanted { count, ..*wanted };
-        let Some(ranked) = best(source, dataset, grouping, own, &searched, &walker())? else {
+        let Some(ranked) = best(source, dataset, grouping, own, &searched, &walker()?)? else {
             return Ok(None);
         };
         let ranked = if is_physical { first_physical(ranked, source, wanted.count)? } else { ranked };
@@ -217,7 +202,7 @@ pub(crate) fn best<'a>(
         if error.kind == ErrorKind::Lost {
             return Err(error);
         }
-        walker.observer.warning(&format!("{error}; the next time robots are chosen anew"));
+        walker.session.observer.warning(&format!("{error}; the next time robots are chosen anew"));
     }
     Ok(Some(found))
 }

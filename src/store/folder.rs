@@ -2,9 +2,9 @@
 
 use crate::base::error::Error;
 use crate::base::files::{check_file, check_writable, remove_half_written, write_atomically};
-use crate::base::observer::Observer;
 use crate::base::remedy::Value;
 use crate::base::remedy::{Invocation, Remedy};
+use crate::base::session::Session;
 use crate::config::Config;
 use crate::shipped;
 use crate::shipped::read_text;
@@ -18,7 +18,6 @@ use crate::store::names::{
 use crate::store::run::RunFile;
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::AtomicBool;
 
 /// The folder in the present one that runs go to if nothing else is said.
 pub const RUNS: &str = "runs";
@@ -68,12 +67,7 @@ impl RunFolder {
     /// # Errors
     /// If another process uses it, or it holds a run and `if_exists` says to refuse, or it cannot
     /// be written, or it is stopped while it waits for a sign of life of another process.
-    pub fn open(
-        path: &Path,
-        if_exists: IfExists,
-        stop: &AtomicBool,
-        observer: &dyn Observer,
-    ) -> Result<Self, Error> {
+    pub fn open(path: &Path, if_exists: IfExists, session: &Session) -> Result<Self, Error> {
         if shipped::is_named(path) {
             let text = "expected another name: so are runs called that lie elsewhere";
             return Err(Error::argument("out", path.display(), text));
@@ -89,7 +83,7 @@ impl RunFolder {
         };
         refuse_run()?;
         let lock = path.join(LOCK);
-        let lock = Lock::take(&lock, stop, observer).map_err(|refusal| {
+        let lock = Lock::take(&lock, session).map_err(|refusal| {
             let held = format!("{}: another morphcog is using this run folder", path.display());
             refusal.into_error(&lock, &held, "wait for it to end").remedy(Remedy::ChooseOut)
         })?;

@@ -7,16 +7,15 @@
 
 use crate::base::error::Error;
 use crate::base::files::read_bytes;
-use crate::base::observer::Observer;
 use crate::base::ownership::{Lost, Ownership};
-use crate::base::stop::{Stopped, check};
+use crate::base::session::Session;
+use crate::base::stop::Stopped;
 use crate::base::threads;
 use gethostname::gethostname;
 use serde::{Deserialize, Serialize};
 use std::fs::{File, TryLockError};
 use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
-use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant, SystemTime};
@@ -144,8 +143,8 @@ impl Lock {
     ///
     /// # Errors
     /// If another process has it; if it is stopped while it waits; what the system says.
-    pub fn take(path: &Path, stop: &AtomicBool, observer: &dyn Observer) -> Result<Self, Refusal> {
-        Lock::take_in(path, DEFAULT, stop, observer)
+    pub fn take(path: &Path, session: &Session) -> Result<Self, Refusal> {
+        Lock::take_in(path, DEFAULT, session)
     }
 
     /// The same of a lock that processes on several machines want at once, as those of a cluster's
@@ -154,16 +153,11 @@ impl Lock {
     ///
     /// # Errors
     /// As [`Lock::take`].
-    pub fn take_contended(path: &Path, stop: &AtomicBool, observer: &dyn Observer) -> Result<Self, Refusal> {
-        Lock::take_in(path, LockPolicy { is_contended: true, ..DEFAULT }, stop, observer)
+    pub fn take_contended(path: &Path, session: &Session) -> Result<Self, Refusal> {
+        Lock::take_in(path, LockPolicy { is_contended: true, ..DEFAULT }, session)
     }
 
-    fn take_in(
-        path: &Path,
-        policy: LockPolicy,
-        stop: &AtomicBool,
-        observer: &dyn Observer,
-    ) -> Result<Self, Refusal> {
+    fn take_in(path: &Path, policy: LockPolicy, session: &Session) -> Result<Self, Refusal> {
         let file = File::options().create(true).truncate(false).read(true).write(true).open(path)?;
         let is_locked = lock(&file, policy)?;
         let host = gethostname().to_string_lossy().into_owned();
@@ -173,8 +167,8 @@ impl Lock {
             if !has_ended {
                 let seconds = policy.dead_after.as_secs_f64().ceil();
                 let text = format!("{before} was at work here: waiting up to {seconds} s for a sign of life");
-                observer.note(&format!("{}: {text}", path.display()));
-                if is_alive(path, &before, policy.dead_after, stop)? {
+                session.observer.note(&format!("{}: {text}", path.display()));
+                if is_alive(path, &before, policy.dead_after, session)? {
                     return Err(Refusal::Held(read(path)?));
                 }
             }
@@ -383,10 +377,10 @@ fn write(path: &Path, holder: &Holder) -> io::Result<()> {
 ///
 /// # Errors
 /// If it is stopped before it knows; what the system says.
-fn is_alive(path: &Path, before: &Holder, dead_after: Duration, stop: &AtomicBool) -> Result<bool, Refusal> {
+fn is_alive(path: &Path, before: &Holder, dead_after: Duration, session: &Session) -> Result<bool, Refusal> {
     let began = Instant::now();
     while began.elapsed() < dead_after {
-        check(stop)?;
+        session.check()?;
         match read(path)? {
             None => return Ok(false),
             Some(now) if now != *before => return Ok(true),
@@ -401,7 +395,8 @@ mod tests {
     use super::*;
     use crate::base::error::ErrorKind;
     use crate::base::files::write_atomically;
-    use crate::base::stop::NEVER;
+
+    use std::sync::atomic::AtomicBool;
 
     /// No locks of the system, and a quick heart.
     const WITHOUT: LockPolicy = LockPolicy {
@@ -433,14 +428,14 @@ mod tests {
         let path = path(&folder);
         for policy in [DEFAULT, WITHOUT] {
             assert_eq!(read(&path).ok().flatten(), None);
-            let lock = Lock::take_in(&path, policy, &NEVER, &()).unwrap();
-            let Err(Refusal::Held(Some(holder))) = Lock::take_in(&path, policy, &NEVER, &()) else {
+            let lock = Lock::take_in(&path, policy, &Session::default()).unwrap();
+            let Err(Refusal::Held(Some(holder))) = Lock::take_in(&path, policy, &Session::default()) else {
                 panic!("{policy:?}: taken twice")
             };
             assert_eq!((holder.process, &holder.host), (std::process::id(), &lock.own.host));
             drop(lock);
             assert_eq!(state(&path).unwrap(), State::Free);
-            drop(Lock::take_in(&path, policy, &NEVER, &()).unwrap());
+            drop(Lock::take_in(&path, policy, &Session::default()).unwrap());
         }
     }
 
@@ -450,12 +445,12 @@ mod tests {
         let path = path(&folder);
         elsewhere(&path);
         let began = Instant::now();
-        let lock = Lock::take_in(&path, WITHOUT, &NEVER, &()).unwrap();
+        let lock = Lock::take_in(&path, WITHOUT, &Session::default()).unwrap();
         assert!(began.elapsed() >= WITHOUT.dead_after);
         let before = read(&path).unwrap().unwrap();
         std::thread::sleep(WITHOUT.beat * 5);
         assert!(read(&path).unwrap().unwrap().beats > before.beats);
-        assert!(matches!(Lock::take_in(&path, WITHOUT, &NEVER, &()), Err(Refusal::Held(_))));
+        assert!(matches!(Lock::take_in(&path, WITHOUT, &Session::default()), Err(Refusal::Held(_))));
         drop(lock);
     }
 
@@ -476,7 +471,8 @@ mod tests {
         elsewhere(&path);
         let stop = AtomicBool::new(false);
         let observer = Stopping(&stop, Mutex::default());
-        assert!(matches!(Lock::take(&path, &stop, &observer), Err(Refusal::Stopped)));
+        let session = Session::new(&stop, &observer);
+        assert!(matches!(Lock::take(&path, &session), Err(Refusal::Stopped)));
         let notes = observer.1.into_inner().unwrap();
         assert!(matches!(&notes[..], [note] if note.contains("process 7 on another-machine")), "{notes:?}");
         // The name stays: nobody knows yet whether that process lives.
@@ -492,7 +488,7 @@ mod tests {
         write(&path, &Holder { host: host.clone(), process: 1, beats: 9 }).unwrap();
         assert!(matches!(state(&path).unwrap(), State::Stale(holder) if holder.host == host));
         let began = Instant::now();
-        let _lock = Lock::take(&path, &NEVER, &()).unwrap();
+        let _lock = Lock::take(&path, &Session::default()).unwrap();
         assert!(began.elapsed() < Duration::from_secs(5));
     }
 
@@ -541,13 +537,13 @@ mod tests {
                 std::thread::sleep(LOOK / 3);
                 elsewhere(&path);
             });
-            let Err(Refusal::Held(Some(holder))) = Lock::take_contended(&path, &NEVER, &()) else {
+            let Err(Refusal::Held(Some(holder))) = Lock::take_contended(&path, &Session::default()) else {
                 panic!("taken by two")
             };
             assert_eq!(holder.host, "another-machine");
         });
         std::fs::write(&path, "").unwrap();
-        drop(Lock::take_contended(&path, &NEVER, &()).unwrap());
+        drop(Lock::take_contended(&path, &Session::default()).unwrap());
     }
 
     #[test]
@@ -557,7 +553,7 @@ mod tests {
             let folder = tempfile::tempdir().unwrap();
             let path = path(&folder);
             let result = folder.path().join("run.json");
-            let lock = Lock::take_in(&path, WITHOUT, &NEVER, &()).unwrap();
+            let lock = Lock::take_in(&path, WITHOUT, &Session::default()).unwrap();
             std::thread::sleep(WITHOUT.beat * 3);
             write_atomically(&result, b"ours").unwrap();
             // The heart was silent for too long, and another process began.
@@ -582,7 +578,7 @@ mod tests {
         for lose in [removed, emptied] {
             let folder = tempfile::tempdir().unwrap();
             let path = path(&folder);
-            let _lock = Lock::take(&path, &NEVER, &()).unwrap();
+            let _lock = Lock::take(&path, &Session::default()).unwrap();
             lose(&path);
             let error = write_atomically(&folder.path().join("run.json"), b"{}").unwrap_err();
             assert_eq!(Lost::of(&error), Some(&Lost::Removed { lock: path }));
@@ -594,7 +590,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = path(&folder);
         std::fs::write(&path, b"\0\0\xff").unwrap();
-        let _lock = Lock::take(&path, &NEVER, &()).unwrap();
+        let _lock = Lock::take(&path, &Session::default()).unwrap();
         assert_eq!(read(&path).unwrap().unwrap().process, std::process::id());
     }
 }

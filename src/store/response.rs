@@ -2,8 +2,8 @@
 
 use crate::base::error::Error;
 use crate::base::number::is_zero;
-use crate::base::observer::Observer;
 use crate::base::ranges;
+use crate::base::session::Session;
 use crate::base::table;
 use crate::body::Body;
 use crate::response::estimate::{Estimate, Teachable};
@@ -303,11 +303,11 @@ impl ResponseFile {
     }
 
     /// The file at a path, if there is one. One that cannot be read is told, and left aside.
-    pub(crate) fn found(path: &Path, observer: &dyn Observer) -> Option<Self> {
+    pub(crate) fn found(path: &Path, session: &Session) -> Option<Self> {
         if !exists(path) {
             return None;
         }
-        let told = |error| observer.warning(&format!("{error}; responses are measured again"));
+        let told = |error| session.observer.warning(&format!("{error}; responses are measured again"));
         ResponseFile::read(path).map_err(told).ok()
     }
 

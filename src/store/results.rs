@@ -4,9 +4,9 @@
 use crate::base::error::Error;
 use crate::base::files::{read_bytes, write_atomically};
 use crate::base::hash::{sha256_hex, short};
-use crate::base::observer::Observer;
 use crate::base::ownership;
 use crate::base::remedy::{Invocation, Remedy};
+use crate::base::session::Session;
 use crate::config::reading;
 use crate::shipped::read_text;
 use serde::Serialize;
@@ -78,11 +78,7 @@ pub(crate) fn by_lines(head: &impl Serialize, list: &[impl Serialize]) -> String
 ///
 /// # Errors
 /// If it cannot be read or renamed.
-pub(crate) fn make_room(
-    path: &Path,
-    is_same: impl FnOnce() -> bool,
-    observer: &dyn Observer,
-) -> Result<(), Error> {
+pub(crate) fn make_room(path: &Path, is_same: impl FnOnce() -> bool, session: &Session) -> Result<(), Error> {
     if !path.is_file() || is_same() {
         return Ok(());
     }
@@ -103,7 +99,8 @@ pub(crate) fn make_room(
         }
     }
     let (path, aside) = (path.display(), aside(path));
-    observer
+    session
+        .observer
         .warning(&format!("{path}: held the results of another test; they are in {} now", aside.display()));
     Ok(())
 }

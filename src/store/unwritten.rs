@@ -2,7 +2,7 @@
 //! shown, and perhaps be written later.
 
 use crate::base::error::{Error, ErrorKind};
-use crate::base::observer::Observer;
+use crate::base::session::Session;
 
 /// How writing the results went the last time.
 #[derive(Debug, Default)]
@@ -13,12 +13,12 @@ impl Unwritten {
     ///
     /// # Errors
     /// If the folder is no longer this process's: to try again would not help.
-    pub fn tried(&mut self, outcome: Result<(), Error>, observer: &dyn Observer) -> Result<(), Error> {
+    pub fn tried(&mut self, outcome: Result<(), Error>, session: &Session) -> Result<(), Error> {
         if matches!(&outcome, Err(error) if error.kind == ErrorKind::Lost) {
             return outcome;
         }
         if let (Err(error), None) = (&outcome, &self.0) {
-            observer.failed(error, "the work goes on, and it is tried again");
+            session.observer.failed(error, "the work goes on, and it is tried again");
         }
         self.0 = outcome.err();
         Ok(())
@@ -33,6 +33,7 @@ impl Unwritten {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::base::stop::NEVER;
     use std::sync::atomic::{AtomicU32, Ordering};
 
     #[test]
@@ -49,7 +50,7 @@ mod tests {
         let full = || Err(Error::other("full".to_string()));
         for (outcome, warnings) in [(Ok(()), 0), (full(), 1), (full(), 1), (Ok(()), 1), (full(), 2)] {
             let is_full = outcome.is_err();
-            unwritten.tried(outcome, &counting).unwrap();
+            unwritten.tried(outcome, &Session::new(&NEVER, &counting)).unwrap();
             assert_eq!((counting.0.load(Ordering::Relaxed), unwritten.0.is_some()), (warnings, is_full));
         }
         assert_eq!(unwritten.error().map(|error| error.message), Some("full".to_string()));

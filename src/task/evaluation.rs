@@ -2,7 +2,8 @@
 //! without loss.
 
 use crate::base::Grid;
-use crate::base::stop::{Stopped, check};
+use crate::base::session::Session;
+use crate::base::stop::Stopped;
 use crate::body::Body;
 use crate::sim::{Physics, StepError, System, Unstable, Worlds};
 use crate::task::perturbation::{Condition, Kind, Perturbation};
@@ -109,10 +110,10 @@ pub fn evaluate(
     physics: &Physics,
     protocol: &Protocol,
     savings: Savings,
-    stop: &AtomicBool,
+    session: &Session,
 ) -> Result<Vec<Evaluation>, Stopped> {
-    let setup = &Setup::new(images, conditions, (physics, protocol), stop);
-    let candidate = |job| check(stop).map(|()| Candidate::new(job, setup, savings));
+    let setup = &Setup::new(images, conditions, (physics, protocol), session);
+    let candidate = |job| session.check().map(|()| Candidate::new(job, setup, savings));
     let candidates: Vec<Candidate> = jobs.iter().map(candidate).collect::<Result<_, Stopped>>()?;
     let mut work: Vec<(usize, &Candidate)> = candidates
         .iter()
@@ -146,9 +147,10 @@ pub fn fresh_rollouts(
     conditions: &[Condition],
     setting: (&Physics, &Protocol),
     progress: &(dyn Fn(u64) + Sync),
-    stop: &AtomicBool,
+    session: &Session,
 ) -> Result<(Vec<Result<f64, Unstable>>, usize), Stopped> {
-    let (found, simulated, ended) = fresh_rollouts_so_far(body, images, conditions, setting, progress, stop);
+    let (found, simulated, ended) =
+        fresh_rollouts_so_far(body, images, conditions, setting, progress, session);
     ended.map(|()| (found, simulated))
 }
 
@@ -161,9 +163,9 @@ pub fn fresh_rollouts_so_far(
     conditions: &[Condition],
     setting: (&Physics, &Protocol),
     progress: &(dyn Fn(u64) + Sync),
-    stop: &AtomicBool,
+    session: &Session,
 ) -> (Vec<Result<f64, Unstable>>, usize, Result<(), Stopped>) {
-    let setup = Setup::new(images, conditions, setting, stop);
+    let setup = Setup::new(images, conditions, setting, session);
     let systems = setup.systems(body);
     let same_as = setup.same_as(body);
     let mut shared = BTreeMap::<usize, u64>::new();
@@ -237,7 +239,7 @@ struct Setup<'a> {
     physics: &'a Physics,
     /// Of each condition.
     protocols: Vec<Protocol>,
-    stop: &'a AtomicBool,
+    session: &'a Session<'a>,
 }
 
 impl<'a> Setup<'a> {
@@ -245,7 +247,7 @@ impl<'a> Setup<'a> {
         images: &'a [Grid<f64>],
         conditions: &[Condition],
         (physics, protocol): (&'a Physics, &Protocol),
-        stop: &'a AtomicBool,
+        session: &'a Session<'a>,
     ) -> Self {
         let mut once = vec![Condition::new()];
         let mut number = |condition: &Condition| {
@@ -260,7 +262,7 @@ impl<'a> Setup<'a> {
             condition.iter().fold(protocol.clone(), |protocol, perturbation| perturbation.protocol(&protocol))
         };
         let protocols = once.iter().map(under).collect();
-        Setup { images, conditions: once, condition_of, physics, protocols, stop }
+        Setup { images, conditions: once, condition_of, physics, protocols, session }
     }
 
     fn protocol(&self) -> &Protocol {
@@ -308,7 +310,7 @@ impl<'a> Setup<'a> {
     ) -> Result<Result<f64, Unstable>, Stopped> {
         let number = self.condition_of[image];
         let stimulus = self.stimulus(body, image);
-        let rollout = fresh_rollout(&systems[number], &self.protocols[number], &stimulus, self.stop);
+        let rollout = fresh_rollout(&systems[number], &self.protocols[number], &stimulus, self.session.stop);
         Ok(self.in_unperturbed_frame(StepError::outcome(rollout)?, number))
     }
 
@@ -322,7 +324,7 @@ impl<'a> Setup<'a> {
     ) -> Result<Vec<Result<f64, Unstable>>, Stopped> {
         let number = images.first().map_or(0, |image| self.condition_of[*image]);
         let stimuli: Vec<Grid<f64>> = images.iter().map(|image| self.stimulus(body, *image)).collect();
-        let found = fresh_rollouts_of(system, &self.protocols[number], &stimuli, self.stop)?;
+        let found = fresh_rollouts_of(system, &self.protocols[number], &stimuli, self.session.stop)?;
         Ok(found.into_iter().map(|displacement| self.in_unperturbed_frame(displacement, number)).collect())
     }
 
@@ -441,7 +443,7 @@ impl<'a> Candidate<'a> {
             RolloutMode::Sequential => {
                 let mut rollout = Rollout::new(&self.systems[0], self.setup.protocol());
                 for image in self.setup.images {
-                    shown.add(StepError::outcome(rollout.show_unless(image, self.setup.stop))?);
+                    shown.add(StepError::outcome(rollout.show_unless(image, self.setup.session.stop))?);
                     if shown.unstable.is_some() || self.outcome(&shown.displacements).is_some() {
                         break;
                     }
@@ -557,7 +559,8 @@ mod tests {
         let body = body();
         let job = Job { body: &body, order: order.to_vec(), may_win, given_up: None };
         let mut evaluations =
-            evaluate(&[job], &images(rows), &[], &physics(), &protocol, savings, &NEVER).unwrap();
+            evaluate(&[job], &images(rows), &[], &physics(), &protocol, savings, &Session::default())
+                .unwrap();
         assert_eq!(evaluations.len(), 1);
         let evaluation = evaluations.remove(0);
         let Evaluation { simulated, shared, stopped, .. } = evaluation;
@@ -595,14 +598,23 @@ mod tests {
             (0..11).map(|k| if k % 3 == 0 { raised.clone() } else { Condition::new() }).collect();
         let protocol = Protocol { control_steps: 40, ..Protocol::default() };
         let physics = Physics::default();
-        let setup = Setup::new(&images, &conditions, (&physics, &protocol), &NEVER);
+        let session = Session::default();
+        let setup = Setup::new(&images, &conditions, (&physics, &protocol), &session);
         let systems = setup.systems(&body);
         assert!(Worlds::gain(&systems[0]));
         let one_by_one: Vec<_> =
             (0..11).map(|image| setup.fresh_rollout(&body, &systems, image).unwrap()).collect();
         for threads in [1, 3] {
-            let together =
-                || fresh_rollouts(&body, &images, &conditions, (&physics, &protocol), &|_| (), &NEVER);
+            let together = || {
+                fresh_rollouts(
+                    &body,
+                    &images,
+                    &conditions,
+                    (&physics, &protocol),
+                    &|_| (),
+                    &Session::default(),
+                )
+            };
             let (found, _) = rayon(threads).install(together).unwrap();
             assert_eq!(found, one_by_one, "{threads} threads");
         }
@@ -700,7 +712,7 @@ mod tests {
             let evaluated = |raised: &[u32]| {
                 let conditions: Vec<Condition> = raised.iter().map(|rows| condition(*rows, false)).collect();
                 let job = Job { body: &body, order: Vec::new(), may_win: Box::new(|_| true), given_up: None };
-                evaluate(&[job], &images, &conditions, &physics, &protocol, savings, &NEVER)
+                evaluate(&[job], &images, &conditions, &physics, &protocol, savings, &Session::default())
                     .unwrap()
                     .remove(0)
             };
@@ -720,9 +732,17 @@ mod tests {
             let body = body();
             let may_win = Box::new(|_: &[Option<f64>]| true);
             let job = Job { body: &body, order: Vec::new(), may_win, given_up: None };
-            evaluate(&[job], &images, &conditions, physics, &protocol, Savings::default(), &NEVER)
-                .unwrap()
-                .remove(0)
+            evaluate(
+                &[job],
+                &images,
+                &conditions,
+                physics,
+                &protocol,
+                Savings::default(),
+                &Session::default(),
+            )
+            .unwrap()
+            .remove(0)
         };
         // A sensor at rest is as far below its goal as tight limits keep it.
         let tight = Physics { limit_high: 1.02, limit_low: 0.98, ..physics() };
@@ -770,7 +790,8 @@ mod tests {
             let expected = perturbation.undo(changed.stimuli.iter().map(live).collect());
             let conditions = vec![vec![perturbation]; images.len()];
             let setting = (&physics, &protocol);
-            let (walked, _) = fresh_rollouts(&body, &images, &conditions, setting, &|_| (), &NEVER).unwrap();
+            let (walked, _) =
+                fresh_rollouts(&body, &images, &conditions, setting, &|_| (), &Session::default()).unwrap();
             let walked: Vec<f64> = walked.into_iter().map(Result::unwrap).collect();
             assert_eq!(walked, expected, "{}", perturbation.name());
         }
@@ -803,18 +824,21 @@ mod tests {
         let conditions = crate::task::perturbation::of_response();
         let conditions: Vec<Condition> = conditions.into_iter().cycle().take(60).collect();
         let setting = (&physics, &protocol);
-        let (whole, _) = fresh_rollouts(&body, &images, &conditions, setting, &|_| (), &NEVER).unwrap();
+        let (whole, _) =
+            fresh_rollouts(&body, &images, &conditions, setting, &|_| (), &Session::default()).unwrap();
         for most in [1, 20, 59] {
             let (stop, done) = (AtomicBool::new(false), AtomicUsize::new(0));
             let told = |count: u64| {
                 let done = done.fetch_add(count as usize, Ordering::Relaxed) + count as usize;
                 stop.fetch_or(done >= most, Ordering::Relaxed);
             };
-            let (found, _, ended) = fresh_rollouts_so_far(&body, &images, &conditions, setting, &told, &stop);
+            let (found, _, ended) =
+                fresh_rollouts_so_far(&body, &images, &conditions, setting, &told, &Session::new(&stop, &()));
             let known = found.len();
             assert_eq!(ended.is_ok(), known == 60, "{known} of {most}");
             let (images, conditions) = (&images[known..], &conditions[known..]);
-            let (rest, _) = fresh_rollouts(&body, images, conditions, setting, &|_| (), &NEVER).unwrap();
+            let (rest, _) =
+                fresh_rollouts(&body, images, conditions, setting, &|_| (), &Session::default()).unwrap();
             assert_eq!([found, rest].concat(), whole, "{known}");
         }
     }
@@ -834,7 +858,15 @@ mod tests {
                     std::thread::sleep(std::time::Duration::from_millis(50));
                     stop.store(true, Ordering::Relaxed);
                 });
-                evaluate(&[job], &images, &[], &Physics::default(), &protocol, Savings::default(), &stop)
+                evaluate(
+                    &[job],
+                    &images,
+                    &[],
+                    &Physics::default(),
+                    &protocol,
+                    Savings::default(),
+                    &Session::new(&stop, &()),
+                )
             });
             assert_eq!(ended, Err(Stopped));
             assert!(begin.elapsed().as_secs() < 5, "{:?}", begin.elapsed());

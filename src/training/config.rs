@@ -1,7 +1,7 @@
 //! The config of a training: that of its gaits with another task, and as many images as there are.
 
 use crate::base::error::Error;
-use crate::base::observer::Observer;
+use crate::base::session::Session;
 use crate::config::evaluation::EvaluationConfig;
 use crate::config::task::TaskConfig;
 use crate::config::validation::{LEAST, ValidationConfig};
@@ -104,7 +104,7 @@ pub(crate) fn sized(
     of_gaits: &Config,
     dataset: &Dataset,
     set: &[String],
-    observer: &dyn Observer,
+    session: &Session,
 ) -> Config {
     let is_asked = set.iter().any(|assignment| reading::sets(assignment, "stimulus.margin"));
     let size = size_of(their_data, &of_gaits.data.dataset, dataset);
@@ -117,7 +117,7 @@ pub(crate) fn sized(
                 stimulus: StimulusParams { margin: Margins::default(), ..config.stimulus },
                 ..config
             };
-            observer.warning(&format!(
+            session.observer.warning(&format!(
                 "stimulus.margin = {margin} is for the gaits' images of {height} × {width} pixels: \
                  of these, robots see {}",
                 config.stimulus.part(shown)
@@ -125,7 +125,7 @@ pub(crate) fn sized(
             config
         }
         (Some(said), ..) => {
-            observer.warning(&said);
+            session.observer.warning(&said);
             config
         }
     }
@@ -140,7 +140,7 @@ pub(crate) fn with_images(
     config: Config,
     before: &[usize],
     dataset: &Dataset,
-    observer: &dyn Observer,
+    session: &Session,
 ) -> Result<Config, Error> {
     let classes = config.classes();
     let fewest = scarcest(dataset, &classes, LEAST_PER_CLASS)?;
@@ -154,7 +154,8 @@ pub(crate) fn with_images(
         // What was asked for by a number of one's own is kept, or refused.
         let is_asked = images != ValidationConfig::default().images;
         if !is_asked && (LEAST..images).contains(&there) {
-            observer
+            session
+                .observer
                 .warning(&format!("validating on {there} images in place of {images}: there are no more"));
             validation.images = there;
         }
@@ -183,5 +184,5 @@ pub(crate) fn check_groups(groups: &Groups, dataset: &Dataset) -> Result<(), Err
 pub fn check(evolved: &Config, groups: &[Vec<u8>; 2], whereabouts: &Whereabouts) -> Result<(), Error> {
     let config = config_of(evolved, groups, None, &[])?;
     let dataset = whereabouts.load(&config.data, &[Split::Train])?;
-    with_images(config, &Training::indices(evolved, &dataset)?, &dataset, &()).map(|_| ())
+    with_images(config, &Training::indices(evolved, &dataset)?, &dataset, &Session::default()).map(|_| ())
 }

@@ -2,8 +2,8 @@
 
 use crate::base::error::Error;
 use crate::base::hash::sha256_hex;
-use crate::base::observer::Observer;
 use crate::base::remedy::Remedy;
+use crate::base::session::Session;
 use crate::config::Config;
 use crate::config::train::TrainConfig;
 use crate::data::dataset::{Dataset, Split};
@@ -87,7 +87,7 @@ pub(super) fn measured(
     config: &Config,
     probing: &Probing,
     walkers: &[Walker],
-    observer: &dyn Observer,
+    session: &Session,
 ) -> Vec<Batch> {
     let nothing = || vec![Vec::new(); walkers.len()];
     // That of a named run is in the present folder, if it was measured.
@@ -99,7 +99,7 @@ pub(super) fn measured(
     if (&config.physics, &config.protocol) != (&of_run.physics, &protocol) {
         return nothing();
     }
-    let Some(file) = ResponseFile::found(&path, observer) else { return nothing() };
+    let Some(file) = ResponseFile::found(&path, session) else { return nothing() };
     let (run, seed, conditions) = (source.run.fingerprint(), of_run.seed, probing.conditions());
     walkers.iter().map(|walker| file.known(&run, seed, conditions, &walker.gait).0.to_vec()).collect()
 }

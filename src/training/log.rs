@@ -3,8 +3,9 @@
 use crate::base::Grid;
 use crate::base::error::Error;
 use crate::base::files::write_atomically;
-use crate::base::observer::{Observer, Work};
+use crate::base::observer::Work;
 use crate::base::remedy::Remedy;
+use crate::base::session::Session;
 use crate::body::Body;
 use crate::config::Config;
 use crate::store::results;
@@ -39,17 +40,11 @@ pub(super) struct Log<'a> {
     done: Option<AtomicU64>,
     /// Whether anything was simulated since it was looked at last.
     pub(super) has_simulated: Arc<AtomicBool>,
-    pub(super) stop: &'a AtomicBool,
-    observer: &'a dyn Observer,
+    pub(super) session: &'a Session<'a>,
 }
 
 impl<'a> Log<'a> {
-    pub(super) fn open(
-        path: PathBuf,
-        key: String,
-        stop: &'a AtomicBool,
-        observer: &'a dyn Observer,
-    ) -> Result<Self, Error> {
+    pub(super) fn open(path: PathBuf, key: String, session: &'a Session<'a>) -> Result<Self, Error> {
         let mut batches = Vec::new();
         if path.exists() {
             let name = path.display().to_string();
@@ -62,29 +57,20 @@ impl<'a> Log<'a> {
                 return Err(error.remedy(Remedy::ChooseOut).remedy(Remedy::Replace));
             }
             if file.checksum.is_none() {
-                observer.warning(&format!("{name}: it has no checksum, so damage to it would go unnoticed"));
+                session
+                    .observer
+                    .warning(&format!("{name}: it has no checksum, so damage to it would go unnoticed"));
             }
             batches = file.rollouts;
         }
         let saved = (count(&batches), Instant::now());
         let has_simulated = Arc::default();
-        Ok(Log {
-            path,
-            key,
-            batches,
-            asked: 0,
-            simulated: 0,
-            saved,
-            done: None,
-            has_simulated,
-            stop,
-            observer,
-        })
+        Ok(Log { path, key, batches, asked: 0, simulated: 0, saved, done: None, has_simulated, session })
     }
 
     /// Work begins whose rollouts are counted.
     pub(super) fn begins(&mut self, label: String, rollouts: usize) {
-        self.observer.begins(&Work::new(label, rollouts as u64, "rollouts"));
+        self.session.observer.begins(&Work::new(label, rollouts as u64, "rollouts"));
         self.done = Some(AtomicU64::new(0));
     }
 
@@ -98,7 +84,7 @@ impl<'a> Log<'a> {
 
     /// Work begins of which each challenger is told by itself.
     pub(super) fn begins_challenges(&mut self, challengers: usize) {
-        self.observer.begins(&Work::new("refining:".to_string(), challengers as u64, "challengers"));
+        self.session.observer.begins(&Work::new("refining:".to_string(), challengers as u64, "challengers"));
         self.done = None;
     }
 
@@ -108,8 +94,8 @@ impl<'a> Log<'a> {
             self.has_simulated.store(true, Ordering::Relaxed);
         }
         if let Some(done) = &self.done {
-            self.observer.skips(count - simulated);
-            self.observer.progress(done.fetch_add(count, Ordering::Relaxed) + count);
+            self.session.observer.skips(count - simulated);
+            self.session.observer.progress(done.fetch_add(count, Ordering::Relaxed) + count);
         }
     }
 
@@ -151,7 +137,7 @@ impl<'a> Log<'a> {
             let (stimuli, conditions) = (&stimuli[begin..end], &conditions[begin..end]);
             let told = |count| self.rolled(count, 1);
             let (found, _, ended) =
-                fresh_rollouts_so_far(body, stimuli, conditions, setting, &told, self.stop);
+                fresh_rollouts_so_far(body, stimuli, conditions, setting, &told, self.session);
             self.batches[number].extend(found.into_iter().map(Result::ok));
             ended.map_err(|_| stopped())?;
             if self.saved.1.elapsed() >= SAVE_EVERY {

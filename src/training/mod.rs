@@ -17,10 +17,9 @@ pub(crate) use config::{check_groups, config_of, sized, with_images};
 
 use crate::base::error::Error;
 use crate::base::files::write_atomically;
-use crate::base::observer::Observer;
 use crate::base::remedy::Remedy;
+use crate::base::session::Session;
 use crate::base::text::counted;
-use crate::base::threads::pool;
 use crate::config::Config;
 use crate::data::dataset::Split;
 use crate::images::training::Training;
@@ -43,7 +42,6 @@ use crate::training::rounds::Taught;
 use gaits::{Walker, key, measured, origin, walkers};
 use log::Log;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 use trainer::Trainer;
 
@@ -66,10 +64,6 @@ pub struct Options {
     pub out: PathBuf,
     /// What to do if there is a run in it.
     pub if_exists: IfExists,
-    /// Where the data are, if the command line says.
-    pub data: Option<PathBuf>,
-    /// Number of threads; `None`: one per core.
-    pub threads: Option<usize>,
 }
 
 /// How a training ended.
@@ -90,24 +84,24 @@ pub struct Finished {
 /// # Errors
 /// What is wrong with archive, options, data or folder; that it was stopped (the same with
 /// [`IfExists::Resume`] goes on). Nothing that was there is lost.
-pub fn train(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> Result<Finished, Error> {
+pub fn train(options: &Options, session: &Session) -> Result<Finished, Error> {
     if options.robots.validated().is_some() {
         let text = "expected another selection: gaits have no task to validate";
         let error = Error::argument("robots", VALIDATED, text);
         return Err(error.remedy(Remedy::ChooseRobots(Some("top:4"))));
     }
     let source = StoredRun::read(&options.archive)?;
-    let whereabouts = Whereabouts::given(options.data.as_deref())
+    let whereabouts = Whereabouts::given(session.folder())
         .and_of_resumed(options.if_exists, &options.out.join(RUN_JSON))
         .and_of(&options.archive);
     let config = config_of(&source.run.config, options.groups.classes(), options.seed, &options.set)?;
     let dataset = whereabouts.load(&config.data, &[Split::Train])?;
     check_groups(&options.groups, &dataset)?;
-    whereabouts::say_transposed(&dataset, &config.data, observer);
+    whereabouts::say_transposed(&dataset, &config.data, session);
     let of_gaits = &source.run;
-    let config = sized(config, &of_gaits.dataset, &of_gaits.config, &dataset, &options.set, observer);
+    let config = sized(config, &of_gaits.dataset, &of_gaits.config, &dataset, &options.set, session);
     let origin = origin(&source, &config, &dataset)?;
-    let config = with_images(config, &origin.trained_on, &dataset, observer)?;
+    let config = with_images(config, &origin.trained_on, &dataset, session)?;
     let mut training = Training::of(&config, &dataset)?;
     let classes = training.images.iter().map(|image| image.label);
     training.conditions = config.train.perturbations.of(classes);
@@ -118,32 +112,32 @@ pub fn train(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> R
     }
     // A gait's response is the same for every task and every seed of a training.
     let probing = Probing::new(&training.conditions, source.run.config.seed);
-    let measured = measured(&source, &config, &probing, &walkers, observer);
+    let measured = measured(&source, &config, &probing, &walkers, session);
     let [log, run] = [TRAINING_JSON, RUN_JSON].map(|name| options.out.join(name));
     if options.if_exists == IfExists::Resume && run.exists() && !log.exists() {
         let text = format!("{}: the run in this folder is no training", options.out.display());
         return Err(Error::occupied(text).remedy(Remedy::ChooseOut).remedy(Remedy::Replace));
     }
     apart(&options.out, &source.path)?;
-    let folder = RunFolder::open(&options.out, options.if_exists, stop, observer)?;
+    let folder = RunFolder::open(&options.out, options.if_exists, session)?;
     let write = |name: &str, content: &[u8]| {
         let path = folder.path().join(name);
         write_atomically(&path, content).map_err(|error| Error::writing(&path, &error))
     };
     let key = key(&config, source.run.config.seed, &walkers, &training);
-    let mut log = Log::open(log, key, stop, observer)?;
+    let mut log = Log::open(log, key, session)?;
     folder.write_config(&config)?;
     whereabouts::remember(&folder, &dataset)?;
-    let pool = pool(options.threads)?;
+    let pool = session.pool()?;
     let began = Instant::now();
     let (gaits, images) = (walkers.len(), training.images.len());
-    observer.note(&format!(
+    session.observer.note(&format!(
         "training in {}: {}, {images} training images",
         folder.path().display(),
         counted(gaits, "gait", "gaits")
     ));
     let trainer = Trainer { config: &config, dataset: &dataset, training: &training, probing, measured };
-    let taught = pool.install(|| trainer.train(&walkers, &mut log, observer));
+    let taught = pool.install(|| trainer.train(&walkers, &mut log, session));
     // What was simulated is kept, however it ended.
     log.save()?;
     let (walker, config, taught) = taught?;
@@ -159,7 +153,7 @@ pub fn train(options: &Options, stop: &AtomicBool, observer: &dyn Observer) -> R
     let archive = folder.path().join(RUN_JSON);
     let validated = match config.validation.best {
         0 => Some(Vec::new()),
-        _ => validation::at_end(&archive, &dataset, &pool, stop, observer)?,
+        _ => validation::at_end(&archive, &dataset, session)?,
     };
     let size = dataset.size(Split::Train).expect("a training loads its training images");
     Ok(Finished { run, rollouts: log.simulated, size, validated })

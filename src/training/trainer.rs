@@ -2,8 +2,9 @@
 
 use crate::base::error::Error;
 use crate::base::number;
-use crate::base::observer::{Observer, Work};
+use crate::base::observer::Work;
 use crate::base::remedy::Remedy;
+use crate::base::session::Session;
 use crate::base::text::counted;
 use crate::config::Config;
 use crate::config::train::TrainConfig;
@@ -58,7 +59,7 @@ impl Trainer<'_> {
         walker: &Walker,
         response: &Response,
         log: &Log,
-        observer: &dyn Observer,
+        session: &Session,
     ) -> Result<Config, Error> {
         let Trainer { config, training, .. } = self;
         let (count, robot) = (config.train.windows, &walker.robot.id);
@@ -67,11 +68,11 @@ impl Trainer<'_> {
         if count == 0 {
             return Ok(with);
         }
-        observer.begins(&Work::new(format!("{robot}: windows:"), count as u64, "windows"));
+        session.observer.begins(&Work::new(format!("{robot}: windows:"), count as u64, "windows"));
         let windows = Windows::of(config, self.dataset, &training.images, self.groups())?;
-        let told = |tried: usize| observer.progress(tried as u64);
-        let found = windows.best(&walker.gait, response, log.stop, &told).map_err(|_| stopped())?;
-        report_window(observer, robot, &found, count);
+        let told = |tried: usize| session.observer.progress(tried as u64);
+        let found = windows.best(&walker.gait, response, log.session, &told).map_err(|_| stopped())?;
+        report_window(session, robot, &found, count);
         with.stimulus.margin = found.margins;
         Ok(with)
     }
@@ -112,7 +113,7 @@ impl Trainer<'_> {
         &self,
         walkers: &'w [Walker<'w>],
         log: &mut Log,
-        observer: &dyn Observer,
+        session: &Session,
     ) -> Result<(&'w Walker<'w>, Config, Taught), Error> {
         let plan = self.plan();
         let Trainer { config, probing, .. } = self;
@@ -121,11 +122,11 @@ impl Trainer<'_> {
             let (gait, robot) = (&walker.gait, &walker.robot.id);
             log.begins(format!("{robot}: response:"), self.config.train.random_images);
             let Some(response) = self.response(gait, measured, log)? else { continue };
-            report_response(observer, &walker.robot.id, gait, &response);
+            report_response(session, &walker.robot.id, gait, &response);
             let seeing = match plan.rounds {
                 // It keeps its own sensors, which are for the images as it sees them.
                 0 => Config { train: TrainConfig { windows: 0, ..config.train }, ..(*config).clone() },
-                _ => self.with_window(walker, &response, log, observer)?,
+                _ => self.with_window(walker, &response, log, session)?,
             };
             let images = self.images(gait, &seeing)?;
             let mut teacher = Teacher::new(gait, &response, images, plan, &config.physics);
@@ -134,11 +135,11 @@ impl Trainer<'_> {
             let mut rollouts = Kept { config, conditions, log };
             if plan.rounds == 0 {
                 let fitness = teacher.own(&mut rollouts)?;
-                report_own(observer, &walker.robot.id, fitness);
+                report_own(session, &walker.robot.id, fitness);
                 best = Some((walker, seeing, teacher));
                 break;
             }
-            report_round(observer, &walker.robot.id, &teacher.round(&mut rollouts)?, &plan);
+            report_round(session, &walker.robot.id, &teacher.round(&mut rollouts)?, &plan);
             if best.as_ref().is_none_or(|(_, _, best)| teacher.predicted() > best.predicted()) {
                 best = Some((walker, seeing, teacher));
             }
@@ -151,7 +152,7 @@ impl Trainer<'_> {
         for number in 2..=plan.rounds {
             rollouts.log.begins_round(&walker.robot.id, number, &plan);
             let round = teacher.round(&mut rollouts)?;
-            report_round(observer, &walker.robot.id, &round, &plan);
+            report_round(session, &walker.robot.id, &round, &plan);
         }
         let challengers = teacher.challengers();
         rollouts.log.begins_challenges(challengers);
@@ -160,30 +161,30 @@ impl Trainer<'_> {
         let told = |challenge: &Challenge| {
             // One that was kept by an earlier session took no time.
             if !has_simulated.swap(false, Ordering::Relaxed) {
-                observer.skips(1);
+                session.observer.skips(1);
             }
-            report_challenge(observer, challenge, challengers);
+            report_challenge(session, challenge, challengers);
         };
         Ok((walker, seeing, teacher.finish(&mut rollouts, told)?))
     }
 }
 
-fn report_response(observer: &dyn Observer, robot: &str, gait: &Gait, response: &Response) {
+fn report_response(session: &Session, robot: &str, gait: &Gait, response: &Response) {
     let places = counted(gait.places().len(), "soft voxel or sensor", "soft voxels and sensors");
     let share = number::explained(response.r_squared);
     let noise = number::fixed(response.noise, 1);
-    observer.note(&format!(
+    session.observer.note(&format!(
         "{robot}: {share} % of its response is explained by {places}; the rest is {noise} voxel lengths"
     ));
 }
 
-fn report_window(observer: &dyn Observer, robot: &str, found: &Found, tried: usize) {
+fn report_window(session: &Session, robot: &str, found: &Found, tried: usize) {
     let Found { margins, predicted, predicted_before } = found;
     let [after, before] = [predicted, predicted_before].map(|fitness| number::fixed(*fitness, 2));
-    observer.note(&format!(
+    session.observer.note(&format!(
         "{robot}: of {tried} windows, stimulus.margin = {margins} is predicted to be best: fitness {after}, before {before}"
     ));
-    observer.finding(
+    session.observer.finding(
         "window",
         &serde_json::json!({
             "robot": robot, "windows": tried, "margin": margins, "predicted": predicted,
@@ -192,16 +193,16 @@ fn report_window(observer: &dyn Observer, robot: &str, found: &Found, tried: usi
     );
 }
 
-fn report_own(observer: &dyn Observer, robot: &str, fitness: f64) {
-    observer.note(&format!("{robot}: fitness {} as it is", number::fixed(fitness, 2)));
-    observer.finding("own", &serde_json::json!({ "robot": robot, "fitness": fitness }));
+fn report_own(session: &Session, robot: &str, fitness: f64) {
+    session.observer.note(&format!("{robot}: fitness {} as it is", number::fixed(fitness, 2)));
+    session.observer.finding("own", &serde_json::json!({ "robot": robot, "fitness": fitness }));
 }
 
-fn report_round(observer: &dyn Observer, robot: &str, round: &Round, plan: &Plan) {
+fn report_round(session: &Session, robot: &str, round: &Round, plan: &Plan) {
     let Round { round, predicted, measured, off, changed, rollouts } = round;
     let [p, m] = [predicted, measured].map(|fitness| number::fixed(*fitness, 2));
-    observer.note(&format!("{robot}: round {round} of {}: fitness {m}, predicted {p}", plan.rounds));
-    observer.finding(
+    session.observer.note(&format!("{robot}: round {round} of {}: fitness {m}, predicted {p}", plan.rounds));
+    session.observer.finding(
         "round",
         &serde_json::json!({
             "robot": robot, "round": round, "rollouts": rollouts, "predicted": predicted, "measured": measured,
@@ -211,15 +212,15 @@ fn report_round(observer: &dyn Observer, robot: &str, round: &Round, plan: &Plan
     );
 }
 
-fn report_challenge(observer: &dyn Observer, challenge: &Challenge, challengers: usize) {
+fn report_challenge(session: &Session, challenge: &Challenge, challengers: usize) {
     let Challenge { number, other_gait, shown, fitness, won } = challenge;
     let what = if *other_gait { "another gait" } else { "other sensors" };
     if *won {
         let fitness = number::fixed(*fitness, 3);
-        observer.note(&format!("challenger {number} of {challengers}: {what}: fitness {fitness}"));
+        session.observer.note(&format!("challenger {number} of {challengers}: {what}: fitness {fitness}"));
     }
-    observer.progress(*number as u64);
-    observer.finding(
+    session.observer.progress(*number as u64);
+    session.observer.finding(
         "challenge",
         &serde_json::json!({
             "challenger": number, "other_gait": other_gait, "images": shown, "fitness": fitness, "won": won,

@@ -7,7 +7,8 @@
 use crate::base::Grid;
 use crate::base::error::Error;
 use crate::base::random::{Purpose, Stream, stream};
-use crate::base::stop::{Stopped, check};
+use crate::base::session::Session;
+use crate::base::stop::Stopped;
 use crate::body::Material;
 use crate::config::Config;
 use crate::data::dataset::{Dataset, Split};
@@ -19,7 +20,6 @@ use crate::task::grouping::balanced;
 use crate::task::margins::Margins;
 use crate::task::stimulus::{StimulusParams, stimulus};
 use rayon::prelude::*;
-use std::sync::atomic::AtomicBool;
 
 /// Windows that are tried side by side before the next are drawn. With more, those near the best
 /// are drawn when it is known less well; with fewer, cores are idle.
@@ -84,7 +84,7 @@ impl<'a> Windows<'a> {
         &self,
         gait: &Gait,
         response: &Response,
-        stop: &AtomicBool,
+        session: &Session,
         told: &dyn Fn(usize),
     ) -> Result<Found, Stopped> {
         let (margins, count) = (self.config.stimulus.margin, self.config.train.windows);
@@ -92,7 +92,7 @@ impl<'a> Windows<'a> {
         let mut best = Found { margins, predicted, predicted_before: predicted };
         let mut tried = 1;
         while tried < count {
-            check(stop)?;
+            session.check()?;
             let draw = |number: usize| {
                 let mut random = stream(self.config.seed, Purpose::Windows, 0, number as u64);
                 match tried < count / 2 {
@@ -171,7 +171,7 @@ fn least(side: usize) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::base::stop::NEVER;
+
     use crate::response::regression::Shown;
     use crate::task::stimulus::Reduction;
 
@@ -220,7 +220,7 @@ mod tests {
         }
 
         fn best(&self) -> Found {
-            self.windows().best(&self.gait, &self.response, &NEVER, &|_| ()).unwrap()
+            self.windows().best(&self.gait, &self.response, &Session::default(), &|_| ()).unwrap()
         }
     }
 
@@ -248,7 +248,8 @@ mod tests {
             planted.config.train.windows = windows;
             let counted = std::sync::Mutex::new(0);
             let tell = |tried: usize| *counted.lock().unwrap() = tried;
-            let found = planted.windows().best(&planted.gait, &planted.response, &NEVER, &tell).unwrap();
+            let found =
+                planted.windows().best(&planted.gait, &planted.response, &Session::default(), &tell).unwrap();
             assert!(found.predicted >= found.predicted_before, "{windows}: {found:?}");
             told.push(*counted.lock().unwrap());
         }

@@ -7,6 +7,7 @@ use flate2::Compression;
 use flate2::write::GzEncoder;
 use morphcog::base::hash::sha256_hex;
 use morphcog::base::observer::{Observer, Work};
+use morphcog::base::session::Session;
 use morphcog::base::stop::NEVER;
 use morphcog::data::catalogue::{Catalogue, RemoteFile};
 use morphcog::data::fetch::{AttemptError, FetchError, FetchOptions, Fetched, Outcome, Program};
@@ -105,7 +106,7 @@ fn fetch(
     options: &FetchOptions,
     observer: &dyn Observer,
 ) -> Result<Vec<Fetched>, FetchError> {
-    morphcog::data::fetch::fetch(catalogue, options, &[program], &NEVER, observer)
+    morphcog::data::fetch::fetch(catalogue, options, &[program], &Session::new(&NEVER, observer))
 }
 
 fn to(folder: &Path) -> FetchOptions {
@@ -390,7 +391,12 @@ fn a_download_that_is_stopped_leaves_no_folder_and_no_process() {
                 std::thread::sleep(Duration::from_millis(500));
                 stop.store(true, Ordering::Relaxed);
             });
-            let ended = morphcog::data::fetch::fetch(&catalogue(&[]), &options, &[program], &stop, &());
+            let ended = morphcog::data::fetch::fetch(
+                &catalogue(&[]),
+                &options,
+                &[program],
+                &Session::new(&stop, &()),
+            );
             assert!(matches!(ended, Err(FetchError::Stopped(_))), "{ended:?}");
             assert!(server.join().unwrap(), "the program goes on");
         });
@@ -414,7 +420,7 @@ fn without_a_program_for_downloads_what_to_fetch_by_hand_is_said() {
     std::fs::write(sandbox.path("own/images.gz"), IMAGES).unwrap();
     std::fs::write(sandbox.path("own/labels.gz"), LABELS).unwrap();
     let there = catalogue(&[]);
-    let kept = morphcog::data::fetch::fetch(&there, &to(&sandbox.path("own")), &[], &NEVER, &());
+    let kept = morphcog::data::fetch::fetch(&there, &to(&sandbox.path("own")), &[], &Session::default());
     assert_eq!(outcomes(kept), [Outcome::Kept, Outcome::Kept]);
 }
 

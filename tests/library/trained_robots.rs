@@ -4,7 +4,7 @@
 
 use crate::common::program::{self, Sandbox, said};
 use morphcog::base::Grid;
-use morphcog::base::stop::NEVER;
+use morphcog::base::session::Session;
 use morphcog::body::Body;
 use morphcog::data::dataset::{Dataset, Split};
 use morphcog::data::files::places;
@@ -70,7 +70,7 @@ fn walks_of(run: &RunFile, body: &Body, mnist: &Dataset, images: &[ImageRef]) ->
     let control_steps = CYCLES * run.config.physics.cycle_steps;
     let protocol = Protocol { rollout: RolloutMode::Fresh, control_steps, ..run.config.protocol.clone() };
     let setting = (&run.config.physics, &protocol);
-    let (walks, _) = fresh_rollouts(body, &stimuli, &[], setting, &|_| (), &NEVER).unwrap();
+    let (walks, _) = fresh_rollouts(body, &stimuli, &[], setting, &|_| (), &Session::default()).unwrap();
     walks.into_iter().map(Result::ok).collect()
 }
 

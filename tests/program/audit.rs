@@ -2,6 +2,7 @@
 
 use crate::common::program::{Made, Sandbox, TINY};
 use morphcog::base::observer::{Observer, Work};
+use morphcog::base::session::Session;
 use morphcog::commands::audit::Options;
 use morphcog::robots::selection::Selection;
 use morphcog::store::audit::AuditFile;
@@ -274,12 +275,13 @@ fn what_a_stopped_audit_was_done_with_is_kept() {
         seed: 1,
         criteria: whole.criteria.clone(),
         fresh: false,
-        data: None,
         out: sandbox.path("run/audit.json"),
-        threads: Some(1),
-        ranks: morphcog::base::ranks::Ranks::ALONE,
     };
-    let ended = morphcog::commands::audit::audit(&options, &impatient.stop, &impatient).unwrap();
+    let ended = morphcog::commands::audit::audit(
+        &options,
+        &Session::new(&impatient.stop, &impatient).threads(Some(1)),
+    )
+    .unwrap();
     assert!(ended.stopped);
     let kept = verdicts(&sandbox);
     let (some, all) = (kept.robots.len(), whole.robots.len());

@@ -2,6 +2,7 @@
 //! stopped or spread.
 
 use crate::common::program::{Made, Sandbox, TINY};
+use morphcog::base::session::Session;
 use morphcog::commands::capacity::Options;
 use morphcog::config::capacity::CapacityConfig;
 use morphcog::store::capacity::CapacityFile;
@@ -166,11 +167,14 @@ fn what_was_found_stays_if_the_next_search_is_stopped_before_it_finds_anything()
         eval: sandbox.path("runs/eval.json"),
         config: CapacityConfig::load(None, &["seed=2".to_string()]).unwrap(),
         physical_only: false,
-        data: None,
         out: sandbox.path("runs/capacity.json"),
-        threads: Some(1),
     };
-    let stopped = morphcog::commands::capacity::capacity(&options, &AtomicBool::new(true), &()).unwrap().file;
+    let stopped = morphcog::commands::capacity::capacity(
+        &options,
+        &Session::new(&AtomicBool::new(true), &()).threads(Some(1)),
+    )
+    .unwrap()
+    .file;
     assert!(stopped.stopped && stopped.tasks.is_empty());
     assert_eq!(sandbox.read("runs/capacity.json"), found);
 }

@@ -3,6 +3,7 @@
 #![allow(clippy::disallowed_methods)]
 
 use crate::common::program::{Sandbox, TINY};
+use morphcog::base::session::Session;
 use morphcog::body::{Body, Material};
 use morphcog::config::Config;
 use morphcog::images::training::Training;
@@ -45,7 +46,9 @@ fn a_robot_is_as_fit_as_opposite_images_move_its_probe_apart() {
         let Training { stimuli, conditions, .. } = &training;
         let Config { physics, protocol, .. } = &run.config;
         let (savings, stop) = (Savings::default(), AtomicBool::new(false));
-        let evaluation = evaluate(&[job], stimuli, conditions, physics, protocol, savings, &stop).unwrap();
+        let evaluation =
+            evaluate(&[job], stimuli, conditions, physics, protocol, savings, &Session::new(&stop, &()))
+                .unwrap();
         let Outcome::Walked(d) = &evaluation[0].outcome else { panic!("{}: unstable", robot.id) };
         assert_eq!(d, &robot.displacements, "{}", robot.id);
         let [odd, even] = [-1.0, 1.0].map(|sign| [0, 2, 4, 6].map(|i| (d[i] + sign * d[i + 1]) / 2.0));

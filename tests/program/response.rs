@@ -2,7 +2,8 @@
 //! any threads, what cannot be measured is a clear error.
 
 use crate::common::program::{Sandbox, TINY, files, terminate};
-use morphcog::base::stop::{NEVER, Stopped};
+use morphcog::base::session::Session;
+use morphcog::base::stop::Stopped;
 use morphcog::body::Body;
 use morphcog::genome::Genome;
 use morphcog::response::gait::Gait;
@@ -71,7 +72,7 @@ fn slopes_predict_other_rollouts_of_a_real_body_as_well_as_is_said() {
     let probing = Probing::new(&file.setting.conditions, file.setting.seed + 1);
     let shown = probing.shown(&gait, &config.physics, 0..120, |probe, stimuli, conditions| {
         let setting = (&config.physics, &config.protocol);
-        let (found, _) = fresh_rollouts(probe, stimuli, conditions, setting, &|_| (), &NEVER)?;
+        let (found, _) = fresh_rollouts(probe, stimuli, conditions, setting, &|_| (), &Session::default())?;
         Ok::<_, Stopped>(found.into_iter().map(Result::ok).collect())
     });
     let shown = shown.unwrap();

@@ -9,7 +9,7 @@ use crate::common::server::{Answer, Server};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD as BASE64;
 use morphcog::base::Grid;
-use morphcog::base::stop::NEVER;
+use morphcog::base::session::Session;
 use morphcog::data::dataset::{BUILTIN, Dataset, Split};
 use morphcog::robots::published;
 use morphcog::serve::simulations::MAX_SIMULATIONS;
@@ -605,7 +605,9 @@ fn each_robot_of_the_team_that_ships_sees_and_walks_as_its_own_run_says() {
             assert_eq!((&config.physics, &config.protocol), (&first.physics, &first.protocol), "one world");
             let seen = stimulus(&drawing, body.height(), body.width(), &config.stimulus).unwrap();
             let protocol = Protocol { control_steps: steps, ..config.protocol.clone() };
-            fresh_rollouts(body, &[seen], &[], (&config.physics, &protocol), &|_| (), &NEVER).unwrap().0[0]
+            fresh_rollouts(body, &[seen], &[], (&config.physics, &protocol), &|_| (), &Session::default())
+                .unwrap()
+                .0[0]
                 .unwrap()
         })
         .collect();

@@ -2,8 +2,7 @@
 //! errors.
 
 use crate::common::program::{Made, Sandbox, TINY, files, gaits, write_images};
-use morphcog::base::ranks::Ranks;
-use morphcog::base::stop::NEVER;
+use morphcog::base::session::Session;
 use morphcog::config::Config;
 use morphcog::data::dataset::Split;
 use morphcog::images::training::Training;
@@ -491,17 +490,14 @@ fn made_by(config: &str, groups: &str) -> usize {
         run.unwrap_or_else(|error| panic!("{error}\n{groups}\n{config}"))
     };
     let Ok(config) = Config::parse(config, "any.toml", &[]) else { return 0 };
-    let (threads, if_exists) = (Some(1), IfExists::Refuse);
+    let if_exists = IfExists::Refuse;
     let options = evolve::Options {
         config: config.clone(),
         name: "any".to_string(),
         out: sandbox.path("any"),
         if_exists,
-        data: None,
-        threads,
-        ranks: Ranks::ALONE,
     };
-    if evolve::evolve(&options, &NEVER, &()).is_err() {
+    if evolve::evolve(&options, &Session::default().threads(Some(1))).is_err() {
         assert!(!sandbox.path("any/run.json").exists());
         return 0;
     }
@@ -518,10 +514,8 @@ fn made_by(config: &str, groups: &str) -> usize {
         name: "taught".to_string(),
         out: sandbox.path("taught"),
         if_exists,
-        data: None,
-        threads,
     };
-    match training::train(&options, &NEVER, &()) {
+    match training::train(&options, &Session::default().threads(Some(1))) {
         Ok(_) => {
             let taught = read("taught");
             Config::load(&sandbox.path("taught/config.toml").to_string_lossy(), &[]).unwrap();

@@ -3,6 +3,8 @@
 
 use crate::common::program::{Made, Sandbox, TINY};
 use morphcog::base::observer::{Generation, Observer};
+use morphcog::base::session::Session;
+use morphcog::base::stop::NEVER;
 use morphcog::config::Config;
 use morphcog::data::dataset::Split;
 use morphcog::images::held_out::images;
@@ -266,11 +268,8 @@ fn evolve_itself_chooses_robots_at_its_end_and_so_whatever_calls_it() {
         name: "run".to_string(),
         out: sandbox.path(folder),
         if_exists: IfExists::Refuse,
-        data: None,
-        threads: Some(1),
-        ranks: morphcog::base::ranks::Ranks::ALONE,
     };
-    let finished = evolve(&options("library"), &AtomicBool::new(false), &Quiet(None)).unwrap();
+    let finished = evolve(&options("library"), &Session::new(&NEVER, &Quiet(None)).threads(Some(1))).unwrap();
     assert!(!finished.stopped);
     assert_eq!(finished.validated.len(), 2);
     let first = &finished.validated[0];
@@ -279,7 +278,8 @@ fn evolve_itself_chooses_robots_at_its_end_and_so_whatever_calls_it() {
     assert_eq!(sandbox.read("library/validation.json"), sandbox.read("run/validation.json"));
     // Stopped before its last generation, a run chooses none.
     let stop = AtomicBool::new(false);
-    let stopped = evolve(&options("stopped"), &stop, &Quiet(Some(&stop))).unwrap();
+    let stopped =
+        evolve(&options("stopped"), &Session::new(&stop, &Quiet(Some(&stop))).threads(Some(1))).unwrap();
     assert!(stopped.stopped && stopped.validated.is_empty());
     assert!(!sandbox.path("stopped/validation.json").exists());
 }

@@ -10,6 +10,7 @@ use crate::common::program::{Said, Sandbox, said_of};
 use crate::common::server;
 use morphcog::base::error::{Error, ErrorKind};
 use morphcog::base::hash::sha256_hex;
+use morphcog::base::session::Session;
 use morphcog::base::text::is_unseen;
 use morphcog::cli::explain::explain;
 use morphcog::cli::output::console::{Console, Mode};
@@ -268,11 +269,8 @@ fn run(world: &World, dice: &mut Dice, case: &mut Case) {
         seed: 1,
         threshold: 3.0,
         cycles: 1,
-        data: None,
         dataset: None,
         out: folder.join("other.json"),
-        threads: Some(1),
-        ranks: morphcog::base::ranks::Ranks::ALONE,
     };
     let stop = Arc::new(AtomicBool::new(false));
     let ended = {
@@ -284,7 +282,7 @@ fn run(world: &World, dice: &mut Dice, case: &mut Case) {
         });
         done
     };
-    case.check(eval::eval(&options, &stop, &()), "run.json");
+    case.check(eval::eval(&options, &Session::new(&stop, &()).threads(Some(1))), "run.json");
     drop(ended);
     world.plot(case, Kind::Archive, &archive, "run.json");
     let substeps = run.config.protocol.control_steps as f64 * f64::from(run.config.physics.substeps);
@@ -378,11 +376,8 @@ fn checkpoint(world: &World, dice: &mut Dice, case: &mut Case) {
         name: "few".to_string(),
         out: folder.clone(),
         if_exists: IfExists::Resume,
-        data: None,
-        threads: Some(1),
-        ranks: morphcog::base::ranks::Ranks::ALONE,
     };
-    let resumed = evolve::evolve(&options, &AtomicBool::new(true), &());
+    let resumed = evolve::evolve(&options, &Session::new(&AtomicBool::new(true), &()).threads(Some(1)));
     // What is wrong with the run is told with its folder.
     if case.check(resumed, "hostile").is_none() {
         assert_eq!(std::fs::read(folder.join("run.json")).unwrap(), before, "nothing is lost");

@@ -5,6 +5,7 @@
 use crate::common::program::{PROGRAM, Sandbox, TINY, files, gaits, without_seconds};
 use crate::common::server::Server;
 use morphcog::base::error::ErrorKind;
+use morphcog::base::session::Session;
 use morphcog::config::Config;
 use morphcog::search::evolve::{Options, evolve};
 use morphcog::store::folder::IfExists;
@@ -302,9 +303,6 @@ fn a_run_stopped_at_any_moments_goes_on_to_the_same_bytes() {
             name: name.to_string(),
             out: sandbox.path(name),
             if_exists: IfExists::Resume,
-            data: None,
-            threads: Some(2),
-            ranks: morphcog::base::ranks::Ranks::ALONE,
         };
         let (mut random, mut stops) = (9_u64, 0);
         loop {
@@ -318,7 +316,7 @@ fn a_run_stopped_at_any_moments_goes_on_to_the_same_bytes() {
                     std::thread::sleep(patience);
                     stop.store(true, Ordering::Relaxed);
                 });
-                evolve(&options, &stop, &())
+                evolve(&options, &Session::new(&stop, &()).threads(Some(2)))
             });
             match finished {
                 Ok(finished) if !finished.stopped => break,

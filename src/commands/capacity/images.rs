@@ -5,6 +5,7 @@ use crate::base::error::Error;
 use crate::base::hash::sha256_hex;
 use crate::base::random::{Purpose, stream};
 use crate::base::remedy::Remedy;
+use crate::base::session::Session;
 use crate::baseline::{Kind, Samples, Trained, train};
 use crate::commands::capacity::Options;
 use crate::config::capacity::CapacityConfig;
@@ -17,7 +18,6 @@ use crate::store::setting::{RunRef, Setting};
 use crate::task::grouping;
 use crate::task::grouping::Group;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::AtomicBool;
 
 /// The images networks learn from, wait on and are tested on, with their classes.
 pub(crate) struct Images {
@@ -36,8 +36,14 @@ pub(crate) struct Seen {
 }
 
 impl Images {
-    pub fn of(report: &EvalFile, setting: &Setting, options: &Options) -> Result<Images, Error> {
-        let dataset = whereabouts(options).load_of(&setting.train_sha256, &setting.data, &Split::ALL)?;
+    pub fn of(
+        report: &EvalFile,
+        setting: &Setting,
+        options: &Options,
+        session: &Session,
+    ) -> Result<Images, Error> {
+        let dataset =
+            whereabouts(options, session).load_of(&setting.train_sha256, &setting.data, &Split::ALL)?;
         if report.test_sha256 != dataset.fingerprint(Split::Test) {
             let text = format!(
                 "{}: the images here are not those of {} (another SHA-256)",
@@ -73,12 +79,12 @@ impl Images {
 }
 
 /// Where the images are: a run beside the evaluation, or in a folder beside it, may know.
-fn whereabouts(options: &Options) -> Whereabouts {
+fn whereabouts(options: &Options, session: &Session) -> Whereabouts {
     let folder = options.eval.parent().filter(|folder| !folder.as_os_str().is_empty());
     let entries = std::fs::read_dir(folder.unwrap_or(Path::new("."))).into_iter().flatten().flatten();
     let mut runs: Vec<PathBuf> = entries.map(|entry| entry.path().join(RUN_JSON)).collect();
     runs.sort();
-    let here = Whereabouts::given(options.data.as_deref()).and_of(&options.eval);
+    let here = Whereabouts::given(session.folder()).and_of(&options.eval);
     runs.iter().fold(here, |whereabouts, run| whereabouts.and_of(run))
 }
 
@@ -150,13 +156,13 @@ impl Task {
         size: usize,
         config: &CapacityConfig,
         number: usize,
-        stop: &AtomicBool,
+        session: &Session,
     ) -> Result<Trained, Error> {
         let kind = self.kind;
         let training = &self.training[number % self.training.len()];
         let waiting = self.waiting.as_ref().unwrap_or(&self.test);
         let rng =
             &mut stream(config.seed, Purpose::Networks, ((kind as u64) << 32) + size as u64, number as u64);
-        Ok(train(size, config.of(kind), training, waiting, &self.test, rng, stop)?)
+        Ok(train(size, config.of(kind), training, waiting, &self.test, rng, session)?)
     }
 }

@@ -2,6 +2,7 @@
 
 use crate::base::error::{Error, ErrorKind};
 use crate::base::observer::{Generation, Observer, Work};
+use crate::base::session::Session;
 use crate::base::text::counted;
 use crate::base::threads;
 use crate::commands::tasks::steps::{is_done, run};
@@ -19,6 +20,7 @@ use serde_json::Value;
 use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, BTreeSet};
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 
@@ -40,12 +42,16 @@ pub struct Summary {
 ///
 /// # Errors
 /// If not.
-pub fn check_data<'a>(tasks: impl Iterator<Item = (usize, &'a Task)>, place: &Place) -> Result<(), Error> {
+pub fn check_data<'a>(
+    tasks: impl Iterator<Item = (usize, &'a Task)>,
+    place: &Place,
+    data: Option<&Path>,
+) -> Result<(), Error> {
     let has_begun = |task: &Task| place.folder(task).join(DATA_FOLDER).exists();
     let mut datasets: BTreeMap<String, Dataset> = BTreeMap::new();
     let mut known = BTreeSet::new();
     for (number, task) in tasks.filter(|(_, task)| !has_begun(task)) {
-        let given = Whereabouts::given(place.data.as_deref());
+        let given = Whereabouts::given(data);
         let (config, whereabouts) = match &task.run {
             Run::Evolve(config, ..) => (&**config, given),
             Run::Train(training) => (&training.config, given.and_of(&training.archive)),
@@ -68,7 +74,8 @@ pub fn check_data<'a>(tasks: impl Iterator<Item = (usize, &'a Task)>, place: &Pl
                 held_out::check(config, &[], "data.images_per_class", dataset).map_err(named)?;
             }
             Run::Train(training) => {
-                training::with_images(training.config.clone(), &[], dataset, &()).map_err(named)?;
+                training::with_images(training.config.clone(), &[], dataset, &Session::default())
+                    .map_err(named)?;
             }
         }
         let Some(step) = test.filter(|step| known.insert((name, step.images, config.classes()))) else {
@@ -101,21 +108,20 @@ pub fn run_all(
     tasks: &[Task],
     place: &Place,
     jobs: Option<usize>,
-    stop: &AtomicBool,
-    observer: &dyn Observer,
+    session: &Session,
 ) -> Result<Summary, Error> {
     let is_open = |task: &&Task| {
         let known = TaskFile::read(&place.folder(task).join(TASK_JSON)).ok().flatten();
         !is_done(known.as_ref(), task, place)
     };
     let numbered: Vec<(usize, &Task)> = (1..).zip(tasks).filter(|(_, task)| is_open(task)).collect();
-    check_data(numbered.iter().copied(), place)?;
+    check_data(numbered.iter().copied(), place, session.folder())?;
     std::fs::create_dir_all(&place.out).map_err(|error| Error::writing(&place.out, &error))?;
     let before = tasks.len() - numbered.len();
     let cores = || std::thread::available_parallelism().map_or(1, usize::from);
-    let threads = place.threads.unwrap_or_else(cores);
+    let threads = session.threads.unwrap_or_else(cores);
     let jobs = jobs.unwrap_or(threads).min(numbered.len()).max(1);
-    let place = Place { threads: Some((threads / jobs).max(1)), ..place.clone() };
+    let threads = Some((threads / jobs).max(1));
     let sum = |tasks: &mut dyn Iterator<Item = &Task>| tasks.map(Task::amount).fold(0, u64::saturating_add);
     let total = sum(&mut tasks.iter());
     let known = total - sum(&mut numbered.iter().map(|(_, task)| *task));
@@ -124,20 +130,21 @@ pub fn run_all(
             format!("{} of {}, {jobs} at once:", numbered.len(), counted(tasks.len(), "task", "tasks"));
         let train = tasks.iter().all(|task| matches!(task.run, Run::Train(_)));
         let unit = if train { "challengers" } else { "generations" };
-        observer.begins(&Work { label, total, known, unit });
+        session.observer.begins(&Work { label, total, known, unit });
     }
-    let all = All { observer, known, parts: numbered.iter().map(|_| AtomicU64::new(0)).collect() };
+    let all = All { session, known, parts: numbered.iter().map(|_| AtomicU64::new(0)).collect() };
     let next = AtomicUsize::new(0);
     let summary = Mutex::new(Summary { done: before, ..Summary::default() });
     // Tasks that other processes were at.
     let elsewhere: Mutex<Vec<&Task>> = Mutex::new(Vec::new());
     let worker = || {
-        while !stop.load(Ordering::Relaxed) {
+        while session.check().is_ok() {
             let index = next.fetch_add(1, Ordering::Relaxed);
             let Some((number, task)) = numbered.get(index) else { break };
             let has_begun = AtomicBool::new(false);
             let part = Part { all: &all, index, amount: task.amount(), name: &task.name, has_begun };
-            let ended = catch_unwind(AssertUnwindSafe(|| run(task, &place, stop, &part)));
+            let ended =
+                catch_unwind(AssertUnwindSafe(|| run(task, place, &session.watched(&part).threads(threads))));
             let ended = ended.unwrap_or_else(|_| {
                 Err(Error::other("a bug of morphcog; what it said stands above".to_string()))
             });
@@ -147,7 +154,7 @@ pub fn run_all(
                     summary.done += 1;
                     part.begins_at(part.amount);
                     part.is_at(part.amount);
-                    observer.note(&format!(
+                    session.observer.note(&format!(
                         "task {number} ({}): done, {} of {}",
                         task.name,
                         summary.done,
@@ -159,7 +166,9 @@ pub fn run_all(
                     elsewhere.lock().unwrap_or_else(PoisonError::into_inner).push(*task);
                 }
                 Err(error) => {
-                    observer.failed(&error.in_place(&format!("task {number} ({}) failed", task.name)), "");
+                    session
+                        .observer
+                        .failed(&error.in_place(&format!("task {number} ({}) failed", task.name)), "");
                     summary.failed.push(*number);
                 }
             }
@@ -178,7 +187,7 @@ pub fn run_all(
 
 /// One progress over all tasks.
 struct All<'o> {
-    observer: &'o dyn Observer,
+    session: &'o Session<'o>,
     /// Generations of tasks that were done before.
     known: u64,
     /// Generations done of each other task.
@@ -199,15 +208,15 @@ impl Part<'_, '_> {
     /// So much was done before it began here, if it has not said so yet.
     fn begins_at(&self, done: u64) {
         if !self.has_begun.swap(true, Ordering::Relaxed) {
-            self.all.observer.skips(done.min(self.amount));
+            self.all.session.observer.skips(done.min(self.amount));
         }
     }
 
     fn is_at(&self, done: u64) {
-        let All { observer, known, parts } = self.all;
+        let All { session, known, parts } = self.all;
         parts[self.index].fetch_max(done.min(self.amount), Ordering::Relaxed);
         let done = parts.iter().map(|part| part.load(Ordering::Relaxed));
-        observer.progress(done.fold(*known, u64::saturating_add));
+        session.observer.progress(done.fold(*known, u64::saturating_add));
     }
 }
 
@@ -225,6 +234,6 @@ impl Observer for Part<'_, '_> {
     }
 
     fn warning(&self, text: &str) {
-        self.all.observer.warning(&format!("{}: {text}", self.name));
+        self.all.session.observer.warning(&format!("{}: {text}", self.name));
     }
 }

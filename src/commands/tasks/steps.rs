@@ -1,9 +1,8 @@
 //! One task: its run, then its steps, as far as they are not done.
 
 use crate::base::error::{Error, ErrorKind};
-use crate::base::observer::Observer;
-use crate::base::ranks::Ranks;
 use crate::base::remedy::Remedy;
+use crate::base::session::Session;
 use crate::commands::tasks::task::{Place, Run, Task, selection};
 use crate::commands::{audit, eval};
 use crate::robots::selection::Selection;
@@ -15,18 +14,17 @@ use crate::store::names::{AUDIT_JSON, RUN_JSON, TASK_JSON, TASK_LOCK};
 use crate::store::task::{State, TaskFile};
 use crate::task::direction;
 use crate::training;
-use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
 /// Does a task, or goes on with it.
 ///
 /// # Errors
 /// Why it failed; that it was stopped; that another process is at it.
-pub fn run(task: &Task, place: &Place, stop: &AtomicBool, observer: &dyn Observer) -> Result<(), Error> {
+pub fn run(task: &Task, place: &Place, session: &Session) -> Result<(), Error> {
     let folder = place.folder(task);
     std::fs::create_dir_all(&folder).map_err(|error| Error::writing(&folder, &error))?;
     let lock = folder.join(TASK_LOCK);
-    let _lock = Lock::take_contended(&lock, stop, observer).map_err(|refusal| {
+    let _lock = Lock::take_contended(&lock, session).map_err(|refusal| {
         let held = format!("{}: another process is at this task", folder.display());
         refusal.into_error(&lock, &held, "let it end, or stop it")
     })?;
@@ -40,7 +38,7 @@ pub fn run(task: &Task, place: &Place, stop: &AtomicBool, observer: &dyn Observe
     file.seconds = before;
     file.write(&path)?;
     let began = Instant::now();
-    let ended = steps(task, place, stop, observer);
+    let ended = steps(task, place, session);
     file.seconds = before + began.elapsed().as_secs_f64();
     (file.state, file.error) = match &ended {
         Ok(()) => (State::Done, None),
@@ -99,16 +97,13 @@ pub(crate) fn test_of(task: &Task, place: &Place) -> Result<Option<eval::Options
         seed: 1,
         threshold: direction::THRESHOLD,
         cycles: held_out_run::CYCLES,
-        data: place.data.clone(),
         dataset: None,
         out: folder.join(eval::own_name(step.split)),
-        threads: place.threads,
-        ranks: Ranks::ALONE,
     }))
 }
 
 /// The run, and the steps after it. What was done before is not done again.
-fn steps(task: &Task, place: &Place, stop: &AtomicBool, observer: &dyn Observer) -> Result<(), Error> {
+fn steps(task: &Task, place: &Place, session: &Session) -> Result<(), Error> {
     let folder = place.folder(task);
     let stopped =
         || Error::stopped("stopped; what is done so far is kept".to_string()).remedy(Remedy::Repeat);
@@ -119,11 +114,8 @@ fn steps(task: &Task, place: &Place, stop: &AtomicBool, observer: &dyn Observer)
                 name: name.clone(),
                 out: folder.clone(),
                 if_exists: IfExists::Resume,
-                data: place.data.clone(),
-                threads: place.threads,
-                ranks: Ranks::ALONE,
             };
-            let finished = evolve::evolve(&options, stop, observer).map_err(of_task)?;
+            let finished = evolve::evolve(&options, session).map_err(of_task)?;
             if written(finished.stopped, finished.unwritten)? {
                 return Err(stopped());
             }
@@ -138,10 +130,8 @@ fn steps(task: &Task, place: &Place, stop: &AtomicBool, observer: &dyn Observer)
                 name: task.name.clone(),
                 out: folder.clone(),
                 if_exists: IfExists::Resume,
-                data: place.data.clone(),
-                threads: place.threads,
             };
-            let trained = training::train(&options, stop, observer).map_err(|error| match error.kind {
+            let trained = training::train(&options, session).map_err(|error| match error.kind {
                 ErrorKind::Stopped => stopped(),
                 _ => of_task(error),
             })?;
@@ -154,13 +144,8 @@ fn steps(task: &Task, place: &Place, stop: &AtomicBool, observer: &dyn Observer)
     if let Some(step) = &task.steps.audit {
         let robots = match selection("audit.robots", &step.robots)? {
             Selection::Validated(best) => {
-                let options = validation::Options {
-                    archive: archive.clone(),
-                    best: Some(best),
-                    data: place.data.clone(),
-                    threads: place.threads,
-                };
-                let found = validation::validate(&options, stop, observer)?.ok_or_else(stopped)?;
+                let options = validation::Options { archive: archive.clone(), best: Some(best) };
+                let found = validation::validate(&options, session)?.ok_or_else(stopped)?;
                 Selection::Ids(found.into_iter().map(|robot| robot.id).collect())
             }
             robots => robots,
@@ -171,21 +156,18 @@ fn steps(task: &Task, place: &Place, stop: &AtomicBool, observer: &dyn Observer)
             seed: 1,
             criteria: step.criteria.clone(),
             fresh: false,
-            data: place.data.clone(),
             out: folder.join(AUDIT_JSON),
-            threads: place.threads,
-            ranks: Ranks::ALONE,
         };
-        let finished = audit::audit(&options, stop, observer)?;
+        let finished = audit::audit(&options, session)?;
         if written(finished.stopped, finished.unwritten)? {
             return Err(stopped());
         }
     }
     if let Some(options) = test_of(task, place)? {
-        if eval::known(&options)?.is_some() {
+        if eval::known(&options, session)?.is_some() {
             return Ok(());
         }
-        let finished = eval::eval(&options, stop, observer)?;
+        let finished = eval::eval(&options, session)?;
         if written(finished.file.stopped, finished.unwritten)? {
             return Err(stopped());
         }

@@ -169,10 +169,6 @@ pub(crate) fn selection(key: &str, text: &str) -> Result<Selection, Error> {
 pub struct Place {
     /// The folder that all run folders lie in.
     pub out: PathBuf,
-    /// Where the data are, if the command line says.
-    pub data: Option<PathBuf>,
-    /// Number of threads in all; `None`: one per core.
-    pub threads: Option<usize>,
 }
 
 impl Place {

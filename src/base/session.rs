@@ -1,0 +1,92 @@
+//! [`Session`]: with what a command works, made once and passed by reference.
+
+use crate::base::error::Error;
+use crate::base::observer::Observer;
+use crate::base::ranks::Ranks;
+use crate::base::stop::{NEVER, Stopped, check};
+use crate::base::threads;
+use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
+use std::sync::atomic::AtomicBool;
+
+/// The threads and processes that a command works with, how it is stopped, who watches it, and
+/// where the user says that the images are.
+pub struct Session<'a> {
+    /// Number of threads; `None`: one per core. Results do not depend on it.
+    pub threads: Option<usize>,
+    /// The processes that do the work together, each with the same options.
+    pub ranks: Ranks,
+    /// Set from another thread or by a signal, it stops the command: what is finished is kept.
+    pub stop: &'a AtomicBool,
+    /// Progress, warnings and findings go here; nothing else is ever printed.
+    pub observer: &'a dyn Observer,
+    /// The folder with the images, if the user names one.
+    pub data: Option<PathBuf>,
+    pool: OnceLock<rayon::ThreadPool>,
+}
+
+impl Default for Session<'_> {
+    /// One thread per core, one process, no observer; never stopped.
+    fn default() -> Self {
+        Session::new(&NEVER, &())
+    }
+}
+
+impl<'a> Session<'a> {
+    /// Returns a session of this process alone, with one thread per core.
+    pub fn new(stop: &'a AtomicBool, observer: &'a dyn Observer) -> Self {
+        let (ranks, pool) = (Ranks::ALONE, OnceLock::new());
+        Session { threads: None, ranks, stop, observer, data: None, pool }
+    }
+
+    /// Returns a session with another number of threads.
+    #[must_use]
+    pub fn threads(self, threads: Option<usize>) -> Self {
+        Session { threads, pool: OnceLock::new(), ..self }
+    }
+
+    /// Returns a session whose work several processes share.
+    #[must_use]
+    pub fn ranks(self, ranks: Ranks) -> Self {
+        Session { ranks, ..self }
+    }
+
+    /// Returns a session with the folder of the images that the user names.
+    #[must_use]
+    pub fn data(self, data: Option<PathBuf>) -> Self {
+        Session { data, ..self }
+    }
+
+    /// Returns a session that differs in its observer.
+    pub fn watched<'b>(&self, observer: &'b dyn Observer) -> Session<'b>
+    where
+        'a: 'b,
+    {
+        Session::new(self.stop, observer).threads(self.threads).ranks(self.ranks).data(self.data.clone())
+    }
+
+    /// Returns the folder of the images that the user names.
+    pub fn folder(&self) -> Option<&Path> {
+        self.data.as_deref()
+    }
+
+    /// Returns the threads, which are started when they are first asked for.
+    ///
+    /// # Errors
+    /// If the system has none left.
+    pub fn pool(&self) -> Result<&rayon::ThreadPool, Error> {
+        if let Some(pool) = self.pool.get() {
+            return Ok(pool);
+        }
+        let pool = threads::pool(self.threads)?;
+        Ok(self.pool.get_or_init(|| pool))
+    }
+
+    /// Checks that the session has not been stopped.
+    ///
+    /// # Errors
+    /// If it has.
+    pub fn check(&self) -> Result<(), Stopped> {
+        check(self.stop)
+    }
+}
