@@ -33,6 +33,7 @@ impl Unwritten {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::base::observer::Observer;
     use crate::base::stop::NEVER;
     use std::sync::atomic::{AtomicU32, Ordering};
 
