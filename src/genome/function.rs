@@ -1,4 +1,4 @@
-//! [`Function`]: what a CPPN node does with the sum of its inputs.
+//! [`Function`]: the function of a CPPN node.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -27,8 +27,8 @@ pub enum Function {
     NegSqrt = 7,
 }
 
-/// Largest size of a node's value. Chains of squares would overflow to infinities, whose
-/// differences are not numbers; no sum of values this large does.
+/// Largest absolute value of a node. Chains of squares would overflow to infinities, whose
+/// differences are NaN; no sum of values this large does.
 const LIMIT: f64 = 1e100;
 
 impl Function {
@@ -44,13 +44,12 @@ impl Function {
         Function::NegSqrt,
     ];
 
-    /// The functions a hidden node may have: all but squash.
+    /// Returns the functions allowed in a hidden node: all but squash.
     pub fn for_hidden() -> &'static [Function] {
         &Self::ALL[1..]
     }
 
-    /// Replaces every sum by the function's value, at most 10¹⁰⁰ in size; what is not a number
-    /// becomes 0.
+    /// Replaces every sum by the function's value, at most 10¹⁰⁰ in size; NaN becomes 0.
     pub fn apply(self, sums: &mut [f64]) {
         match self {
             Function::Squash => each(sums, |s| 2.0 / (1.0 + libm::exp(-s)) - 1.0),
