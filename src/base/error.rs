@@ -41,9 +41,9 @@ impl ErrorKind {
     }
 }
 
-/// What went wrong, where, what was expected, and what to do about it.
+/// An error: what went wrong, where, what was expected, and what to do about it.
 ///
-/// An error names the field of a command's options that it is about, and its remedies, but no
+/// An error knows the field of a command's options that it is about, and its remedies, but no
 /// option of the command line: whoever prints it spells both for its users.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Error {

@@ -99,8 +99,7 @@ pub fn read_given(path: &Path) -> io::Result<String> {
 /// `>` writes it.
 ///
 /// # Errors
-/// Returns the system's error, or one of its own if it is no such text or has more than 256
-/// megabytes.
+/// Returns the system's error, or one of its own if it is no such text or above 256 megabytes.
 pub fn read_limited(source: impl Read) -> io::Result<String> {
     let mut bytes = Vec::new();
     let read = source.take(MOST_TEXT + 1).read_to_end(&mut bytes)?;
@@ -137,8 +136,7 @@ pub fn exists(path: &Path) -> bool {
 
 /// Writes a file as a whole or not at all: to a temporary name in the same folder, synced, then
 /// renamed. A symbolic link stays and its target is written. Anything but a regular file
-/// (`/dev/stdout`, a pipe) is written to directly. Removes what a killed process left of the same
-/// file.
+/// (`/dev/stdout`, a pipe) is written to directly. Removes leftovers of killed writers.
 ///
 /// # Errors
 /// Returns the system's error, for example if the folder does not exist, or [`ownership::Lost`].

@@ -5,8 +5,7 @@ pub(crate) fn is_zero(number: &usize) -> bool {
     *number == 0
 }
 
-/// Formats a number with a fixed number of decimals. A value that rounds to 0 has no sign: there is
-/// no −0.00.
+/// Formats a number with fixed decimals. A value that rounds to 0 has no sign: no −0.00.
 pub fn fixed(value: f64, decimals: usize) -> String {
     unsigned_zero(format!("{value:.decimals$}"))
 }

@@ -3,8 +3,7 @@
 use crate::base::error::Error;
 use serde::Serialize;
 
-/// Receives the progress of a command, from several threads at once. Implementing a method is
-/// optional.
+/// Receives the progress of a command, from several threads at once. Every method is optional.
 pub trait Observer: Sync {
     /// Reports in words that a step begins, or that something was found.
     fn note(&self, _text: &str) {}
@@ -12,8 +11,7 @@ pub trait Observer: Sync {
     fn begins(&self, _work: &Work) {}
     /// Reports the total done so far of the work that began last.
     fn progress(&self, _done: u64) {}
-    /// Reports work that counts as done without taking time, because its result is known or not
-    /// needed. Speeds leave it out.
+    /// Reports work that is done without taking time: known or not needed. No speed counts it.
     fn skips(&self, _count: u64) {}
     /// Reports a completed generation; first of all, those completed earlier.
     fn generation(&self, _generation: &Generation) {}
@@ -21,8 +19,7 @@ pub trait Observer: Sync {
     fn finding(&self, _kind: &str, _fields: &serde_json::Value) {}
     /// Reports something that the user should know.
     fn warning(&self, _text: &str) {}
-    /// Reports a failure that does not end the command; `then` says how it continues, if that is
-    /// not obvious.
+    /// Reports a failure that does not end the command; `then` says how it continues, if not plain.
     fn failed(&self, _error: &Error, _then: &str) {}
 }
 

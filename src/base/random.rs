@@ -46,8 +46,7 @@ pub enum Purpose {
 #[derive(Clone, Debug)]
 pub struct Stream(Pcg64);
 
-/// Returns the stream for `purpose` in a run with `seed`; `generation` and `child` tell its uses
-/// apart.
+/// Returns the stream for `purpose` in a run with `seed`; `generation` and `child` number its uses.
 pub fn stream(seed: u64, purpose: Purpose, generation: u64, child: u64) -> Stream {
     // SplitMix64 (Steele et al. 2014) over the four words, so that neighbouring names give
     // unrelated PCG states.
@@ -93,15 +92,13 @@ impl Stream {
         (!items.is_empty()).then(|| &items[self.below(items.len())])
     }
 
-    /// Draws from the standard normal distribution (Box–Muller, with `libm` so that the bits are
-    /// the same on every machine).
+    /// Draws from the standard normal (Box–Muller, with `libm` for the same bits on every machine).
     pub fn normal(&mut self) -> f64 {
         let radius = libm::sqrt(-2.0 * libm::log(1.0 - self.unit()));
         radius * libm::cos(std::f64::consts::TAU * self.unit())
     }
 
-    /// Draws up to `count` different numbers of 0 … n − 1 in random order (partial Fisher–Yates
-    /// shuffle).
+    /// Draws up to `count` different numbers of 0 … n − 1 in random order (partial Fisher–Yates).
     pub fn sample(&mut self, n: usize, count: usize) -> Vec<usize> {
         let mut all: Vec<usize> = (0..n).collect();
         let count = count.min(n);

@@ -64,8 +64,7 @@ impl Ranks {
     /// or the others block.
     ///
     /// # Panics
-    /// If a rank's value cannot be written or read as JSON, which does not happen as all run the
-    /// same program.
+    /// If a value cannot pass through JSON, which cannot happen as all ranks run the same program.
     pub fn share<T: Serialize + DeserializeOwned>(self, own: T) -> Vec<T> {
         const WHY: &str = "all ranks are the same program, and say numbers, texts and lists";
         if self.size == 1 {
@@ -97,8 +96,7 @@ impl Ranks {
         Some(owners.iter().map(next).collect())
     }
 
-    /// Returns true if every rank votes true. Every rank must vote, even one that was stopped, or
-    /// the others block.
+    /// Returns true if all ranks vote true. Even a stopped rank must vote, or the others block.
     pub fn all(self, own: bool) -> bool {
         self.share(own).into_iter().all(|is_so| is_so)
     }
@@ -108,8 +106,7 @@ impl Ranks {
         self.share(own).swap_remove(0)
     }
 
-    /// Ends all ranks at once, this one with an exit code; for failures that only this rank may
-    /// know of.
+    /// Ends all ranks at once, this one with an exit code; for failures that others may not know.
     pub fn abort(self, code: u8) -> ! {
         abort(code)
     }

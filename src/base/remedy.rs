@@ -3,7 +3,7 @@
 
 use std::path::{Path, PathBuf};
 
-/// What a user can do about an error; several remedies of one error are alternatives.
+/// An action that a user can take about an error; several of one error are alternatives.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Remedy {
     /// Advice in plain words, without names of options or commands.

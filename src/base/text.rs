@@ -47,7 +47,7 @@ fn written(c: char) -> String {
     if is_unseen(c) { c.escape_default().collect() } else { c.to_string() }
 }
 
-/// Returns true if a character is not visible, or does something besides.
+/// Returns true if a character is invisible or controls the display.
 pub fn is_unseen(c: char) -> bool {
     c.is_control()
         || matches!(c,

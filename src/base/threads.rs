@@ -1,5 +1,4 @@
-//! Threads and thread pools. All are made here, so that running out of threads is a reported error,
-//! not a panic.
+//! Threads and thread pools, all made here, so that running out of them is an error, not a panic.
 
 use crate::base::error::Error;
 use std::fmt::Display;
@@ -22,8 +21,7 @@ pub fn check_environment() -> Result<(), Error> {
     }
 }
 
-/// Makes a pool of this many threads; `None` means one per core, as far as the address space has
-/// room.
+/// Makes a pool of threads; `None` means one per core, as far as the address space has room.
 ///
 /// # Errors
 /// Returns an error if the system has no threads left.

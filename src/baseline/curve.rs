@@ -49,8 +49,7 @@ pub fn parabola(points: &[(f64, f64)]) -> Option<[f64; 3]> {
     Some([solution[0], solution[1] / scale, solution[2] / (scale * scale)])
 }
 
-/// Returns the smallest x in [from, to] at which a parabola is at or above a value; `None` if it
-/// never is.
+/// Returns the smallest x in [from, to] at which a parabola reaches a value; `None` if none does.
 pub fn first_crossing([c0, c1, c2]: [f64; 3], value: f64, (from, to): (f64, f64)) -> Option<Crossing> {
     let at = |x: f64| c0 + x * (c1 + x * c2);
     if at(from) > value {

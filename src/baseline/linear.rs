@@ -58,9 +58,8 @@ impl Moments {
         Moments { size, by_class: classes.into_par_iter().map(of_class).collect() }
     }
 
-    /// Returns the linear function with the least squared distance from 1 under images of the
-    /// classes of one group, and from −1 under those of the other; with a small penalty on its
-    /// weights.
+    /// Returns the linear function closest in square to 1 under images of one group's classes, and
+    /// to −1 under those of the other's; with a small penalty on its weights.
     pub fn apart(&self, first: &[u8], second: &[u8]) -> Linear {
         let mut square = DMatrix::zeros(self.size, self.size);
         let mut towards = DVector::zeros(self.size);

@@ -1,6 +1,5 @@
 //! [`Network`]: the paper's two networks and their gradients, on nalgebra. Sums run in a fixed
-//! order and functions come from `libm`, so training gives the same bits on every machine and on
-//! any number of threads.
+//! order and functions come from `libm`: training gives the same bits on any machine and threads.
 
 use crate::base::Grid;
 use crate::base::random::Stream;
@@ -108,9 +107,8 @@ impl Shape {
         self.places().1 * self.size
     }
 
-    /// Returns the ranges of the parameters in one vector: weights of the hidden layer (by pixel,
-    /// then by unit), its biases, weights of the outputs (by output, then by feature), their
-    /// biases.
+    /// Returns the ranges of the parameters in one vector: hidden weights (by pixel, then by unit),
+    /// hidden biases, output weights (by output, then by feature), output biases.
     fn layout(&self) -> [Range<usize>; 4] {
         let sizes = [self.inputs() * self.size, self.size, self.features() * OUTPUTS, OUTPUTS];
         let mut end = 0;
@@ -238,8 +236,8 @@ impl Network {
         std::array::from_fn(output)
     }
 
-    /// Adds to `gradient` the derivatives of a loss by the parameters, given those by the outputs,
-    /// for the last image of [`forward`](Network::forward).
+    /// Adds to `gradient` a loss's derivatives by the parameters, given those by the outputs, for
+    /// the last image of [`forward`](Network::forward).
     pub fn backward(&self, image: &Patches, outputs: [f64; OUTPUTS], gradient: &mut DVector<f64>) {
         let Shape { size, activation, pooling, .. } = self.shape;
         let [hidden, biases, weights, output_biases] = self.shape.layout();
@@ -361,8 +359,7 @@ fn add_scaled(sums: &mut [f64], factor: f64, terms: &[f64]) {
     }
 }
 
-/// Returns the cross-entropy of outputs against the group of an image, and its derivatives by the
-/// outputs.
+/// Returns the cross-entropy of outputs against an image's group, and its derivatives by them.
 pub fn cross_entropy(outputs: [f64; OUTPUTS], group: usize) -> (f64, [f64; OUTPUTS]) {
     let largest = outputs.into_iter().fold(f64::NEG_INFINITY, f64::max);
     let powers = outputs.map(|output| libm::exp(output - largest));

@@ -17,7 +17,7 @@ impl Kind {
     /// All kinds.
     pub const ALL: [Kind; 2] = [Kind::Mlp, Kind::Cnn];
 
-    /// Its name in files.
+    /// Returns its name in files.
     pub fn name(self) -> &'static str {
         match self {
             Kind::Mlp => "mlp",

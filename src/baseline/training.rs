@@ -54,8 +54,7 @@ impl Samples {
     }
 }
 
-/// Returns a network's accuracy on samples, and the value that training should improve; larger is
-/// better.
+/// Returns a network's accuracy on samples, and the value to improve; larger is better.
 fn test(
     network: &mut Network,
     samples: &Samples,

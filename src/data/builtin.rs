@@ -1,6 +1,5 @@
-//! Built-in digits: handwriting-like images that the program draws, so that everything works
-//! without a download. There are any number; each is a pure function of (seed, split, class,
-//! number).
+//! Built-in digits: handwriting-like images drawn by the program, so that all works without a
+//! download. There are any number, each a pure function of (seed, split, class, number).
 
 use crate::base::Grid;
 use crate::base::hash::sha256_hex;
@@ -59,8 +58,7 @@ impl BuiltinDigits {
     /// Number of rows and of columns of every image.
     pub const SIDE: usize = pen::SIDE;
 
-    /// Checks that there is at least one class, that all are different digits, and that none has
-    /// too many images.
+    /// Checks for at least one class, different digits, and not too many images of each.
     ///
     /// # Errors
     /// Returns a [`BuiltinError`] otherwise.
@@ -106,8 +104,8 @@ impl BuiltinDigits {
         Some(pen::write(class, &mut stream(self.seed, Purpose::BuiltinDigits, page, number)))
     }
 
-    /// Returns the SHA-256 of all that determines a split's images: the drawing's version, seed,
-    /// classes and number.
+    /// Returns the SHA-256 of what decides a split's images: drawing version, seed, classes,
+    /// number.
     pub fn fingerprint(&self, split: Split) -> String {
         let (seed, classes, number) = (self.seed, &self.classes, self.per_class(split));
         let drawing = pen::DRAWING;

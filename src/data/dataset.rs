@@ -110,8 +110,7 @@ impl Dataset {
     /// of splits that are not wanted may be missing.
     ///
     /// # Errors
-    /// Returns [`DatasetError::Files`], which names the file, its expected place and content, and
-    /// what to do.
+    /// Returns [`DatasetError::Files`]: the file, its place, what was expected and what to do.
     pub fn load(name: &str, given: &[Place], wanted: &[Split]) -> Result<Self, DatasetError> {
         Dataset::oriented(name, given, wanted, None)
     }
@@ -226,8 +225,7 @@ impl Dataset {
         label.ok_or_else(|| self.no_such(split, index))
     }
 
-    /// Returns the indices of all images of a class in a split, ascending; none if it was not
-    /// loaded.
+    /// Returns the indices of all images of a class in a split, ascending; none if not loaded.
     pub fn indices_of(&self, split: Split, class: u8) -> &[usize] {
         self.splits.get(&split).and_then(|loaded| loaded.by_class.get(&class)).map_or(&[], Vec::as_slice)
     }
@@ -237,8 +235,8 @@ impl Dataset {
         self.splits.get(&split).map_or_else(Vec::new, |loaded| loaded.by_class.keys().copied().collect())
     }
 
-    /// Returns the SHA-256 of a split's content (see [`SplitInfo::fingerprint`]); `None` if it was
-    /// not loaded.
+    /// Returns the SHA-256 of a split's content (see [`SplitInfo::fingerprint`]); `None` if not
+    /// loaded.
     pub fn fingerprint(&self, split: Split) -> Option<String> {
         self.splits.get(&split).map(|loaded| match &loaded.images {
             Images::Stored(stored) => stored.fingerprint.clone(),
@@ -266,12 +264,11 @@ impl Dataset {
     }
 
     /// Draws `per_class` different images of each class by seed and returns their indices: first
-    /// those of `classes[0]`, then those of `classes[1]`, … The draw of one class does not depend
-    /// on the others.
+    /// those of `classes[0]`, then those of `classes[1]`, … The other classes do not affect a
+    /// class.
     ///
     /// # Errors
-    /// Returns [`DatasetError::NotLoaded`], or [`DatasetError::TooFew`] if a class has fewer
-    /// images.
+    /// Returns [`DatasetError::NotLoaded`], or [`DatasetError::TooFew`] if images are too few.
     pub fn draw(
         &self,
         split: Split,

@@ -358,8 +358,7 @@ struct Running(Child);
 
 impl Drop for Running {
     fn drop(&mut self) {
-        // A process that has ended already cannot be killed; nothing can be done about either
-        // error.
+        // A process that has ended cannot be killed; nothing helps against either error.
         let _ = self.0.kill();
         let _ = self.0.wait();
     }
@@ -444,8 +443,8 @@ fn pieces(mut output: impl Read + Send + 'static) -> Result<Receiver<io::Result<
     Ok(receiver)
 }
 
-/// Returns the last line of a program's messages, without its name and without the address and time
-/// before an error.
+/// Returns the last line of a program's messages, without the program's name and an error's address
+/// and time.
 fn last_line(program: Program, said: &str) -> Option<String> {
     let line = said.lines().map(str::trim).rfind(|line| !line.is_empty())?;
     let line = line.strip_prefix(program.name()).and_then(|line| line.strip_prefix(": ")).unwrap_or(line);

@@ -370,8 +370,7 @@ mod tests {
     use crate::data::dataset::{Dataset, DatasetError};
     use std::fs;
 
-    /// Writes images and labels under the given names; every pixel of image i is i, label i is 10 −
-    /// i.
+    /// Writes images and labels under the given names; pixels of image i are i, its label 10 − i.
     fn write(folder: &Path, images: &str, labels: &str, count: u8) {
         let pixels: Vec<u8> = (0..count).flat_map(|i| [i; 6]).collect();
         let values: Vec<u8> = (0..count).map(|i| 10 - i).collect();

@@ -189,8 +189,7 @@ pub enum IdxError {
 }
 
 impl IdxError {
-    /// Returns true if the file could not be opened or read at all, rather than having the wrong
-    /// content.
+    /// Returns true if the file could not be opened or read; false if it has the wrong content.
     pub fn is_io(&self) -> bool {
         matches!(self, IdxError::Io { .. })
     }

@@ -101,8 +101,7 @@ fn mirror(point: Point, centre: Point) -> Point {
     [2.0 * centre[0] - point[0], 2.0 * centre[1] - point[1]]
 }
 
-/// Bends the whole digit with two slow waves through the paper, and makes the hand shake with a
-/// quick one.
+/// Bends the whole digit by two slow waves through the paper, and shakes the hand by a quick one.
 fn warp(lines: &mut [Vec<Point>], chance: &mut Stream) {
     let mut waves = Vec::new();
     for (size, low, high) in [(0.035, 0.5, 1.0), (0.02, 1.0, 1.8), (0.006, 3.0, 5.0)] {
@@ -136,8 +135,7 @@ fn tilt(lines: &mut [Vec<Point>], digit: u8, chance: &mut Stream) {
     }
 }
 
-/// Scales the lines to the ink box and moves them near the middle of the image; from here on in
-/// pixels.
+/// Scales the lines to the ink box near the middle of the image; from here on in pixels.
 fn fit(lines: &mut [Vec<Point>], radius: f64, chance: &mut Stream) {
     let mut low = [f64::INFINITY; 2];
     let mut high = [f64::NEG_INFINITY; 2];
@@ -181,8 +179,7 @@ fn ink(lines: &[Vec<Point>], radius: f64, chance: &mut Stream) -> Grid<u8> {
     cover.map(|&c| (255.0 * c).round() as u8)
 }
 
-/// Draws one straight piece; the coverage of a pixel follows from its centre's distance to the
-/// piece.
+/// Draws one straight piece; a pixel's coverage follows from its centre's distance to the piece.
 fn segment(cover: &mut Grid<f64>, from: Point, to: Point, radius: f64) {
     let reach = radius + 1.0;
     let range = |axis: usize| {

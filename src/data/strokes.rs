@@ -1,8 +1,7 @@
 //! Strokes of the built-in digits: every digit in the ways people write it.
 //!
 //! A stroke is a list of places that the pen passes; [`crate::data::pen`] draws a smooth line
-//! through them and varies everything. Coordinates: x to the right, y down, in units of the digit's
-//! height.
+//! through them and varies everything. Coordinates: x to the right, y down, in digit heights.
 
 /// One place on a stroke.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -107,9 +107,8 @@ impl Cppn {
         order
     }
 
-    /// Returns the content in bytes, the same for equal networks and only for them: numbers
-    /// little-endian, weights as their bits. Ids are made of it, so it must not change within a
-    /// version.
+    /// Returns the content in bytes, equal for equal networks and only for them: numbers
+    /// little-endian, weights as bits. Ids are made of it, so it must not change within a version.
     pub fn canonical_bytes(&self) -> Vec<u8> {
         let mut bytes = VERSION.to_le_bytes().to_vec();
         bytes.extend(self.outputs.iter().map(|f| *f as u8));
@@ -123,8 +122,7 @@ impl Cppn {
         bytes
     }
 
-    /// Returns true if an edge may be added between two nodes: there is none, and it closes no
-    /// cycle.
+    /// Returns true if two nodes may get an edge: there is none, and it closes no cycle.
     pub(super) fn may_connect(&self, from: usize, to: usize) -> bool {
         self.position(from, to).is_err() && !self.is_ancestor(to, from)
     }

@@ -132,8 +132,8 @@ impl Genome {
         id
     }
 
-    /// Returns true if an id is this genome's: its current form, or that of older files, where some
-    /// begin with a digit.
+    /// Returns true if an id is this genome's, as now or as in older files, where some begin with a
+    /// digit.
     pub fn has_id(&self, id: &str) -> bool {
         id == self.id() || id == &self.digest()[..10]
     }
@@ -193,8 +193,7 @@ impl Genome {
         let mutations = if min_muscles > height.saturating_mul(width) { 0 } else { MAX_MUTATIONS };
         let mut genome = self.clone();
         for number in 1..=mutations {
-            // Quick searches complete anyway: a run that is stopped at its start still gets its
-            // folder.
+            // A quick search completes anyway: a run stopped at its start still gets its folder.
             if number % MUTATIONS_AT_ONCE == 0 {
                 check(stop)?;
             }
@@ -207,8 +206,7 @@ impl Genome {
         Err(GenomeError::NoValidBody { mutations, height, width, min_muscles })
     }
 
-    /// Makes a random individual: [`Genome::initial`], mutated until its body is valid; with that
-    /// body.
+    /// Makes a random individual: [`Genome::initial`], mutated until its body is valid; and that.
     ///
     /// # Errors
     /// As [`Genome::offspring`].

@@ -8,8 +8,7 @@ use crate::genome::params::MutationParams;
 /// One kind of mutation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mutation {
-    /// Splits an edge by a hidden node with a random function: weight in as the edge's, weight out
-    /// 1.
+    /// Splits an edge by a hidden node with a random function: the edge's weight in, weight 1 out.
     AddNode,
     /// Removes a hidden node; joins each predecessor to each successor by the product of the two
     /// weights, unless there is an edge between them already.

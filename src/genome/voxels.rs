@@ -29,8 +29,7 @@ impl Genome {
     }
 }
 
-/// Draws a place, (row, column), and one of the six materials that it does not have, all with equal
-/// probability.
+/// Draws a place, (row, column), and one of the six other materials, all equally likely.
 pub fn other_voxel(voxels: &Grid<Material>, rng: &mut Stream) -> ((usize, usize), Material) {
     let place = (rng.below(voxels.height()), rng.below(voxels.width()));
     let step = 1 + rng.below(Material::ALL.len() - 1);

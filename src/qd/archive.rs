@@ -110,8 +110,7 @@ impl<S> Archive<S> {
         }
     }
 
-    /// Returns the objective of the `count`-th fittest elite (from 1) of a kind; none if there are
-    /// fewer.
+    /// Returns the objective of the `count`-th fittest elite (from 1) of a kind, if it exists.
     pub fn nth_fittest(&self, count: usize, of: impl Fn(&S) -> bool) -> Option<f64> {
         let mut objectives: Vec<f64> =
             self.elites().filter(|e| of(&e.solution)).map(|e| e.objective).collect();

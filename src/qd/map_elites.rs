@@ -65,8 +65,7 @@ impl<S> MapElites<S> {
     /// returns the outcome of each. Leave out solutions without fitness (unstable rollouts).
     ///
     /// # Errors
-    /// Returns an [`ArchiveError`] if a fitness is not finite; earlier solutions are then in the
-    /// archive.
+    /// Returns an [`ArchiveError`] if a fitness is not finite; the archive has earlier solutions.
     pub fn tell(
         &mut self,
         mut generation: Vec<Evaluated<S>>,

@@ -1,9 +1,8 @@
-//! Estimates the accuracy that training could reach, from the linear response alone, without
-//! optimism.
+//! Estimates the accuracy that training could reach, from the linear response alone.
 //!
-//! A design that was solved for looks best under the very slopes and images it was solved with.
-//! Both are noisy, so under these it looks better than it is. Here one half of rollouts and images
-//! solves for it, and the other half evaluates it (cross-fitting).
+//! A design looks best under the very slopes and images it was solved with. Both are noisy, so it
+//! looks better than it is. Here one half of rollouts and images solves the design problem, and the
+//! other half evaluates the design (cross-fitting).
 
 use crate::base::random::{Purpose, stream};
 use crate::base::stop::{Stopped, check};
@@ -203,7 +202,7 @@ struct Answer {
     off: Vec<f64>,
 }
 
-/// Returns the mean of clipped margins that scatter normally about one, and its derivative by that.
+/// Returns the mean of clipped margins scattered normally about `margin`, and its derivative by it.
 fn expected_clipped_margin(margin: f64, scatter: f64, enough: f64) -> (f64, f64) {
     let [low, high] = [-enough, enough].map(|end| (end - margin) / scatter);
     let [below, under] = [low, high].map(normal);
@@ -212,7 +211,7 @@ fn expected_clipped_margin(margin: f64, scatter: f64, enough: f64) -> (f64, f64)
     (clipped / enough, inside / enough)
 }
 
-/// Returns the fraction above a threshold of margins that scatter normally about one, and its
+/// Returns the fraction above `threshold` of margins scattered normally about `margin`, and its
 /// derivative by that.
 fn right(margin: f64, scatter: f64, threshold: f64) -> (f64, f64) {
     let beyond = (margin - threshold) / scatter;
@@ -289,8 +288,7 @@ mod tests {
             (0..count).map(example).collect()
         }
 
-        /// Returns the true mean clipped margin of a design, and its true fraction of correct
-        /// answers.
+        /// Returns a design's true mean clipped margin and true fraction of correct answers.
         fn truth(&self, (design, side): &Solved, examples: &[Example]) -> [f64; 2] {
             let (mut clipped, mut share) = (0.0, 0.0);
             for example in examples {

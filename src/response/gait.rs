@@ -65,8 +65,7 @@ impl Gait {
         Body::new(voxels).expect("a body with other materials is as large as before")
     }
 
-    /// Returns the body with an expanding sensor at every place, with which its response is
-    /// measured.
+    /// Returns the body with an expanding sensor at every place, for measuring its response.
     pub fn probe(&self) -> Body {
         self.body.probe()
     }
@@ -101,8 +100,7 @@ impl Gait {
     }
 }
 
-/// Returns the pixel under which an expanding sensor is as wide as a soft voxel; 0 or 1 if it never
-/// is.
+/// Returns the pixel that makes an expanding sensor as wide as a soft voxel; 0 or 1 if none does.
 fn resting(physics: &Physics) -> f64 {
     let [narrow, wide] = [0.0, 1.0].map(|pixel| width(Material::SensorExpand, pixel, physics));
     let rest = width(Material::Soft, 0.0, physics);

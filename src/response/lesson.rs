@@ -60,8 +60,7 @@ fn choice(material: Material) -> usize {
     CHOICES.iter().position(|other| *other == material).expect("a design has materials of CHOICES only")
 }
 
-/// A design problem: examples, the first design, and the slopes that predict the displacements of
-/// others.
+/// A design problem: examples, first design, and slopes that predict displacements of others.
 pub struct Lesson {
     /// Width by place, choice and example \[rest widths\].
     widths: Vec<[Vec<f64>; 3]>,

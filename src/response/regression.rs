@@ -4,8 +4,7 @@
 //! d ≈ c + Σ Jᵢ wᵢ. Linear regression finds the *slopes* J from a body whose soft voxels and
 //! sensors are all expanding sensors, under images with independent random pixels: an intervention
 //! on every voxel by itself. (Natural images only reveal what goes together.) The slopes belong to
-//! the gait, so they serve every task: a [`Lesson`](super::lesson::Lesson) finds the sensors for
-//! it.
+//! the gait, so they serve every task: a [`Lesson`](super::lesson::Lesson) finds its sensors.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -185,11 +184,11 @@ pub struct Response {
     pub intercept: f64,
     /// Intercept under each condition; none without rollouts.
     pub intercepts: Vec<Option<f64>>,
-    /// Unexplained displacement with slopes fitted to other rollouts: standard deviation,
+    /// Standard deviation of displacements about predictions from slopes of other rollouts,
     /// cross-validated \[voxel lengths\].
     pub noise: f64,
-    /// Unexplained displacement with the true slopes: `noise` without the errors of the slopes
-    /// \[voxel lengths\].
+    /// Standard deviation of displacements about predictions from the true slopes: `noise` without
+    /// the slopes' errors \[voxel lengths\].
     pub scatter: f64,
     /// Fraction of the displacements' variance that slopes fitted to other rollouts explain.
     pub r_squared: f64,

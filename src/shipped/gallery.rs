@@ -7,8 +7,7 @@ use std::path::PathBuf;
 /// Prefix of the names of shipped runs.
 pub const PREFIX: &str = "gallery:";
 
-/// Robots that distinguish zeros from ones, the best run first: the default where the user names no
-/// run.
+/// Robots that distinguish zeros from ones, the best run first: the default if nobody names others.
 pub const ZERO_ONE: &str = "gallery:zero_one";
 
 /// A robot for each pair of digits; together they answer as a team.

@@ -33,8 +33,7 @@ pub fn name(path: &Path) -> Option<(&str, &str)> {
     parts(path)?.0.split_once(':')
 }
 
-/// Returns the collection of a named run, and its set: the part before its seed, or before its
-/// digits.
+/// Returns the collection of a named run, and its set: the part before its seed or digits.
 pub fn set(path: &Path) -> Option<(&str, &str)> {
     let (of, run) = name(path)?;
     Some((of, run.rsplit_once('-')?.0))
@@ -46,8 +45,7 @@ pub fn atlas_of(path: &Path) -> Option<PathBuf> {
     atlas::folder_of(name.strip_prefix(atlas::PREFIX)?)
 }
 
-/// Returns the place of a named run's file; none for other paths, or if no such file ships with the
-/// program.
+/// Returns the place of a named run's file; none for other paths, or if no such file ships.
 ///
 /// # Errors
 /// Returns an error with the atlas's remedies if it has no such file.

@@ -5,8 +5,7 @@ use crate::task::fitness::Fitness;
 use crate::task::grouping::{Group, Split};
 use crate::task::score::{Answer, of_split};
 
-/// Least displacement that counts as an answer: it must be larger than this many voxel lengths
-/// (paper, section "Generalization test").
+/// Displacements up to this many voxel lengths are no answer (paper, "Generalization test").
 pub const THRESHOLD: f64 = 3.0;
 
 /// A way to walk.

@@ -19,12 +19,12 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Savings {
-    /// Do not simulate a body again that was already evaluated in this run: it would be exactly as
-    /// fit, and only strictly fitter robots enter the archive.
+    /// True to simulate no body twice in a run: it would be exactly as fit, and only strictly
+    /// fitter robots enter the archive.
     pub known_bodies: bool,
-    /// Stop simulating an offspring that can no longer beat the elite of any cell it may belong to.
+    /// True to stop simulating offspring that can no longer beat the elite of any possible cell.
     pub early_stop: bool,
-    /// Share a rollout among images that give a body's sensors the same pixels.
+    /// True to share a rollout among images that give a body's sensors the same pixels.
     pub shared_rollouts: bool,
 }
 
@@ -47,8 +47,7 @@ pub enum Outcome {
 }
 
 impl Outcome {
-    /// Returns the displacement under every image, as far as known; `None` if a rollout became
-    /// unstable.
+    /// Returns the displacements as far as known, one per image; `None` if a rollout was unstable.
     pub fn known(&self) -> Option<Vec<Option<f64>>> {
         match self {
             Outcome::Walked(displacements) => Some(displacements.iter().copied().map(Some).collect()),
@@ -72,7 +71,7 @@ pub struct Evaluation {
     pub stopped: u64,
 }
 
-/// A condition on a robot's displacements so far.
+/// A predicate of a robot's displacements so far.
 pub type MayWin<'a> = dyn Fn(&[Option<f64>]) -> bool + Sync + Send + 'a;
 
 /// A body to be evaluated.
@@ -137,8 +136,7 @@ pub fn evaluate(
 /// simulated. `progress` is called after each with the number of images it covers.
 ///
 /// # Errors
-/// Returns [`Stopped`] if `stop` was set in the meantime. Each rollout that ended early is an
-/// [`Unstable`] within.
+/// Returns [`Stopped`] if `stop` was set in the meantime; single rollouts return [`Unstable`].
 pub fn fresh_rollouts(
     body: &Body,
     images: &[Grid<f64>],

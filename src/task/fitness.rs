@@ -30,11 +30,10 @@ pub enum Fitness {
     /// The mean of the margins, each divided by ten voxel lengths and clipped to −1 … 1.
     MeanClipped,
     /// The strength of a gait's response to its voxels' pixels, whatever its task \[voxel
-    /// lengths\]: `√(mean(o²) − var(e)) − |mean(e)| / 8`. Each image is used as it is and inverted,
-    /// and
+    /// lengths\]: `√(mean(o²) − var(e)) − |mean(e)| / 8`. Each image is used as it is and
+    /// inverted:
     ///
-    /// - `o` is half the difference of the two displacements: the part linear in the voxels'
-    ///   widths;
+    /// - `o` is half the difference of the two displacements: the part linear in voxel widths;
     /// - `e` is half their sum: the nonlinear part, and the distance that the body walks anyway;
     /// - `var(e)` is the variance within each of [the
     ///   conditions](crate::task::perturbation::of_response) that pairs take in turn. Chance is in
@@ -42,8 +41,7 @@ pub enum Fitness {
     ///
     /// The sensors have to make up for an eighth of the distance that the body walks anyway. A run
     /// measures the response of the body's [probe](crate::body::Body::probe) and multiplies it by
-    /// the root of the number of the probe's sensors. Both ways to assign directions have the same
-    /// fitness.
+    /// the root of the number of its sensors. Both ways to assign directions have the same fitness.
     Response,
 }
 
@@ -145,8 +143,8 @@ fn response(displacements: impl Iterator<Item = Option<f64>> + Clone) -> f64 {
     response_so_far(displacements).unwrap_or(0.0)
 }
 
-/// Returns displacements in the correct direction, by number of the group, if group A should walk
-/// right; if it should walk left, their negatives are.
+/// Returns the group's number and the margin of each answer if group A should walk right; if it
+/// should walk left, the margins are their negatives.
 pub(super) fn margins(
     answers: impl Iterator<Item = (Group, Option<f64>)> + Clone,
 ) -> impl Iterator<Item = (usize, Option<f64>)> + Clone {

@@ -166,9 +166,8 @@ impl FromStr for Groups {
     }
 }
 
-/// Returns the correct way and the weight of images with these labels: 1, right, for the first
-/// group and −1, left, for every other class. The images of either side have a total weight of one
-/// half.
+/// Returns the correct direction and the weight of images with these labels: 1, right, for the
+/// first group and −1, left, for every other class. Either side weighs one half in total.
 pub fn balanced<'a>(
     labels: impl Iterator<Item = u8> + Clone + 'a,
     first: &'a [u8],
@@ -227,8 +226,7 @@ impl Grouping {
     /// is an additional last task.
     ///
     /// # Errors
-    /// Returns a [`GroupingError`] if a class occurs twice or there are not 2 to [`MAX_CLASSES`]
-    /// classes.
+    /// Returns a [`GroupingError`] for repeated classes, or for other than 2 to [`MAX_CLASSES`].
     pub fn all_splits(classes: &[u8], same_way_bin: bool) -> Result<Self, GroupingError> {
         let k = classes.len();
         if !(2..=MAX_CLASSES).contains(&k) {

@@ -1,5 +1,4 @@
-//! A robot's task: stimuli, protocols, rollouts and their scores; how a gait responds and is
-//! trained.
+//! A robot's task: stimuli, protocols, rollouts and scores; how a gait responds and is trained.
 
 pub mod direction;
 pub mod evaluation;

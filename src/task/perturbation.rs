@@ -23,7 +23,7 @@ pub enum Kind {
     Start,
     /// Robot and images are mirrored, which reverses ties and all that goes from left to right.
     Mirror,
-    /// The same material at a shorter time step ([`Physics::refined`]).
+    /// The material stays, at a shorter time step ([`Physics::refined`]).
     TimeStep,
     /// The length limits remove an excess half as fast. Or they are beyond every goal, so that no
     /// spring is held at a limit against its goal and gains energy there.

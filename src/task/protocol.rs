@@ -3,8 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Farthest start column either way \[voxels\]: up to here world coordinates stay exact to far
-/// below a voxel.
+/// Farthest start column either way \[voxels\]: world coordinates stay exact to far below a voxel.
 pub const MAX_COLUMN: i64 = 1_000_000;
 
 /// Most control steps of an image or a scenario: twenty thousand actuation cycles of the paper's.
@@ -23,8 +22,7 @@ pub enum RolloutMode {
     Sequential,
 }
 
-/// The presentation of images to a robot (paper, "Protocol"); keys of a config's section
-/// `[protocol]`.
+/// The presentation of images to a robot (paper, "Protocol"); keys of a config's `[protocol]`.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Protocol {

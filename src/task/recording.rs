@@ -22,8 +22,7 @@ pub struct Phase {
     pub first_frame: usize,
     /// The image.
     pub seen: Seen,
-    /// Signed x displacement of the centre of mass over the phase, voxel lengths (right is
-    /// positive).
+    /// X displacement of the centre of mass over the phase, voxel lengths, right positive.
     pub displacement: f64,
 }
 

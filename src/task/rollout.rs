@@ -128,7 +128,7 @@ pub fn fresh_rollout(
 /// [`fresh_rollout`].
 ///
 /// # Errors
-/// Returns [`Stopped`] if `stop` was set. Each rollout that ended early is an [`Unstable`] within.
+/// Returns [`Stopped`] if `stop` was set; single rollouts return [`Unstable`].
 pub fn fresh_rollouts_of(
     system: &Arc<System>,
     protocol: &Protocol,

@@ -15,8 +15,7 @@ use crate::task::grouping::{Group, Grouping, Split};
 pub struct Answer {
     /// Class of the image.
     pub class: u8,
-    /// Displacement of the robot under it, to the right, in voxel lengths; `None` if not simulated
-    /// yet.
+    /// Displacement to the right under it, in voxel lengths; `None` if not simulated yet.
     pub displacement: Option<f64>,
 }
 
@@ -31,8 +30,7 @@ pub struct Score {
 }
 
 /// Returns the fitness on two groups, in voxel lengths: the smallest margin under the better of
-/// both assignments of directions to groups. Infinite without answers, NaN if an answer is NaN;
-/// never −0.
+/// both assignments of directions. Infinite without answers, NaN with a NaN answer; never −0.
 pub fn two_group_fitness(answers: &[(Group, f64)]) -> f64 {
     better(Fitness::Min.of_assignments(answers.iter().map(|&(group, d)| (group, Some(d)))))
 }
@@ -56,8 +54,7 @@ impl Grouping {
     ///
     /// With one image per class and the smallest margin this is the paper's rule: fitness is min
     /// |d|, and the signs determine the task. A robot that walks the same way for all classes goes
-    /// to that bin with min |d| if there is one, else to its best split with that one's negative
-    /// fitness.
+    /// to that bin with min |d| if there is one, else to its best split, with a negative fitness.
     pub fn score(&self, answers: &[Answer]) -> Score {
         let mut best = Score { task: 0, fitness: f64::NEG_INFINITY };
         for (task, split) in self.tasks().iter().enumerate() {

@@ -28,8 +28,7 @@ pub enum Encoding {
     /// value / 255: "proportional to the intensity of the pixel" (the paper's text).
     #[default]
     Intensity,
-    /// 1 for any value above 0, else 0: the encoding under which the paper's published robots
-    /// evolved.
+    /// 1 for any value above 0, else 0: the paper's published robots evolved under this encoding.
     Saturated,
     /// 1 if value / 255 is above [`StimulusParams::level`], else 0.
     Threshold,
@@ -170,8 +169,7 @@ impl StimulusError {
 /// voxel, row 0 on top.
 ///
 /// # Errors
-/// Returns a [`StimulusError`] if the body's size does not fit the reduction, or a threshold is out
-/// of range.
+/// Returns a [`StimulusError`] if the sizes do not fit, or if a threshold is out of range.
 pub fn stimulus(
     image: &Grid<u8>,
     height: usize,
@@ -292,8 +290,7 @@ mod tests {
             stimulus(&quarter, 1, 1, &params(Area, Intensity)).unwrap().cells(),
             [256.0 / 4.0 / 255.0]
         );
-        // The mean is encoded, not the pixels: 64/255 is above 0.25, though only one pixel of four
-        // is.
+        // The mean is encoded, not the pixels: 64/255 exceeds 0.25, as only one pixel does.
         let above = |level| {
             let params = StimulusParams { level, ..params(Area, Threshold) };
             stimulus(&quarter, 1, 1, &params).unwrap()[(0, 0)]

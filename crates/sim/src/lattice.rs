@@ -22,9 +22,8 @@ const ACROSS: [(isize, isize); 4] = [(-1, 0), (0, 1), (1, 0), (0, -1)];
 /// Number of spring families: horizontal, vertical, falling and rising diagonals.
 pub(crate) const FAMILIES: usize = 4;
 
-/// Returns the index of a slot's spring of a family in the arrays over all springs. These are
-/// ordered by blocks of slots, then by families, so a sweep over the slots reads them from front to
-/// back.
+/// Returns the index of a slot's spring of a family in the arrays over all springs: by blocks of
+/// slots, then by families, so that a sweep over the slots reads them from front to back.
 #[inline(always)]
 pub(crate) fn spring_index(slot: usize, family: usize) -> usize {
     (slot / BLOCK * FAMILIES + family) * BLOCK + slot % BLOCK

@@ -1,5 +1,4 @@
-//! [`Physics`]: every constant of the simulator, with its unit, its default and its section of
-//! physics.md.
+//! [`Physics`]: every constant of the simulator, with unit, default and section of physics.md.
 
 /// Most substeps in a control step. With this many, a control step of a body of 64 × 64 voxels
 /// takes about a quarter of a second.
@@ -34,8 +33,7 @@ pub struct Physics {
     pub time_step: f64,
     /// Substeps in a control step. (Units)
     pub substeps: u32,
-    /// Control steps in an actuation cycle; the period of the muscles' sine is one less. (Units;
-    /// Actuation)
+    /// Control steps in an actuation cycle; the sine's period is one less. (Units; Actuation)
     pub cycle_steps: u32,
 
     /// Stiffness of a rigid voxel's sides \[mass/s²\]. (Points and springs)
@@ -51,16 +49,13 @@ pub struct Physics {
     /// Stiffness of a muscle's or sensor's diagonals, relative to its sides. (Points and springs)
     pub active_diagonal_ratio: f64,
 
-    /// Least target width of an active voxel \[rest widths\]; smaller targets are clipped.
-    /// (Actuation)
+    /// Least target width of an active voxel \[rest widths\]; clips smaller ones. (Actuation)
     pub target_min: f64,
-    /// Greatest target width of an active voxel \[rest widths\]; larger targets are clipped.
-    /// (Actuation)
+    /// Greatest target width of an active voxel \[rest widths\]; clips larger ones. (Actuation)
     pub target_max: f64,
     /// Muscle's target at the trough of its sine \[rest widths\]. (Actuation)
     pub muscle_low: f64,
-    /// Muscle's target at the crest of its sine minus that at the trough \[rest widths\].
-    /// (Actuation)
+    /// Muscle's target at the sine's crest minus that at its trough \[rest widths\]. (Actuation)
     pub muscle_swing: f64,
     /// Phase of the antiphase muscles \[rad\]. (Actuation)
     pub antiphase: f64,
@@ -122,8 +117,8 @@ pub struct Physics {
     /// Threshold of instability: a simulation is unstable if more ordered pairs of distant surface
     /// voxels overlap than this times the number of surface voxels. (Instability)
     pub unstable_ratio: f64,
-    /// Greatest width or height of a voxel \[wu\]; beyond it the simulation is unstable. This limit
-    /// is ours: EvoGym continues, but no body that still hangs together comes near. (Instability)
+    /// Greatest width or height of a voxel \[wu\]; beyond it the simulation is unstable. Ours:
+    /// EvoGym continues, but no body that still hangs together comes near. (Instability)
     pub blow_up_extent: f64,
 }
 

@@ -130,8 +130,7 @@ impl World {
         meter.iter_mut().for_each(|meter| meter.drive(&scratch.goals, &state.position));
     }
 
-    /// Completes a control step. Every substep checks the one before; only here is the last
-    /// checked.
+    /// Completes a control step. Every substep checks the one before, so the last is checked here.
     pub(crate) fn end_step(&mut self) -> Result<(), Unstable> {
         let control_step = self.state.control_step;
         if !self.centre_of_mass().iter().all(|coordinate| coordinate.is_finite()) {
@@ -179,8 +178,7 @@ impl World {
     /// Continues from a state of the same system; the stimulus stays.
     ///
     /// # Errors
-    /// Returns [`StateMismatch`] if the state cannot be of this system; the world then stays as it
-    /// is.
+    /// Returns [`StateMismatch`], and changes nothing, if the state cannot be of this system.
     pub fn restore(&mut self, state: &State) -> Result<(), StateMismatch> {
         if !state.fits(&self.state) {
             return Err(StateMismatch);

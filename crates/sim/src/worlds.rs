@@ -11,10 +11,9 @@ use crate::world::{Start, World};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-/// Simulations of one system from the same start, each with its own stimulus, that step side by
-/// side. Each gives the same bits as alone. Bodies with many rigid voxels are faster so: the rigid
-/// pass (physics.md, "One substep", 4b) is serial within a simulation, but runs for all of them at
-/// once.
+/// Simulations of one system from the same start that step side by side, each with its own stimulus
+/// and the bits it has alone. Bodies with many rigid voxels are faster so: the rigid pass
+/// (physics.md, "One substep", 4b) is serial within a simulation, but runs for all of them at once.
 #[derive(Clone, Debug)]
 pub struct Worlds {
     worlds: Vec<World>,
@@ -26,8 +25,8 @@ impl Worlds {
     /// Most simulations side by side.
     pub const MOST: usize = BLOCK;
 
-    /// Returns true if simulations of this system are faster side by side, which takes about one
-    /// rigid voxel in two. With fewer, eight states at once crowd each other out of the processor's
+    /// Returns true if simulations of this system are faster side by side, from about one rigid
+    /// voxel in two. With fewer, eight states at once crowd each other out of the processor's
     /// cache.
     pub fn gain(system: &System) -> bool {
         let links = system.lattice.rigid_links.len();

@@ -27,8 +27,7 @@ impl Limits {
         Limits { squares: [low, high], middle: (low + high) / 2.0, half: (high - low) / 2.0 }
     }
 
-    /// Returns t for a squared length beyond the limits (positive if too long, negative if too
-    /// short).
+    /// Returns t for a squared length beyond the limits: above 0 if too long, below if too short.
     #[inline(always)]
     pub fn excess<L: Lanes>(&self, square: L) -> L {
         let [low, high] = each!(i in [0, 1] => L::splat(1.0 / self.squares[i]));
@@ -56,8 +55,7 @@ pub(crate) enum Reach {
 }
 
 /// Limits all springs at once: computes corrections from the same positions, then adds them up.
-/// `reach` is a guess from the substep before, replaced by the case found; it does not affect the
-/// result.
+/// `reach` is a guess from the substep before, then the case found; results do not depend on it.
 #[inline(always)]
 pub(crate) fn limit_all<L: Lanes>(
     system: &System,

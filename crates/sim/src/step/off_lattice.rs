@@ -1,5 +1,5 @@
-//! Springs that end in an off-lattice point, where two voxels touch only at a corner: few, with
-//! ends anywhere in the arrays.
+//! Springs that end in an off-lattice point, where two voxels touch only at a corner: few,
+//! anywhere.
 
 use crate::lattice::{FAMILIES, Lattice};
 use crate::simd::{BLOCK, Buffer, Lanes, each};
@@ -87,8 +87,7 @@ impl OffLattice {
         self.load_points(lattice);
     }
 
-    /// Computes the corrections of springs beyond their limits, to be fed to the positions they
-    /// come from.
+    /// Computes corrections of springs beyond their limits, to be fed to the same positions.
     #[inline(always)]
     pub fn limit<L: Lanes>(&mut self, System { lattice, physics }: &System, position: &Pair) {
         self.fetch(lattice, position);
