@@ -2,8 +2,7 @@
 
 use std::time::Duration;
 
-/// The clock of [`thread_time`]: "processor", or "wall" where the system does not report a thread's
-/// processor time.
+/// The clock of [`thread_time`]: "processor", or "wall" if the system does not report that.
 pub const CLOCK: &str = if IS_KNOWN { "processor" } else { "wall" };
 
 #[cfg(all(

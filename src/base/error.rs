@@ -49,15 +49,13 @@ impl ErrorKind {
 pub struct Error {
     /// The kind of failure.
     pub kind: ErrorKind,
-    /// One line for the user, whatever the files and names in it hold (see [`one_line`]); without
-    /// the argument.
+    /// One line for the user, whatever is in it (see [`one_line`]); without the argument.
     pub message: String,
     /// The argument that the error is about, if any.
     pub argument: Option<Argument>,
     /// Alternatives for the user, the most likely one first.
     pub remedies: Vec<Remedy>,
-    /// The key of a config that the error is about, if any: its path in dots, items of lists by
-    /// their number from 1.
+    /// The config key that it is about, if any: a dotted path, items of lists by number from 1.
     pub key: Option<String>,
 }
 
@@ -206,8 +204,8 @@ impl Error {
     }
 }
 
-/// Returns true if there is no room: on the disk, in the user's quota, or within the file size
-/// limit of the system.
+/// Returns true if there is no room: on the disk, in the user's quota or within the file size
+/// limit.
 pub fn is_full(error: &io::Error) -> bool {
     use io::ErrorKind::{FileTooLarge, QuotaExceeded, StorageFull};
     matches!(error.kind(), StorageFull | QuotaExceeded | FileTooLarge)

@@ -19,8 +19,7 @@ const TO_LOCK: Duration = Duration::from_secs(10);
 const MOST_TEXT: u64 = 256 << 20;
 
 /// Opens a file of a run or a dataset, where anybody can put one. A pipe, a socket or a device is
-/// refused at once, because opening or reading it could block for ever. (Reading a folder reports
-/// what it is.)
+/// refused at once, because opening or reading it could block for ever. (A folder fails when read.)
 ///
 /// # Errors
 /// Returns the system's error, or one that names the kind if it is no regular file.
@@ -120,8 +119,8 @@ fn utf16(bytes: &[u8], unit: fn([u8; 2]) -> u16) -> Option<String> {
     text.filter(|_| rest.is_empty())
 }
 
-/// Replaces a leading `~` by the user's home folder, as shells do: in files and in `--option=~/…`
-/// no shell does it.
+/// Replaces a leading `~` by the user's home folder, as shells do: in files and `--option=~/…` no
+/// shell does.
 pub fn home_expanded(path: &Path) -> PathBuf {
     match (path.strip_prefix("~"), std::env::home_dir()) {
         (Ok(below), Some(home)) if !home.as_os_str().is_empty() => home.join(below),

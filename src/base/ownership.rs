@@ -74,8 +74,7 @@ impl Drop for Ownership {
     }
 }
 
-/// Checks that this process may write a file: it has not lost a lock that it took on the file's
-/// folder.
+/// Checks that this process may write a file: it has not lost its lock on the file's folder.
 ///
 /// # Errors
 /// Returns [`Lost`], or the system's error if the lock cannot be read.

@@ -2,8 +2,7 @@
 //!
 //! Every use of chance has a stream of its own, named by (seed, purpose, generation, child). So no
 //! result depends on the order of threads or on where a run was interrupted. Numbers are made from
-//! the bits here, not by a library's distributions, so that their values never change with a
-//! library's version.
+//! the bits here, since a library's distributions may change with its version.
 
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64;
@@ -48,8 +47,7 @@ pub struct Stream(Pcg64);
 
 /// Returns the stream for `purpose` in a run with `seed`; `generation` and `child` number its uses.
 pub fn stream(seed: u64, purpose: Purpose, generation: u64, child: u64) -> Stream {
-    // SplitMix64 (Steele et al. 2014) over the four words, so that neighbouring names give
-    // unrelated PCG states.
+    // SplitMix64 (Steele et al. 2014): neighbouring names give unrelated PCG states.
     let mut state = 0u64;
     let mut bytes = [0; 32];
     let words = [seed, purpose as u64, generation, child];

@@ -60,8 +60,7 @@ impl Ranks {
         owners(sizes, self.size)
     }
 
-    /// Exchanges a value and returns those of all ranks, in their order. Every rank must call it,
-    /// or the others block.
+    /// Returns the values of all ranks, in their order. Every rank must call it, or others block.
     ///
     /// # Panics
     /// If a value cannot pass through JSON, which cannot happen as all ranks run the same program.

@@ -78,8 +78,7 @@ pub fn stop_flag() -> Result<StopFlag, Error> {
         }
     };
     let stop = Arc::new(AtomicBool::new(false));
-    // The order matters: the first SIGINT finds its flag unset and sets it; the second finds it
-    // set.
+    // In this order: the first SIGINT finds its flag unset and sets it, the second finds it set.
     let interrupted = Arc::new(AtomicBool::new(false));
     flag::register_conditional_shutdown(SIGINT, AT_ONCE, Arc::clone(&interrupted)).map_err(failed)?;
     flag::register(SIGINT, interrupted).map_err(failed)?;

@@ -1,5 +1,4 @@
-//! [`one_line`]: any text as one line that a terminal displays faithfully; [`counted`]: numbers
-//! with their nouns.
+//! [`one_line`]: any text as one line that a terminal displays; [`counted`]: numbers with nouns.
 
 use std::fmt::Display;
 
@@ -51,8 +50,7 @@ fn written(c: char) -> String {
 pub fn is_unseen(c: char) -> bool {
     c.is_control()
         || matches!(c,
-            // Marks and overrides of the direction, separators of lines, tags, and zero-width
-            // characters.
+            // Direction marks and overrides, line separators, tags, zero-width characters.
             '\u{61c}' | '\u{180e}' | '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}'
             | '\u{2060}'..='\u{206f}' | '\u{feff}' | '\u{fff9}'..='\u{fffb}' | '\u{e0000}'..='\u{e007f}')
 }

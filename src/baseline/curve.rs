@@ -66,8 +66,7 @@ pub fn first_crossing([c0, c1, c2]: [f64; 3], value: f64, (from, to): (f64, f64)
         if discriminant < 0.0 {
             return None;
         }
-        // The stable form: no difference of nearly equal numbers (Press et al., Numerical Recipes,
-        // 5.6).
+        // The stable form, without cancellation (Press et al., Numerical Recipes, 5.6).
         let q = -0.5 * (c1 + discriminant.sqrt().copysign(c1));
         [Some(q / c2), (q != 0.0).then(|| c / q)]
     };

@@ -1,5 +1,6 @@
 //! [`Network`]: the paper's two networks and their gradients, on nalgebra. Sums run in a fixed
-//! order and functions come from `libm`: training gives the same bits on any machine and threads.
+//! order and functions come from `libm`, so training gives the same bits on any machine and any
+//! number of threads.
 
 use crate::base::Grid;
 use crate::base::random::Stream;

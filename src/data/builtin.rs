@@ -104,8 +104,7 @@ impl BuiltinDigits {
         Some(pen::write(class, &mut stream(self.seed, Purpose::BuiltinDigits, page, number)))
     }
 
-    /// Returns the SHA-256 of what decides a split's images: drawing version, seed, classes,
-    /// number.
+    /// Returns the SHA-256 of a split's parameters: drawing version, seed, classes and number.
     pub fn fingerprint(&self, split: Split) -> String {
         let (seed, classes, number) = (self.seed, &self.classes, self.per_class(split));
         let drawing = pen::DRAWING;

@@ -36,8 +36,7 @@ pub struct UnknownDataset {
     pub name: String,
 }
 
-/// Name, size and SHA-256 of the four files of a dataset: training images and labels, test images
-/// and labels.
+/// Name, size and SHA-256 of a dataset's training images and labels, test images and labels.
 type Published = [(&'static str, u64, &'static str); 4];
 
 const MNIST: Published = [

@@ -235,8 +235,7 @@ impl Dataset {
         self.splits.get(&split).map_or_else(Vec::new, |loaded| loaded.by_class.keys().copied().collect())
     }
 
-    /// Returns the SHA-256 of a split's content (see [`SplitInfo::fingerprint`]); `None` if not
-    /// loaded.
+    /// Returns a split's SHA-256 (see [`SplitInfo::fingerprint`]); `None` if it was not loaded.
     pub fn fingerprint(&self, split: Split) -> Option<String> {
         self.splits.get(&split).map(|loaded| match &loaded.images {
             Images::Stored(stored) => stored.fingerprint.clone(),
@@ -263,9 +262,8 @@ impl Dataset {
         DatasetInfo { name, source, origin, splits }
     }
 
-    /// Draws `per_class` different images of each class by seed and returns their indices: first
-    /// those of `classes[0]`, then those of `classes[1]`, … The other classes do not affect a
-    /// class.
+    /// Draws `per_class` different images of each class by seed and returns their indices: those of
+    /// `classes[0]`, those of `classes[1]`, … Other classes do not affect the draw of one.
     ///
     /// # Errors
     /// Returns [`DatasetError::NotLoaded`], or [`DatasetError::TooFew`] if images are too few.

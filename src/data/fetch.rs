@@ -443,8 +443,7 @@ fn pieces(mut output: impl Read + Send + 'static) -> Result<Receiver<io::Result<
     Ok(receiver)
 }
 
-/// Returns the last line of a program's messages, without the program's name and an error's address
-/// and time.
+/// Returns a program's last message, without its name and an error's address and time.
 fn last_line(program: Program, said: &str) -> Option<String> {
     let line = said.lines().map(str::trim).rfind(|line| !line.is_empty())?;
     let line = line.strip_prefix(program.name()).and_then(|line| line.strip_prefix(": ")).unwrap_or(line);

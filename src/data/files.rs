@@ -59,8 +59,7 @@ pub fn default_folder(name: &str) -> PathBuf {
     Path::new("data").join(name)
 }
 
-/// The reason why a dataset's files cannot be used: the file, its place and what was expected; see
-/// also [`remedies`].
+/// The reason why a dataset's files cannot be used: file, place and expectation; see [`remedies`].
 ///
 /// [`remedies`]: FilesError::remedies
 #[derive(Debug, thiserror::Error)]

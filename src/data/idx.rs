@@ -1,5 +1,4 @@
-//! The IDX format (<http://yann.lecun.com/exdb/mnist/>), in which MNIST and its look-alikes store
-//! images and labels.
+//! The IDX format (<http://yann.lecun.com/exdb/mnist/>)of MNIST and its look-alikes.
 //!
 //! A file is a magic number (two zero bytes, the type of the numbers, the number of dimensions),
 //! the length of every dimension as a big-endian 32-bit number, and the numbers in row-major order.
@@ -206,8 +205,7 @@ pub fn read_images(file: &Path) -> Result<IdxFile<IdxImages>, IdxError> {
     Ok(with_origin(&stored, IdxImages { count, height, width, pixels }))
 }
 
-/// Reads an IDX1 file of unsigned bytes, one label per image, raw or gzipped (detected by content,
-/// not by name).
+/// Reads labels, an IDX1 file of unsigned bytes, raw or gzipped (detected by content, not by name).
 ///
 /// # Errors
 /// Returns an [`IdxError`] if the file cannot be read or is anything but exactly such a file.
@@ -217,8 +215,7 @@ pub fn read_labels(file: &Path) -> Result<IdxFile<Vec<u8>>, IdxError> {
     Ok(with_origin(&stored, labels))
 }
 
-/// Returns the header of an IDX file of unsigned bytes with these sizes: magic number and
-/// big-endian lengths.
+/// Returns the header of unsigned bytes with these sizes: magic number and big-endian lengths.
 pub fn header(sizes: &[u32]) -> Vec<u8> {
     let mut bytes = vec![0, 0, UNSIGNED_BYTE, sizes.len() as u8];
     bytes.extend(sizes.iter().flat_map(|size| size.to_be_bytes()));
@@ -339,8 +336,8 @@ fn decode<const N: usize>(
 
 #[cfg(test)]
 mod tests {
-    //! Contract of the IDX reader on broken files; `tests/library/idx_reader.rs` compares it with
-    //! another reader.
+    //! Contract of the IDX reader on broken files; `tests/library/idx_reader.rs` compares it to
+    //! another.
 
     use super::*;
     use flate2::{Compression, write::GzEncoder};

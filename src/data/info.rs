@@ -18,8 +18,8 @@ pub struct DatasetInfo {
 }
 
 impl DatasetInfo {
-    /// Lists unintended differences between training and test images: sizes, and classes of one
-    /// split alone.
+    /// Lists unintended differences between training and test images: sizes, and classes in one
+    /// only.
     pub fn differences(&self) -> Vec<String> {
         let [Some(train), Some(test)] = Split::ALL.map(|split| self.splits.get(&split)) else {
             return Vec::new();

@@ -3,8 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// The function of a node, applied to the weighted sum s of its predecessors (paper, section
-/// "Genome").
+/// The function of a node, of the weighted sum s of its predecessors (paper, "Genome").
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 #[repr(u8)]

@@ -132,7 +132,7 @@ impl Genome {
         id
     }
 
-    /// Returns true if an id is this genome's, as now or as in older files, where some begin with a
+    /// Returns true if an id is this genome's, now or in older files, where it may begin with a
     /// digit.
     pub fn has_id(&self, id: &str) -> bool {
         id == self.id() || id == &self.digest()[..10]
@@ -143,9 +143,8 @@ impl Genome {
         hash::sha256_hex(&[self.cppn.canonical_bytes(), self.edits.canonical_bytes()].concat())
     }
 
-    /// Returns a copy mutated once or more, until its body is valid; with that body. In a fraction
-    /// [`MutationParams::voxel_mutations`] of offspring, one or a few voxels are mutated instead of
-    /// the network.
+    /// Returns a copy mutated once or more, until its body is valid; with that body. A fraction
+    /// [`MutationParams::voxel_mutations`] of offspring has voxels mutated instead.
     ///
     /// # Errors
     /// Returns a [`GenomeError`] if the size is impossible or [`MAX_MUTATIONS`] give no valid body.
@@ -169,8 +168,7 @@ impl Genome {
         rng: &mut Stream,
         stop: &AtomicBool,
     ) -> Result<(Genome, Body), GenomeError> {
-        // Without voxel mutations nothing is drawn, so runs have the same results as before there
-        // were any.
+        // Without voxel mutations nothing is drawn: runs are as before there were any.
         if params.voxel_mutations == 0.0 || rng.unit() >= params.voxel_mutations {
             return self.with_mutated_network(spec, params, rng, stop);
         }

@@ -91,8 +91,7 @@ fn remove_node(cppn: &mut Cppn, params: &MutationParams, rng: &mut Stream) -> Op
     let out: Vec<_> = cppn.edges().iter().copied().filter(|e| e.from == node).collect();
     for i in &into {
         for o in &out {
-            // Products of weights within a limit of 1 stay within it; others must not grow without
-            // bound.
+            // Products of weights within 1 stay within it; others must not grow without bound.
             cppn.connect(i.from, o.to, clip(i.weight * o.weight, params));
         }
     }

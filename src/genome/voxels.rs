@@ -8,8 +8,7 @@ use crate::genome::{BodySpec, Edits, Genome, GenomeError, MAX_MUTATIONS, Mutatio
 use std::sync::atomic::AtomicBool;
 
 impl Genome {
-    /// Returns a copy with a random number of voxels changed ([`MutationParams::voxel_changes`]),
-    /// and its body.
+    /// Returns a copy with up to [`MutationParams::voxel_changes`] voxels changed, and its body.
     pub(super) fn with_voxels_changed(
         &self,
         described: &Body,

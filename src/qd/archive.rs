@@ -15,8 +15,7 @@ pub struct Elite<S> {
     pub solution: S,
 }
 
-/// At most one [`Elite`] per cell (Mouret & Clune 2015). In files a list of elites in the order of
-/// their cells.
+/// At most one [`Elite`] per cell (Mouret & Clune 2015). In files a list in the cells' order.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(try_from = "Vec<Elite<S>>", bound(deserialize = "S: Deserialize<'de>"))]
 pub struct Archive<S> {
@@ -53,8 +52,7 @@ pub enum ArchiveError {
     Occupied(usize),
 }
 
-/// Figures of an archive: pyribs' `ArchiveStats` for an archive that consists of exactly the
-/// possible cells.
+/// Figures of an archive: pyribs' `ArchiveStats` for an archive of the possible cells alone.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ArchiveStats {
     /// Number of elites.
@@ -93,8 +91,7 @@ impl<S> Archive<S> {
         Ok(old.map_or(Insertion::New, |old| Insertion::Improved { old }))
     }
 
-    /// Removes all but the `count` fittest of each kind; among equally fit ones those in the first
-    /// cells stay.
+    /// Removes all but the `count` fittest of each kind; the first cells win a tie.
     pub fn retain_fittest<K: Ord>(&mut self, count: usize, kind: impl Fn(&S) -> K) {
         let mut ranked: Vec<(f64, usize)> = self.elites().map(|e| (e.objective, e.cell)).collect();
         // A stable sort: elites come in the order of their cells.

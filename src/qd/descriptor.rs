@@ -68,8 +68,7 @@ fn bin_width(area: usize) -> usize {
     (area / COUNT_BINS).max(1)
 }
 
-/// Returns the bin of a count on a grid with `area` cells: min(count div (area div 7), 6), with
-/// bins at least 1 wide.
+/// Returns a count's bin on a grid of `area` cells: min(count div max(area div 7, 1), 6).
 pub fn count_bin(count: usize, area: usize) -> usize {
     (count / bin_width(area)).min(COUNT_BINS - 1)
 }

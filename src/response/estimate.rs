@@ -169,8 +169,7 @@ impl<'a> Half<'a> {
             // Variance over other images.
             let by_images = pairs().map(|(answer, (clipped, _))| answer.weight * (clipped - value));
             let by_images: f64 = by_images.map(|off| off * off).sum();
-            // Variance over other rollouts, to first order: through the slopes, and through the
-            // mean displacement.
+            // Variance over other rollouts, to first order: by slopes and by mean displacement.
             let (mut of_slopes, mut of_mean) = (vec![0.0; self.widths.len()], 0.0);
             for (answer, (_, growth)) in pairs() {
                 let change = answer.weight * answer.right * growth;
@@ -211,8 +210,7 @@ fn expected_clipped_margin(margin: f64, scatter: f64, enough: f64) -> (f64, f64)
     (clipped / enough, inside / enough)
 }
 
-/// Returns the fraction above `threshold` of margins scattered normally about `margin`, and its
-/// derivative by that.
+/// Returns the fraction of normally scattered margins above `threshold`, and its derivative.
 fn right(margin: f64, scatter: f64, threshold: f64) -> (f64, f64) {
     let beyond = (margin - threshold) / scatter;
     (normal(beyond), density(beyond) / scatter)

@@ -79,8 +79,8 @@ impl Gait {
         self.built(&design.iter().map(expanding).collect::<Vec<_>>())
     }
 
-    /// Returns the image under which [`probe_of`](Gait::probe_of) a design walks as the design does
-    /// under a stimulus.
+    /// Returns the image under which the [`probe_of`](Gait::probe_of) a design walks as the design
+    /// does under a stimulus.
     pub fn as_probe(&self, design: &[Material], stimulus: &Grid<f64>) -> Grid<f64> {
         let mut image = stimulus.clone();
         for (place, material) in self.places.iter().zip(design) {

@@ -24,8 +24,7 @@ const STARTS: usize = 6;
 pub struct Example {
     /// Target width of each place under it, for each of [`CHOICES`] \[rest widths\].
     pub choices: Vec<[f64; 3]>,
-    /// Displacement of the body with the problem's first design, measured or predicted \[voxel
-    /// lengths\].
+    /// Displacement with the problem's first design, measured or predicted \[voxel lengths\].
     pub displacement: f64,
     /// Correct direction: 1 right, −1 left.
     pub right: f64,

@@ -35,8 +35,8 @@ impl Probing {
     }
 
     /// Simulates a gait's probe under the random images with these numbers and returns the stable
-    /// rollouts. `roll` simulates: displacements of a body under images and conditions, `None`
-    /// where unstable.
+    /// rollouts. `roll` returns a body's displacements under images and conditions, `None` if
+    /// unstable.
     ///
     /// # Errors
     /// Returns those of `roll`.

@@ -111,8 +111,8 @@ impl Evidence {
         Fit { slopes: factor.solve(&self.vector).as_slice().to_vec(), factor }
     }
 
-    /// Returns the slopes by ridge regression, and for each the factor from a rollout's noise to
-    /// its standard error.
+    /// Returns the slopes by ridge regression, and their standard errors in units of a rollout's
+    /// noise.
     ///
     /// # Panics
     /// If `ridge` is not above 0.
@@ -179,8 +179,7 @@ pub struct Response {
     pub slopes: Vec<f64>,
     /// Standard errors of the slopes, including the shrinkage by the penalty \[voxel lengths\].
     pub errors: Vec<f64>,
-    /// Displacement of a body whose places all have width 0, the mean over conditions \[voxel
-    /// lengths\].
+    /// Displacement of a body with all places of width 0, mean over conditions \[voxel lengths\].
     pub intercept: f64,
     /// Intercept under each condition; none without rollouts.
     pub intercepts: Vec<Option<f64>>,

@@ -1,6 +1,6 @@
 //! Runs identified by a name instead of a path: those that ship with the program
-//! (`gallery:zero_one-1`), and those of the atlas (`atlas:zero_one-1`). Results of such a run go to
-//! the current folder.
+//! (`gallery:zero_one-1`), and those of the atlas (`atlas:zero_one-1`). Their results go to the
+//! current folder.
 
 pub mod atlas;
 pub mod gallery;

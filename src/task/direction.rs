@@ -18,8 +18,7 @@ pub enum Direction {
 }
 
 impl Direction {
-    /// Returns the direction of a displacement; `None` if it is not larger than `threshold` (paper:
-    /// 3 voxel lengths).
+    /// Returns a displacement's direction; `None` up to `threshold` (paper: 3 voxel lengths).
     pub fn of(displacement: f64, threshold: f64) -> Option<Self> {
         let direction = if displacement > 0.0 { Direction::Right } else { Direction::Left };
         (displacement.abs() > threshold).then_some(direction)
@@ -48,8 +47,7 @@ pub struct Assignment {
 }
 
 impl Assignment {
-    /// Returns the assignment under which a robot's training answers are fitter (A left if it makes
-    /// no difference).
+    /// Returns the assignment under which a robot's training answers are fitter (A left in a tie).
     pub fn from_training(split: &Split, fitness: Fitness, answers: &[Answer]) -> Self {
         let (a_right, a_left) = fitness.of_assignments(of_split(split, answers));
         Assignment { a: if a_right > a_left { Direction::Right } else { Direction::Left } }

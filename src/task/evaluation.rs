@@ -186,11 +186,9 @@ pub fn fresh_rollouts_so_far(
     (found, rolled.len(), ended)
 }
 
-/// A finished rollout: of one image if fresh; of all images up to the robot's drop-out if
-/// sequential.
+/// A finished rollout: of one image if fresh; of all up to the robot's drop-out if sequential.
 struct Shown {
-    /// Displacement under each image, voxel lengths; none for the one under which it became
-    /// unstable.
+    /// Displacement under each image, voxel lengths; none where it became unstable.
     displacements: Vec<Option<f64>>,
     /// The instability, if any.
     unstable: Option<Unstable>,
@@ -282,8 +280,7 @@ impl<'a> Setup<'a> {
         self.conditions.iter().map(system).collect()
     }
 
-    /// Returns for each image the first that gives the body's sensors the same pixels under the
-    /// same condition.
+    /// Returns for each image the first with the same condition and the same pixels under sensors.
     fn same_as(&self, body: &Body) -> Vec<usize> {
         let mut first = HashMap::new();
         let same = same_to_sensors(body, &self.images.iter().collect::<Vec<_>>());
@@ -503,8 +500,7 @@ impl<'a> Candidate<'a> {
     }
 
     fn evaluation(&self) -> Evaluation {
-        // All rollouts that the verdict needs are done; without images there is nothing to walk
-        // for.
+        // All rollouts that the verdict needs are done; without images there are none.
         let mut rollouts = self.locked();
         self.count(&mut rollouts);
         rollouts.verdict.take().unwrap_or_else(|| self.ended(Outcome::Walked(Vec::new()), 0))
@@ -648,8 +644,7 @@ mod tests {
 
     #[test]
     fn fresh_rollouts_follow_the_order_and_stop_when_nothing_can_be_won() {
-        // Image 3 shares image 1's rollout, image 4 image 0's: with both known, the robot can no
-        // longer win.
+        // Image 3 shares image 1's rollout, image 4 image 0's: with both known, it cannot win.
         let may_win = |known: &[Option<f64>]| {
             assert!(known[3].is_some() && known[1] == known[3], "image 3 comes first: {known:?}");
             known[0].is_none()
@@ -687,8 +682,7 @@ mod tests {
             let raised = Protocol { start_row: protocol.start_row + rows, ..protocol.clone() };
             fresh_rollout(&system, &raised, &images[image], &NEVER).unwrap()
         };
-        // Images 1 and 3, and 0 and 4, are the same to the sensors; the first pair also starts the
-        // same.
+        // To the sensors images 1 and 3, and 0 and 4, are the same; 1 and 3 also start the same.
         let raised = [1, 0, 1, 2];
         let expected = [live(0, 1), live(1, 0), live(2, 1), live(3, 2), live(4, 0)];
         assert!(expected[1] != expected[3] && expected[0] != expected[4], "{expected:?}");
@@ -739,8 +733,7 @@ mod tests {
         assert!(alone[1] != alone[3] && alone[2] != alone[4], "{alone:?}");
         assert_eq!((evaluation.outcome, evaluation.simulated), (Outcome::Walked(alone), 5));
 
-        // Without them it grows wider than allowed: that is no reason to refuse it, but no
-        // displacement either.
+        // Without them it grows wider than allowed: no reason to refuse it, but no walk either.
         assert!(expected(&tight, 2).is_ok() && expected(&tight.without_limits(), 2).is_err());
         let evaluation = evaluated(&tight, &[false, false, true, false, false]);
         let Outcome::Walked(walked) = evaluation.outcome else { panic!("{:?}", evaluation.outcome) };

@@ -30,8 +30,7 @@ pub enum Fitness {
     /// The mean of the margins, each divided by ten voxel lengths and clipped to −1 … 1.
     MeanClipped,
     /// The strength of a gait's response to its voxels' pixels, whatever its task \[voxel
-    /// lengths\]: `√(mean(o²) − var(e)) − |mean(e)| / 8`. Each image is used as it is and
-    /// inverted:
+    /// lengths\]: `√(mean(o²) − var(e)) − |mean(e)| / 8`. Images are used as they are and inverted:
     ///
     /// - `o` is half the difference of the two displacements: the part linear in voxel widths;
     /// - `e` is half their sum: the nonlinear part, and the distance that the body walks anyway;
@@ -59,8 +58,7 @@ impl Fitness {
 pub(super) type Assignments = (f64, f64);
 
 impl Fitness {
-    /// Returns the fitness under both assignments, of answers by group and displacement in the
-    /// images' order:
+    /// Returns the fitness under both assignments, of answers by group in the images' order:
     ///
     /// - if some are still missing (`None`): upper bounds;
     /// - without any image: infinite;
@@ -109,8 +107,7 @@ pub fn clipped_margin(margin: f64) -> f64 {
 /// first; with less, so do bodies that walk one way and that no sensors could turn.
 const OFFSET_COST: f64 = 0.125;
 
-/// Returns the response of the pairs of displacements known so far; `None` if every condition has
-/// fewer than two pairs.
+/// Returns the response of the known pairs of displacements; `None` if no condition has two.
 pub fn response_so_far(displacements: impl Iterator<Item = Option<f64>>) -> Option<f64> {
     let known: Vec<f64> = displacements.map_while(|displacement| displacement).collect();
     let pairs = known.chunks_exact(2);
@@ -199,8 +196,7 @@ mod tests {
                 d.iter().zip([A, B, B].iter().cycle()).map(|(&d, &g)| (g, d)).collect();
             fitness(Fitness::Response, &answers)
         };
-        // Half differences 3, 2, −1, −2; half sums 0 and 0, and 10 and 10, which is 5 voxel lengths
-        // on average.
+        // Half differences 3, 2, −1, −2; half sums 0, 0, 10 and 10, 5 on average.
         let pairs = [3.0, -3.0, 12.0, 8.0, -1.0, 1.0, 8.0, 12.0];
         assert_eq!(response(&pairs), 4.5_f64.sqrt() - 5.0 / 8.0);
         // The direction does not matter; the distance walked anyway costs; differences between

@@ -18,8 +18,8 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Kind {
-    /// The robot starts above the ground, so it first touches the ground in another way; its column
-    /// also changes.
+    /// The robot starts above the ground, and first touches it in another way; also in another
+    /// column.
     Start,
     /// Robot and images are mirrored, which reverses ties and all that goes from left to right.
     Mirror,
@@ -30,8 +30,7 @@ pub enum Kind {
     LengthLimits,
     /// A contact of the robot with itself counts once instead of twice.
     SelfContact,
-    /// In a sequential simulation the images come in reverse order: this finds robots that turn
-    /// round by the clock.
+    /// Images of a sequential simulation are reversed: this finds robots that turn by the clock.
     Order,
     /// The stiffness of all springs changes.
     Stiffness,
@@ -94,8 +93,7 @@ pub struct Sizes {
     pub share: f64,
     /// Number of rollouts with a changed pixel in every image. Default 3.
     pub pixels: u32,
-    /// Fewest sensors of a robot whose pixels are changed: with fewer, one pixel is more than
-    /// noise. Default 10.
+    /// Fewest sensors of a robot whose pixels are changed: else one pixel is no noise. Default 10.
     pub least_sensors: usize,
     /// Seed of the pixels. Default 1.
     pub seed: u64,
@@ -140,8 +138,7 @@ impl Default for ByTurns {
 pub type Condition = Vec<Perturbation>;
 
 impl ByTurns {
-    /// Returns every condition once: starts raised by 0 up to the most rows, then again without
-    /// length limits.
+    /// Returns every condition once: starts raised by 0 up to the most rows, then without limits.
     pub fn conditions(&self) -> impl Iterator<Item = Condition> {
         let ByTurns { start, length_limits } = *self;
         let one = move |without_limits: bool| (0..=start).map(move |rows| condition(rows, without_limits));
@@ -289,8 +286,7 @@ impl TryFrom<Stored> for Perturbation {
 }
 
 impl Perturbation {
-    /// Returns all changes of these sizes that apply to a body under a protocol, in the order of a
-    /// report.
+    /// Returns all changes of these sizes that apply to body and protocol, in a report's order.
     pub fn all(sizes: &Sizes, body: &Body, rollout: RolloutMode) -> Vec<Self> {
         let sees = body.counts().sensor >= sizes.least_sensors;
         let factors = [1.0 - sizes.share, 1.0 + sizes.share];

@@ -26,8 +26,8 @@ pub struct Phase {
     pub displacement: f64,
 }
 
-/// One moment of the robot in voxel lengths: x from the left edge of its starting box, y from the
-/// ground's surface up.
+/// One moment of the robot in voxel lengths: x from its starting box's left edge, y up from the
+/// ground.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Frame {
     /// Position [x, y] of every point.

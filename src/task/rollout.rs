@@ -83,8 +83,7 @@ impl<'a> Rollout<'a> {
         self.world.step_unless(stop)
     }
 
-    /// Returns the displacement of the centre of mass along x under the current image, in voxel
-    /// lengths, right positive.
+    /// Returns the centre of mass's x displacement under this image, voxel lengths, right positive.
     pub fn moved(&self) -> f64 {
         voxel_lengths(self.world.centre_of_mass()[0] - self.begin, self.physics())
     }
@@ -124,8 +123,7 @@ pub fn fresh_rollout(
 }
 
 /// Simulates fresh rollouts under at most [`Worlds::MOST`] images, side by side, unless `stop` is
-/// set in the meantime. Returns the displacement of each in voxel lengths, with the bits of
-/// [`fresh_rollout`].
+/// set in the meantime. Returns displacements in voxel lengths, with the bits of [`fresh_rollout`].
 ///
 /// # Errors
 /// Returns [`Stopped`] if `stop` was set; single rollouts return [`Unstable`].
@@ -153,8 +151,7 @@ pub fn fresh_rollouts_of(
 }
 
 /// Simulates the images by the protocol, in fresh rollouts or one, unless `stop` is set in the
-/// meantime. Returns the displacement under each in voxel lengths, and the energies put into the
-/// robot if `measured`.
+/// meantime. Returns the displacements in voxel lengths, and, if `measured`, the energies put in.
 ///
 /// # Errors
 /// Returns a [`StepError`] if it was stopped, or if a rollout became unstable.
@@ -322,8 +319,7 @@ mod tests {
             let way = recording.frames[end].centre[0] - recording.frames[phase.first_frame].centre[0];
             assert!((phase.displacement - way).abs() < 1e-9, "{} {way}", phase.displacement);
         }
-        // y is measured from the ground, on which the robot stands; x from its left edge; a voxel
-        // is 1.
+        // y starts at the ground, under the robot; x at its left edge; a voxel is 1.
         let points = &recording.frames[0].points;
         let least = |axis: usize| points.iter().map(|p| p[axis]).fold(f64::INFINITY, f64::min);
         assert!(least(0).abs() < 1e-9 && least(1).abs() < 1e-9, "{} {}", least(0), least(1));

@@ -24,8 +24,7 @@ pub struct Answer {
 pub struct Score {
     /// Index in [`Grouping::tasks`].
     pub task: usize,
-    /// See [`Fitness`]. The smallest margin is in voxel lengths and positive if every image is
-    /// answered correctly.
+    /// See [`Fitness`]. The smallest margin is in voxel lengths, above 0 if all is correct.
     pub fitness: f64,
 }
 
@@ -200,8 +199,7 @@ mod tests {
 
     #[test]
     fn a_robot_stops_when_no_task_it_can_perform_is_open_to_it() {
-        // 0 left and 1 right: only splits that separate them remain; 0|123 is empty, but 01|23 is
-        // out of reach.
+        // 0 left and 1 right: only splits of these remain; 0|123 is empty, 01|23 out of reach.
         let shown = |classes: &[u8]| {
             let to_come = classes.iter().map(|&class| Answer { class, displacement: None });
             answers(&[-5.0, 6.0]).into_iter().chain(to_come).collect::<Vec<_>>()

@@ -1,5 +1,4 @@
-//! From an image to the stimulus of a body's sensors: reduction to the body's grid, then encoding
-//! (paper, "Task").
+//! From image to stimulus: reduction to the body's grid, then encoding (paper, "Task").
 
 use crate::base::Grid;
 use crate::body::MAX_SIDE;

@@ -105,8 +105,7 @@ impl From<Material> for u8 {
 pub const MAX_SIDE: usize = 64;
 
 /// A robot's body: H × W voxels, row 0 on top. Empty rows and columns count: pixel (row, column) of
-/// a stimulus drives voxel (row, column). In files it is a list of rows of numbers 0…6 (see
-/// [`Material`]).
+/// a stimulus drives voxel (row, column). In files: rows of numbers 0…6 (see [`Material`]).
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(try_from = "Grid<Material>", into = "Grid<Material>"))]

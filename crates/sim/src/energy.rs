@@ -1,5 +1,5 @@
-//! [`Energy`]: the energy that the actuators and the length limits put into a robot (physics.md,
-//! "One substep", 4).
+//! [`Energy`]: the energy that actuators and length limits put into a robot (physics.md, "One
+//! substep", 4).
 //!
 //! At the start of every substep the servo makes a spring of stiffness k and gain g pull towards
 //! its goal length with k·g·(d − goal). Over many substeps that is a spring of stiffness k·g with
@@ -40,8 +40,7 @@ pub(crate) struct Meter {
     points: Vec<usize>,
     /// Weight of a point.
     weight: f64,
-    /// Goals of the current control step; empty before the first one, when every goal is the
-    /// spring's length.
+    /// Goals of the current control step; empty before the first (lengths then).
     goals: Vec<f64>,
     before: f64,
     pub energy: Energy,

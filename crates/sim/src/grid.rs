@@ -76,8 +76,7 @@ impl<T> Grid<T> {
         self.cells.len()
     }
 
-    /// Returns the cell, or `None` outside the grid. Indices are signed so that callers can look at
-    /// neighbours freely.
+    /// Returns the cell, or `None` outside; signed indices reach neighbours without checks.
     pub fn get(&self, row: isize, column: isize) -> Option<&T> {
         let (r, c) = (usize::try_from(row).ok()?, usize::try_from(column).ok()?);
         (r < self.height && c < self.width).then(|| &self.cells[r * self.width + c])

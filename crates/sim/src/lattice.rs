@@ -40,8 +40,7 @@ pub(crate) struct OffLatticeSpring {
 /// A horizontal side actuated by active voxels.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ActuatedSide {
-    /// Index into the goals: a slot of the horizontal family, or (`len` + index of the off-lattice
-    /// spring).
+    /// Index into the goals: a horizontal spring's slot, or `len` + index off the lattice.
     pub goal: usize,
     /// The one or two active voxels that share it, as indices into [`Lattice::active`].
     pub voxels: [usize; 2],
@@ -84,8 +83,7 @@ pub(crate) struct Lattice {
     pub(crate) lengths: [f64; FAMILIES],
     /// Stiffness of every spring ([`spring_index`]), 0 where there is none.
     pub(crate) stiffness: Buffer,
-    /// Bit mask of every spring: all bits but the sign's where there is one, 0 elsewhere (see
-    /// [`Lanes::bits_and`]).
+    /// Bit mask of every spring: all bits but the sign's, or 0 (see [`Lanes::bits_and`]).
     pub(crate) exists: Buffer,
     pub(crate) off_lattice_springs: Vec<OffLatticeSpring>,
     pub(crate) actuated: Vec<ActuatedSide>,
@@ -93,8 +91,7 @@ pub(crate) struct Lattice {
     /// Sides of rigid voxels, in an order that gives the same results as the rigid pass's.
     pub(crate) rigid_links: Vec<[usize; 2]>,
     pub(crate) surface: Vec<SurfaceVoxel>,
-    /// Every existing point with its grid vertex (row, column) in the body, in EvoGym's order of
-    /// creation.
+    /// Every point with its grid vertex (row, column), in EvoGym's order of creation.
     pub(crate) points: Vec<(usize, (usize, usize))>,
     /// Non-empty voxels, row-major, with their points clockwise from the top left.
     pub(crate) voxels: Vec<((usize, usize), [usize; 4])>,
@@ -209,8 +206,7 @@ impl Lattice {
             if (0..FAMILIES).any(|family| exists(&family)) {
                 used[slot / BLOCK] = true;
             }
-            // All but vertical springs reach into the next column, so their forces also reach the
-            // next block.
+            // All but vertical springs reach into the next column, perhaps of the next block.
             if [0, 2, 3].iter().any(exists) {
                 used[(slot + 1) / BLOCK] = true;
             }
@@ -270,8 +266,7 @@ fn numbered_voxels(body: &Body) -> NumberedVoxels {
             let at = |dr: isize, dc: isize| !body.at(r as isize + dr, c as isize + dc).is_empty();
             let falling = at(-1, -1) && at(0, 0) && !at(-1, 0) && !at(0, -1);
             let rising = at(-1, 0) && at(0, -1) && !at(-1, -1) && !at(0, 0);
-            // If two voxels touch only here, the lower one, for which the vertex is a top corner,
-            // is later.
+            // If two voxels touch only here, the later one has the vertex as a top corner.
             if (falling || rising) && down == 0 {
                 *off_lattice[(r, c)].get_or_insert_with(|| {
                     *len += 1;

@@ -1,5 +1,4 @@
-//! EvoGym's soft-robot physics: a fast mass–spring lattice on flat ground, with the same bits on
-//! every machine.
+//! EvoGym's soft-robot physics: a fast mass–spring lattice on flat ground, the same bits anywhere.
 //!
 //! A [`Body`] is a grid of voxels: rigid, soft, muscles that oscillate, and sensors that follow a
 //! pixel each. A [`System`] is a body under some [`Physics`]; a [`World`] simulates it. Neither
@@ -53,8 +52,7 @@
 //! simulation does not depend on where on the ground the robot stands, except for the pegs below
 //! it, which count columns.
 //!
-//! The rest of this page is the specification, `physics.md`; comments in the code cite its
-//! sections.
+//! The rest of this page is the specification, `physics.md`, whose sections the code cites.
 //!
 #![doc = include_str!("../physics.md")]
 // Tests may panic and print.

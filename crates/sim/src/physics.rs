@@ -10,8 +10,7 @@ pub const MOST_CYCLE_STEPS: u32 = 100_000;
 /// Highest row of the ground \[grid rows\].
 pub const MOST_ROWS: u32 = 1_000_000;
 
-/// Greatest `Physics::blow_up_extent` \[voxel lengths\]: contacts are searched in every cell under
-/// a voxel.
+/// Greatest `Physics::blow_up_extent` \[voxel lengths\]: contacts search all cells under a voxel.
 pub const MOST_CELLS: u32 = 1000;
 
 /// The constants of the physics, each with the title of its section of physics.md. Defaults are
@@ -28,8 +27,7 @@ pub struct Physics {
     pub cell_size: f64,
     /// Mass of every point \[mass\]. (Units)
     pub mass: f64,
-    /// Duration of a substep \[s\]. Much above 1e-4 the stiffest springs leave RK4's region of
-    /// stability. (Units)
+    /// Duration of a substep \[s\]. Much above 1e-4 the stiffest springs make RK4 unstable. (Units)
     pub time_step: f64,
     /// Substeps in a control step. (Units)
     pub substeps: u32,
@@ -104,8 +102,7 @@ pub struct Physics {
 
     /// Top of the ground \[grid rows\]; the ground is one cell thick. (World)
     pub ground_row: u32,
-    /// Columns from one peg below the ground to the next; a peg covers the underside of a cell.
-    /// (World)
+    /// Columns between pegs below the ground; a peg covers the underside of a cell. (World)
     pub peg_spacing: u32,
     /// Stiffness of the floor plane at y = 0 \[mass/s²\]. (World)
     pub floor_stiffness: f64,

@@ -38,8 +38,7 @@ pub struct State {
     pub(crate) position: Pair,
     /// Integrated velocities \[wu/s\].
     pub(crate) velocity: Pair,
-    /// Positions at the end of the previous substep \[wu\]. The *true* velocity is (x − previous x)
-    /// / dt.
+    /// Positions at the end of the previous substep \[wu\]. *True* velocity: (x − previous x)/dt.
     pub(crate) previous: Pair,
     /// Number of control steps completed: the muscles' clock.
     pub(crate) control_step: u64,

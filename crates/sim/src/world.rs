@@ -12,8 +12,8 @@ use crate::unstable::{StepError, Unstable, UnstableReason};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-/// The start of a simulation: the grid cell of the lower left corner of the body's box (empty rows
-/// and columns count).
+/// The start of a simulation: the grid cell of the body's lower left corner (empty rows and columns
+/// count).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Start {
     /// Column \[voxels\]. It matters only to the positions of the pegs below the ground.
@@ -154,8 +154,7 @@ impl World {
         [mean(&self.state.position[X]), mean(&self.state.position[Y])]
     }
 
-    /// Returns all points [x, y] in world units (as [`World::centre_of_mass`]), in EvoGym's order
-    /// of creation.
+    /// Returns all points [x, y] (as [`World::centre_of_mass`]), in EvoGym's order of creation.
     pub fn points(&self) -> impl Iterator<Item = [f64; 2]> + '_ {
         let [x, y] = &self.state.position;
         self.system.lattice.points.iter().map(|&(point, _)| [x[point], y[point]])

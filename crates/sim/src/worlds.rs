@@ -26,8 +26,7 @@ impl Worlds {
     pub const MOST: usize = BLOCK;
 
     /// Returns true if simulations of this system are faster side by side, from about one rigid
-    /// voxel in two. With fewer, eight states at once crowd each other out of the processor's
-    /// cache.
+    /// voxel in two. With fewer, eight states at once overflow the processor's cache.
     pub fn gain(system: &System) -> bool {
         let links = system.lattice.rigid_links.len();
         links >= SharedRigidPass::LEAST && links >= 2 * system.lattice.voxels.len()
@@ -58,8 +57,7 @@ impl Worlds {
         self.worlds[number].set_stimulus(stimulus);
     }
 
-    /// Returns for each simulation how it became unstable, if it did. It steps no more, and its
-    /// state is useless.
+    /// Returns how each became unstable, if it did: it steps no more, and its state is useless.
     pub fn ended(&self) -> &[Option<Unstable>] {
         &self.ended
     }

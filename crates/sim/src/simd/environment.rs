@@ -114,8 +114,7 @@ mod tests {
     #[test]
     fn whatever_the_host_has_chosen_numbers_are_the_same_and_it_has_its_choice_again() {
         let usual = computed();
-        // Down, up, towards zero; subnormal results flushed, subnormal operands read as zero; all
-        // of them.
+        // Down, up, towards zero; subnormals flushed, or read as zero; all of them.
         for choice in [0x2000, 0x4000, 0x6000, 0x8000, 0x0040, 0xe040] {
             let host = STANDARD | choice;
             write(host);

@@ -1,5 +1,4 @@
-//! Wide lanes: numerical loops written once, compiled for every instruction set, chosen at run
-//! time.
+//! Wide lanes: numerical loops compiled for every instruction set, one chosen at run time.
 //!
 //! A loop is a [`Kernel`], generic over [`Lanes`], a few `f64` side by side. [`dispatch`] runs it
 //! with the widest lanes that the machine has. Every operation of [`Lanes`] is an exactly rounded
@@ -65,8 +64,7 @@ impl InstructionSet {
         }
     }
 
-    /// Returns the one that the environment variable `MORPHCOG_ISA` names, or `None` if it is not
-    /// set.
+    /// Returns the one that the environment variable `MORPHCOG_ISA` names, if it is set.
     ///
     /// # Errors
     /// Returns the name and those available if this machine has no such instruction set.
@@ -112,8 +110,8 @@ pub trait Lanes:
     fn mul_sub_from(self, factor: Self, more: Self) -> Self;
     /// Returns self · factor − less, rounded once.
     fn mul_sub(self, factor: Self, less: Self) -> Self;
-    /// Returns the bits that both have: the absolute value if `other` has all bits but the sign's,
-    /// 0 if it is 0.
+    /// Returns the common bits: the absolute value if `other` lacks only the sign bit, 0 if it is
+    /// 0.
     fn bits_and(self, other: Self) -> Self;
     /// Returns the square root.
     fn sqrt(self) -> Self;
@@ -138,8 +136,7 @@ pub trait Lanes:
 }
 
 /// Makes an array of an expression for some indices, `each!(i in [0, 1] => a[i] + b[i])`. Unlike
-/// `array::map` it needs no inlining: a closure that is not inlined would be compiled without wide
-/// instructions.
+/// `array::map` it needs no inlining: a closure that is not inlined would lose wide instructions.
 macro_rules! each {
     ($index:ident in [$($value:expr),*] => $expression:expr) => {
         [$({

@@ -168,8 +168,7 @@ impl Lanes for F64x4 {
     fn shift_in(self, previous: Self) -> Self {
         // SAFETY: the processor has the instructions (see the module).
         unsafe {
-            // [previous 2, previous 3, self 0, self 1]; then its odd lanes interleave with the even
-            // lanes of self.
+            // [previous 2, previous 3, self 0, self 1]; then its odd with self's even lanes.
             let middle = _mm256_permute2f128_pd::<0x21>(previous.0, self.0);
             F64x4(_mm256_shuffle_pd::<0b0101>(middle, self.0))
         }

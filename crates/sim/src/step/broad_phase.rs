@@ -43,8 +43,7 @@ pub(crate) struct BroadPhase {
     /// Pairs of surface voxels, not neighbours in the body, whose boxes may overlap.
     pub distant: Vec<[usize; 2]>,
     bounds: Vec<Bounds>,
-    /// `bounds` for wide lanes, in whole blocks: low x, low y, high x, high y. NaN behind the last
-    /// box.
+    /// `bounds` for wide lanes, in whole blocks: low x, low y, high x, high y. NaN after the last.
     sides: [Buffer; 4],
 }
 
@@ -206,8 +205,7 @@ impl BroadPhase {
     /// (physics.md, "Instability").
     pub fn too_many_overlaps(&self, System { lattice, physics }: &System, state: &State) -> bool {
         let most = physics.unstable_ratio * lattice.surface.len() as f64;
-        // Ordered pairs: each counts twice. Usually the list itself is too short to be worth a
-        // search.
+        // Ordered pairs: each counts twice. The list is usually too short for a search.
         if (2 * self.distant.len()) as f64 <= most {
             return false;
         }

@@ -12,8 +12,7 @@ use crate::system::System;
 /// For each corner (clockwise from the top left), the far ends of the two sides that meet there.
 const FAR_ENDS: [[usize; 2]; 4] = [[1, 3], [0, 2], [3, 1], [2, 0]];
 
-/// Distance from a voxel's box \[wu\] beyond which a point is not inside, whatever rounding does to
-/// the exact test.
+/// A point this far out of a voxel's box \[wu\] is not inside, despite the exact test's rounding.
 const CLEAR: f64 = 1e-9;
 
 /// Most columns that a voxel spans: those of the widest that has not blown up, and room for its

@@ -1,5 +1,5 @@
-//! Length limits: corrections of positions that keep springs near their rest lengths (physics.md,
-//! "One substep", 4).
+//! Length limits: corrected positions keep springs near their rest lengths (physics.md, "One
+//! substep", 4).
 //!
 //! A spring beyond a limit l is corrected by (1 − l/d) of its vector. With t = d²/l² − 1, which is
 //! small, that is 1 − 1/√(1 + t) again: usually neither root nor division.

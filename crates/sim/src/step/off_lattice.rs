@@ -1,5 +1,4 @@
-//! Springs that end in an off-lattice point, where two voxels touch only at a corner: few,
-//! anywhere.
+//! Springs that end in an off-lattice point, where voxels touch only at a corner: few, anywhere.
 
 use crate::lattice::{FAMILIES, Lattice};
 use crate::simd::{BLOCK, Buffer, Lanes, each};

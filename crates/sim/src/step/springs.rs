@@ -3,16 +3,14 @@
 //! A sweep goes over the lattice's slots block by block. Each slot has four springs (horizontal,
 //! vertical, falling, rising), which only look ahead: to the slot's own point, the one to the
 //! right, and the two below. So forces on points ahead are passed on (`carry` of [`Gather`]), each
-//! point's forces are added in the same order on any lanes, and a block's results may overwrite its
-//! inputs.
+//! point adds up its forces in one order on any lanes, and blocks may overwrite their inputs.
 //!
 //! A spring of stiffness k and rest length ρ, of length d₀ at the start of the substep, pulls with
 //! k(1 − ρ/d)w when its vector w has length d. With t = d²/d₀² − 1 that is
 //!
 //! k(1 − ρ/d₀) + k(ρ/d₀)·(1 − 1/√(1 + t)) = `initial` + `change`·(1 − 1/√(1 + t)).
 //!
-//! Within a substep t is small and a short series suffices ([`super::series`]): neither root nor
-//! division.
+//! Within a substep t is small: a short series ([`super::series`]) avoids root and division.
 
 use crate::lattice::FAMILIES;
 use crate::simd::{BLOCK, Lanes, each};
@@ -183,8 +181,7 @@ pub(crate) fn squares<L: Lanes>([x, y]: &Vectors<L>) -> [L; FAMILIES] {
 pub(crate) struct Gather<'a, L> {
     carry: [&'a mut [f64]; 2],
     pitch: usize,
-    /// Forces of the previous block's springs on points at their right: in their own row, and in
-    /// the row below.
+    /// The previous block's forces on points at its right: in its own row, and in the row below.
     beside: [L; 2],
     below: [L; 2],
 }
@@ -197,8 +194,7 @@ impl<'a, L: Lanes> Gather<'a, L> {
         Gather { carry, pitch, beside: nothing, below: nothing }
     }
 
-    /// Returns the sum of all springs' pulls on the points at the next slot, given the pulls of the
-    /// slot's own springs.
+    /// Returns the sum of all pulls on the points at the next slot, given those of its own springs.
     #[inline(always)]
     pub fn next(&mut self, pull: [L; FAMILIES], vectors: &Vectors<L>, slot: usize) -> [L; 2] {
         each!(axis in [X, Y] => {
