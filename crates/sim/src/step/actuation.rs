@@ -22,6 +22,7 @@ pub(crate) fn target(material: Material, control_step: u64, pixel: f64, physics:
 /// Returns the target width of any voxel under a pixel in [0, 1] \[rest widths\]: for a muscle
 /// halfway through its swing, for a passive voxel 1.
 ///
+/// # Panics
 /// If `target_min` exceeds `target_max` or one is NaN, which [`Physics::validate`] refuses.
 pub fn width(material: Material, pixel: f64, physics: &Physics) -> f64 {
     let free = match material {
