@@ -1,9 +1,9 @@
-//! Bodies, which are the simulator's, and what they are known by.
+//! Bodies, which are the simulator's, and their content hashes.
 
 use crate::base::hash;
 pub use morphcog_sim::body::*;
 
-/// The content hash of a body: equal bodies, and only those, have equal keys.
+/// Returns the content hash of a body: equal bodies, and only those, have equal keys.
 pub fn key(body: &Body) -> [u8; 16] {
     hash::content_key(body.to_string().as_bytes())
 }

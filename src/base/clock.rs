@@ -1,9 +1,8 @@
-//! The time that a thread's own work takes, whatever else the machine has to do.
+//! The time that a thread's own work takes, whatever else the machine does.
 
 use std::time::Duration;
 
-/// What [`thread_time`] tells: "processor", or "wall" where the system does not tell a thread's
-/// processor time.
+/// The clock of [`thread_time`]: "processor", or "wall" if the system does not report that.
 pub const CLOCK: &str = if IS_KNOWN { "processor" } else { "wall" };
 
 #[cfg(all(
@@ -56,8 +55,8 @@ mod system {
 
 use system::IS_KNOWN;
 
-/// Processor time of the calling thread so far; where the system does not tell it, wall-clock time
-/// since the first call. Only differences mean anything.
+/// Returns the calling thread's processor time so far, or, where the system does not report it,
+/// wall-clock time since the first call. Only differences mean anything.
 pub fn thread_time() -> Duration {
     system::now()
 }

@@ -1,4 +1,4 @@
-//! [`Error`]: what a command fails with, and the exit code it means.
+//! [`Error`]: the failure of a command, and its exit code.
 
 use crate::base::ownership::{self, Lost};
 use crate::base::remedy::Remedy;
@@ -11,24 +11,24 @@ use std::path::Path;
 /// Kinds of failure; each has an exit code of its own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ErrorKind {
-    /// Anything without a code of its own, as a full disk.
+    /// Any failure without a code of its own, such as a full disk.
     Other,
-    /// The command line asks for what cannot be.
+    /// The command line asks for the impossible.
     Usage,
     /// A file the user gave is missing, broken or of the wrong kind.
     Input,
     /// A simulated rollout became unstable (`simulate` only).
     Unstable,
-    /// Something is in the way: a run folder that exists, or is in use.
+    /// Something is in the way: a run folder exists or is in use.
     Occupied,
-    /// A folder that this process had locked is no longer its own: nothing more is written to it.
+    /// This process has lost its lock on a folder: it writes nothing more there.
     Lost,
     /// Stopped by a signal; the run was saved and can be resumed.
     Stopped,
 }
 
 impl ErrorKind {
-    /// The process's exit code.
+    /// Returns the process's exit code.
     pub fn exit_code(self) -> u8 {
         match self {
             ErrorKind::Other => 1,
@@ -41,32 +41,30 @@ impl ErrorKind {
     }
 }
 
-/// What went wrong, where, what was expected, and what to do about it.
+/// An error: what went wrong, where, what was expected, and what to do about it.
 ///
-/// An error knows the field of a command's options that it is about, and how it can be remedied, but no
-/// option of the command line: whoever shows it spells both in the words of its users.
+/// An error knows the field of a command's options that it is about, and its remedies, but no
+/// option of the command line: whoever prints it spells both for its users.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Error {
     /// The kind of failure.
     pub kind: ErrorKind,
-    /// One line for the user, whatever the files and names in it hold (see [`one_line`]); without
-    /// the argument.
+    /// One line for the user, whatever is in it (see [`one_line`]); without the argument.
     pub message: String,
-    /// The argument that it is about, if it is about one.
+    /// The argument that the error is about, if any.
     pub argument: Option<Argument>,
-    /// What the user can do: alternatives, the most likely one first.
+    /// Alternatives for the user, the most likely one first.
     pub remedies: Vec<Remedy>,
-    /// The key that it is about, if it is about one of a config: its path in dots, items of lists
-    /// by their number from 1.
+    /// The config key that it is about, if any: a dotted path, items of lists by number from 1.
     pub key: Option<String>,
 }
 
 /// A field of a command's options.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Argument {
-    /// Its name, as "control_steps".
+    /// Its name, such as "control_steps".
     pub name: &'static str,
-    /// The value that was given, on one line, if the error is about the value.
+    /// The given value, on one line, if the error is about the value.
     pub value: Option<String>,
 }
 
@@ -75,64 +73,64 @@ impl Error {
         Error { kind, message: one_line(&message), argument: None, remedies: Vec::new(), key: None }
     }
 
-    /// A file the user gave is wrong.
+    /// Reports that a file from the user is wrong.
     pub fn input(message: String) -> Self {
         Error::new(ErrorKind::Input, message)
     }
 
-    /// A key of a config has a value that cannot be.
+    /// Reports that a key of a config has an invalid value.
     pub fn value(key: &str, found: impl fmt::Display, expected: &str) -> Self {
         Error::input(format!("{key} = {found}: expected {expected}")).with_key(key)
     }
 
-    /// Something is wrong about a key of a config.
+    /// Reports a problem with a key of a config.
     pub fn at_key(key: &str, text: impl fmt::Display) -> Self {
         Error::input(format!("{key}: {text}")).with_key(key)
     }
 
-    /// An argument of a command has a value that cannot be; `text` says what was expected.
+    /// Reports that an argument of a command has an invalid value; `text` says what was expected.
     pub fn argument(name: &'static str, value: impl fmt::Display, text: impl Into<String>) -> Self {
         let value = Some(one_line(&value.to_string()));
         Error { argument: Some(Argument { name, value }), ..Error::usage(text.into()) }
     }
 
-    /// The command line is wrong.
+    /// Reports that the command line is wrong.
     pub fn usage(message: String) -> Self {
         Error::new(ErrorKind::Usage, message)
     }
 
-    /// Something is in the way.
+    /// Reports that something is in the way.
     pub fn occupied(message: String) -> Self {
         Error::new(ErrorKind::Occupied, message)
     }
 
-    /// A failure of another kind.
+    /// Reports a failure of another kind.
     pub fn other(message: String) -> Self {
         Error::new(ErrorKind::Other, message)
     }
 
-    /// An unstable rollout.
+    /// Reports an unstable rollout.
     pub fn unstable(message: String) -> Self {
         Error::new(ErrorKind::Unstable, message)
     }
 
-    /// Stopped by a signal.
+    /// Reports that a signal stopped the command.
     pub fn stopped(message: String) -> Self {
         Error::new(ErrorKind::Stopped, message)
     }
 
-    /// A file the user gave cannot be read.
+    /// Reports that a file from the user cannot be read.
     pub fn reading(path: &Path, error: &io::Error) -> Self {
         Error::input(format!("{}: cannot be read: {error}", path.display()))
     }
 
-    /// [`Error::reading`], with a remedy where there is no such file.
+    /// Acts as [`Error::reading`], and adds a remedy if there is no such file.
     pub fn reading_or(path: &Path, error: &io::Error, remedy: Remedy) -> Self {
         let text = Error::reading(path, error);
         if error.kind() == io::ErrorKind::NotFound { text.remedy(remedy) } else { text }
     }
 
-    /// A file is not written any more: its folder is another process's, or anybody's.
+    /// Reports that a file is not written because its folder is no longer this process's.
     fn lost(path: &Path, lost: &Lost) -> Self {
         let advice = match lost {
             Lost::Taken { .. } => "let that one end, or start this command again in another folder",
@@ -142,10 +140,10 @@ impl Error {
         Error::new(ErrorKind::Lost, text).advice(advice)
     }
 
-    /// A file cannot be written; if there is no room for it, or the lock of its folder is lost, with
-    /// what to do.
+    /// Reports that a file cannot be written; adds remedies if there is no room for it or the lock
+    /// of its folder is lost.
     pub fn writing(path: &Path, error: &io::Error) -> Self {
-        // A folder that was removed a moment ago fails in other ways, too.
+        // A folder removed a moment ago fails in other ways, too.
         let now = ownership::check(path).err();
         if let Some(lost) = [Some(error), now.as_ref()].into_iter().flatten().find_map(Lost::of) {
             return Error::lost(path, lost);
@@ -166,7 +164,7 @@ impl Error {
         }
     }
 
-    /// Adds a remedy, after those there are.
+    /// Adds a remedy after the existing ones.
     #[must_use]
     pub fn remedy(mut self, remedy: Remedy) -> Self {
         self.remedies.push(match remedy {
@@ -176,7 +174,7 @@ impl Error {
         self
     }
 
-    /// Adds advice in plain words, which name no option and no command.
+    /// Adds advice in plain words, without names of options or commands.
     #[must_use]
     pub fn advice(self, text: impl Into<String>) -> Self {
         self.remedy(Remedy::advice(text))
@@ -188,13 +186,13 @@ impl Error {
         Error { argument: Some(Argument { name, value: None }), ..self }
     }
 
-    /// The same about a key.
+    /// Names the key that the error is about.
     #[must_use]
     pub fn with_key(self, key: &str) -> Self {
         Error { key: Some(key.to_string()), ..self }
     }
 
-    /// The same with where it is, unless it says that already.
+    /// Adds the place to the message unless it begins with it.
     #[must_use]
     pub fn in_place(mut self, place: &str) -> Self {
         let place = one_line(place);
@@ -206,8 +204,8 @@ impl Error {
     }
 }
 
-/// Whether there is no room: on the disk, in the user's quota, or in a file of the size that the
-/// system allows.
+/// Returns true if there is no room: on the disk, in the user's quota or within the file size
+/// limit.
 pub fn is_full(error: &io::Error) -> bool {
     use io::ErrorKind::{FileTooLarge, QuotaExceeded, StorageFull};
     matches!(error.kind(), StorageFull | QuotaExceeded | FileTooLarge)

@@ -1,4 +1,4 @@
-//! Writing files so that nothing is ever half-written, and reading texts that end.
+//! Writing files so that none is ever half-written, and reading texts of limited size.
 
 use crate::base::ownership::{self, folder_of};
 use std::ffi::{OsStr, OsString};
@@ -7,21 +7,20 @@ use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};
 
-/// Beginning and end of the names of temporary files, around the name of the file to be written.
+/// Prefix and suffix of the names of temporary files, around the name of the file to be written.
 const TEMPORARY: [&str; 2] = [".", ".tmp"];
 
-/// A writer has its temporary file locked after so long.
+/// Time after which a writer surely has its temporary file locked.
 const TO_LOCK: Duration = Duration::from_secs(10);
 
-/// Most bytes of a text: many times what any file of ours has.
+/// Most bytes of a text: many times the size of any file of ours.
 const MOST_TEXT: u64 = 256 << 20;
 
-/// Opens a file of a run or a dataset, which may lie where anybody can put one: a pipe, a socket or
-/// a device is refused at once, because opening or reading it could block for ever. (A folder says
-/// what it is when it is read.)
+/// Opens a file of a run or a dataset, where anybody can put one. A pipe, a socket or a device is
+/// refused at once, because opening or reading it could block for ever. (A folder fails when read.)
 ///
 /// # Errors
-/// What the system says; if it is no file.
+/// Returns the system's error, or one that names the kind if it is no regular file.
 pub fn open_file(path: &Path) -> io::Result<File> {
     let mut options = File::options();
     options.read(true);
@@ -29,12 +28,12 @@ pub fn open_file(path: &Path) -> io::Result<File> {
     {
         use rustix::fs::OFlags;
         use std::os::unix::fs::OpenOptionsExt;
-        // Without this, to open a pipe waits for its other end.
+        // Otherwise opening a pipe waits for its other end.
         let flags = OFlags::NONBLOCK | OFlags::NOCTTY;
         options.custom_flags(flags.bits().cast_signed());
     }
     let file = options.open(path)?;
-    // Of what is open, so that nothing can take its place in between.
+    // Checks the open file, so that nothing can replace it in between.
     regular(&file.metadata()?)?;
     Ok(file)
 }
@@ -49,16 +48,16 @@ fn regular(found: &Metadata) -> io::Result<()> {
     }
 }
 
-/// Whether [`open_file`] would open a file, or there is none: to be known before one is written,
-/// because opening a pipe to write could block for ever, too.
+/// Checks that [`open_file`] would open a file, or that there is none. Call it before writing:
+/// opening a pipe to write could block for ever, too.
 ///
 /// # Errors
-/// If something else is in its place.
+/// Returns an error if something else is in its place.
 pub fn check_file(path: &Path) -> io::Result<()> {
     std::fs::metadata(path).map_or(Ok(()), |found| regular(&found))
 }
 
-/// Reads such a file to its end.
+/// Reads a file of a run or a dataset to its end.
 ///
 /// # Errors
 /// As [`open_file`].
@@ -76,8 +75,8 @@ pub fn read_text(path: &Path) -> io::Result<String> {
     read_limited(open_file(path)?)
 }
 
-/// Reads a text that the user wrote and named: it may come through a pipe, as from `<(…)` of a
-/// shell. What does not end, as a device, is refused before it fills the memory.
+/// Reads a text that the user wrote and named. It may come through a pipe, as from `<(…)` of a
+/// shell. An endless source, such as a device, is refused before it fills the memory.
 ///
 /// # Errors
 /// As [`read_text`].
@@ -88,11 +87,11 @@ pub fn read_given(path: &Path) -> io::Result<String> {
     }
 }
 
-/// Reads a text to its end: UTF-8, or UTF-16 that begins with its mark, as PowerShell's `>` writes
-/// it.
+/// Reads a text to its end: UTF-8, or UTF-16 that begins with its byte order mark, as PowerShell's
+/// `>` writes it.
 ///
 /// # Errors
-/// What the system says; if it is no such text; if it has more than 256 megabytes.
+/// Returns the system's error, or one of its own if it is no such text or above 256 megabytes.
 pub fn read_limited(source: impl Read) -> io::Result<String> {
     let mut bytes = Vec::new();
     let read = source.take(MOST_TEXT + 1).read_to_end(&mut bytes)?;
@@ -113,8 +112,8 @@ fn utf16(bytes: &[u8], unit: fn([u8; 2]) -> u16) -> Option<String> {
     text.filter(|_| rest.is_empty())
 }
 
-/// A path in which a leading `~` stands for the user's home folder, as shells have it: files and
-/// `--option=~/…` get to the program as they are.
+/// Replaces a leading `~` by the user's home folder, as shells do: in files and `--option=~/…` no
+/// shell does.
 pub fn home_expanded(path: &Path) -> PathBuf {
     match (path.strip_prefix("~"), std::env::home_dir()) {
         (Ok(below), Some(home)) if !home.as_os_str().is_empty() => home.join(below),
@@ -123,22 +122,22 @@ pub fn home_expanded(path: &Path) -> PathBuf {
 }
 
 /// Writes a file as a whole or not at all: to a temporary name in the same folder, synced, then
-/// renamed. Of a symbolic link, the file it leads to; what is no ordinary file (`/dev/stdout`, a
-/// pipe) is written to as it is. What a killed process left of the same file is removed.
+/// renamed. A symbolic link stays and its target is written. Anything but a regular file
+/// (`/dev/stdout`, a pipe) is written to directly. Removes leftovers of killed writers.
 ///
 /// # Errors
-/// What the system says, as when the folder does not exist; [`ownership::Lost`]. The file is then as
-/// it was.
+/// Returns the system's error, for example if the folder does not exist, or [`ownership::Lost`].
+/// The file then stays as it was.
 pub fn write_atomically(path: &Path, content: &[u8]) -> io::Result<()> {
     write_whole(path, |file| file.write_all(content))
 }
 
-/// The same of what `write` writes to the file, for what need not be in memory.
+/// Acts as [`write_atomically`], but `write` writes the content, which need not be in memory.
 ///
 /// # Errors
-/// As [`write_atomically`]; what `write` says.
+/// As [`write_atomically`]; also the error of `write`.
 pub fn write_whole(path: &Path, write: impl FnOnce(&mut File) -> io::Result<()>) -> io::Result<()> {
-    // A rename would put an ordinary file in the place of a device or a link.
+    // A rename would replace a device or a link by an ordinary file.
     if std::fs::metadata(path).is_ok_and(|found| !found.is_file() && !found.is_dir()) {
         return write(&mut File::options().write(true).open(path)?);
     }
@@ -147,7 +146,7 @@ pub fn write_whole(path: &Path, write: impl FnOnce(&mut File) -> io::Result<()>)
     let path = &led_to(asked);
     let folder = folder_of(path);
     let mut file = temporary(path)?;
-    // Says to others that its writer lives; where the file system has no locks, nothing does.
+    // Tells others that the writer lives; where the file system has no locks, nothing does.
     let _ = file.as_file().try_lock();
     write(file.as_file_mut())?;
     file.as_file().sync_all()?;
@@ -158,30 +157,30 @@ pub fn write_whole(path: &Path, write: impl FnOnce(&mut File) -> io::Result<()>)
     sync_folder(folder)
 }
 
-/// A temporary file beside a file.
+/// Makes a temporary file beside a file.
 fn temporary(path: &Path) -> io::Result<tempfile::NamedTempFile<File>> {
     let mut prefix = OsString::from(TEMPORARY[0]);
     prefix.extend([inner_name(path), OsStr::new(".")]);
-    // Opened here: with the permissions of any new file, not a temporary file's owner-only; and so
-    // that what the system says does not name a file that the user did not ask for.
+    // Opened here for two reasons: it gets the permissions of any new file, not a temporary file's
+    // owner-only ones; and the system's error does not name a file that the user never mentioned.
     let open = |name: &Path| File::options().write(true).create_new(true).open(name);
     tempfile::Builder::new().prefix(&prefix).suffix(TEMPORARY[1]).make_in(folder_of(path), open)
 }
 
-/// What temporary names have of a file's own name: names have at most 255 bytes.
+/// Returns the part of a file's name used in temporary names: names have at most 255 bytes.
 fn inner_name(path: &Path) -> &OsStr {
     path.file_name().filter(|name| name.len() <= 200).unwrap_or_default()
 }
 
-/// Of which file a name is a temporary one.
+/// Returns the name of the file that a temporary name belongs to.
 fn temporary_of(name: &str) -> Option<&str> {
     let [begin, end] = TEMPORARY;
     let inner = name.strip_prefix(begin)?.strip_suffix(end)?;
     inner.rsplit_once('.').map(|(name, _)| name)
 }
 
-/// Removes the temporary files of a file whose writers were killed. What cannot be removed stays: the
-/// file itself is written.
+/// Removes the temporary files of a file whose writers were killed. Ignores failures: the file
+/// itself is already written.
 fn remove_left_behind(path: &Path) {
     let own = inner_name(path).to_string_lossy();
     let Ok(entries) = std::fs::read_dir(folder_of(path)) else { return };
@@ -193,27 +192,26 @@ fn remove_left_behind(path: &Path) {
     }
 }
 
-/// Whether the writer of a temporary file has ended: it would have the file locked. One that has only
-/// just made the file may not have locked it yet.
+/// Returns true if the writer of a temporary file has ended: otherwise it would hold its lock. A
+/// writer that has only just made the file may not have locked it yet.
 fn is_left_behind(entry: &DirEntry) -> io::Result<bool> {
     let found = entry.metadata()?;
     let age = SystemTime::now().duration_since(found.modified()?).unwrap_or_default();
-    // Other things than files are nobody's leftovers; and network file systems lock only what is
-    // open for writing.
+    // Only files can be leftovers; and network file systems lock only what is open for writing.
     let opened = || File::options().write(true).open(entry.path());
     Ok(found.is_file() && age > TO_LOCK && opened()?.try_lock().is_ok())
 }
 
-/// Where a path leads; also of a symbolic link to a file that is not there yet.
+/// Returns the target of a path, even if it is a symbolic link to a file that does not exist yet.
 fn led_to(path: &Path) -> PathBuf {
     let beside = |link: PathBuf| path.with_file_name(link);
     path.canonicalize().or_else(|_| path.read_link().map(beside)).unwrap_or_else(|_| path.to_path_buf())
 }
 
-/// Whether [`write_atomically`] would find its place; nothing is left behind.
+/// Checks that [`write_atomically`] could write here; leaves nothing behind.
 ///
 /// # Errors
-/// What the system says, as when the folder does not exist.
+/// Returns the system's error, for example if the folder does not exist.
 pub fn check_writable(path: &Path) -> io::Result<()> {
     match std::fs::metadata(path) {
         Ok(found) if found.is_dir() => Err(io::ErrorKind::IsADirectory.into()),
@@ -222,11 +220,11 @@ pub fn check_writable(path: &Path) -> io::Result<()> {
     }
 }
 
-/// Removes what writing the files of these names left half-written in a folder when the process was
-/// killed. Only for who alone writes those files.
+/// Removes temporary files with these names that a killed process left in a folder. Only their sole
+/// writer may call this.
 ///
 /// # Errors
-/// What the system says.
+/// Returns the system's error.
 pub fn remove_half_written(folder: &Path, names: &[&str]) -> io::Result<()> {
     for entry in std::fs::read_dir(folder)? {
         let entry = entry?;
@@ -237,10 +235,10 @@ pub fn remove_half_written(folder: &Path, names: &[&str]) -> io::Result<()> {
     Ok(())
 }
 
-/// Makes a rename in a folder durable. (Elsewhere than on Unix a folder cannot be synced.)
+/// Makes a rename in a folder durable. (Only Unix can sync a folder.)
 ///
 /// # Errors
-/// What the system says.
+/// Returns the system's error.
 pub fn sync_folder(folder: &Path) -> io::Result<()> {
     if cfg!(unix) { File::open(folder)?.sync_all() } else { Ok(()) }
 }
@@ -309,7 +307,7 @@ mod tests {
         write_atomically(&link, b"new").unwrap();
         assert_eq!(std::fs::read(&real).unwrap(), b"new");
         assert!(link.symlink_metadata().unwrap().is_symlink());
-        // Also where what it leads to is not there yet.
+        // Also if the target does not exist yet.
         std::fs::create_dir(folder.path().join("scratch")).unwrap();
         let link = folder.path().join("later.json");
         std::os::unix::fs::symlink("scratch/later.json", &link).unwrap();
@@ -347,7 +345,7 @@ mod tests {
                 assert!(error.to_string().contains("regular file"), "{error}");
             }
         }
-        // A folder is what the system calls it, a link to a file that file.
+        // A folder gives the system's error; a link to a file opens that file.
         assert_eq!(read_text(folder.path()).unwrap_err().kind(), io::ErrorKind::IsADirectory);
         std::fs::write(folder.path().join("file"), "text").unwrap();
         std::fs::remove_file(&link).unwrap();

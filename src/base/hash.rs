@@ -2,20 +2,20 @@
 
 use sha2::{Digest, Sha256};
 
-/// SHA-256 of some bytes in lower-case hexadecimal (64 digits).
+/// Returns the SHA-256 of some bytes in lower-case hexadecimal (64 digits).
 pub fn sha256_hex(bytes: &[u8]) -> String {
     hex(&Sha256::digest(bytes))
 }
 
-/// The first 16 bytes of SHA-256: enough that two different contents never meet in practice
-/// (among 10⁶ contents the chance is below 10⁻²⁶).
+/// Returns the first 16 bytes of SHA-256: enough that two different contents never collide in
+/// practice (among 10⁶ contents the chance is below 10⁻²⁶).
 pub fn content_key(bytes: &[u8]) -> [u8; 16] {
     let mut key = [0; 16];
     key.copy_from_slice(&Sha256::digest(bytes)[..16]);
     key
 }
 
-/// Bytes as lower-case hexadecimal.
+/// Writes bytes as lower-case hexadecimal.
 pub fn hex(bytes: &[u8]) -> String {
     use std::fmt::Write;
     bytes.iter().fold(String::new(), |mut text, b| {
@@ -24,7 +24,7 @@ pub fn hex(bytes: &[u8]) -> String {
     })
 }
 
-/// The beginning of a hash, as much as people compare; all of one that is shorter, as files may have.
+/// Returns the beginning of a hash, enough for people to compare, or all of a shorter one.
 pub fn short(hash: &str) -> &str {
     hash.get(..10).unwrap_or(hash)
 }

@@ -1,5 +1,4 @@
-//! What every module stands on (random generators, hashes, files; numbers, lines and tables as
-//! text).
+//! The base of all modules: random generators, hashes and files; numbers, lines and tables as text.
 
 pub mod clock;
 pub mod error;

@@ -1,27 +1,27 @@
-//! Numbers for people: the one place where tables, labels and messages get theirs from.
+//! Numbers for people: tables, labels and messages all format theirs here.
 
-/// Whether it is 0, for files that leave it out then.
+/// Returns true for 0, which files leave out.
 pub(crate) fn is_zero(number: &usize) -> bool {
     *number == 0
 }
 
-/// A number with a fixed number of decimals. What rounds to 0 has no sign: there is no −0.00.
+/// Formats a number with fixed decimals. A value that rounds to 0 has no sign: no −0.00.
 pub fn fixed(value: f64, decimals: usize) -> String {
     unsigned_zero(format!("{value:.decimals$}"))
 }
 
-/// The same with a plus before what is above nothing.
+/// Formats a number as [`fixed`], with a plus if it is positive.
 pub fn signed(value: f64, decimals: usize) -> String {
     unsigned_zero(format!("{value:+.decimals$}"))
 }
 
-/// A share of 1 in percent, with one decimal.
+/// Formats a fraction as a percentage with one decimal.
 pub fn percent(share: f64) -> String {
     fixed(100.0 * share, 1)
 }
 
-/// The share of a variance that a model explains, by its R², in percent without decimals. A model
-/// whose cross-validated R² is negative predicts worse than the mean, and explains nothing.
+/// Formats the share of a variance that a model with this R² explains, in percent without decimals.
+/// A model with a negative cross-validated R² predicts worse than the mean, and explains nothing.
 pub fn explained(r_squared: f64) -> String {
     fixed(100.0 * r_squared.max(0.0), 0)
 }

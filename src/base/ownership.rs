@@ -1,26 +1,26 @@
-//! Folders that this process has locked. Nothing is written to one after its lock was lost: another
-//! process may be at work there.
+//! Folders that this process has locked. After losing a lock it writes nothing more there: another
+//! process may be at work.
 
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-/// This process had locked a folder, and the lock is no longer its own.
+/// A lock on a folder that this process no longer holds.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Lost {
-    /// Another process has it.
+    /// Another process holds it.
     #[error("{holder} has taken over {}", lock.display())]
     Taken {
-        /// The file of the lock.
+        /// The lock file.
         lock: PathBuf,
         /// The name of that process.
         holder: String,
     },
-    /// The file of the lock was removed or emptied.
+    /// The lock file was removed or emptied.
     #[error("{}, the lock that keeps others out, was removed", lock.display())]
     Removed {
-        /// The file of the lock.
+        /// The lock file.
         lock: PathBuf,
     },
 }
@@ -32,7 +32,7 @@ impl From<Lost> for io::Error {
 }
 
 impl Lost {
-    /// The loss that an error of a write stands for, if it does.
+    /// Returns the loss that caused an error of a write, if one did.
     pub fn of(error: &io::Error) -> Option<&Self> {
         error.get_ref()?.downcast_ref()
     }
@@ -42,7 +42,7 @@ type Look = dyn Fn() -> io::Result<()> + Send + Sync;
 
 struct Claim {
     number: u64,
-    /// The folder as an absolute path, and as it is without links.
+    /// The folder's absolute path, and its path without links.
     places: Vec<PathBuf>,
     look: Arc<Look>,
 }
@@ -53,13 +53,13 @@ fn claims() -> MutexGuard<'static, Vec<Claim>> {
     CLAIMS.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// A claim on a folder; given up when it is dropped.
+/// A claim on a folder, given up on drop.
 #[derive(Debug)]
 pub struct Ownership(u64);
 
 impl Ownership {
-    /// Claims the folder that a lock is in: before this process writes a file there, `look` says whether
-    /// it still may.
+    /// Claims the folder of a lock. Before this process writes a file there, it calls `look`, which
+    /// fails if it no longer may.
     pub fn claim(lock: &Path, look: impl Fn() -> io::Result<()> + Send + Sync + 'static) -> Self {
         static NEXT: AtomicU64 = AtomicU64::new(0);
         let number = NEXT.fetch_add(1, Ordering::Relaxed);
@@ -74,11 +74,10 @@ impl Drop for Ownership {
     }
 }
 
-/// Whether this process may write a file: it has not lost the lock of the file's folder, if it took
-/// one.
+/// Checks that this process may write a file: it has not lost its lock on the file's folder.
 ///
 /// # Errors
-/// [`Lost`]; what the system says if the lock cannot be read.
+/// Returns [`Lost`], or the system's error if the lock cannot be read.
 pub fn check(file: &Path) -> io::Result<()> {
     if claims().is_empty() {
         return Ok(());
@@ -90,12 +89,12 @@ pub fn check(file: &Path) -> io::Result<()> {
     looks.iter().try_for_each(|look| look())
 }
 
-/// The folder that a file is in.
+/// Returns the folder of a file.
 pub(super) fn folder_of(path: &Path) -> &Path {
     path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
-/// The names of a folder under which it is found again, also when it was removed.
+/// Returns the paths of a folder by which it is found again, even after it was removed.
 fn places(folder: &Path) -> Vec<PathBuf> {
     [std::path::absolute(folder), folder.canonicalize()].into_iter().flatten().collect()
 }

@@ -1,14 +1,13 @@
-//! The only maker of random generators, and the only way random bits become numbers.
+//! The only source of random generators, and the only place that turns random bits into numbers.
 //!
-//! Every use of chance has a stream of its own, named by (seed, purpose, generation, child), so
-//! that no result depends on which thread asked first or on where a run was interrupted. Numbers
-//! are made from the bits here, not by a library's distributions: their values then never change
-//! with a library's version.
+//! Every use of chance has a stream of its own, named by (seed, purpose, generation, child). So no
+//! result depends on the order of threads or on where a run was interrupted. Numbers are made from
+//! the bits here, since a library's distributions may change with its version.
 
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64;
 
-/// What a stream is for. The numbers are part of every result: never renumber, only append.
+/// The purpose of a stream. The numbers are part of every result: never renumber, only append.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u64)]
 pub enum Purpose {
@@ -16,29 +15,29 @@ pub enum Purpose {
     RandomImmigrant = 1,
     /// Mutation of one offspring.
     Mutation = 2,
-    /// Which elites become parents.
+    /// Choice of the elites that become parents.
     Parents = 3,
-    /// Which images of a data set are used.
+    /// Choice of the images of a dataset.
     Images = 4,
     /// Strokes of the built-in digits.
     BuiltinDigits = 5,
-    /// Which robots of an archive are looked at.
+    /// Choice of the robots of an archive to examine.
     Robots = 6,
-    /// Which pixels an audit changes.
+    /// Choice of the pixels that an audit changes.
     AuditPixels = 20,
-    /// Which images robots are selected on.
+    /// Choice of the images for selecting robots.
     Validation = 21,
     /// Resamples of a bootstrap.
     Bootstrap = 22,
-    /// Networks: how they start, and the order of their images.
+    /// Networks: their initial weights, and the order of their images.
     Networks = 23,
-    /// Images that a network's training waits on.
+    /// Images that decide when a network's training stops.
     Waiting = 24,
-    /// Pixels of random images, under which a gait's response is measured.
+    /// Pixels of random images, for measuring a gait's response.
     RandomImages = 26,
-    /// Training of designs: the order in which places are tried, and images shown.
+    /// Training of designs: the order of places and of images.
     Training = 27,
-    /// Windows of images that a gait could be taught to look at.
+    /// Image windows that a gait could be trained to look at.
     Windows = 28,
 }
 
@@ -46,10 +45,9 @@ pub enum Purpose {
 #[derive(Clone, Debug)]
 pub struct Stream(Pcg64);
 
-/// The stream for `purpose` in a run with `seed`; `generation` and `child` tell its uses apart.
+/// Returns the stream for `purpose` in a run with `seed`; `generation` and `child` number its uses.
 pub fn stream(seed: u64, purpose: Purpose, generation: u64, child: u64) -> Stream {
-    // SplitMix64 (Steele et al. 2014) over the four words: neighbouring names give unrelated PCG
-    // states.
+    // SplitMix64 (Steele et al. 2014): neighbouring names give unrelated PCG states.
     let mut state = 0u64;
     let mut bytes = [0; 32];
     let words = [seed, purpose as u64, generation, child];
@@ -71,34 +69,34 @@ fn split_mix(word: u64) -> u64 {
 }
 
 impl Stream {
-    /// Uniform in [0, 1), 53 random bits.
+    /// Draws uniformly from [0, 1), with 53 random bits.
     pub fn unit(&mut self) -> f64 {
         (self.0.next_u64() >> 11) as f64 * (1.0 / (1u64 << 53) as f64)
     }
 
-    /// Uniform in [low, high).
+    /// Draws uniformly from [low, high).
     pub fn uniform(&mut self, low: f64, high: f64) -> f64 {
         low + (high - low) * self.unit()
     }
 
-    /// Uniform in 0 … n − 1; `n` must not be 0. (Bias below 2⁻³² for any n below 2³².)
+    /// Draws uniformly from 0 … n − 1; `n` must not be 0. (Bias below 2⁻³² for any n below 2³².)
     pub fn below(&mut self, n: usize) -> usize {
         debug_assert!(n > 0);
         ((u128::from(self.0.next_u64()) * n as u128) >> 64) as usize
     }
 
-    /// One of the items, uniformly; `None` if there is none.
+    /// Draws one of the items uniformly; `None` if there is none.
     pub fn choose<'a, T>(&mut self, items: &'a [T]) -> Option<&'a T> {
         (!items.is_empty()).then(|| &items[self.below(items.len())])
     }
 
-    /// Standard normal (Box–Muller, with `libm` so that the bits are the same on every machine).
+    /// Draws from the standard normal (Box–Muller, with `libm` for the same bits on every machine).
     pub fn normal(&mut self) -> f64 {
         let radius = libm::sqrt(-2.0 * libm::log(1.0 - self.unit()));
         radius * libm::cos(std::f64::consts::TAU * self.unit())
     }
 
-    /// Up to `count` different numbers of 0 … n − 1 in random order (partial Fisher–Yates shuffle).
+    /// Draws up to `count` different numbers of 0 … n − 1 in random order (partial Fisher–Yates).
     pub fn sample(&mut self, n: usize, count: usize) -> Vec<usize> {
         let mut all: Vec<usize> = (0..n).collect();
         let count = count.min(n);

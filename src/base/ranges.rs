@@ -1,6 +1,5 @@
-//! Ranges of the numbers in files. A field that names its range, as in
-//! `#[serde(deserialize_with = "ranges::share")]`, is checked where it is read, so that the error
-//! has its line and key.
+//! Ranges of the numbers in files. A field that names its range, as in `#[serde(deserialize_with =
+//! "ranges::share")]`, is checked while it is read, so that the error has its line and key.
 
 use crate::base::error::Error;
 use serde::{Deserialize, Deserializer};
@@ -51,7 +50,7 @@ impl<K, T: Numbers> Numbers for BTreeMap<K, T> {
     }
 }
 
-/// Reads shares of one, from 0 to 1.
+/// Reads fractions, from 0 to 1.
 pub(crate) fn share<'de, D: Deserializer<'de>, T: Numbers + Deserialize<'de>>(
     from: D,
 ) -> Result<T, D::Error> {
@@ -75,7 +74,7 @@ pub(crate) fn at_most_one<'de, D: Deserializer<'de>>(from: D) -> Result<f64, D::
     read(from, -MOST..=1.0)
 }
 
-/// Reads an interval of shares.
+/// Reads an interval of fractions.
 pub(crate) fn interval<'de, D, T>(from: D) -> Result<T, D::Error>
 where
     D: Deserializer<'de>,
@@ -117,7 +116,7 @@ fn read<'de, D: Deserializer<'de>, T: Numbers + Deserialize<'de>>(
 /// Checks a number whose type belongs to another crate.
 ///
 /// # Errors
-/// If it is larger than any that a simulation gives; the error names `key`.
+/// Returns an error that names `key` if the number is larger than any that a simulation gives.
 pub(crate) fn check(key: &str, number: f64) -> Result<(), Error> {
     match number.outside(&NUMBER) {
         None => Ok(()),
@@ -130,7 +129,7 @@ fn refusal(number: f64, range: &RangeInclusive<f64>) -> String {
     format!("expected a number from {low} to {high}, found {number}")
 }
 
-/// A number in few characters, however large it is.
+/// Formats a number in few characters, however large it is.
 fn short(number: f64) -> String {
     if number.abs() < 1e6 { number.to_string() } else { format!("{number:e}") }
 }

@@ -1,69 +1,69 @@
 //! [`Ranks`]: processes that share the work of one command, by MPI (feature `mpi`).
 //!
-//! Every process, a *rank*, does the same with the same data, and so knows the same; only what takes
-//! time is divided, and its results are exchanged. The first rank leads: it alone writes results and
-//! speaks. (`validation.json`, which all ranks know, each may write: the same bytes.)
+//! Every process, a *rank*, runs the same code on the same data, so all have the same results. Only
+//! slow work is divided, and its results are exchanged. The first rank leads: it alone writes
+//! results and prints. (Any rank may write `validation.json`: all have the same bytes.)
 
 use crate::base::error::Error;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::cmp::Reverse;
 
-/// The ranks as one of them sees them.
+/// The ranks as seen by one of them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Ranks {
     rank: usize,
     size: usize,
 }
 
-/// Keeps MPI up; when it goes, all ranks part.
+/// Keeps MPI running; dropping it finalises MPI.
 pub struct Guard {
     #[cfg(feature = "mpi")]
     _universe: Option<mpi::environment::Universe>,
 }
 
-/// Variables by which MPI's launchers tell a process how many there are.
+/// Environment variables in which MPI launchers put the number of processes.
 const LAUNCHED: [&str; 2] = ["OMPI_COMM_WORLD_SIZE", "PMI_SIZE"];
 
 impl Ranks {
     /// A process by itself.
     pub const ALONE: Ranks = Ranks { rank: 0, size: 1 };
 
-    /// The ranks that this process was started with, which is alone without MPI.
+    /// Joins the ranks that this process was started with; without MPI it is alone.
     ///
     /// # Errors
-    /// If MPI started several processes, and this program was built without it: all of them would do
-    /// the same; if MPI cannot be used.
+    /// Returns an error if MPI cannot be used, or if it started several processes of a program
+    /// built without it, which would all do the same work.
     pub fn join() -> Result<(Ranks, Guard), Error> {
         let launched =
             LAUNCHED.iter().find_map(|name| std::env::var(name).ok()?.trim().parse::<usize>().ok());
         join(launched)
     }
 
-    /// Whether this is the rank that writes and speaks.
+    /// Returns true if this is the rank that writes and prints.
     pub fn leads(self) -> bool {
         self.rank == 0
     }
 
-    /// Number of this rank, from 0.
+    /// Returns the number of this rank, from 0.
     pub fn rank(self) -> usize {
         self.rank
     }
 
-    /// How many there are.
+    /// Returns the number of ranks.
     pub fn size(self) -> usize {
         self.size
     }
 
-    /// The rank that does each piece of work, by the pieces' sizes.
+    /// Returns the rank that does each piece of work, given the pieces' sizes.
     pub fn owners(self, sizes: &[u64]) -> Vec<usize> {
         owners(sizes, self.size)
     }
 
-    /// What every rank has to say, in their order. All ranks must call it, and wait for each other.
+    /// Returns the values of all ranks, in their order. Every rank must call it, or others block.
     ///
     /// # Panics
-    /// If what a rank says cannot be read by the others: they are the same program.
+    /// If a value cannot pass through JSON, which cannot happen as all ranks run the same program.
     pub fn share<T: Serialize + DeserializeOwned>(self, own: T) -> Vec<T> {
         const WHY: &str = "all ranks are the same program, and say numbers, texts and lists";
         if self.size == 1 {
@@ -73,9 +73,9 @@ impl Ranks {
         all.iter().map(|bytes| serde_json::from_slice(bytes).expect(WHY)).collect()
     }
 
-    /// Divides jobs among the ranks by their sizes; each rank does its own with `work`, and learns the
-    /// results of all, in the jobs' order. `None` where one rank gave up: then all do. All ranks must
-    /// call it with the same jobs.
+    /// Divides jobs among the ranks by size. Each rank does its own with `work` and receives all
+    /// results, in the jobs' order. If one rank's `work` gives up, all return `None`. Every rank
+    /// must call it with the same jobs, or the others block.
     pub fn scatter_gather<J, R: Serialize + DeserializeOwned>(
         self,
         jobs: Vec<J>,
@@ -95,28 +95,27 @@ impl Ranks {
         Some(owners.iter().map(next).collect())
     }
 
-    /// Whether it is so for every rank: also where one was stopped, none waits for it. All ranks must
-    /// call it.
+    /// Returns true if all ranks vote true. Even a stopped rank must vote, or the others block.
     pub fn all(self, own: bool) -> bool {
         self.share(own).into_iter().all(|is_so| is_so)
     }
 
-    /// What the leading rank has to say. All ranks must call it.
+    /// Returns the leading rank's value. Every rank must call it, or the others block.
     pub fn from_lead<T: Serialize + DeserializeOwned>(self, own: Option<T>) -> Option<T> {
         self.share(own).swap_remove(0)
     }
 
-    /// Ends all ranks at once, this one with an exit code; for what only this one may know of.
+    /// Ends all ranks at once, this one with an exit code; for failures that others may not know.
     pub fn abort(self, code: u8) -> ! {
         abort(code)
     }
 }
 
-/// Divides pieces of work of these sizes among ranks: the largest first, each to the rank that has
-/// least to do. So it depends on the work, and on nothing that differs from one time to the next.
+/// Divides pieces of work of these sizes among ranks: the largest first, each to the rank with the
+/// least work. So the result depends on the sizes alone.
 pub fn owners(sizes: &[u64], ranks: usize) -> Vec<usize> {
     let mut order: Vec<usize> = (0..sizes.len()).collect();
-    // Stable: pieces of the same size stay in their order.
+    // A stable sort: pieces of the same size keep their order.
     order.sort_by_key(|piece| Reverse(sizes[*piece]));
     let (mut owners, mut loads) = (vec![0; sizes.len()], vec![0_u64; ranks]);
     for piece in order {

@@ -1,18 +1,18 @@
-//! [`Remedy`]: what a user can do about an error. It says what, never with which option: the command
-//! line, Python and the tasks of a sweep each put it in their own words.
+//! [`Remedy`]: what a user can do about an error, without saying with which option. The command
+//! line, Python and the tasks of a sweep each word it in their own way.
 
 use std::path::{Path, PathBuf};
 
-/// What a user can do about an error. Several of one error are alternatives.
+/// An action that a user can take about an error; several of one error are alternatives.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Remedy {
-    /// In plain words, which name no option and no command.
+    /// Advice in plain words, without names of options or commands.
     Advice(String),
     /// Run a command; the text says what it does ("audits the run as it is now"), and may be empty.
     Run(Invocation, &'static str),
-    /// Run the same command again: it goes on.
+    /// Run the same command again: it continues.
     Repeat,
-    /// Run the same command again, resuming the run that it has saved.
+    /// Run the same command again and resume the run that it has saved.
     RepeatResuming,
     /// Resume the run in the folder.
     Resume,
@@ -20,13 +20,13 @@ pub enum Remedy {
     Replace,
     /// Write to another place.
     ChooseOut,
-    /// Move the file or folder away that is in the way.
+    /// Move the file or folder that is in the way.
     MoveAway,
-    /// Name the run that is meant.
+    /// Name the run.
     NameRun,
     /// Name more runs.
     AddRuns,
-    /// Choose other robots; one way to select some, where one is worth a word.
+    /// Choose other robots, with one way to select some where that is worth a word.
     ChooseRobots(Option<&'static str>),
     /// Take robots that the audit did not find physical.
     TakeUnphysical,
@@ -34,9 +34,9 @@ pub enum Remedy {
     NameData,
     /// Use the digits that the program draws.
     UseBuiltin,
-    /// Show the images of another dataset.
+    /// Use the images of another dataset.
     ShowOtherDataset,
-    /// Let the training images be drawn by the seed.
+    /// Let the seed draw the training images.
     DrawTrainingImages,
     /// Name the classes of a team.
     NameClasses,
@@ -48,23 +48,23 @@ pub enum Remedy {
     NameMirror,
     /// Name another port, or none.
     ChoosePort,
-    /// Name one robot, such as this.
+    /// Name one robot, for example this one.
     NameRobot(String),
-    /// Make space on the disk of a folder.
+    /// Free space on the disk of a folder.
     FreeSpace(PathBuf),
 }
 
 impl Remedy {
-    /// Advice in plain words.
+    /// Makes advice in plain words.
     pub fn advice(text: impl Into<String>) -> Self {
         Remedy::Advice(text.into())
     }
 }
 
-/// A command of the program with its options: what to run, before anybody has spelled it for a shell.
+/// A command of the program with its options, not yet spelled for a shell.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Invocation {
-    /// The command, as "data fetch".
+    /// The command, such as "data fetch".
     pub command: &'static str,
     /// Values without an option.
     pub values: Vec<Value>,
@@ -79,12 +79,12 @@ pub enum Value {
     Word(String),
     /// A path.
     Path(PathBuf),
-    /// Stands for what the user has to fill in.
+    /// A placeholder that the user fills in.
     Placeholder(&'static str),
 }
 
 impl Invocation {
-    /// A command without options.
+    /// Makes a command without options.
     pub fn new(command: &'static str) -> Self {
         Invocation { command, values: Vec::new(), options: Vec::new() }
     }

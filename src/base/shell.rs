@@ -1,10 +1,10 @@
-//! Words of command lines that people copy: [`quoted`] for any, [`in_shell`] for paths.
+//! Words of command lines for people to copy: [`quoted`] for any word, [`in_shell`] for paths.
 
 use crate::base::text::is_unseen;
 use std::ffi::OsStr;
 use std::path::Path;
 
-/// A path as a shell reads it, never taken for an option.
+/// Quotes a path for a shell, so that it is never taken for an option.
 pub fn in_shell(path: &Path) -> String {
     match path.as_os_str().as_encoded_bytes().starts_with(b"-") {
         true => quoted(Path::new(".").join(path)),
@@ -12,8 +12,8 @@ pub fn in_shell(path: &Path) -> String {
     }
 }
 
-/// A word as a shell reads it: as it is if it is plain, else in quotes. Bytes that are not UTF-8, and
-/// what a terminal would obey or not show, are escaped (`$'\377'`: Bash, Zsh and POSIX 2024 read it).
+/// Quotes a word for a shell if it is not plain. Escapes bytes that are not UTF-8 and characters
+/// that a terminal would obey or not display (`$'\377'`: Bash, Zsh and POSIX 2024 read it).
 pub fn quoted(word: impl AsRef<OsStr>) -> String {
     let is_plain = |c: char| c.is_alphanumeric() || "_-./:@%+,".contains(c);
     match word.as_ref().to_str() {

@@ -1,5 +1,5 @@
-//! Signals: the first one asks a command that has something to save to stop and save; where there
-//! is nothing, or when that is done, a signal ends the process, as is usual.
+//! Signals: the first one makes a command that has something to save stop and save. If there is
+//! nothing to save, or after that, a signal ends the process as usual.
 
 use crate::base::error::Error;
 use signal_hook::consts::{SIGINT, SIGTERM};
@@ -8,29 +8,29 @@ use std::ops::Deref;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, OnceLock};
 
-/// Exit code after a second SIGINT: the shell's for a process that SIGINT ended.
+/// Exit code after a second SIGINT: a shell's code for a process that SIGINT ended.
 const AT_ONCE: i32 = 130;
 
-/// Whether no flag watches signals; they then end the process.
+/// True if no flag watches signals; they then end the process.
 static UNUSED: OnceLock<Arc<AtomicBool>> = OnceLock::new();
 
-/// A flag that SIGINT, SIGTERM, SIGUSR1 and SIGHUP set as long as this exists.
+/// A flag that SIGINT, SIGTERM, SIGUSR1 and SIGHUP set while it exists.
 #[derive(Debug)]
 pub struct StopFlag {
     stop: Arc<AtomicBool>,
     /// The signal that set it last.
     signal: Arc<AtomicUsize>,
-    /// Whether another flag watched signals before.
+    /// True if no other flag watched signals before.
     were_unused: bool,
 }
 
 impl StopFlag {
-    /// Ends the process by the signal that set the flag, as is usual; nothing if none did.
+    /// Ends the process by the signal that set the flag, as usual; does nothing if none did.
     pub fn end_process(self) {
         let signal = self.signal.load(Ordering::Relaxed);
         drop(self);
         if let Some(signal) = i32::try_from(signal).ok().filter(|signal| *signal > 0) {
-            // It was watched a moment ago: it can be sent.
+            // A flag for it was registered a moment ago, so it can be raised.
             let _ = signal_hook::low_level::raise(signal);
         }
     }
@@ -51,19 +51,19 @@ impl Drop for StopFlag {
     }
 }
 
-/// Lets a file that may grow no larger be an error that can be told, not the end of the process.
+/// Makes writing beyond the file size limit an error instead of the end of the process.
 pub fn heed_file_limit() {
-    // Where it cannot be handled, it ends the process, as is usual.
+    // If it cannot be handled, it ends the process as usual.
     #[cfg(unix)]
     let _ = flag::register(signal_hook::consts::SIGXFSZ, Arc::default());
 }
 
-/// A flag that SIGINT, SIGTERM, SIGUSR1 and SIGHUP set; a second SIGINT ends the process at once.
-/// When it goes, signals end the process again. A SIGHUP that is ignored stays ignored: so `nohup`
-/// keeps a process alive.
+/// Returns a flag that SIGINT, SIGTERM, SIGUSR1 and SIGHUP set; a second SIGINT ends the process at
+/// once. After the flag is dropped, signals end the process again. An ignored SIGHUP stays ignored,
+/// so `nohup` keeps a process alive.
 ///
 /// # Errors
-/// If the system does not let signals be handled.
+/// Returns an error if the system does not let signals be handled.
 pub fn stop_flag() -> Result<StopFlag, Error> {
     let failed = |error: std::io::Error| Error::other(format!("signals cannot be handled: {error}"));
     let signals = stopping();
@@ -78,8 +78,7 @@ pub fn stop_flag() -> Result<StopFlag, Error> {
         }
     };
     let stop = Arc::new(AtomicBool::new(false));
-    // In this order: the first SIGINT finds its flag unset and sets it, the second one finds it
-    // set.
+    // In this order: the first SIGINT finds its flag unset and sets it, the second finds it set.
     let interrupted = Arc::new(AtomicBool::new(false));
     flag::register_conditional_shutdown(SIGINT, AT_ONCE, Arc::clone(&interrupted)).map_err(failed)?;
     flag::register(SIGINT, interrupted).map_err(failed)?;
@@ -93,7 +92,7 @@ pub fn stop_flag() -> Result<StopFlag, Error> {
     Ok(StopFlag { stop, signal: by, were_unused })
 }
 
-/// The signals that ask a command to stop.
+/// Returns the signals that make a command stop.
 fn stopping() -> Vec<i32> {
     let mut signals = vec![SIGINT, SIGTERM];
     #[cfg(unix)]
@@ -105,7 +104,7 @@ fn stopping() -> Vec<i32> {
     signals
 }
 
-/// Whether a signal is known not to be ignored, which only Linux tells.
+/// Returns true if a signal is known not to be ignored; only Linux reports that.
 #[cfg(unix)]
 fn is_heeded(signal: i32) -> bool {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();

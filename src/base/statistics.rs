@@ -2,7 +2,7 @@
 
 use crate::base::random::{Purpose, stream};
 
-/// 95 % Wilson score interval of a share (Wilson 1927).
+/// Returns the 95 % Wilson score interval of a proportion (Wilson 1927).
 pub fn wilson(right: usize, total: usize) -> [f64; 2] {
     const Z: f64 = 1.959_963_984_540_054;
     if total == 0 {
@@ -19,7 +19,7 @@ pub fn wilson(right: usize, total: usize) -> [f64; 2] {
     [low, high]
 }
 
-/// Of a sample; none of fewer than two values.
+/// Returns the standard deviation of a sample; none for fewer than two values.
 pub fn standard_deviation(values: &[f64]) -> Option<f64> {
     let n = values.len() as f64;
     let mean = values.iter().sum::<f64>() / n;
@@ -27,10 +27,10 @@ pub fn standard_deviation(values: &[f64]) -> Option<f64> {
     (values.len() > 1).then(|| (squares / (n - 1.0)).sqrt())
 }
 
-/// 95 % interval of the mean of all values: percentiles of the means of resamples (Efron 1979), the
-/// same every time. Of several clusters, as robots of several runs, clusters are drawn first, and
-/// then as many values within each (Davison & Hinkley 1997, section 3.8): values of one cluster are
-/// not independent. None of fewer than two values.
+/// Returns a 95 % interval of the mean of all values: percentiles of the means of resamples (Efron
+/// 1979), the same every time. Values of one cluster, such as the robots of one run, are not
+/// independent. With several clusters, clusters are drawn first, then as many values within each
+/// (Davison & Hinkley 1997, section 3.8). None for fewer than two values.
 pub fn bootstrap(clusters: &[Vec<f64>]) -> Option<[f64; 2]> {
     const RESAMPLES: usize = 10_000;
     let clusters: Vec<&Vec<f64>> = clusters.iter().filter(|values| !values.is_empty()).collect();

@@ -2,11 +2,11 @@
 
 use serde::Serialize;
 
-/// The text of a table. A row's fields come in the columns' order; a list in a row stands for as
-/// many columns.
+/// Writes a table as CSV. A row's fields are in the columns' order; a list in a row fills as many
+/// columns as it has items.
 ///
 /// # Panics
-/// If rows have not as many fields as there are columns.
+/// If a row does not have a field for every column.
 pub fn csv<R: Serialize>(
     columns: impl IntoIterator<Item = impl AsRef<[u8]>>,
     rows: impl IntoIterator<Item = R>,
@@ -18,12 +18,12 @@ pub fn csv<R: Serialize>(
     writer.into_inner().expect(WHY)
 }
 
-/// Names of columns that are numbered from 0, as `displacement_0`.
+/// Returns names of columns numbered from 0, such as `displacement_0`.
 pub fn numbered(name: &str, count: usize) -> impl Iterator<Item = String> {
     (0..count).map(move |number| format!("{name}_{number}"))
 }
 
-/// As many fields as there are columns: those of a list, then empty ones.
+/// Pads a list with empty fields to the number of columns.
 pub fn padded(values: &[f64], columns: usize) -> Vec<Option<f64>> {
     (0..columns).map(|column| values.get(column).copied()).collect()
 }

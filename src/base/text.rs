@@ -1,28 +1,26 @@
-//! [`one_line`]: text from anywhere as one line that a terminal shows as it is meant; [`counted`]:
-//! how many there are of something.
+//! [`one_line`]: any text as one line that a terminal displays; [`counted`]: numbers with nouns.
 
 use std::fmt::Display;
 
 /// Most characters of a message: more than any of ours has.
 const MOST: usize = 1500;
 
-/// A text as one line of printable characters: a control character, a line break or what turns the
-/// direction of writing is written as `\u{…}` (or `\n`, `\r`, `\t`), so that a file, or a file's
-/// name, can neither command the terminal nor forge a line. Of what is very long, beginning and end
-/// stay.
+/// Writes a text as one line of printable characters. Control characters, line breaks and changes
+/// of writing direction become `\u{…}` (or `\n`, `\r`, `\t`), so that a file or its name can
+/// neither command the terminal nor forge a line. A very long text loses its middle.
 pub fn one_line(text: &str) -> String {
     shortened(text, MOST)
 }
 
-/// [`one_line`], cut to about this number of characters.
+/// Acts as [`one_line`], but cuts to about this number of characters.
 pub fn shortened(text: &str, most: usize) -> String {
     let begin: String = text.chars().take(most + 1).map(written).collect();
     let whole = || text.chars().map(written).collect();
-    // It is short enough, also as it is written.
+    // It is short enough, even when escaped.
     if text.chars().nth(most).is_none() && begin.chars().count() <= most {
         return whole();
     }
-    // It was shortened before: no second piece is taken out.
+    // It was shortened before: do not cut it twice.
     if text.contains(CUT) && text.chars().count() <= most + 99 {
         return whole();
     }
@@ -35,25 +33,24 @@ pub fn shortened(text: &str, most: usize) -> String {
     format!("{begin}{CUT}{end}")
 }
 
-/// A number, and the word for one or for any other number of things: "1 robot", "2 robots".
+/// Writes a number with the noun for one or for any other number of things: "1 robot", "2 robots".
 pub fn counted<N: Display + PartialEq + From<u8>>(count: N, one: &str, more: &str) -> String {
     let word = if count == N::from(1) { one } else { more };
     format!("{count} {word}")
 }
 
-/// Where a piece is left out.
+/// Marks the place of a cut.
 const CUT: &str = " … ";
 
 fn written(c: char) -> String {
     if is_unseen(c) { c.escape_default().collect() } else { c.to_string() }
 }
 
-/// Whether a character does something else than to be seen.
+/// Returns true if a character is invisible or controls the display.
 pub fn is_unseen(c: char) -> bool {
     c.is_control()
         || matches!(c,
-            // Marks and overrides of the direction, separators of lines, tags, and what has no
-            // width.
+            // Direction marks and overrides, line separators, tags, zero-width characters.
             '\u{61c}' | '\u{180e}' | '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}'
             | '\u{2060}'..='\u{206f}' | '\u{feff}' | '\u{fff9}'..='\u{fffb}' | '\u{e0000}'..='\u{e007f}')
 }

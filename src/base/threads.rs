@@ -1,5 +1,4 @@
-//! Threads, and pools of them. Here alone they are made, so that a system that has none left is an
-//! error that is told, not a panic.
+//! Threads and thread pools, all made here, so that running out of them is an error, not a panic.
 
 use crate::base::error::Error;
 use std::fmt::Display;
@@ -9,10 +8,10 @@ use std::thread::{Builder, JoinHandle};
 /// Most threads.
 pub const MOST_THREADS: u16 = 1024;
 
-/// Whether the environment's variable for threads (rayon's) can be followed.
+/// Checks the number of threads that rayon's environment variable asks for.
 ///
 /// # Errors
-/// If it asks for more than [`MOST_THREADS`].
+/// Returns an error if it is more than [`MOST_THREADS`].
 pub fn check_environment() -> Result<(), Error> {
     const NAME: &str = "RAYON_NUM_THREADS";
     let asked = std::env::var(NAME).ok().and_then(|text| text.parse::<usize>().ok());
@@ -22,10 +21,10 @@ pub fn check_environment() -> Result<(), Error> {
     }
 }
 
-/// So many threads; `None`: one per core, as far as the address space has room for them.
+/// Makes a pool of threads; `None` means one per core, as far as the address space has room.
 ///
 /// # Errors
-/// If the system has none left.
+/// Returns an error if the system has no threads left.
 pub fn pool(threads: Option<usize>) -> Result<rayon::ThreadPool, Error> {
     let usual = || match room() {
         Some(room) if room < std::thread::available_parallelism().map_or(1, usize::from) => room.max(1),
@@ -34,11 +33,11 @@ pub fn pool(threads: Option<usize>) -> Result<rayon::ThreadPool, Error> {
     rayon::ThreadPoolBuilder::new().num_threads(threads.unwrap_or_else(usual)).build().map_err(none_left)
 }
 
-/// Does work on the pool that this thread is of, or, if it is of none, on a pool of its own; on this
-/// thread alone where there is no room for others.
+/// Runs work on the current pool, or on a new one if this thread belongs to none; on this thread
+/// alone if there is no room for others.
 ///
 /// # Errors
-/// If the system has no threads left.
+/// Returns an error if the system has no threads left.
 pub fn in_pool<T: Send>(work: impl FnOnce() -> T + Send) -> Result<T, Error> {
     if rayon::current_thread_index().is_some() {
         return Ok(work());
@@ -50,11 +49,11 @@ pub fn in_pool<T: Send>(work: impl FnOnce() -> T + Send) -> Result<T, Error> {
     Ok(pool.map_err(none_left)?.install(work))
 }
 
-/// Threads that a limit of the address space (`ulimit -v`) has room for, if there is one and the
-/// system tells.
+/// Returns the number of threads that a limit of the address space (`ulimit -v`) has room for, if
+/// there is a limit and the system reports it.
 fn room() -> Option<usize> {
-    // The C library reserves so much for each thread that allocates. Where it fails it tries again at
-    // every allocation: a picture takes three times as long.
+    // The C library reserves this much for each thread that allocates. If that fails, it tries
+    // again at every allocation: drawing a picture takes three times as long.
     const EACH: usize = 128 << 20;
     let limits = std::fs::read_to_string("/proc/self/limits").ok()?;
     let limit = limits.lines().find_map(|line| line.strip_prefix("Max address space"))?;
@@ -66,7 +65,7 @@ fn room() -> Option<usize> {
 /// Starts a thread with a name.
 ///
 /// # Errors
-/// If the system has none left.
+/// Returns an error if the system has no threads left.
 pub fn start<T: Send + 'static>(
     name: &str,
     work: impl FnOnce() -> T + Send + 'static,
@@ -74,12 +73,12 @@ pub fn start<T: Send + 'static>(
     Builder::new().name(name.to_string()).spawn(work).map_err(none_left)
 }
 
-/// Does the same work on so many threads at once, to its end.
+/// Runs the same work on this many threads at once, to its end.
 ///
 /// # Errors
-/// If the system has not so many left; then nothing is done.
+/// Returns an error if the system has too few threads left; then nothing is done.
 pub fn at_once(threads: usize, work: impl Fn() + Sync) -> Result<(), Error> {
-    // Nobody reads it before all of them are there.
+    // Workers read it only after all of them have started.
     let all_there = RwLock::new(false);
     let worker = || {
         if *all_there.read().unwrap_or_else(PoisonError::into_inner) {

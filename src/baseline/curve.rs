@@ -6,16 +6,16 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
-/// Where a curve reaches a value.
+/// The place where a curve reaches a value.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(untagged)]
 pub enum Crossing {
-    /// At this size. A number in JSON.
+    /// It reaches it at this size. A number in JSON.
     At(f64),
-    /// It is above the value at the smallest size already. An object in JSON, so that the bound is
-    /// not mistaken for the size.
+    /// It is above the value already at the smallest size. An object in JSON, so that nobody
+    /// mistakes the bound for the size.
     Below {
-        /// That smallest size.
+        /// The smallest size.
         below: f64,
     },
 }
@@ -29,8 +29,8 @@ impl fmt::Display for Crossing {
     }
 }
 
-/// c0, c1, c2 of the least-squares parabola c0 + c1·x + c2·x² through points; `None` of fewer than
-/// three different x.
+/// Returns c0, c1, c2 of the least-squares parabola c0 + c1·x + c2·x² through points; `None` for
+/// fewer than three different x.
 pub fn parabola(points: &[(f64, f64)]) -> Option<[f64; 3]> {
     let mut xs: Vec<f64> = points.iter().map(|point| point.0).collect();
     xs.sort_by(f64::total_cmp);
@@ -38,7 +38,7 @@ pub fn parabola(points: &[(f64, f64)]) -> Option<[f64; 3]> {
     if xs.len() < 3 {
         return None;
     }
-    // Of x/largest x: the squares of sizes would spoil the condition of the system.
+    // Fitted to x/largest x: the squares of sizes would spoil the condition of the system.
     let scale = xs.iter().fold(1.0_f64, |most, x| most.max(x.abs()));
     let matrix = DMatrix::from_fn(points.len(), 3, |row, power| {
         let x = points[row].0 / scale;
@@ -49,8 +49,7 @@ pub fn parabola(points: &[(f64, f64)]) -> Option<[f64; 3]> {
     Some([solution[0], solution[1] / scale, solution[2] / (scale * scale)])
 }
 
-/// The smallest x in [from, to] at which a parabola reaches a value: where it is at or above it
-/// first. `None` if it never is.
+/// Returns the smallest x in [from, to] at which a parabola reaches a value; `None` if none does.
 pub fn first_crossing([c0, c1, c2]: [f64; 3], value: f64, (from, to): (f64, f64)) -> Option<Crossing> {
     let at = |x: f64| c0 + x * (c1 + x * c2);
     if at(from) > value {
@@ -67,8 +66,7 @@ pub fn first_crossing([c0, c1, c2]: [f64; 3], value: f64, (from, to): (f64, f64)
         if discriminant < 0.0 {
             return None;
         }
-        // The stable form: no difference of nearly equal numbers (Press et al., Numerical Recipes,
-        // 5.6).
+        // The stable form, without cancellation (Press et al., Numerical Recipes, 5.6).
         let q = -0.5 * (c1 + discriminant.sqrt().copysign(c1));
         [Some(q / c2), (q != 0.0).then(|| c / q)]
     };
@@ -76,7 +74,7 @@ pub fn first_crossing([c0, c1, c2]: [f64; 3], value: f64, (from, to): (f64, f64)
     within.min_by(f64::total_cmp).map(Crossing::At)
 }
 
-/// The first x at which a point is at or above a value. `None` if none is.
+/// Returns the first x at which a point is at or above a value; `None` if none is.
 pub fn first_of(points: &[(f64, f64)], value: f64) -> Option<Crossing> {
     let place = points.iter().position(|(_, y)| *y >= value)?;
     let (x, y) = points[place];

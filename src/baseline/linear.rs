@@ -1,22 +1,22 @@
-//! Linear classifiers by least squares: without a body, on the pixels that robots see. What they
-//! answer depends on the images alone, to the bit.
+//! Linear classifiers by least squares: without a body, on the stimuli of robots. Their answers
+//! depend on the images alone, to the bit.
 
 use crate::base::Grid;
 use nalgebra::{Cholesky, DMatrix, DVector};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 
-/// An image as robots see it, with its class.
+/// A stimulus with its class.
 pub type Labelled<'a> = (&'a Grid<f64>, u8);
 
-/// Weight of the penalty on the size of the weights, as a share of the mean square of a pixel over
+/// Weight of the penalty on the size of the weights, relative to the mean square of a pixel over
 /// the images: enough for pixels that are always dark.
 const RIDGE: f64 = 1e-3;
 
 /// Sums over the training images of each class: all that least squares need.
 #[derive(Clone, Debug)]
 pub struct Moments {
-    /// Pixels of an image, and one more that is always 1.
+    /// Number of pixels of an image, plus one for the constant 1.
     size: usize,
     /// Sum of *x xᵀ* over a class's images; its last column is the sum of *x*.
     by_class: BTreeMap<u8, DMatrix<f64>>,
@@ -28,7 +28,7 @@ pub struct Linear {
     weights: DVector<f64>,
 }
 
-/// The pixels that are not 0, by their places, and the constant 1 behind them.
+/// Returns the nonzero pixels by their indices, followed by the constant 1.
 fn sparse(stimulus: &Grid<f64>) -> Vec<(usize, f64)> {
     let pixels = stimulus.cells();
     let lit = pixels.iter().copied().enumerate().filter(|(_, value)| *value != 0.0);
@@ -36,7 +36,7 @@ fn sparse(stimulus: &Grid<f64>) -> Vec<(usize, f64)> {
 }
 
 impl Moments {
-    /// Those of training images, all of one size.
+    /// Sums up training images, all of one size.
     pub fn new(images: &[Labelled]) -> Self {
         let size = images.first().map_or(0, |(stimulus, _)| stimulus.cells().len()) + 1;
         let mut classes: Vec<u8> = images.iter().map(|(_, class)| *class).collect();
@@ -58,8 +58,8 @@ impl Moments {
         Moments { size, by_class: classes.into_par_iter().map(of_class).collect() }
     }
 
-    /// The linear function with the least squared distance from 1 under images of the classes of
-    /// one group, and from −1 under those of the other; with a small penalty on its weights.
+    /// Returns the linear function closest in square to 1 under images of one group's classes, and
+    /// to −1 under those of the other's; with a small penalty on its weights.
     pub fn apart(&self, first: &[u8], second: &[u8]) -> Linear {
         let mut square = DMatrix::zeros(self.size, self.size);
         let mut towards = DVector::zeros(self.size);
@@ -70,7 +70,7 @@ impl Moments {
             }
         }
         let penalty = RIDGE * square.trace() / self.size as f64;
-        // Of no images at all, every function is as good.
+        // Without images every function is as good.
         let penalty = if penalty > 0.0 { penalty } else { 1.0 };
         for place in 0..self.size {
             square[(place, place)] += penalty;
@@ -81,7 +81,7 @@ impl Moments {
 }
 
 impl Linear {
-    /// Its value for an image: about 1 for the first group, −1 for the second.
+    /// Returns its value for an image: about 1 for the first group, −1 for the second.
     pub fn value(&self, stimulus: &Grid<f64>) -> f64 {
         sparse(stimulus).into_iter().map(|(place, value)| self.weights[place] * value).sum()
     }
@@ -91,7 +91,7 @@ impl Linear {
 mod tests {
     use super::*;
 
-    /// Class 0: the left of two pixels is brighter; class 1: the right one.
+    /// Makes images: in class 0 the left of two pixels is brighter, in class 1 the right one.
     fn images() -> Vec<(Grid<f64>, u8)> {
         let of = |k: usize| {
             let (a, b) = ((k % 7) as f64 / 10.0, (k % 5) as f64 / 10.0);
@@ -108,13 +108,13 @@ mod tests {
 
     #[test]
     fn least_squares_recover_a_planted_plane() {
-        // The mean of ±1 over equally many images of pixels that say nothing is the plane itself.
+        // The mean of ±1 over equally many images of uninformative pixels is the plane itself.
         let images = images();
         let linear = Moments::new(&labelled(&images)).apart(&[0], &[1]);
         let right =
             images.iter().filter(|(image, class)| (linear.value(image) > 0.0) == (*class == 0)).count();
         assert!(right >= 120, "{right} of 140");
-        // Normal equations: what is left over is orthogonal to every pixel, but for the penalty.
+        // Normal equations: the residual is orthogonal to every pixel, up to the penalty.
         for pixel in [0, 1] {
             let residual = |(image, class): &(Grid<f64>, u8)| {
                 (linear.value(image) - if *class == 0 { 1.0 } else { -1.0 }) * image.cells()[pixel]

@@ -1,5 +1,5 @@
-//! What robots are compared with: networks (paper, "Morphological cognition capacity"), trained on a
-//! library; linear classifiers and the nearest image.
+//! Baselines for robots: networks (paper, "Morphological cognition capacity"), linear classifiers
+//! and the nearest image.
 
 pub mod curve;
 pub mod linear;

@@ -1,11 +1,11 @@
-//! The nearest training image: a classifier without a body, on the pixels that robots see. What it
-//! answers depends on the images alone, to the bit.
+//! The nearest training image: a classifier without a body, on the stimuli of robots. Its answers
+//! depend on the images alone, to the bit.
 
 use crate::base::Grid;
 
-/// The label of the known image that is nearest to an image (Euclidean distance), `None` without any.
-/// Of several that are as near, as robots of few sensors often see, the label that most of them have;
-/// of equals the one that comes first.
+/// Returns the label of the known image nearest to an image (Euclidean distance), `None` without
+/// any. If several are equally near, as is common with few sensors, returns their most frequent
+/// label; the first one wins a tie.
 pub fn nearest<'a, L: Copy + PartialEq>(
     known: impl IntoIterator<Item = (&'a Grid<f64>, L)>,
     image: &Grid<f64>,
@@ -28,7 +28,7 @@ pub fn nearest<'a, L: Copy + PartialEq>(
     votes.into_iter().reduce(more).map(|(label, _)| label)
 }
 
-/// In eight sums, which the processor does at once; always in the same order.
+/// Adds up in eight sums, which the processor computes at once; always in the same order.
 fn squared_distance(a: &[f64], b: &[f64]) -> f64 {
     const LANES: usize = 8;
     let mut sums = [0.0; LANES];

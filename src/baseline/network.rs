@@ -1,5 +1,5 @@
-//! [`Network`]: the paper's two networks and their gradients, on nalgebra. Sums run in a fixed order
-//! and functions come from `libm`, so a training has the same bits on every machine and on any
+//! [`Network`]: the paper's two networks and their gradients, on nalgebra. Sums run in a fixed
+//! order and functions come from `libm`, so training gives the same bits on any machine and any
 //! number of threads.
 
 use crate::base::Grid;
@@ -30,7 +30,7 @@ impl Activation {
         }
     }
 
-    /// The derivative where the activation has this value.
+    /// Returns the derivative at the point where the activation has this value.
     #[inline]
     fn slope(self, value: f64) -> f64 {
         match self {
@@ -42,7 +42,7 @@ impl Activation {
 }
 
 impl Pooling {
-    /// Rows and columns of pixels that become one, in a map of this size.
+    /// Returns the rows and columns of pixels that become one, in a map of this size.
     fn window(self, (rows, columns): (usize, usize)) -> (usize, usize) {
         match self {
             Pooling::None => (1, 1),
@@ -52,28 +52,28 @@ impl Pooling {
     }
 }
 
-/// Shape of a network: all that its parameters do not say.
+/// Shape of a network: all that determines it besides its parameters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Shape {
     /// Its kind.
     pub kind: Kind,
-    /// Hidden neurons, or kernels; 1 or more.
+    /// Number of hidden neurons or kernels, 1 or more.
     pub size: usize,
     /// Rows and columns of an image.
     pub image: (usize, usize),
-    /// Side of a convolution's kernels, not larger than the image's.
+    /// Side of a convolution's kernels, at most the image's.
     pub kernel: usize,
     /// The function that follows the hidden layer.
     pub activation: Activation,
-    /// How a convolution's maps are reduced.
+    /// Reduction of a convolution's maps.
     pub pooling: Pooling,
 }
 
-/// Outputs: the two groups of a task.
+/// Number of outputs: the two groups of a task.
 pub const OUTPUTS: usize = 2;
 
 impl Shape {
-    /// Rows and columns of the part of an image that a hidden unit sees at one place.
+    /// Returns the rows and columns of an image that a hidden unit covers at one place.
     fn field(&self) -> (usize, usize) {
         match self.kind {
             Kind::Mlp => self.image,
@@ -81,13 +81,13 @@ impl Shape {
         }
     }
 
-    /// Pixels that a hidden unit sees at one place.
+    /// Returns the number of pixels that a hidden unit covers at one place.
     fn inputs(&self) -> usize {
         self.field().0 * self.field().1
     }
 
-    /// Rows and columns of places that pooling reduces to one, and of the places it leaves. A hidden
-    /// layer has one place, the whole image.
+    /// Returns the rows and columns of places that pooling reduces to one, and of the places it
+    /// leaves. An MLP has one place, the whole image.
     fn pooled(&self) -> [(usize, usize); 2] {
         let (rows, columns) = (self.image.0 + 1 - self.field().0, self.image.1 + 1 - self.field().1);
         let window = match self.kind {
@@ -97,19 +97,19 @@ impl Shape {
         [window, (rows / window.0, columns / window.1)]
     }
 
-    /// Places that pooling reduces to one, and places that it leaves.
+    /// Returns the number of places that pooling reduces to one, and the number that it leaves.
     fn places(&self) -> (usize, usize) {
         let [window, pooled] = self.pooled();
         (window.0 * window.1, pooled.0 * pooled.1)
     }
 
-    /// Outputs of the hidden layer per image, after pooling.
+    /// Returns the number of outputs of the hidden layer per image, after pooling.
     fn features(&self) -> usize {
         self.places().1 * self.size
     }
 
-    /// Where the parameters lie in one vector: weights of the hidden layer (by pixel, then by unit),
-    /// its biases, weights of the outputs (by output, then by feature), their biases.
+    /// Returns the ranges of the parameters in one vector: hidden weights (by pixel, then by unit),
+    /// hidden biases, output weights (by output, then by feature), output biases.
     fn layout(&self) -> [Range<usize>; 4] {
         let sizes = [self.inputs() * self.size, self.size, self.features() * OUTPUTS, OUTPUTS];
         let mut end = 0;
@@ -119,11 +119,11 @@ impl Shape {
         })
     }
 
-    /// Prepares an image: the lit pixels that the hidden units see at each place. Most pixels of a
+    /// Prepares an image: the lit pixels under the hidden units at each place. Most pixels of a
     /// drawing are dark and add nothing to a sum, so leaving them out saves most of the work.
     ///
     /// # Panics
-    /// If the image has another size than the shape.
+    /// If the image does not have the shape's size.
     pub fn patches(&self, image: &Grid<f64>) -> Patches {
         assert_eq!((image.height(), image.width()), self.image, "an image of the shape's size");
         let [window, pooled] = self.pooled();
@@ -144,12 +144,12 @@ impl Shape {
     }
 }
 
-/// An image as the hidden units of a network see it.
+/// An image as the inputs of a network's hidden units.
 #[derive(Clone, Debug)]
 pub struct Patches {
-    /// By place (those that pooling reduces to one stand together): where its pixels end in `lit`.
+    /// End of each place's pixels in `lit`; places that pooling reduces to one are neighbours.
     ends: Vec<usize>,
-    /// Number of the pixel within its place, and its value.
+    /// Index of the pixel within its place, and its value.
     lit: Vec<(usize, f64)>,
 }
 
@@ -173,7 +173,7 @@ pub struct Network {
 
 impl Network {
     /// Makes a network with random parameters: uniform within ±1/√(inputs of a unit), as PyTorch
-    /// starts such layers.
+    /// initialises such layers.
     pub fn new(shape: Shape, rng: &mut Stream) -> Self {
         let [hidden, biases, weights, output_biases] = shape.layout();
         let (size, features) = (shape.size, shape.features());
@@ -198,12 +198,12 @@ impl Network {
         Network { shape, parameters, units, features: DVector::zeros(features) }
     }
 
-    /// The numbers that training changes.
+    /// Returns the trained parameters.
     pub fn parameters(&self) -> &DVector<f64> {
         &self.parameters
     }
 
-    /// The same, to be changed.
+    /// Returns the trained parameters, mutably.
     pub fn parameters_mut(&mut self) -> &mut DVector<f64> {
         &mut self.parameters
     }
@@ -237,8 +237,8 @@ impl Network {
         std::array::from_fn(output)
     }
 
-    /// Adds to `gradient` the derivatives of a loss by the parameters, given those by the outputs, for
-    /// the image that [`forward`](Network::forward) saw last.
+    /// Adds to `gradient` a loss's derivatives by the parameters, given those by the outputs, for
+    /// the last image of [`forward`](Network::forward).
     pub fn backward(&self, image: &Patches, outputs: [f64; OUTPUTS], gradient: &mut DVector<f64>) {
         let Shape { size, activation, pooling, .. } = self.shape;
         let [hidden, biases, weights, output_biases] = self.shape.layout();
@@ -261,7 +261,7 @@ impl Network {
                 let share = match pooling {
                     _ if within == 1 => 1.0,
                     Pooling::Mean => 1.0 / within as f64,
-                    // The first of equals has all of it.
+                    // The first of equals gets all of it.
                     _ => {
                         let of_place = (place / within * within..place)
                             .all(|other| self.units[other * size + number] < units[number]);
@@ -279,8 +279,8 @@ impl Network {
     }
 }
 
-// Most of a training is spent in the loops below. They are plain, because the standard library's iterators
-// are not always inlined where the parts of a crate are compiled apart.
+// Training spends most of its time in the loops below. They are plain, because the standard
+// library's iterators are not always inlined across the codegen units of a crate.
 
 /// Computes units from their biases and the values of pixels; `weights` by pixel, then by unit.
 fn weighted_sums(units: &mut [f64], biases: &[f64], pixels: &[(usize, f64)], weights: &[f64]) {
@@ -299,7 +299,7 @@ fn weighted_sums(units: &mut [f64], biases: &[f64], pixels: &[(usize, f64)], wei
     }
 }
 
-/// Computes the `N` units from the `first`, which stay in registers meanwhile.
+/// Computes `N` units from `first` on, which stay in registers.
 #[inline]
 #[expect(clippy::manual_memcpy, reason = "so few numbers are not worth a call")]
 fn weighted_sums_of<const N: usize>(
@@ -327,7 +327,7 @@ fn weighted_sums_of<const N: usize>(
     }
 }
 
-/// Reduces the units of some places, place by place, to one feature a unit.
+/// Reduces the units of some places, place by place, to one feature per unit.
 fn pool(features: &mut [f64], units: &[f64], pooling: Pooling) {
     let size = features.len();
     let within = units.len() / size;
@@ -360,7 +360,7 @@ fn add_scaled(sums: &mut [f64], factor: f64, terms: &[f64]) {
     }
 }
 
-/// The cross-entropy of outputs against the group of an image, and its derivatives by the outputs.
+/// Returns the cross-entropy of outputs against an image's group, and its derivatives by them.
 pub fn cross_entropy(outputs: [f64; OUTPUTS], group: usize) -> (f64, [f64; OUTPUTS]) {
     let largest = outputs.into_iter().fold(f64::NEG_INFINITY, f64::max);
     let powers = outputs.map(|output| libm::exp(output - largest));
@@ -377,7 +377,7 @@ mod tests {
 
     const IMAGE: (usize, usize) = (7, 6);
 
-    /// Noise in which every third pixel is dark.
+    /// Makes noise in which every third pixel is dark.
     fn images() -> Vec<Grid<f64>> {
         let rng = &mut stream(5, Purpose::Networks, 0, 0);
         let pixel = |row: usize, column: usize, rng: &mut Stream| {
@@ -411,7 +411,7 @@ mod tests {
         Network::new(shape, &mut stream(1, Purpose::Networks, 0, 0))
     }
 
-    /// The value of one hidden unit at a place, by its definition.
+    /// Computes a hidden unit at a place by its definition.
     fn unit(network: &Network, unit: usize, image: &Grid<f64>, corner: (usize, usize)) -> f64 {
         let shape = network.shape;
         let (height, width) = shape.field();

@@ -1,4 +1,4 @@
-//! Which networks there are, how they are trained, and how well a trained one does: plain data.
+//! Networks, their training, and the accuracy of a trained one: plain data.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -17,7 +17,7 @@ impl Kind {
     /// All kinds.
     pub const ALL: [Kind; 2] = [Kind::Mlp, Kind::Cnn];
 
-    /// Its name in files.
+    /// Returns its name in files.
     pub fn name(self) -> &'static str {
         match self {
             Kind::Mlp => "mlp",
@@ -26,7 +26,7 @@ impl Kind {
     }
 }
 
-/// What follows the hidden layer.
+/// The function after the hidden layer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Activation {
@@ -38,51 +38,51 @@ pub enum Activation {
     Sigmoid,
 }
 
-/// What a convolution's maps are made to before the output head.
+/// The reduction of a convolution's maps before the output head.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Pooling {
-    /// Nothing: every pixel of every map goes into the head.
+    /// No reduction: every pixel of every map is an input of the head.
     None,
-    /// The largest of 2 × 2 pixels.
+    /// The maximum of each 2 × 2 pixels.
     Max2,
     /// The mean of a whole map.
     Mean,
-    /// The largest of a whole map.
+    /// The maximum of a whole map.
     Max,
 }
 
-/// What training waits for an improvement of.
+/// The measure whose improvement training waits for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Watch {
-    /// Share answered correctly: larger is better.
+    /// Fraction of correct answers: larger is better.
     Accuracy,
     /// Cross-entropy: smaller is better.
     Loss,
 }
 
-/// How networks are trained.
+/// Settings of the training of networks.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Hyperparameters {
-    /// Passes over the training images. Default 50, the paper's.
+    /// Most passes over the training images. Default 50, the paper's.
     pub epochs: usize,
     /// Epochs without an improvement after which training ends. Default 5, the paper's.
     pub patience: usize,
-    /// What is to improve.
+    /// Measure of improvement. Default accuracy.
     pub watch: Watch,
-    /// Whether the best epoch's network is tested, not the last epoch's.
+    /// True to test the best epoch's network instead of the last epoch's. Default false.
     pub restore_best: bool,
-    /// Adam's learning rate.
+    /// Learning rate of Adam. Default 0.0005.
     pub learning_rate: f64,
-    /// Images per step; 0: all at once.
+    /// Images per step; 0 means all at once. Default 1.
     pub batch: usize,
-    /// What follows the hidden layer.
+    /// Function after the hidden layer. Default relu.
     pub activation: Activation,
-    /// Side of the convolution's kernels.
+    /// Side of the convolution's kernels. Default 3.
     pub kernel: usize,
-    /// What becomes of the convolution's maps.
+    /// Reduction of the convolution's maps. Default none.
     pub pooling: Pooling,
 }
 
@@ -102,13 +102,13 @@ impl Default for Hyperparameters {
     }
 }
 
-/// How a training ended.
+/// The result of a training.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Trained {
-    /// Share of the test images answered correctly.
+    /// Fraction of the test images answered correctly.
     pub accuracy: f64,
-    /// Epochs it took.
+    /// Epochs trained.
     pub epochs: usize,
-    /// Numbers that training changed.
+    /// Number of trained parameters.
     pub parameters: usize,
 }

@@ -1,4 +1,4 @@
-//! Training a network from scratch, as the paper has it: Adam, with early stopping.
+//! Training a network from scratch as in the paper: Adam, with early stopping.
 
 use crate::base::Grid;
 use crate::base::random::Stream;
@@ -12,11 +12,11 @@ use nalgebra::DVector;
 #[derive(Clone, Debug)]
 pub struct Samples {
     images: Vec<(Patches, usize)>,
-    /// The networks' shape but for their size.
+    /// The networks' shape, except for their size.
     shape: Shape,
 }
 
-/// Why images make no samples.
+/// The reason why images make no samples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum SamplesError {
     /// There are no images.
@@ -36,7 +36,7 @@ impl Samples {
     /// Prepares images of one size, with values in [0, 1], each with its group (0 or 1).
     ///
     /// # Errors
-    /// If there are no images, or they differ in size.
+    /// Returns an error if there are no images, or if they differ in size.
     pub fn new(
         images: &[(&Grid<f64>, usize)],
         kind: Kind,
@@ -54,8 +54,7 @@ impl Samples {
     }
 }
 
-/// Returns a network's accuracy on samples, and the value that training is to improve; larger is
-/// better.
+/// Returns a network's accuracy on samples, and the value to improve; larger is better.
 fn test(
     network: &mut Network,
     samples: &Samples,
@@ -108,7 +107,7 @@ impl Adam {
 /// `test_set`: samples for networks of one kind.
 ///
 /// # Errors
-/// [`Stopped`] if `stop` is set meanwhile; it is looked at for every image.
+/// Returns [`Stopped`] if `stop` is set in the meantime; every image checks it.
 pub fn train(
     size: usize,
     hyper: &Hyperparameters,
@@ -128,7 +127,7 @@ pub fn train(
     let mut best: Option<(f64, Option<DVector<f64>>)> = None;
     let mut waited = 0;
     let mut done = 0;
-    // The accuracy of the network as it is, on the images that training waits on.
+    // Accuracy of the current network on `waiting`.
     let mut present = None;
     while done < epochs && waited < patience {
         for chosen in rng.sample(count, count).chunks(batch) {
@@ -168,7 +167,7 @@ mod tests {
 
     use std::sync::atomic::AtomicBool;
 
-    /// Noisy images that are brighter above, or below.
+    /// Makes noisy images that are brighter at the top, or at the bottom.
     fn samples(seed: u64, count: usize, kind: Kind, hyper: &Hyperparameters) -> Samples {
         let rng = &mut stream(seed, Purpose::Networks, 0, 0);
         let groups: Vec<usize> = (0..count).map(|number| usize::from(number % 3 == 0)).collect();

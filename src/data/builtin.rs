@@ -1,5 +1,5 @@
-//! Built-in digits: handwriting-like images that the program draws itself, so that everything works
-//! without a download. Any number of them, each a pure function of (seed, split, class, number).
+//! Built-in digits: handwriting-like images drawn by the program, so that all works without a
+//! download. There are any number, each a pure function of (seed, split, class, number).
 
 use crate::base::Grid;
 use crate::base::hash::sha256_hex;
@@ -12,12 +12,12 @@ use serde::{Deserialize, Serialize};
 /// Name of the built-in digits as a dataset.
 pub const BUILTIN: &str = "builtin";
 
-/// Which built-in digits there are. In each split the classes take turns: index i shows `classes[i
-/// % k]`, so that indices 0, 1, …, k − 1 are one image of each class.
+/// The choice of built-in digits. In each split the classes take turns: index i has the class
+/// `classes[i % k]`, so that indices 0, 1, …, k − 1 are one image of each class.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct BuiltinDigits {
-    /// Another seed, other images.
+    /// Seed of the images.
     pub seed: u64,
     /// The digits (0 … 9) in the order in which they take turns.
     pub classes: Vec<u8>,
@@ -37,19 +37,19 @@ impl Default for BuiltinDigits {
 /// Most images of a class in a split.
 const MAX_PER_CLASS: usize = 1_000_000;
 
-/// Why there are no such built-in digits.
+/// The reason why such built-in digits do not exist.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum BuiltinError {
-    /// No class at all.
+    /// There is no class.
     #[error("built-in digits: no classes given; expected at least one of 0 to 9")]
     NoClasses,
-    /// A class that is not a digit.
+    /// A class is not a digit.
     #[error("built-in digits: there is no class {0}; expected 0 to 9")]
     NotADigit(u8),
-    /// More images than can be told apart by index.
+    /// There are more images than indices can tell apart.
     #[error("built-in digits: {0} images of each class; expected at most {MAX_PER_CLASS}")]
     TooMany(usize),
-    /// A class given twice.
+    /// A class is given twice.
     #[error("built-in digits: class {0} is given more than once")]
     Repeated(u8),
 }
@@ -58,11 +58,10 @@ impl BuiltinDigits {
     /// Number of rows and of columns of every image.
     pub const SIDE: usize = pen::SIDE;
 
-    /// Whether the classes are different digits, there is at least one, and not too many images of
-    /// each.
+    /// Checks for at least one class, different digits, and not too many images of each.
     ///
     /// # Errors
-    /// [`BuiltinError`] if not.
+    /// Returns a [`BuiltinError`] otherwise.
     pub fn check(&self) -> Result<(), BuiltinError> {
         if self.classes.is_empty() {
             return Err(BuiltinError::NoClasses);
@@ -82,17 +81,17 @@ impl BuiltinDigits {
         Ok(())
     }
 
-    /// Number of images of a split.
+    /// Returns the number of images of a split.
     pub fn len(&self, split: Split) -> usize {
         self.classes.len() * self.per_class(split)
     }
 
-    /// Whether a split has no image.
+    /// Returns true if a split has no image.
     pub fn is_empty(&self, split: Split) -> bool {
         self.len(split) == 0
     }
 
-    /// The digit shown at an index of a split; `None` beyond its end.
+    /// Returns the digit at an index of a split; `None` beyond its end.
     pub fn label(&self, split: Split, index: usize) -> Option<u8> {
         (index < self.len(split)).then(|| self.classes[index % self.classes.len()])
     }
@@ -105,7 +104,7 @@ impl BuiltinDigits {
         Some(pen::write(class, &mut stream(self.seed, Purpose::BuiltinDigits, page, number)))
     }
 
-    /// SHA-256 of what decides a split's images: the drawing's version, seed, classes and number.
+    /// Returns the SHA-256 of a split's parameters: drawing version, seed, classes and number.
     pub fn fingerprint(&self, split: Split) -> String {
         let (seed, classes, number) = (self.seed, &self.classes, self.per_class(split));
         let drawing = pen::DRAWING;
@@ -128,8 +127,8 @@ mod tests {
 
     #[test]
     fn drawings_are_stable_across_versions() {
-        // Pinned: if this changes, so do all results on built-in digits; raise pen::DRAWING and say
-        // so in the CHANGELOG.
+        // Pinned: if this changes, so do all results on built-in digits. Then raise pen::DRAWING
+        // and say so in the CHANGELOG.
         let digits = BuiltinDigits::default();
         let mut bytes = Vec::new();
         for index in 0..200 {

@@ -1,10 +1,10 @@
-//! What can be downloaded, from where, and how to know that it is the right thing.
+//! The datasets that can be downloaded: their addresses, and the checksums of their files.
 
 use crate::data::info::FileInfo;
 /// Datasets that `morphcog data fetch` can download.
 pub const FETCHABLE: [&str; 2] = ["mnist", "fashion-mnist"];
 
-/// A file to be downloaded, as published.
+/// A file to download, as published.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct RemoteFile {
     /// Its name, on the mirrors and on disk.
@@ -13,7 +13,7 @@ pub struct RemoteFile {
     pub bytes: u64,
     /// SHA-256 in lower-case hexadecimal.
     pub sha256: String,
-    /// The same of what is in it, however it is packed, as far as it is known.
+    /// SHA-256 of the unpacked content, if known.
     pub content_sha256: Option<String>,
 }
 
@@ -36,8 +36,7 @@ pub struct UnknownDataset {
     pub name: String,
 }
 
-/// Name, size and SHA-256 of the four files of a dataset: training images and labels, test images
-/// and labels.
+/// Name, size and SHA-256 of a dataset's training images and labels, test images and labels.
 type Published = [(&'static str, u64, &'static str); 4];
 
 const MNIST: Published = [
@@ -59,7 +58,7 @@ const MNIST: Published = [
     ("t10k-labels-idx1-ubyte.gz", 4_542, "f7ae60f92e00ec6debd23a6088c31dbd2371eca3ffa0defaefb259924204aec6"),
 ];
 
-/// SHA-256 of what is in the files of MNIST, in their order.
+/// SHA-256 of the unpacked files of MNIST, in their order.
 const MNIST_UNPACKED: [&str; 4] = [
     "ba891046e6505d7aadcbbe25680a0738ad16aec93bde7f9b65e87a2fc25776db",
     "65a50cbbf4e906d70832878ad85ccda5333a97f0f4c3dd2ef09a8a9eef7101c5",
@@ -67,8 +66,8 @@ const MNIST_UNPACKED: [&str; 4] = [
     "ff7bcfd416de33731a308c3f266cc351222c34898ecbeaf847f06e48f7ec33f2",
 ];
 
-/// SHA-256 of the content of MNIST's training and test split (see [`SplitInfo::fingerprint`](crate::data::info::SplitInfo::fingerprint)): it
-/// is known however it is packed.
+/// SHA-256 of the content of MNIST's training and test split, however it is packed (see
+/// [`SplitInfo::fingerprint`](crate::data::info::SplitInfo::fingerprint)).
 pub const MNIST_CONTENT: [&str; 2] = [
     "c5097fdd51cfdbe7695fd9df3612695696864b5c424f58d843ffdc5d335e9914",
     "18489308deedfe2f7bd3a11e599a597126f161d991b1ffcffb71642aa76f7f62",
@@ -103,10 +102,10 @@ const FASHION_MNIST_MIRRORS: [&str; 3] = [
 ];
 
 impl Catalogue {
-    /// The files and mirrors of "mnist" or "fashion-mnist".
+    /// Returns the files and mirrors of "mnist" or "fashion-mnist".
     ///
     /// # Errors
-    /// [`UnknownDataset`] for any other name.
+    /// Returns [`UnknownDataset`] for any other name.
     pub fn named(name: &str) -> Result<Self, UnknownDataset> {
         let (mirrors, files, unpacked): (&[&str], _, _) = match name {
             "mnist" => (&MNIST_MIRRORS, MNIST, MNIST_UNPACKED.map(Some)),
@@ -127,8 +126,8 @@ impl Catalogue {
     }
 }
 
-/// The dataset that a split is known to be of by its fingerprint and files, whatever it is called where it was found: MNIST by
-/// its content, Fashion-MNIST by its files as published.
+/// Recognises the dataset of a split by its fingerprint and files, whatever name it was found
+/// under: MNIST by its content, Fashion-MNIST by its files as published.
 pub fn known_as(fingerprint: &str, files: &[FileInfo]) -> Option<&'static str> {
     let are_published = |published: &Published| {
         let is_one = |file: &FileInfo| published.iter().any(|(_, _, sha256)| *sha256 == file.sha256);
@@ -167,7 +166,7 @@ mod tests {
         assert_eq!(named(MNIST_CONTENT[1], &[]), Some("mnist"));
         let [(_, _, images), (_, _, labels), ..] = FASHION_MNIST;
         assert_eq!(named("", &[images, labels]), Some("fashion-mnist"));
-        // With other labels they are other data.
+        // With other labels it is another dataset.
         assert_eq!(named("", &[images, "0"]), None);
         assert_eq!(named("", &[]), None);
     }

@@ -13,28 +13,28 @@ use crate::data::info::{DatasetInfo, SplitInfo};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// Why a dataset cannot be loaded, or does not have what it was asked for.
+/// The reason why a dataset cannot be loaded, or lacks what was requested.
 #[derive(Debug, thiserror::Error)]
 pub enum DatasetError {
-    /// The files are not there or not right.
+    /// The files are missing or wrong.
     #[error(transparent)]
     Files(#[from] FilesError),
-    /// There are no such built-in digits.
+    /// Such built-in digits do not exist.
     #[error(transparent)]
     Builtin(#[from] BuiltinError),
-    /// A published dataset lies where another one is looked for.
+    /// A published dataset is in the place of another one.
     #[error("{place}: these {split} images are those of {found}, not of {dataset}")]
     Other {
         /// Name of the dataset.
         dataset: String,
         /// The name that it is published under.
         found: &'static str,
-        /// Where they are.
+        /// Its place.
         place: String,
         /// The split.
         split: Split,
     },
-    /// The split was not asked for when the dataset was loaded.
+    /// The split was not requested when the dataset was loaded.
     #[error("{dataset}: the {split} images were not loaded")]
     NotLoaded {
         /// Name of the dataset.
@@ -42,19 +42,19 @@ pub enum DatasetError {
         /// The split.
         split: Split,
     },
-    /// An index beyond the end of a split.
+    /// An index is beyond the end of a split.
     #[error("{dataset}: there is no {split} image {index}: there are {len}, counted from 0")]
     Index {
         /// Name of the dataset.
         dataset: String,
         /// The split.
         split: Split,
-        /// The index asked for.
+        /// The index requested.
         index: usize,
         /// Number of images in the split.
         len: usize,
     },
-    /// Fewer images of a class than asked for.
+    /// There are fewer images of a class than requested.
     #[error("{dataset}: {wanted} {split} images of class {class} were asked for, there are {found}")]
     TooFew {
         /// Name of the dataset.
@@ -63,9 +63,9 @@ pub enum DatasetError {
         split: Split,
         /// The class.
         class: u8,
-        /// How many were asked for.
+        /// Number requested.
         wanted: usize,
-        /// How many there are.
+        /// Number of images of the class.
         found: usize,
     },
 }
@@ -84,7 +84,7 @@ impl From<DatasetError> for Error {
 #[derive(Clone, Debug)]
 pub struct Dataset {
     name: String,
-    /// The folder with its files; none of the built-in digits.
+    /// The folder with its files; none for the built-in digits.
     folder: Option<PathBuf>,
     origin: String,
     splits: BTreeMap<Split, Loaded>,
@@ -105,20 +105,19 @@ enum Images {
 
 impl Dataset {
     /// Loads the wanted splits of a dataset: "builtin" (the default [`BuiltinDigits`]), "mnist",
-    /// "fashion-mnist", or any other name for IDX files of one's own. The files are looked for in
-    /// the first of the `given` places (see [`files::places`]) or, if none is given, in
-    /// `data/<name>`; files of splits that are not wanted may be missing.
+    /// "fashion-mnist", or any other name for the user's own IDX files. The files must be in the
+    /// first of the `given` places (see [`files::places`]) or, without any, in `data/<name>`. Files
+    /// of splits that are not wanted may be missing.
     ///
     /// # Errors
-    /// [`DatasetError::Files`] naming the file, where it was looked for, what was expected and what
-    /// to do.
+    /// Returns [`DatasetError::Files`]: the file, its place, what was expected and what to do.
     pub fn load(name: &str, given: &[Place], wanted: &[Split]) -> Result<Self, DatasetError> {
         Dataset::oriented(name, given, wanted, None)
     }
 
-    /// The same; `transpose` says whether rows and columns of the images in the files are exchanged.
-    /// By default those of EMNIST are, which is known by its names. (The built-in digits are in no
-    /// file.)
+    /// Acts as [`Dataset::load`]; `transpose` says whether rows and columns of the images in the
+    /// files are exchanged. By default those of EMNIST are, which is recognised by its names. (The
+    /// built-in digits have no files.)
     ///
     /// # Errors
     /// As [`Dataset::load`].
@@ -135,7 +134,7 @@ impl Dataset {
         let mut splits = BTreeMap::new();
         for &split in wanted {
             let (labels, stored) = files::load(name, &place, split, transpose)?;
-            // Results would say that they are of the other.
+            // Otherwise results would name the wrong dataset.
             if FETCHABLE.contains(&name)
                 && let Some(found) =
                     known_as(&stored.fingerprint, &stored.files).filter(|found| *found != name)
@@ -148,10 +147,10 @@ impl Dataset {
         Ok(Dataset { name: name.to_string(), folder: Some(place.path), origin: place.origin, splits })
     }
 
-    /// Built-in digits with parameters of one's own. Images are drawn when they are asked for.
+    /// Makes built-in digits with the given parameters. Images are drawn on request.
     ///
     /// # Errors
-    /// [`DatasetError::Builtin`] if the classes are not different digits.
+    /// Returns [`DatasetError::Builtin`] if [`BuiltinDigits::check`] fails.
     pub fn builtin(digits: BuiltinDigits, wanted: &[Split]) -> Result<Self, DatasetError> {
         digits.check()?;
         let loaded = |&split: &Split| {
@@ -162,17 +161,17 @@ impl Dataset {
         Ok(Dataset { name: BUILTIN.to_string(), folder: None, origin: BUILTIN.to_string(), splits })
     }
 
-    /// Name of the dataset.
+    /// Returns the name of the dataset.
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// The folder it was read from; none of the built-in digits.
+    /// Returns the folder it was read from; none for the built-in digits.
     pub fn folder(&self) -> Option<&Path> {
         self.folder.as_deref()
     }
 
-    /// Name, folder, and what named that folder: for messages.
+    /// Returns name, folder and the origin of that folder, for messages.
     pub fn place(&self) -> String {
         match &self.folder {
             Some(folder) => format!("{} in {} ({})", self.name, folder.display(), self.origin),
@@ -180,7 +179,7 @@ impl Dataset {
         }
     }
 
-    /// Height and width of the images of a split; `None` if it was not loaded.
+    /// Returns height and width of the images of a split; `None` if it was not loaded.
     pub fn size(&self, split: Split) -> Option<[usize; 2]> {
         self.splits.get(&split).map(|loaded| match &loaded.images {
             Images::Stored(stored) => [stored.images.height, stored.images.width],
@@ -188,27 +187,27 @@ impl Dataset {
         })
     }
 
-    /// Whether rows and columns of the images in its files are exchanged.
+    /// Returns true if rows and columns of the images in its files are exchanged.
     pub fn is_transposed(&self) -> bool {
         let is_turned =
             |loaded: &Loaded| matches!(&loaded.images, Images::Stored(stored) if stored.transposed);
         self.splits.values().any(is_turned)
     }
 
-    /// Number of images in a split; 0 if it was not loaded.
+    /// Returns the number of images in a split; 0 if it was not loaded.
     pub fn len(&self, split: Split) -> usize {
         self.splits.get(&split).map_or(0, |loaded| loaded.labels.len())
     }
 
-    /// Whether a split has no images or was not loaded.
+    /// Returns true if a split has no images or was not loaded.
     pub fn is_empty(&self, split: Split) -> bool {
         self.len(split) == 0
     }
 
-    /// The image at an index of a split: 0 background … 255 ink, row 0 on top.
+    /// Returns the image at an index of a split: 0 background … 255 ink, row 0 on top.
     ///
     /// # Errors
-    /// [`DatasetError::NotLoaded`] or [`DatasetError::Index`].
+    /// Returns [`DatasetError::NotLoaded`] or [`DatasetError::Index`].
     pub fn image(&self, split: Split, index: usize) -> Result<Grid<u8>, DatasetError> {
         let image = match &self.loaded(split)?.images {
             Images::Stored(stored) => stored.images.image(index),
@@ -217,26 +216,26 @@ impl Dataset {
         image.ok_or_else(|| self.no_such(split, index))
     }
 
-    /// The class of the image at an index of a split.
+    /// Returns the class of the image at an index of a split.
     ///
     /// # Errors
-    /// [`DatasetError::NotLoaded`] or [`DatasetError::Index`].
+    /// Returns [`DatasetError::NotLoaded`] or [`DatasetError::Index`].
     pub fn label(&self, split: Split, index: usize) -> Result<u8, DatasetError> {
         let label = self.loaded(split)?.labels.get(index).copied();
         label.ok_or_else(|| self.no_such(split, index))
     }
 
-    /// Indices of all images of a class in a split, ascending; none if the split was not loaded.
+    /// Returns the indices of all images of a class in a split, ascending; none if not loaded.
     pub fn indices_of(&self, split: Split, class: u8) -> &[usize] {
         self.splits.get(&split).and_then(|loaded| loaded.by_class.get(&class)).map_or(&[], Vec::as_slice)
     }
 
-    /// The classes that occur in a split, ascending; none if it was not loaded.
+    /// Returns the classes that occur in a split, ascending; none if it was not loaded.
     pub fn classes(&self, split: Split) -> Vec<u8> {
         self.splits.get(&split).map_or_else(Vec::new, |loaded| loaded.by_class.keys().copied().collect())
     }
 
-    /// SHA-256 of a split's content (see [`SplitInfo::fingerprint`]); `None` if it was not loaded.
+    /// Returns a split's SHA-256 (see [`SplitInfo::fingerprint`]); `None` if it was not loaded.
     pub fn fingerprint(&self, split: Split) -> Option<String> {
         self.splits.get(&split).map(|loaded| match &loaded.images {
             Images::Stored(stored) => stored.fingerprint.clone(),
@@ -244,7 +243,7 @@ impl Dataset {
         })
     }
 
-    /// What to record about the dataset.
+    /// Returns the description of the dataset for a run's record.
     pub fn info(&self) -> DatasetInfo {
         let describe = |(&split, loaded): (&Split, &Loaded)| {
             let [height, width] = self.size(split).expect("the split is loaded");
@@ -263,12 +262,11 @@ impl Dataset {
         DatasetInfo { name, source, origin, splits }
     }
 
-    /// Draws `per_class` different images of each class by seed: first those of `classes[0]`, then
-    /// those of `classes[1]`, …; their indices. What is drawn of one class does not depend on the
-    /// other classes asked for.
+    /// Draws `per_class` different images of each class by seed and returns their indices: those of
+    /// `classes[0]`, those of `classes[1]`, … Other classes do not affect the draw of one.
     ///
     /// # Errors
-    /// [`DatasetError::NotLoaded`], or [`DatasetError::TooFew`] if a class has fewer images.
+    /// Returns [`DatasetError::NotLoaded`], or [`DatasetError::TooFew`] if images are too few.
     pub fn draw(
         &self,
         split: Split,

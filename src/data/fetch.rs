@@ -1,6 +1,6 @@
-//! `morphcog data fetch`: downloads the files of a dataset and lets none in that is not the
-//! published one. A program of the system downloads them, curl or wget: it knows the user's proxies
-//! and certificates, and what it brings is checked in any case.
+//! `morphcog data fetch`: downloads the files of a dataset and accepts only the published ones. A
+//! program of the system, curl or wget, downloads them: it knows the user's proxies and
+//! certificates, and every file is checked in any case.
 
 use crate::base::error::{Error, is_full};
 use crate::base::files::{read_bytes, write_atomically};
@@ -19,16 +19,16 @@ use std::process::{Child, Command, Stdio};
 use std::sync::mpsc::{self, Receiver, RecvTimeoutError};
 use std::time::{Duration, Instant};
 
-/// Longest time for one file.
+/// Longest download of one file.
 const LONGEST: Duration = Duration::from_secs(1800);
 
-/// How often a download looks whether to stop.
+/// Interval at which a download checks whether to stop.
 const LOOK: Duration = Duration::from_millis(50);
 
-/// Most bytes that are read of what a program says about its failure.
+/// Most bytes to read of a program's error output.
 const MOST_SAID: u64 = 1 << 14;
 
-/// A program that downloads.
+/// A program that downloads files.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Program {
     /// Part of macOS, of Windows and of most Linux systems.
@@ -38,10 +38,10 @@ pub enum Program {
 }
 
 impl Program {
-    /// All of them, the preferred one first.
+    /// All programs, the preferred one first.
     pub const ALL: [Program; 2] = [Program::Curl, Program::Wget];
 
-    /// Its name as a command.
+    /// Returns its name as a command.
     pub fn name(self) -> &'static str {
         match self {
             Program::Curl => "curl",
@@ -49,26 +49,26 @@ impl Program {
         }
     }
 
-    /// Whether it is on the PATH.
+    /// Returns true if it is on the PATH.
     pub fn is_installed(self) -> bool {
         let mut command = Command::new(self.name());
         command.arg("--version").stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
         command.status().is_ok()
     }
 
-    /// The command that writes a file to its standard output. Its limits are for a slow line, not for
-    /// patience: it gives up a mirror that is dead or says nothing.
+    /// Returns the command that writes a file to its standard output. Its limits allow for a slow
+    /// line: it gives up only on a mirror that is dead or silent.
     fn command(self, url: &str) -> Command {
         let agent = concat!("morphcog/", env!("CARGO_PKG_VERSION"));
         let mut command = Command::new(self.name());
         match self {
-            // -q comes first: a user's .curlrc may turn anything into something else.
+            // -q comes first: a user's .curlrc may change the meaning of anything.
             Program::Curl => command
                 .args(["-q", "--silent", "--show-error", "--fail", "--location", "--globoff"])
                 .args(["--proto", "=http,https", "--proto-redir", "=http,https", "--max-redirs", "10"])
                 .args(["--connect-timeout", "15", "--speed-limit", "1", "--speed-time", "30"])
                 .args(["--user-agent", agent, "--url", url]),
-            // In their short forms, options are the same in all programs of this name.
+            // The short forms of options are the same in all programs of this name.
             Program::Wget => command.args(["-nv", "-O", "-", "-t", "1", "-T", "20", "-U", agent, "--", url]),
         };
         command.env("LC_ALL", "C").stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
@@ -76,32 +76,32 @@ impl Program {
     }
 }
 
-/// What the user may choose about a download.
+/// A user's choices for a download.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct FetchOptions {
-    /// The folder to write to, created if need be; `data/<name>` if not given.
+    /// The folder to write to, created if necessary; `data/<name>` if not given.
     pub to: Option<PathBuf>,
     /// Address of a folder with the files, used instead of the known mirrors.
     pub mirror: Option<String>,
-    /// Downloads and replaces files that are already there, right or wrong.
+    /// True to download and replace files that exist already, right or wrong.
     pub force: bool,
 }
 
-/// Why one attempt to download a file failed.
+/// The reason why one attempt to download a file failed.
 #[derive(Debug, thiserror::Error)]
 pub enum AttemptError {
-    /// No (good) answer, or the connection broke off: what the program says.
+    /// There was no (good) answer, or the connection broke off: the program's message.
     #[error("{}: {text}", program.name())]
     Failed {
         /// The program.
         program: Program,
-        /// One line of it.
+        /// One line of its message.
         text: String,
     },
-    /// The address is not one of the web.
+    /// The address is not a web address.
     #[error("expected an address that begins with http:// or https://")]
     Address,
-    /// More or fewer bytes than the published file has; at most one byte more is read.
+    /// The file has more or fewer bytes than the published one; at most one byte more is read.
     #[error("expected {expected} bytes, found {}",
         if found > expected { "more".to_string() } else { found.to_string() })]
     Size {
@@ -110,12 +110,12 @@ pub enum AttemptError {
         /// Bytes received.
         found: u64,
     },
-    /// As long as the published file, but not the same.
+    /// The file has the length of the published one, but another content.
     #[error("expected SHA-256 {expected}, found {found}")]
     Checksum {
-        /// Of the published file.
+        /// Checksum of the published file.
         expected: String,
-        /// Of what was received.
+        /// Checksum of the received file.
         found: String,
     },
 }
@@ -125,11 +125,11 @@ pub enum AttemptError {
 pub struct Attempt {
     /// The address tried.
     pub url: String,
-    /// What went wrong.
+    /// The error.
     pub error: AttemptError,
 }
 
-/// What was tried, and what went wrong: once where that was always the same.
+/// Describes the attempts and their errors, each error only once.
 fn tried(attempts: &[Attempt]) -> String {
     let mut all: Vec<(String, Vec<&str>)> = Vec::new();
     for Attempt { url, error } in attempts {
@@ -143,10 +143,10 @@ fn tried(attempts: &[Attempt]) -> String {
     all.iter().map(one).collect::<Vec<_>>().join("; ")
 }
 
-/// Why a dataset was not fetched. Files fetched before the error stay.
+/// The reason why a dataset was not fetched. Files fetched before the error stay.
 #[derive(Debug, thiserror::Error)]
 pub enum FetchError {
-    /// Another file of that name is there; it is not touched, and nothing is downloaded.
+    /// Another file of that name exists; it stays, and nothing is downloaded.
     #[error(
         "{}: is there but is not the published file (expected SHA-256 {expected}, found {found}); \
          move it away, choose another folder with --to, or replace it with --force", file.display()
@@ -156,7 +156,7 @@ pub enum FetchError {
         file: PathBuf,
         /// SHA-256 of the published file.
         expected: String,
-        /// SHA-256 of the file that is there.
+        /// SHA-256 of the existing file.
         found: String,
     },
     /// The folder or a file in it cannot be read or written.
@@ -164,7 +164,7 @@ pub enum FetchError {
     Disk {
         /// The folder or file.
         path: PathBuf,
-        /// What the system says.
+        /// The system's error.
         source: io::Error,
     },
     /// No mirror had the right file.
@@ -175,23 +175,23 @@ pub enum FetchError {
     Mirrors {
         /// Name of the file.
         file: String,
-        /// Where it should have gone.
+        /// Its intended folder.
         folder: PathBuf,
-        /// What was tried, in order.
+        /// The attempts, in order.
         attempts: Vec<Attempt>,
     },
-    /// No program that downloads is installed.
+    /// No program for downloads is installed.
     #[error(
         "neither curl nor wget, which download files, is on the PATH: install one of them, or put these files \
          into {} yourself: {}", folder.display(), urls.join(", ")
     )]
     NoProgram {
-        /// Where the files should have gone.
+        /// The intended folder of the files.
         folder: PathBuf,
         /// Their addresses.
         urls: Vec<String>,
     },
-    /// Stopped.
+    /// The download was stopped.
     #[error(transparent)]
     Stopped(#[from] Stopped),
 }
@@ -214,31 +214,31 @@ impl From<FetchError> for Error {
     }
 }
 
-/// How a file came to be there.
+/// The origin of a file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Outcome {
-    /// It was there already, and right.
+    /// It existed already, and was right.
     Kept,
     /// It was downloaded from this address.
     Downloaded(String),
 }
 
-/// A file that is there and right.
+/// A file that exists and is right.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Fetched {
     /// The file.
     pub file: PathBuf,
-    /// How it came to be there.
+    /// Its origin.
     pub outcome: Outcome,
 }
 
-/// Brings all files of a dataset to disk. Each is checked against its published size and SHA-256
-/// before anything is written, and then written atomically; files that are there and right, however
-/// they are packed, are kept. Of these programs the first that is installed downloads.
+/// Downloads all files of a dataset with the first of these programs that is installed. Each is
+/// checked against its published size and SHA-256 before anything is written, and then written
+/// atomically. Existing right files are kept, however they are packed.
 ///
 /// # Errors
-/// [`FetchError`]. If any file that is there differs from the published one (and `force` is off),
-/// nothing is done. No empty folder is left, nor a process.
+/// Returns a [`FetchError`]. If any existing file differs from the published one (and `force` is
+/// off), nothing is done. No empty folder and no process is left behind.
 pub fn fetch(
     catalogue: &Catalogue,
     options: &FetchOptions,
@@ -269,7 +269,7 @@ pub fn fetch(
         })?;
         let file = folder.join(&remote.name);
         write_atomically(&file, &bytes).map_err(|source| disk(&file, source))?;
-        // An unpacked file that says something else would be as good as this one.
+        // Remove an unpacked file with other content: it would count as much as this one.
         let is_other = |other: &PathBuf| idx::unpacked(other).ok() != idx::unpacked(&file).ok();
         let other = unpacked(&folder, remote).filter(|other| options.force && other.exists());
         if let Some(other) = other.filter(is_other) {
@@ -283,21 +283,21 @@ pub fn fetch(
     });
     let fetched: Result<Vec<Fetched>, FetchError> = fetched.collect();
     if fetched.is_err() {
-        // Those that hold something stay.
+        // Folders that are not empty stay.
         made.iter().for_each(|folder| drop(std::fs::remove_dir(folder)));
     }
     fetched
 }
 
-/// The path of a file in a folder once it is unpacked.
+/// Returns the path of a file in a folder after unpacking.
 fn unpacked(folder: &Path, remote: &RemoteFile) -> Option<PathBuf> {
     remote.name.strip_suffix(".gz").map(|name| folder.join(name))
 }
 
-/// The right file, packed or not, if it is there; another one is an error.
+/// Returns the right file, packed or not, if it exists; another one is an error.
 fn found(folder: &Path, remote: &RemoteFile) -> Result<Option<PathBuf>, FetchError> {
     let packed = folder.join(&remote.name);
-    // What is in it must be known to tell others apart.
+    // An unpacked file can only be checked if its content is known.
     let unpacked = unpacked(folder, remote).filter(|_| remote.content_sha256.is_some());
     let mut right = None;
     for file in [Some(packed), unpacked].into_iter().flatten() {
@@ -316,15 +316,15 @@ fn found(folder: &Path, remote: &RemoteFile) -> Result<Option<PathBuf>, FetchErr
     Ok(right)
 }
 
-/// The address of a file on a mirror.
+/// Returns the address of a file on a mirror.
 fn address(mirror: &str, remote: &RemoteFile) -> String {
     format!("{}/{}", mirror.trim_end_matches('/'), remote.name)
 }
 
-/// An address and what is there, or what was tried.
+/// An address and its content, or the failed attempts.
 type Downloaded = Result<(String, Vec<u8>), Vec<Attempt>>;
 
-/// The file from the first mirror that has it right, and its address there; otherwise what was tried.
+/// Downloads the file from the first mirror that has it right.
 fn from_any(
     program: Program,
     mirrors: &[String],
@@ -351,18 +351,18 @@ fn from_any(
     Ok(Err(attempts))
 }
 
-/// A process that is ended when this goes.
+/// A process that is ended on drop.
 struct Running(Child);
 
 impl Drop for Running {
     fn drop(&mut self) {
-        // One that has ended cannot be ended; neither can be helped.
+        // A process that has ended cannot be killed; nothing helps against either error.
         let _ = self.0.kill();
         let _ = self.0.wait();
     }
 }
 
-/// What a program brings. If it is to stop before its end, it brings less, and its failure is told.
+/// Returns the file that a program downloads. A stop ends it early with an error.
 fn download(
     program: Program,
     url: &str,
@@ -377,7 +377,7 @@ fn download(
     let io = |error: io::Error| failed(error.to_string());
     let mut running = Running(program.command(url).spawn().map_err(io)?);
     let output = running.0.stdout.take().expect("piped");
-    // One byte more than expected is enough to know that it is too long.
+    // One byte more than expected is enough to detect a file that is too long.
     let pieces = pieces(output.take(remote.bytes + 1)).map_err(|error| failed(error.to_string()))?;
     let mut bytes = Vec::new();
     let begin = Instant::now();
@@ -418,7 +418,7 @@ fn download(
     Ok(bytes)
 }
 
-/// What a program writes, piece by piece, until it ends.
+/// Reads a program's output piece by piece until it ends.
 fn pieces(mut output: impl Read + Send + 'static) -> Result<Receiver<io::Result<Vec<u8>>>, Error> {
     let (sender, receiver) = mpsc::sync_channel(4);
     let read = move || {
@@ -440,7 +440,7 @@ fn pieces(mut output: impl Read + Send + 'static) -> Result<Receiver<io::Result<
     Ok(receiver)
 }
 
-/// The last line that a program says, without its name, and the address and time before an error.
+/// Returns a program's last message, without its name and an error's address and time.
 fn last_line(program: Program, said: &str) -> Option<String> {
     let line = said.lines().map(str::trim).rfind(|line| !line.is_empty())?;
     let line = line.strip_prefix(program.name()).and_then(|line| line.strip_prefix(": ")).unwrap_or(line);

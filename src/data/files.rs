@@ -1,4 +1,4 @@
-//! Where the files of a dataset are looked for, and their loading.
+//! Finding and loading the files of a dataset.
 
 use crate::base::files::home_expanded;
 use crate::base::hash::{hex, sha256_hex};
@@ -15,15 +15,15 @@ use std::fmt;
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// Height and width of the images of a dataset of this name, if it is one that everybody has.
+/// Returns the height and width of the images of a published dataset, if the name is one's.
 pub(crate) fn published_size(name: &str) -> Option<[usize; 2]> {
     (name == BUILTIN || FETCHABLE.contains(&name)).then_some([BuiltinDigits::SIDE; 2])
 }
 
-/// A folder in which someone says the data are.
+/// A folder that should hold the data.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Place {
-    /// Who says so, as the user knows it: "as given", "MORPHCOG_DATA", `[data] dir`.
+    /// Origin of the folder in the user's terms: "as given", "MORPHCOG_DATA", `[data] dir`.
     pub origin: String,
     /// The folder. If it has a subfolder with the dataset's name, that is used, so one folder can
     /// hold several datasets.
@@ -36,11 +36,11 @@ impl fmt::Display for Place {
     }
 }
 
-/// The places that were given, in order of precedence: the option `--data`, the environment
-/// variable `MORPHCOG_DATA` (its value, empty counts as not set), and the config's `[data] dir`.
+/// Returns the given places, in order of precedence: the option `--data`, the environment variable
+/// `MORPHCOG_DATA` (its value; empty counts as not set), and the config's `[data] dir`.
 ///
-/// The first one is used and has to work: silently reading other data than the user named would be
-/// worse than an error.
+/// Only the first one is used, and must work: silently reading other data than the user named would
+/// be worse than an error.
 pub fn places(option: Option<&Path>, environment: Option<OsString>, config: Option<&Path>) -> Vec<Place> {
     let environment = environment.filter(|value| !value.is_empty()).map(PathBuf::from);
     [
@@ -53,18 +53,18 @@ pub fn places(option: Option<&Path>, environment: Option<OsString>, config: Opti
     .collect()
 }
 
-/// Where a dataset is looked for if no place is given, and where it is downloaded to:
+/// Returns the folder of a dataset if no place is given, which is also the target of downloads:
 /// `data/<name>`.
 pub fn default_folder(name: &str) -> PathBuf {
     Path::new("data").join(name)
 }
 
-/// Why a dataset's files cannot be used: which file, where, what was expected; [`remedies`] say what to do.
+/// The reason why a dataset's files cannot be used: file, place and expectation; see [`remedies`].
 ///
 /// [`remedies`]: FilesError::remedies
 #[derive(Debug, thiserror::Error)]
 pub enum FilesError {
-    /// A name that cannot be a folder's name.
+    /// The name cannot be a folder's name.
     #[error("\"{0}\" cannot be the name of a dataset: expected letters, digits, '-', '_' and '.'")]
     Name(String),
     /// The folder cannot be listed.
@@ -72,14 +72,14 @@ pub enum FilesError {
     Folder {
         /// Name of the dataset.
         dataset: String,
-        /// Where it was looked for.
+        /// The folder.
         place: Box<Place>,
-        /// What the system says.
+        /// The system's error.
         source: io::Error,
-        /// What to do.
+        /// The user's alternatives.
         remedies: Vec<Remedy>,
     },
-    /// A file is not there.
+    /// A file is missing.
     #[error(
         "{dataset}: the {split} {content} are missing: expected {expected} (or with .gz, or a name ending so) \
          in {place}"
@@ -93,12 +93,12 @@ pub enum FilesError {
         content: &'static str,
         /// The file's standard name.
         expected: String,
-        /// Where it was looked for.
+        /// The folder.
         place: Box<Place>,
-        /// What to do.
+        /// The user's alternatives.
         remedies: Vec<Remedy>,
     },
-    /// Several files could be meant.
+    /// Several files match.
     #[error(
         "{dataset}: several files in {place} could be the {split} {content}: {}; keep one, or one dataset per folder",
         found.join(", ")
@@ -110,20 +110,20 @@ pub enum FilesError {
         split: Split,
         /// "images" or "labels".
         content: &'static str,
-        /// Where it was looked for.
+        /// The folder.
         place: Box<Place>,
-        /// The files in question.
+        /// The files that match.
         found: Vec<String>,
     },
-    /// A file is there but not what it should be.
+    /// A file is broken or of the wrong kind.
     #[error("{source}")]
     Broken {
-        /// What is wrong with which file.
+        /// The error, which names the file.
         source: IdxError,
-        /// What to do.
+        /// The user's alternatives.
         remedies: Vec<Remedy>,
     },
-    /// Images and labels do not belong together.
+    /// Numbers of images and labels differ.
     #[error(
         "{}: holds {labels} labels, expected {images}, one for each image in {}",
         label_file.display(), image_file.display()
@@ -137,13 +137,13 @@ pub enum FilesError {
         image_file: PathBuf,
         /// Number of images in it.
         images: usize,
-        /// What to do.
+        /// The user's alternatives.
         remedies: Vec<Remedy>,
     },
 }
 
 impl FilesError {
-    /// What the user can do.
+    /// Returns the user's alternatives.
     pub fn remedies(&self) -> &[Remedy] {
         match self {
             FilesError::Name(_) => &[Remedy::NameData],
@@ -156,20 +156,20 @@ impl FilesError {
     }
 }
 
-/// The images of one split, and where they came from.
+/// The images of one split and their origin.
 #[derive(Clone, Debug)]
 pub(crate) struct StoredSplit {
     pub images: IdxImages,
-    /// Whether their rows and columns are exchanged in the files.
+    /// True if their rows and columns are exchanged in the files.
     pub transposed: bool,
     pub files: Vec<FileInfo>,
     pub fingerprint: String,
 }
 
-/// Whether a dataset can have a name: that of a folder.
+/// Checks that a name can be a dataset's: it must be a folder's.
 ///
 /// # Errors
-/// [`FilesError::Name`] if not.
+/// Returns [`FilesError::Name`] otherwise.
 pub fn check_name(name: &str) -> Result<(), FilesError> {
     let allowed = |c: char| c.is_ascii_alphanumeric() || "-_.".contains(c);
     match name.is_empty() || name.starts_with('.') || !name.chars().all(allowed) {
@@ -178,8 +178,7 @@ pub fn check_name(name: &str) -> Result<(), FilesError> {
     }
 }
 
-/// The place that is used: the first given one, or else the default; its path is the folder with
-/// the files.
+/// Chooses the first given place, or else the default; its path is the folder with the files.
 pub(crate) fn choose(name: &str, given: &[Place]) -> Result<Place, FilesError> {
     check_name(name)?;
     Ok(match given.first() {
@@ -192,8 +191,8 @@ pub(crate) fn choose(name: &str, given: &[Place]) -> Result<Place, FilesError> {
     })
 }
 
-/// The labels and images of one split; `transpose` says whether rows and columns of the images are
-/// exchanged, as in EMNIST's files. By default that is known by their names.
+/// Loads the labels and images of one split. `transpose` says whether rows and columns of the
+/// images are exchanged, as in EMNIST's files, which are recognised by their names by default.
 pub(crate) fn load(
     name: &str,
     place: &Place,
@@ -203,7 +202,7 @@ pub(crate) fn load(
     let broken =
         |source: IdxError| FilesError::Broken { remedies: remedies(name, place, !source.is_io()), source };
     let (image_file, beginning) = find(name, place, split, "images", None)?;
-    // Those of another set in the same folder would be as many.
+    // Another set in the same folder might have as many labels.
     let (label_file, _) = find(name, place, split, "labels", Some(&beginning))?;
     let mut images = idx::read_images(&image_file).map_err(broken)?;
     let transposed = transpose.unwrap_or_else(|| is_emnist(name, place, &image_file));
@@ -235,8 +234,8 @@ pub(crate) fn load(
     Ok((labels.content, StoredSplit { images: images.content, transposed, files, fingerprint }))
 }
 
-/// Whether images are EMNIST's, which is published with rows and columns exchanged, by the names of
-/// their dataset, file or folder. (The folder of a published dataset may be called anything.)
+/// Returns true if images are EMNIST's, which is published with rows and columns exchanged, by the
+/// names of their dataset, file or folder. (A published dataset may be in a folder of any name.)
 fn is_emnist(dataset: &str, place: &Place, image_file: &Path) -> bool {
     let folder = place.path.canonicalize().unwrap_or_else(|_| place.path.clone());
     let folder = folder.file_name().filter(|_| !FETCHABLE.contains(&dataset));
@@ -247,7 +246,7 @@ fn is_emnist(dataset: &str, place: &Place, image_file: &Path) -> bool {
     })
 }
 
-/// The standard names (without .gz) of a split's images or labels, the most usual first.
+/// Returns the standard names (without .gz) of a split's images or labels, the most common first.
 fn standard_names(split: Split, content: &str) -> Vec<String> {
     let stems: &[&str] = match split {
         Split::Train => &["train"],
@@ -258,10 +257,10 @@ fn standard_names(split: Split, content: &str) -> Vec<String> {
     stems.iter().flat_map(spelled).collect()
 }
 
-/// The file of a split's images or labels: one of a standard name, or else the only one whose name
-/// ends in one (EMNIST's `emnist-digits-train-images-idx3-ubyte.gz`), in capitals or small letters.
-/// Several, such as a file and the same one gzipped, must hold the same. With how its name begins,
-/// up to the content; `beginning` is how it must.
+/// Finds the file of a split's images or labels: one with a standard name, or else the only one
+/// whose name ends in one (EMNIST's `emnist-digits-train-images-idx3-ubyte.gz`), in upper or lower
+/// case. Several, such as a file and its gzipped copy, must have the same content. Returns the path
+/// and the beginning of the name, up to the content; `beginning` requires one.
 fn find(
     name: &str,
     place: &Place,
@@ -278,7 +277,7 @@ fn find(
         }
     };
     let standard = standard_names(split, content);
-    // Those of a standard name go before all others, in the order of these names; gzipped ones first.
+    // Standard names go before all others, in their own order; gzipped files first.
     let mut found: Vec<(usize, String, &String)> = Vec::new();
     for file in present.iter().rev() {
         let base = bare(file);
@@ -309,13 +308,13 @@ fn find(
     Ok((place.path.join(file), begins(base, content).to_string()))
 }
 
-/// A file's name as names are compared: in small letters, without the ending of gzipped ones.
+/// Returns a file's name for comparisons: in lower case, without the ending of gzipped files.
 fn bare(file: &str) -> String {
     let name = file.to_ascii_lowercase();
     name.strip_suffix(".gz").unwrap_or(&name).to_string()
 }
 
-/// Whether files hold the same when they are unpacked.
+/// Returns true if files have the same content after unpacking.
 fn hold_the_same(name: &str, place: &Place, files: &[&String]) -> Result<bool, FilesError> {
     if files.len() < 2 {
         return Ok(true);
@@ -329,13 +328,13 @@ fn hold_the_same(name: &str, place: &Place, files: &[&String]) -> Result<bool, F
     Ok(sums.len() == 1)
 }
 
-/// How a file's name begins, before what it holds.
+/// Returns the beginning of a file's name, before the kind of its content.
 fn begins<'a>(base: &'a str, content: &str) -> &'a str {
     &base[..base.rfind(content).unwrap_or(base.len())]
 }
 
-/// Names of what a folder holds and is no folder, also of links that lead nowhere: to read them says
-/// so. Not of hidden files, as macOS puts beside others.
+/// Returns the names of all entries of a folder that are not folders. Includes broken links, since
+/// reading them reports the problem. Leaves out hidden files, such as those that macOS adds.
 fn file_names(folder: &Path) -> io::Result<BTreeSet<String>> {
     let mut names = BTreeSet::new();
     for entry in std::fs::read_dir(folder)? {
@@ -347,7 +346,7 @@ fn file_names(folder: &Path) -> io::Result<BTreeSet<String>> {
     Ok(names)
 }
 
-/// What to do about files that are missing or (`replace`) wrong.
+/// Returns remedies for files that are missing or (`replace`) wrong.
 fn remedies(name: &str, place: &Place, replace: bool) -> Vec<Remedy> {
     if !FETCHABLE.contains(&name) {
         let put = Remedy::advice("put its IDX files there");
@@ -370,8 +369,7 @@ mod tests {
     use crate::data::dataset::{Dataset, DatasetError};
     use std::fs;
 
-    /// Writes images and labels under the given names; every pixel of image i is i, label i is 10 −
-    /// i.
+    /// Writes images and labels under the given names; pixels of image i are i, its label 10 − i.
     fn write(folder: &Path, images: &str, labels: &str, count: u8) {
         let pixels: Vec<u8> = (0..count).flat_map(|i| [i; 6]).collect();
         let values: Vec<u8> = (0..count).map(|i| 10 - i).collect();
@@ -392,7 +390,7 @@ mod tests {
         Error::from(Dataset::load(name, &given(folder), &[split]).unwrap_err()).remedies
     }
 
-    /// The command that downloads a dataset into a folder.
+    /// Returns the command that downloads a dataset into a folder.
     fn fetching(name: &str, folder: &Path) -> Invocation {
         Invocation::new("data fetch").value(name).option("to", folder)
     }
@@ -511,7 +509,7 @@ mod tests {
             assert!(message.contains(&plain) && message.contains(other), "{message}");
             fs::remove_file(folder.path().join(other)).unwrap();
         }
-        // A copy that is cut off is no copy.
+        // A truncated copy is no copy.
         fs::write(folder.path().join(&zipped), [0x1f, 0x8b]).unwrap();
         let message = failure("own", folder.path(), Split::Train);
         assert!(message.contains("cannot be unpacked") && message.contains(&zipped), "{message}");
@@ -540,7 +538,7 @@ mod tests {
         assert!(message.starts_with(&expected) && message.contains("link to elsewhere"), "{message}");
     }
 
-    /// A single image of two rows of three pixels, 0 to 5, and what is seen of it.
+    /// Writes a single image of two rows of three pixels, 0 to 5, and returns it as loaded.
     fn seen(dataset: &str, folder: &Path, prefix: &str, transpose: Option<bool>) -> Vec<Vec<u8>> {
         let name = |content| folder.join(format!("{prefix}train-{content}-ubyte"));
         let pixels = [idx::header(&[1, 2, 3]), (0..6).collect()].concat();
@@ -562,7 +560,7 @@ mod tests {
         assert_eq!(seen("own", &at("EMNIST"), "", None), turned);
         assert_eq!(seen("own", &at("c"), "", None), stored);
         assert_eq!(seen("mnist", &at("EMNIST"), "", None), stored);
-        // One of another name, whose images stand upright.
+        // A similar name, whose images are upright.
         assert_eq!(seen("femnist", &at("d"), "femnist-", None), stored);
         assert_eq!(seen("own", &at("e"), "", Some(true)), turned);
         assert_eq!(seen("own", &at("f"), "emnist-letters-", Some(false)), stored);

@@ -1,11 +1,9 @@
-//! The IDX format (<http://yann.lecun.com/exdb/mnist/>): how MNIST and its look-alikes store images
-//! and labels.
+//! The IDX format (<http://yann.lecun.com/exdb/mnist/>)of MNIST and its look-alikes.
 //!
-//! A file is a magic number (two zero bytes, the type of the numbers, how many dimensions), the
-//! length of every dimension as a big-endian 32-bit number, and the numbers themselves in row-major
-//! order. Here the numbers are unsigned bytes; images have three dimensions (count, rows, columns),
-//! labels one. Counts and sizes are taken from the header, and the file must hold exactly what its
-//! header announces.
+//! A file is a magic number (two zero bytes, the type of the numbers, the number of dimensions),
+//! the length of every dimension as a big-endian 32-bit number, and the numbers in row-major order.
+//! Here the numbers are unsigned bytes; images have three dimensions (count, rows, columns), labels
+//! one. The file must hold exactly the counts and sizes that its header announces.
 
 use crate::base::Grid;
 use crate::base::files::open_file;
@@ -14,8 +12,8 @@ use flate2::read::MultiGzDecoder;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
-/// More than this in one file (as stored or unpacked, bytes) is refused: it is not a set of images
-/// but a broken header or the wrong file. (MNIST: 47 MB; the whole of EMNIST: 0.6 GB.)
+/// Most bytes of one file, stored or unpacked. A larger file is not a set of images but has a
+/// broken header or is the wrong file. (MNIST: 47 MB; the whole of EMNIST: 0.6 GB.)
 pub const MAX_BYTES: u64 = 1 << 30;
 
 /// Type code of unsigned bytes in a magic number.
@@ -30,20 +28,19 @@ pub struct IdxImages {
     pub height: usize,
     /// Columns per image, at least 1.
     pub width: usize,
-    /// All pixels (0 … 255), image after image, row-major from the top left: count × height × width
-    /// of them.
+    /// All count × height × width pixels (0 … 255), image after image, row-major from the top left.
     pub pixels: Vec<u8>,
 }
 
 impl IdxImages {
-    /// One image; `None` beyond the last.
+    /// Returns one image; `None` beyond the last.
     pub fn image(&self, index: usize) -> Option<Grid<u8>> {
         let first = index.checked_mul(self.height)?;
         let rows = self.pixels.chunks(self.width).skip(first).take(self.height);
         Grid::from_rows(rows.map(<[u8]>::to_vec).collect()).ok()
     }
 
-    /// The same images with rows and columns exchanged.
+    /// Exchanges rows and columns of all images.
     #[must_use]
     pub fn transposed(mut self) -> Self {
         let (height, width) = (self.height, self.width);
@@ -57,18 +54,18 @@ impl IdxImages {
     }
 }
 
-/// What was read, and which bytes on disk it came from.
+/// The content of a file, and the bytes on disk that it came from.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct IdxFile<T> {
     /// The decoded content.
     pub content: T,
-    /// Size of the file as found (compressed, if it is), bytes.
+    /// Size of the stored file (compressed, if it is), bytes.
     pub bytes: u64,
-    /// SHA-256 of the file as found, in hexadecimal.
+    /// SHA-256 of the stored file, in hexadecimal.
     pub sha256: String,
 }
 
-/// Why a file is not the IDX file that was expected. Every message names the file.
+/// The reason why a file is not the expected IDX file. Every message names the file.
 #[derive(Debug, thiserror::Error)]
 pub enum IdxError {
     /// The file cannot be opened or read.
@@ -76,7 +73,7 @@ pub enum IdxError {
     Io {
         /// The file.
         file: PathBuf,
-        /// What the system says.
+        /// The system's error.
         source: io::Error,
     },
     /// The gzip stream is broken.
@@ -84,7 +81,7 @@ pub enum IdxError {
     Gzip {
         /// The file.
         file: PathBuf,
-        /// What the unpacker says.
+        /// The unpacker's error.
         source: io::Error,
     },
     /// The file ends within its header.
@@ -97,7 +94,7 @@ pub enum IdxError {
         file: PathBuf,
         /// Length of the header, bytes.
         expected: usize,
-        /// How much of it there is.
+        /// Number of bytes found.
         found: usize,
     },
     /// The first four bytes are not those of an IDX file of unsigned bytes.
@@ -111,13 +108,12 @@ pub enum IdxError {
         file: PathBuf,
         /// Number of dimensions expected.
         dimensions: u8,
-        /// What the file should hold.
+        /// Expected content.
         what: &'static str,
         /// The first four bytes (after unpacking).
         found: [u8; 4],
     },
-    /// An IDX file of unsigned bytes, but of another shape (labels where images were expected,
-    /// say).
+    /// An IDX file of unsigned bytes has another shape (for example labels instead of images).
     #[error(
         "{}: wrong number of dimensions: expected {expected} ({what}), found {found}; \
          are the image and the label file mixed up?",
@@ -128,7 +124,7 @@ pub enum IdxError {
         file: PathBuf,
         /// Number of dimensions expected.
         expected: u8,
-        /// What the file should hold.
+        /// Expected content.
         what: &'static str,
         /// Number of dimensions in the magic number.
         found: u8,
@@ -140,10 +136,10 @@ pub enum IdxError {
         file: PathBuf,
         /// Lengths of the dimensions, from the header.
         sizes: Vec<u32>,
-        /// What the dimensions are.
+        /// Names of the dimensions.
         axes: &'static str,
     },
-    /// The header announces more than [`MAX_BYTES`]; nothing of that size has been allocated.
+    /// The header announces more than [`MAX_BYTES`]; nothing of that size was allocated.
     #[error(
         "{}: the header says {sizes:?} ({axes}), which is more than the {MAX_BYTES} bytes accepted; \
          the header is broken or this is not a set of images",
@@ -154,7 +150,7 @@ pub enum IdxError {
         file: PathBuf,
         /// Lengths of the dimensions, from the header.
         sizes: Vec<u32>,
-        /// What the dimensions are.
+        /// Names of the dimensions.
         axes: &'static str,
     },
     /// The file itself is larger than [`MAX_BYTES`].
@@ -165,7 +161,7 @@ pub enum IdxError {
         /// Its size, bytes.
         found: u64,
     },
-    /// Fewer numbers than the header announces.
+    /// There are fewer numbers than the header announces.
     #[error(
         "{}: too short: {expected} bytes were expected after the header, found {found}; \
          the file is cut off", file.display()
@@ -175,10 +171,10 @@ pub enum IdxError {
         file: PathBuf,
         /// Bytes announced after the header.
         expected: u64,
-        /// Bytes there are.
+        /// Bytes found.
         found: u64,
     },
-    /// More numbers than the header announces.
+    /// There are more numbers than the header announces.
     #[error(
         "{}: too long: {expected} bytes were expected after the header, found more; \
          the header is wrong or something was appended", file.display()
@@ -192,16 +188,16 @@ pub enum IdxError {
 }
 
 impl IdxError {
-    /// Whether the file could not even be opened or read, as opposed to holding the wrong thing.
+    /// Returns true if the file could not be opened or read; false if it has the wrong content.
     pub fn is_io(&self) -> bool {
         matches!(self, IdxError::Io { .. })
     }
 }
 
-/// Reads an IDX3 file of unsigned bytes, raw or gzipped (told apart by content, not by name).
+/// Reads an IDX3 file of unsigned bytes, raw or gzipped (detected by content, not by name).
 ///
 /// # Errors
-/// [`IdxError`] if the file cannot be read or is anything but exactly such a file.
+/// Returns an [`IdxError`] if the file cannot be read or is anything but exactly such a file.
 pub fn read_images(file: &Path) -> Result<IdxFile<IdxImages>, IdxError> {
     let stored = read_file(file)?;
     let (sizes, pixels) = decode::<3>(file, &stored, "images", "count, rows, columns")?;
@@ -209,19 +205,17 @@ pub fn read_images(file: &Path) -> Result<IdxFile<IdxImages>, IdxError> {
     Ok(with_origin(&stored, IdxImages { count, height, width, pixels }))
 }
 
-/// Reads an IDX1 file of unsigned bytes, raw or gzipped (told apart by content, not by name): one
-/// label per image.
+/// Reads labels, an IDX1 file of unsigned bytes, raw or gzipped (detected by content, not by name).
 ///
 /// # Errors
-/// [`IdxError`] if the file cannot be read or is anything but exactly such a file.
+/// Returns an [`IdxError`] if the file cannot be read or is anything but exactly such a file.
 pub fn read_labels(file: &Path) -> Result<IdxFile<Vec<u8>>, IdxError> {
     let stored = read_file(file)?;
     let (_, labels) = decode::<1>(file, &stored, "labels", "count")?;
     Ok(with_origin(&stored, labels))
 }
 
-/// The header of an IDX file of unsigned bytes with these sizes: magic number and big-endian
-/// lengths.
+/// Returns the header of unsigned bytes with these sizes: magic number and big-endian lengths.
 pub fn header(sizes: &[u32]) -> Vec<u8> {
     let mut bytes = vec![0, 0, UNSIGNED_BYTE, sizes.len() as u8];
     bytes.extend(sizes.iter().flat_map(|size| size.to_be_bytes()));
@@ -235,7 +229,7 @@ fn with_origin<T>(stored: &[u8], content: T) -> IdxFile<T> {
 fn read_file(file: &Path) -> Result<Vec<u8>, IdxError> {
     let io = |source| IdxError::Io { file: file.to_path_buf(), source };
     let found = std::fs::metadata(file).map_err(|error| io(nowhere(file, error)))?;
-    // To open a pipe would wait for someone who writes to it.
+    // Opening a pipe would wait for a writer.
     if !found.is_file() {
         return Err(io(io::Error::other("it is not a regular file")));
     }
@@ -247,7 +241,7 @@ fn read_file(file: &Path) -> Result<Vec<u8>, IdxError> {
     Ok(stored)
 }
 
-/// Why a file is not there: a link to it may lead nowhere.
+/// Explains why a file is missing: a link to it may be broken.
 fn nowhere(file: &Path, error: io::Error) -> io::Error {
     match file.read_link() {
         Ok(to) if error.kind() == io::ErrorKind::NotFound => {
@@ -257,10 +251,10 @@ fn nowhere(file: &Path, error: io::Error) -> io::Error {
     }
 }
 
-/// The content of a file, unpacked if it is gzipped.
+/// Returns the content of a file, unpacked if it is gzipped.
 ///
 /// # Errors
-/// [`IdxError`] if it cannot be read or unpacked, or has more than [`MAX_BYTES`].
+/// Returns an [`IdxError`] if it cannot be read or unpacked, or has more than [`MAX_BYTES`].
 pub(crate) fn unpacked(file: &Path) -> Result<Vec<u8>, IdxError> {
     let stored = read_file(file)?;
     let mut content = Vec::new();
@@ -272,7 +266,7 @@ pub(crate) fn unpacked(file: &Path) -> Result<Vec<u8>, IdxError> {
     }
 }
 
-/// Why what is in a file was not got out of it.
+/// Turns an unpacker's error into one of the file.
 fn unpacking(file: &Path, source: io::Error) -> IdxError {
     let file = file.to_path_buf();
     match source.kind() {
@@ -288,7 +282,7 @@ fn reader(stored: &[u8]) -> Box<dyn Read + '_> {
     }
 }
 
-/// The lengths of the N dimensions and the numbers.
+/// Returns the lengths of the N dimensions and the numbers.
 fn decode<const N: usize>(
     file: &Path,
     stored: &[u8],
@@ -327,7 +321,7 @@ fn decode<const N: usize>(
         return Err(IdxError::Absurd { file, sizes, axes });
     };
 
-    // Grown by what is really there: a header that lies costs nothing.
+    // The vector grows with what is really there, so a false header costs nothing.
     let mut numbers = Vec::new();
     content.take(expected + 1).read_to_end(&mut numbers).map_err(broken)?;
     let found = numbers.len() as u64;
@@ -342,8 +336,8 @@ fn decode<const N: usize>(
 
 #[cfg(test)]
 mod tests {
-    //! Contract of the IDX reader on broken files; `tests/library/idx_reader.rs` compares it with another
-    //! reader.
+    //! Contract of the IDX reader on broken files; `tests/library/idx_reader.rs` compares it to
+    //! another.
 
     use super::*;
     use flate2::{Compression, write::GzEncoder};
@@ -418,7 +412,7 @@ mod tests {
         assert!(matches!(empty, IdxError::Zero { .. }), "{empty}");
         let absurd = error(&images([u32::MAX, u32::MAX, u32::MAX], &[]));
         assert!(matches!(absurd, IdxError::Absurd { .. }), "{absurd}");
-        // 1 GB announced, none there: within the limit, so only the reading finds out.
+        // 1 GB announced, none there: within the limit, so only reading detects it.
         let lie = error(&images([1 << 20, 32, 32], &[0; 10]));
         assert!(matches!(lie, IdxError::Short { found: 10, .. }), "{lie}");
     }

@@ -1,26 +1,25 @@
-//! What is recorded about a dataset, so that a result can be traced to the very images it came
-//! from.
+//! Record of a dataset, by which a result can be traced to the exact images behind it.
 
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fmt;
 
-/// What a run records about its dataset.
+/// A run's record of its dataset.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct DatasetInfo {
     /// Name: "mnist", "fashion-mnist", "builtin" or the user's own.
     pub name: String,
     /// The folder it was read from, or "builtin".
     pub source: String,
-    /// Who named that folder ("as given", "MORPHCOG_DATA", `[data] dir`, "default"), or "builtin".
+    /// Origin of that folder ("as given", "MORPHCOG_DATA", `[data] dir`, "default"), or "builtin".
     pub origin: String,
     /// The splits that were loaded.
     pub splits: BTreeMap<Split, SplitInfo>,
 }
 
 impl DatasetInfo {
-    /// In what training and test images differ where results should not depend on it: sizes, and
-    /// classes that only one split has.
+    /// Lists unintended differences between training and test images: sizes, and classes in one
+    /// only.
     pub fn differences(&self) -> Vec<String> {
         let [Some(train), Some(test)] = Split::ALL.map(|split| self.splits.get(&split)) else {
             return Vec::new();
@@ -43,7 +42,7 @@ impl DatasetInfo {
     }
 }
 
-/// What a run records about one split.
+/// A run's record of one split.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SplitInfo {
     /// Number of images.
@@ -52,11 +51,11 @@ pub struct SplitInfo {
     pub height: usize,
     /// Columns per image.
     pub width: usize,
-    /// SHA-256 of the content; for files: of the unpacked image file followed by the unpacked label
-    /// file (the same whether they are gzipped or not), the images transposed if they are; for
-    /// built-in digits: of their parameters.
+    /// SHA-256 of the content. For files: of the unpacked image file followed by the unpacked label
+    /// file (whether or not they are gzipped), with the images transposed if they are. For built-in
+    /// digits: of their parameters.
     pub fingerprint: String,
-    /// Whether the images are those of the files with rows and columns exchanged.
+    /// True if rows and columns of the images are exchanged in the files.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub transposed: bool,
     /// Number of images of every class that occurs.
@@ -80,9 +79,9 @@ pub struct FileInfo {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Split {
-    /// What robots are evolved on.
+    /// Images for evolution and training.
     Train,
-    /// Held out: what they are tested on.
+    /// Held-out images for tests.
     Test,
 }
 
@@ -90,7 +89,7 @@ impl Split {
     /// Both, training first.
     pub const ALL: [Split; 2] = [Split::Train, Split::Test];
 
-    /// The split's number in names of random streams: part of every result.
+    /// Returns the split's number in names of random streams, which is part of every result.
     pub(crate) fn code(self) -> u64 {
         match self {
             Split::Train => 0,

@@ -1,5 +1,4 @@
-//! Images: the IDX reader, where datasets lie and where they come from, the digits that the program
-//! draws.
+//! Images: the IDX reader, places and sources of datasets, and the digits that the program draws.
 
 pub mod builtin;
 pub mod catalogue;

@@ -1,7 +1,7 @@
 //! The pen that writes the built-in digits: variation of the strokes, and anti-aliased drawing.
 //!
-//! As in MNIST, the ink is scaled to a box of about 20 × 20 pixels and put in the middle of 28 ×
-//! 28. Everything here ends up in stimuli, so transcendental functions come from `libm` alone.
+//! As in MNIST, the ink is scaled to a box of about 20 × 20 pixels in the middle of 28 × 28. All of
+//! this ends up in stimuli, so transcendental functions come from `libm` alone.
 
 use crate::base::Grid;
 use crate::base::random::Stream;
@@ -11,25 +11,25 @@ use std::f64::consts::TAU;
 /// Rows and columns of a built-in digit.
 pub(crate) const SIDE: usize = 28;
 
-/// Changes whenever any pixel of any digit does; part of the fingerprints.
+/// Version of the drawing: changes whenever any pixel of any digit does; part of the fingerprints.
 pub(crate) const DRAWING: u32 = 1;
 
 /// Longer side of the ink before its size is varied, pixels (MNIST: 20).
 const BOX: f64 = 20.0;
 /// Least distance of ink from the border, pixels.
 const MARGIN: f64 = 1.0;
-/// Most that pressure adds to the pen's radius, as a share of it.
+/// Most that pressure adds to the pen's radius, as a fraction of it.
 const PRESSURE: f64 = 0.28;
 /// Pieces into which the line between two places is cut.
 const PIECES: usize = 8;
 /// Standard deviation of a place's displacement, in digit heights.
 const PLACE_SPREAD: f64 = 0.028;
-/// How much of a place's displacement the next one shares: a hand drifts rather than jumps.
+/// Fraction of a place's displacement that the next one shares: a hand drifts rather than jumps.
 const DRIFT: f64 = 0.75;
 
 type Point = [f64; 2];
 
-/// Writes one digit (0 … 9) in a way that the stream decides: 28 × 28, 0 paper, 255 ink.
+/// Writes one digit (0 … 9) with variations from the stream: 28 × 28, 0 paper, 255 ink.
 pub(crate) fn write(digit: u8, chance: &mut Stream) -> Grid<u8> {
     let variant = choose(DIGITS[usize::from(digit) % DIGITS.len()], chance);
     let mut lines: Vec<Vec<Point>> =
@@ -52,7 +52,7 @@ fn choose<'a>(variants: &'a [Variant], chance: &mut Stream) -> &'a Variant {
     &variants[chosen]
 }
 
-/// The stroke with every place moved a little: no two hands close a loop at the same point.
+/// Moves every place of a stroke a little: no two hands close a loop at the same point.
 fn displaced(stroke: &[Place], chance: &mut Stream) -> Vec<Place> {
     let fresh = (1.0 - DRIFT * DRIFT).sqrt();
     let mut drift = [PLACE_SPREAD * chance.normal(), PLACE_SPREAD * chance.normal()];
@@ -67,8 +67,7 @@ fn displaced(stroke: &[Place], chance: &mut Stream) -> Vec<Place> {
     stroke.iter().map(moved).collect()
 }
 
-/// A smooth line through the places (a Catmull–Rom spline), interrupted in its direction at the
-/// turns.
+/// Draws a smooth line through the places (a Catmull–Rom spline) with corners at the turns.
 fn line(places: &[Place]) -> Vec<Point> {
     let points: Vec<Point> = places
         .iter()
@@ -102,7 +101,7 @@ fn mirror(point: Point, centre: Point) -> Point {
     [2.0 * centre[0] - point[0], 2.0 * centre[1] - point[1]]
 }
 
-/// Two slow waves through the paper bend the whole digit, a quick one makes the hand shake.
+/// Bends the whole digit by two slow waves through the paper, and shakes the hand by a quick one.
 fn warp(lines: &mut [Vec<Point>], chance: &mut Stream) {
     let mut waves = Vec::new();
     for (size, low, high) in [(0.035, 0.5, 1.0), (0.02, 1.0, 1.8), (0.006, 3.0, 5.0)] {
@@ -122,11 +121,11 @@ fn warp(lines: &mut [Vec<Point>], chance: &mut Stream) {
     }
 }
 
-/// Aspect, slant (to the right on average, as most hands write) and rotation.
+/// Varies aspect, slant (to the right on average, as most hands write) and rotation.
 fn tilt(lines: &mut [Vec<Point>], digit: u8, chance: &mut Stream) {
     let aspect = libm::exp(0.13 * chance.normal());
     let slant = (0.14 + 0.17 * chance.normal()).clamp(-0.3, 0.6);
-    // A one may lie further over than the others: nothing else looks like it.
+    // A one may lean further than the others: nothing else looks like it.
     let spread = if digit == 1 { 0.12 } else { 0.07 };
     let turn = (spread * chance.normal()).clamp(-2.5 * spread, 2.5 * spread);
     let (sin, cos) = (libm::sin(turn), libm::cos(turn));
@@ -136,8 +135,7 @@ fn tilt(lines: &mut [Vec<Point>], digit: u8, chance: &mut Stream) {
     }
 }
 
-/// Scales the lines to the ink box and puts them about the middle of the image; from here on in
-/// pixels.
+/// Scales the lines to the ink box near the middle of the image; from here on in pixels.
 fn fit(lines: &mut [Vec<Point>], radius: f64, chance: &mut Stream) {
     let mut low = [f64::INFINITY; 2];
     let mut high = [f64::NEG_INFINITY; 2];
@@ -165,7 +163,7 @@ fn fit(lines: &mut [Vec<Point>], radius: f64, chance: &mut Stream) {
     }
 }
 
-/// Draws the lines with a round pen whose pressure changes on the way; one pixel of soft edge.
+/// Draws the lines with a round pen whose pressure varies along the way; one pixel of soft edge.
 fn ink(lines: &[Vec<Point>], radius: f64, chance: &mut Stream) -> Grid<u8> {
     let pressure = (PRESSURE / 2.0 * chance.normal()).clamp(-PRESSURE, PRESSURE);
     let (rate, phase) = (chance.uniform(0.5, 1.6), TAU * chance.unit());
@@ -181,8 +179,7 @@ fn ink(lines: &[Vec<Point>], radius: f64, chance: &mut Stream) -> Grid<u8> {
     cover.map(|&c| (255.0 * c).round() as u8)
 }
 
-/// Draws one straight piece: how much of a pixel is covered follows from its middle's distance to
-/// the piece.
+/// Draws one straight piece; a pixel's coverage follows from its centre's distance to the piece.
 fn segment(cover: &mut Grid<f64>, from: Point, to: Point, radius: f64) {
     let reach = radius + 1.0;
     let range = |axis: usize| {

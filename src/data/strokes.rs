@@ -1,7 +1,7 @@
-//! How the built-in digits are written: the strokes of every digit, in the ways people write it.
+//! Strokes of the built-in digits: every digit in the ways people write it.
 //!
-//! A stroke is a list of places the pen passes; [`crate::data::pen`] draws a smooth line through
-//! them and varies everything. Coordinates: x to the right, y down, in units of the digit's height.
+//! A stroke is a list of places that the pen passes; [`crate::data::pen`] draws a smooth line
+//! through them and varies everything. Coordinates: x to the right, y down, in digit heights.
 
 /// One place on a stroke.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -14,8 +14,7 @@ pub(crate) enum Place {
 
 use Place::{Turn, Via};
 
-/// One way of writing a digit: its strokes in writing order, and how often it is chosen (relative
-/// weight).
+/// One way of writing a digit: its strokes in writing order, and its weight.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Variant {
     /// Relative weight among the variants of its digit.

@@ -6,24 +6,24 @@ use crate::genome::function::Function;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Inputs: nodes 0 (x), 1 (y), 2 (distance to the centre) and 3 (bias).
+/// Number of inputs: nodes 0 (x), 1 (y), 2 (distance to the centre) and 3 (bias).
 pub const INPUTS: usize = 4;
-/// Outputs, one per material in the order of [`Material::ALL`]: nodes 4 … 10.
+/// Number of outputs, one per material in the order of [`Material::ALL`]: nodes 4 … 10.
 pub const OUTPUTS: usize = Material::ALL.len();
 /// Number of the first hidden node.
 pub const FIRST_HIDDEN: usize = INPUTS + OUTPUTS;
-/// Most hidden nodes a network may have (drifting ones have at most some 20).
+/// Most hidden nodes of a network (under mutation alone some 20 at most).
 pub const MAX_HIDDEN: usize = 1000;
 
 /// A weighted connection; in files `[from, to, weight]`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(from = "(usize, usize, f64)", into = "(usize, usize, f64)")]
 pub struct Edge {
-    /// Node it comes from: an input or a hidden node.
+    /// Source node: an input or a hidden node.
     pub from: usize,
-    /// Node it goes to: an output or a hidden node.
+    /// Target node: an output or a hidden node.
     pub to: usize,
-    /// Its weight, finite.
+    /// Weight, finite.
     pub weight: f64,
 }
 
@@ -37,54 +37,54 @@ pub struct Edge {
 /// ```
 ///
 /// `outputs` and `hidden` are the nodes' functions in the order of their numbers (squash is for
-/// outputs only); edges lead out of inputs and hidden nodes into outputs and hidden nodes, no two
-/// between the same nodes, no cycle.
+/// outputs only). Edges lead from inputs and hidden nodes to outputs and hidden nodes, no two join
+/// the same nodes, and they form no cycle.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(try_from = "CppnFile", into = "CppnFile")]
 pub struct Cppn {
     pub(super) outputs: [Function; OUTPUTS],
     pub(super) hidden: Vec<Function>,
-    /// Sorted by (to, from): what comes into a node is one run, summed in this order.
+    /// Sorted by (to, from): a node's incoming edges are one run, summed in this order.
     pub(super) edges: Vec<Edge>,
 }
 
 impl Cppn {
-    /// Where evolution starts: inputs fully connected to squashing outputs with weights 0.
+    /// Returns the start of evolution: inputs fully connected to squashing outputs with weights 0.
     pub fn initial() -> Self {
         let pairs = (INPUTS..FIRST_HIDDEN).flat_map(|to| (0..INPUTS).map(move |from| (from, to)));
         let edges = pairs.map(|(from, to)| Edge { from, to, weight: 0.0 }).collect();
         Cppn { outputs: [Function::Squash; OUTPUTS], hidden: Vec::new(), edges }
     }
 
-    /// Number of nodes: inputs, outputs and hidden.
+    /// Returns the number of nodes: inputs, outputs and hidden.
     pub fn node_count(&self) -> usize {
         FIRST_HIDDEN + self.hidden.len()
     }
 
-    /// Functions of the hidden nodes 11, 12, ….
+    /// Returns the functions of the hidden nodes 11, 12, ….
     pub fn hidden(&self) -> &[Function] {
         &self.hidden
     }
 
-    /// All edges, sorted by where they go to, then by where they come from.
+    /// Returns all edges, sorted by target, then by source.
     pub fn edges(&self) -> &[Edge] {
         &self.edges
     }
 
-    /// The edges into a node, sorted by where they come from.
+    /// Returns the edges into a node, sorted by source.
     pub fn incoming(&self, node: usize) -> &[Edge] {
         let start = self.edges.partition_point(|e| e.to < node);
         let count = self.edges[start..].partition_point(|e| e.to == node);
         &self.edges[start..start + count]
     }
 
-    /// The function of an output or hidden node; `None` for inputs and numbers without a node.
+    /// Returns the function of an output or hidden node; `None` for inputs and unused numbers.
     pub fn function(&self, node: usize) -> Option<Function> {
         let (outputs, hidden) = (node.checked_sub(INPUTS)?, node.checked_sub(FIRST_HIDDEN));
         self.outputs.get(outputs).or_else(|| self.hidden.get(hidden?)).copied()
     }
 
-    /// All nodes, each after its predecessors.
+    /// Returns all nodes, each after its predecessors.
     pub fn topological_order(&self) -> Vec<usize> {
         // Kahn's algorithm; nodes on a cycle are never reached.
         let mut waiting_for = vec![0; self.node_count()];
@@ -107,8 +107,8 @@ impl Cppn {
         order
     }
 
-    /// The content in bytes, the same for equal networks and only for them: numbers little-endian,
-    /// weights as their bits. What ids are made of, so it must not change within a version.
+    /// Returns the content in bytes, equal for equal networks and only for them: numbers
+    /// little-endian, weights as bits. Ids are made of it, so it must not change within a version.
     pub fn canonical_bytes(&self) -> Vec<u8> {
         let mut bytes = VERSION.to_le_bytes().to_vec();
         bytes.extend(self.outputs.iter().map(|f| *f as u8));
@@ -122,7 +122,7 @@ impl Cppn {
         bytes
     }
 
-    /// Whether an edge may be added between two nodes: there is none, and it closes no cycle.
+    /// Returns true if two nodes may get an edge: there is none, and it closes no cycle.
     pub(super) fn may_connect(&self, from: usize, to: usize) -> bool {
         self.position(from, to).is_err() && !self.is_ancestor(to, from)
     }
@@ -172,8 +172,7 @@ impl Cppn {
         self.retain_hidden(|node| fed[node] && useful[node]);
     }
 
-    /// Removes the hidden nodes not to be kept, with their edges; those behind them move up in
-    /// number.
+    /// Removes hidden nodes that `keep` rejects, with their edges; later ones move up in number.
     pub(super) fn retain_hidden(&mut self, keep: impl Fn(usize) -> bool) {
         let kept = |node: usize| node < FIRST_HIDDEN || keep(node);
         let mut next = 0..;
@@ -192,7 +191,7 @@ impl Cppn {
         self.edges.binary_search_by_key(&(to, from), |e| (e.to, e.from))
     }
 
-    /// Whether `node` is `of` or one of its predecessors, near or far.
+    /// Returns true if `node` is `of` or one of its direct or indirect predecessors.
     fn is_ancestor(&self, node: usize, of: usize) -> bool {
         let mut seen = vec![false; self.node_count()];
         let mut open = vec![of];
@@ -224,7 +223,7 @@ impl From<Edge> for (usize, usize, f64) {
 mod tests {
     use super::*;
 
-    /// x → 11 (|s|) → 12 (s²) → first output.
+    /// Makes x → 11 (|s|) → 12 (s²) → first output.
     fn chain() -> Cppn {
         let mut cppn = Cppn::initial();
         cppn.edges.clear();
@@ -271,7 +270,7 @@ mod tests {
         open.disconnect(0);
         open.prune();
         assert!(open.hidden().is_empty() && open.edges().is_empty());
-        // A node that only useless nodes feed goes with them; what is left moves up in number.
+        // A node that only useless nodes feed goes with them; the others move up in number.
         let mut unfed = chain();
         let node = unfed.add_hidden(Function::Sin);
         unfed.connect(1, node, 0.3);

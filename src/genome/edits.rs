@@ -1,4 +1,4 @@
-//! [`Edits`]: single voxels in which a body differs from what its network describes.
+//! [`Edits`]: single voxels in which a body differs from its network's description.
 
 use crate::base::Grid;
 use crate::body::{Body, MAX_SIDE, Material};
@@ -6,37 +6,37 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// Voxels that are not what a genome's network says: a direct encoding on top of the indirect one,
-/// for the last touches that no change of a network makes alone (HybrID of Clune, Beckmann, Pennock
-/// & Ofria, ECAL 2009). In files a list of `[row, column, material]`. Those outside a body's grid
-/// have no effect.
+/// Voxels that differ from the description of a genome's network: a direct encoding on top of the
+/// indirect one, for final touches that no change of a network makes alone (HybrID of Clune,
+/// Beckmann, Pennock & Ofria, ECAL 2009). In files a list of `[row, column, material]`. Edits
+/// outside a body's grid have no effect.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(try_from = "Vec<(usize, usize, Material)>", into = "Vec<(usize, usize, Material)>")]
 pub struct Edits(BTreeMap<(usize, usize), Material>);
 
-/// Why a list is not one of edits.
+/// The reason why a list is not one of edits.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum EditError {
-    /// A voxel beyond the largest body.
+    /// A voxel is beyond the largest body.
     #[error("edits: row {0}, column {1}: bodies have at most {MAX_SIDE} rows and columns")]
     Place(usize, usize),
-    /// Two edits of one voxel.
+    /// A voxel has two edits.
     #[error("edits: row {0}, column {1} is there twice")]
     Twice(usize, usize),
 }
 
 impl Edits {
-    /// Whether the body is just what the network describes.
+    /// Returns true if the body is exactly the network's.
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()
     }
 
-    /// How many voxels differ.
+    /// Returns the number of voxels that differ.
     pub fn len(&self) -> usize {
         self.0.len()
     }
 
-    /// Makes the voxel at a place (row, column) of `material`, where the network says `described`.
+    /// Makes the voxel at (row, column) of `material`, where the network has `described`.
     pub(super) fn set(&mut self, place: (usize, usize), material: Material, described: Material) {
         if material == described {
             self.0.remove(&place);
@@ -45,7 +45,7 @@ impl Edits {
         }
     }
 
-    /// What the network describes, edited.
+    /// Returns the network's body with the edits.
     pub(super) fn apply(&self, described: &Body) -> Grid<Material> {
         let voxels = described.voxels();
         Grid::from_fn(voxels.height(), voxels.width(), |row, column| {
@@ -53,7 +53,7 @@ impl Edits {
         })
     }
 
-    /// Bytes that are the same for equal edits, and only for those.
+    /// Returns bytes that are the same for equal edits, and only for those.
     pub(super) fn canonical_bytes(&self) -> Vec<u8> {
         // Rows and columns are below MAX_SIDE.
         self.0

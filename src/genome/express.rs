@@ -6,16 +6,16 @@ use crate::body::{Body, BodyError, MAX_SIDE, Material};
 use crate::genome::cppn::{Cppn, INPUTS, OUTPUTS};
 
 impl Cppn {
-    /// The body of `height` × `width` voxels the network describes: in each cell, the material
-    /// whose output is largest; the first wins a tie.
+    /// Returns the network's body of `height` × `width` voxels: each cell has the material with the
+    /// largest output; the first wins a tie.
     ///
-    /// x goes from −1 (left column) to 1 (right), y from −1 (top row) to 1 (bottom); both are 0
-    /// where there is only one column or row. The distance to the centre, √(x² + y²), is rescaled
+    /// x goes from −1 (left column) to 1 (right), y from −1 (top row) to 1 (bottom); both are 0 if
+    /// there is only one column or row. The distance to the centre, √(x² + y²), is rescaled
     /// linearly so that its smallest and largest value on the grid are −1 and 1 (0 if it is the
     /// same everywhere). The bias is 1.
     ///
     /// # Errors
-    /// [`BodyError`] if there is no cell, or more than [`MAX_SIDE`] rows or columns.
+    /// Returns a [`BodyError`] if there is no cell, or more than [`MAX_SIDE`] rows or columns.
     pub fn express(&self, height: usize, width: usize) -> Result<Body, BodyError> {
         if height == 0 || width == 0 {
             return Err(GridError::Empty.into());
@@ -36,7 +36,7 @@ impl Cppn {
         }))
     }
 
-    /// Values of the outputs in all cells, from those of the inputs.
+    /// Returns the values of the outputs in all cells, from those of the inputs.
     fn evaluate(&self, inputs: [Vec<f64>; INPUTS]) -> Vec<Vec<f64>> {
         let cells = inputs[0].len();
         let mut values = Vec::from(inputs);
@@ -56,7 +56,7 @@ impl Cppn {
     }
 }
 
-/// x, y, distance and bias of all cells in row-major order.
+/// Returns x, y, distance and bias of all cells in row-major order.
 fn inputs(height: usize, width: usize) -> [Vec<f64>; INPUTS] {
     let coordinate = |i: usize, n: usize| match n {
         1 => 0.0,
@@ -80,7 +80,7 @@ mod tests {
     use super::*;
     use crate::genome::function::Function;
 
-    /// The network with these edges only.
+    /// Makes a network with only these edges.
     fn network(hidden: &[Function], edges: &[(usize, usize, f64)]) -> Cppn {
         let mut cppn = Cppn::initial();
         (0..28).for_each(|i| cppn.set_weight(i, 0.0));
@@ -128,7 +128,7 @@ mod tests {
 
     #[test]
     fn a_hidden_node_applies_its_function_for_every_successor() {
-        // 11 = |x| goes to two outputs: both see |x|, not x.
+        // 11 = |x| goes to two outputs: both get |x|, not x.
         let cppn = network(&[Function::Abs], &[(0, 11, 1.0), (11, 5, 0.4), (11, 6, 0.5)]);
         assert_eq!(text(&cppn, 1, 3), "202");
     }

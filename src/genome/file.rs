@@ -1,4 +1,4 @@
-//! The file form of a [`Cppn`] and what is checked on reading it.
+//! The file form of a [`Cppn`] and its validation.
 
 use crate::genome::cppn::{Cppn, Edge, FIRST_HIDDEN, INPUTS, MAX_HIDDEN, OUTPUTS};
 use crate::genome::function::Function;
@@ -17,20 +17,20 @@ pub(super) struct CppnFile {
     outputs: Vec<Function>,
     /// Functions of the hidden nodes, from 11 on.
     hidden: Vec<Function>,
-    /// Edges, each `[from, to, weight]`, sorted by the node that they go to.
+    /// Edges, each `[from, to, weight]`, sorted by target node.
     edges: Vec<Edge>,
 }
 
-/// Why a file does not hold a CPPN.
+/// The reason why a file does not hold a CPPN.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum CppnError {
-    /// Another version of the file form.
+    /// The file has another version of the form.
     #[error("version {0} of the CPPN form is unknown; expected {VERSION} (made by a newer morphcog?)")]
     Version(u32),
-    /// Not one function per material.
+    /// There is not one function per material.
     #[error("outputs: {0} functions, expected {OUTPUTS}, one per material")]
     Outputs(usize),
-    /// More hidden nodes than [`MAX_HIDDEN`].
+    /// There are more hidden nodes than [`MAX_HIDDEN`].
     #[error("hidden: {0} nodes, at most {MAX_HIDDEN} are possible")]
     TooLarge(usize),
     /// A hidden node squashes.
@@ -42,17 +42,17 @@ pub enum CppnError {
          hidden node; hidden nodes are {FIRST_HIDDEN} … below {nodes}"
     )]
     Ends {
-        /// Where the edge comes from.
+        /// Source of the edge.
         from: usize,
-        /// Where it goes to.
+        /// Target of the edge.
         to: usize,
         /// Number of nodes.
         nodes: usize,
     },
-    /// Two edges between the same nodes.
+    /// Two edges join the same nodes.
     #[error("edge {0} → {1} is there twice")]
     Duplicate(usize, usize),
-    /// A weight that is infinite or not a number.
+    /// A weight is infinite or NaN.
     #[error("edge {0} → {1}: the weight must be a finite number")]
     Weight(usize, usize),
     /// The edges form a cycle.

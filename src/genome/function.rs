@@ -1,10 +1,9 @@
-//! [`Function`]: what a CPPN node does with the sum of its inputs.
+//! [`Function`]: the function of a CPPN node.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// The function of a node, applied to the weighted sum s of its predecessors (paper, section
-/// "Genome").
+/// The function of a node, of the weighted sum s of its predecessors (paper, "Genome").
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 #[repr(u8)]
@@ -27,8 +26,8 @@ pub enum Function {
     NegSqrt = 7,
 }
 
-/// Largest size of a node's value. Chains of squares would overflow to infinities, whose
-/// differences are not numbers; no sum of values this large does.
+/// Largest absolute value of a node. Chains of squares would overflow to infinities, whose
+/// differences are NaN; no sum of values this large does.
 const LIMIT: f64 = 1e100;
 
 impl Function {
@@ -44,13 +43,12 @@ impl Function {
         Function::NegSqrt,
     ];
 
-    /// The functions a hidden node may have: all but squash.
+    /// Returns the functions allowed in a hidden node: all but squash.
     pub fn for_hidden() -> &'static [Function] {
         &Self::ALL[1..]
     }
 
-    /// Replaces every sum by the function's value, at most 10¹⁰⁰ in size; what is not a number
-    /// becomes 0.
+    /// Replaces every sum by the function's value, at most 10¹⁰⁰ in size; NaN becomes 0.
     pub fn apply(self, sums: &mut [f64]) {
         match self {
             Function::Squash => each(sums, |s| 2.0 / (1.0 + libm::exp(-s)) - 1.0),

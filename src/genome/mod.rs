@@ -22,19 +22,19 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 pub use voxels::other_voxel;
 
-/// What evolution varies: a network that describes a body, and single voxels in which the body
-/// differs from that. In files `{"cppn": …, "edits": …}`, see [`Cppn`] and [`Edits`].
+/// The object of evolution: a network that describes a body, and single voxels in which the body
+/// differs. In files `{"cppn": …, "edits": …}`, see [`Cppn`] and [`Edits`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Genome {
     /// The network.
     cppn: Cppn,
-    /// Voxels that are not what the network describes.
+    /// Voxels that differ from the network's description.
     #[serde(default, skip_serializing_if = "Edits::is_empty")]
     edits: Edits,
 }
 
-/// Which bodies evolution may use (paper: 14 × 14 voxels, connected, at least three muscles).
+/// The bodies that evolution may use (paper: 14 × 14 voxels, connected, at least three muscles).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BodySpec {
     /// Rows.
@@ -46,13 +46,13 @@ pub struct BodySpec {
 }
 
 /// Most mutations in a row without a valid body. (On 14 × 14 voxels a random individual needs some
-/// 25 from nothing, seldom above 150; an offspring two or three.)
+/// 25 from scratch, seldom above 150; an offspring two or three.)
 pub const MAX_MUTATIONS: usize = 100_000;
 
-/// Mutations between two looks at whether to stop.
+/// Mutations between two checks for a stop.
 const MUTATIONS_AT_ONCE: usize = 200;
 
-/// Why there is no valid body.
+/// The reason why there is no valid body.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum GenomeError {
     /// Mutation never gave a valid body.
@@ -67,51 +67,51 @@ pub enum GenomeError {
         height: usize,
         /// Columns of the body.
         width: usize,
-        /// Muscles asked for.
+        /// Muscles required.
         min_muscles: usize,
     },
-    /// The size is not a body's.
+    /// The size is impossible for a body.
     #[error(transparent)]
     Size(#[from] BodyError),
-    /// It was stopped before there was one.
+    /// The search was stopped before there was one.
     #[error(transparent)]
     Stopped(#[from] Stopped),
 }
 
 impl Genome {
-    /// Where evolution starts: [`Cppn::initial`], an empty body.
+    /// Returns the start of evolution: [`Cppn::initial`], an empty body.
     pub fn initial() -> Self {
         Genome { cppn: Cppn::initial(), edits: Edits::default() }
     }
 
-    /// Its network.
+    /// Returns its network.
     pub fn cppn(&self) -> &Cppn {
         &self.cppn
     }
 
-    /// Voxels that are not what the network says.
+    /// Returns the voxels that differ from the network's description.
     pub fn edits(&self) -> &Edits {
         &self.edits
     }
 
-    /// One random mutation of the network (paper, section "Genome").
+    /// Applies one random mutation to the network (paper, section "Genome").
     pub fn mutate(&mut self, params: &MutationParams, rng: &mut Stream) {
         mutation::mutate(&mut self.cppn, params, rng);
     }
 
-    /// The body it describes, of `height` × `width` voxels.
+    /// Returns its body, of `height` × `width` voxels.
     ///
     /// # Errors
-    /// [`BodyError`] if the size is not a body's.
+    /// Returns a [`BodyError`] if the size is impossible for a body.
     pub fn body(&self, height: usize, width: usize) -> Result<Body, BodyError> {
         let described = self.cppn.express(height, width)?;
         if self.edits.is_empty() { Ok(described) } else { Body::new(self.edits.apply(&described)) }
     }
 
-    /// A copy whose body is this one: what its network does not say is edited.
+    /// Returns a copy with this body: voxels that differ from the network's are edited.
     ///
     /// # Errors
-    /// [`BodyError`] if the size is not a body's.
+    /// Returns a [`BodyError`] if the size is impossible for a body.
     pub fn with_body(&self, body: &Body) -> Result<Self, BodyError> {
         let described = self.cppn.express(body.height(), body.width())?;
         let mut edits = Edits::default();
@@ -121,7 +121,7 @@ impl Genome {
         Ok(Genome { cppn: self.cppn.clone(), edits })
     }
 
-    /// A short id, the same for the same genome: the first ten hexadecimal digits of its
+    /// Returns a short id, the same for the same genome: the first ten hexadecimal digits of its
     /// [digest](Genome::digest). The first is a letter: `g` to `p` stand for 0 to 9, since tools
     /// take `0636890406` and `18e2354970` for numbers.
     pub fn id(&self) -> String {
@@ -132,23 +132,22 @@ impl Genome {
         id
     }
 
-    /// Tells whether an id is this genome's: as it is now, or as it is in older files, where some
-    /// begin with a digit.
+    /// Returns true if an id is this genome's, now or in older files, where it may begin with a
+    /// digit.
     pub fn has_id(&self, id: &str) -> bool {
         id == self.id() || id == &self.digest()[..10]
     }
 
-    /// SHA-256 of its content, in hexadecimal digits.
+    /// Returns the SHA-256 of its content, in hexadecimal digits.
     pub fn digest(&self) -> String {
         hash::sha256_hex(&[self.cppn.canonical_bytes(), self.edits.canonical_bytes()].concat())
     }
 
-    /// A copy with one mutation, and more of them until its body is valid; with that body. Of some,
-    /// as many as [`MutationParams::voxel_mutations`] says, one voxel is mutated and not the
-    /// network, or a few of them.
+    /// Returns a copy mutated once or more, until its body is valid; with that body. A fraction
+    /// [`MutationParams::voxel_mutations`] of offspring has voxels mutated instead.
     ///
     /// # Errors
-    /// [`GenomeError`] if the size is not a body's or [`MAX_MUTATIONS`] give no valid body.
+    /// Returns a [`GenomeError`] if the size is impossible or [`MAX_MUTATIONS`] give no valid body.
     pub fn offspring(
         &self,
         spec: BodySpec,
@@ -158,10 +157,10 @@ impl Genome {
         self.offspring_unless(spec, params, rng, &Session::default())
     }
 
-    /// The same, unless `stop` is set meanwhile.
+    /// Acts as [`Genome::offspring`], unless `stop` is set in the meantime.
     ///
     /// # Errors
-    /// [`GenomeError::Stopped`] then; else as [`Genome::offspring`].
+    /// Returns [`GenomeError::Stopped`] if it was stopped; otherwise as [`Genome::offspring`].
     pub fn offspring_unless(
         &self,
         spec: BodySpec,
@@ -169,8 +168,7 @@ impl Genome {
         rng: &mut Stream,
         session: &Session,
     ) -> Result<(Genome, Body), GenomeError> {
-        // Without voxel mutations nothing is drawn, and runs are what they were before there were
-        // any.
+        // Without voxel mutations nothing is drawn: runs are as before there were any.
         if params.voxel_mutations == 0.0 || rng.unit() >= params.voxel_mutations {
             return self.with_mutated_network(spec, params, rng, session);
         }
@@ -193,8 +191,7 @@ impl Genome {
         let mutations = if min_muscles > height.saturating_mul(width) { 0 } else { MAX_MUTATIONS };
         let mut genome = self.clone();
         for number in 1..=mutations {
-            // What is quick is done all the same: a run that is stopped as it begins has its
-            // folder.
+            // A quick search completes anyway: a run stopped at its start still gets its folder.
             if number % MUTATIONS_AT_ONCE == 0 {
                 session.check()?;
             }
@@ -207,7 +204,7 @@ impl Genome {
         Err(GenomeError::NoValidBody { mutations, height, width, min_muscles })
     }
 
-    /// A random individual: [`Genome::initial`], mutated until its body is valid; with that body.
+    /// Makes a random individual: [`Genome::initial`], mutated until its body is valid; and that.
     ///
     /// # Errors
     /// As [`Genome::offspring`].
@@ -219,10 +216,10 @@ impl Genome {
         Genome::random_unless(spec, params, rng, &Session::default())
     }
 
-    /// The same, unless `stop` is set meanwhile.
+    /// Acts as [`Genome::random`], unless `stop` is set in the meantime.
     ///
     /// # Errors
-    /// [`GenomeError::Stopped`] then; else as [`Genome::offspring`].
+    /// Returns [`GenomeError::Stopped`] if it was stopped; otherwise as [`Genome::offspring`].
     pub fn random_unless(
         spec: BodySpec,
         params: &MutationParams,

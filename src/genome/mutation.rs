@@ -8,27 +8,27 @@ use crate::genome::params::MutationParams;
 /// One kind of mutation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mutation {
-    /// A hidden node with a random function splits an edge: weight in as the edge's, weight out 1.
+    /// Splits an edge by a hidden node with a random function: the edge's weight in, weight 1 out.
     AddNode,
-    /// A hidden node goes; each predecessor is joined to each successor by the product of the two
-    /// weights, where there is no edge between them yet.
+    /// Removes a hidden node; joins each predecessor to each successor by the product of the two
+    /// weights, unless there is an edge between them already.
     RemoveNode,
-    /// An edge that closes no cycle, its weight plus or minus [`MutationParams::new_edge_weight`].
+    /// Adds an edge that closes no cycle, with weight ± [`MutationParams::new_edge_weight`].
     AddEdge,
-    /// An edge goes.
+    /// Removes an edge.
     RemoveEdge,
-    /// A hidden or output node gets another function.
+    /// Gives a hidden or output node another function.
     ChangeFunction,
-    /// A normal deviate is added to a weight, which is then clipped.
+    /// Adds a normal deviate to a weight, then clips it.
     ChangeWeight,
 }
 
-/// Pairs of nodes drawn for a new edge before none is taken to be possible. Uniform among the
-/// possible ones, and cheap however large the network.
+/// Pairs of nodes drawn for a new edge before giving up. The draw is uniform among possible pairs,
+/// and cheap however large the network.
 const EDGE_DRAWS: usize = 100;
 
 impl Mutation {
-    /// All six, each as probable as the others.
+    /// All six, each with the same probability.
     pub const ALL: [Mutation; 6] = [
         Mutation::AddNode,
         Mutation::RemoveNode,
@@ -38,7 +38,7 @@ impl Mutation {
         Mutation::ChangeWeight,
     ];
 
-    /// Mutates a network and says whether that was possible; if not, it is unchanged.
+    /// Mutates a network; returns false and leaves it unchanged if that is impossible.
     pub fn apply(self, cppn: &mut Cppn, params: &MutationParams, rng: &mut Stream) -> bool {
         let applied = match self {
             Mutation::AddNode => add_node(cppn, rng),
@@ -57,10 +57,10 @@ impl Mutation {
     }
 }
 
-/// One random mutation; one that is impossible (nothing to remove …) is drawn again.
+/// Applies one random mutation; an impossible one (nothing to remove …) is drawn again.
 pub fn mutate(cppn: &mut Cppn, params: &MutationParams, rng: &mut Stream) -> Mutation {
     loop {
-        // Ends: a function can always be changed.
+        // The loop ends: a function can always be changed.
         let mutation = Mutation::ALL[rng.below(Mutation::ALL.len())];
         if mutation.apply(cppn, params, rng) {
             return mutation;
@@ -91,8 +91,7 @@ fn remove_node(cppn: &mut Cppn, params: &MutationParams, rng: &mut Stream) -> Op
     let out: Vec<_> = cppn.edges().iter().copied().filter(|e| e.from == node).collect();
     for i in &into {
         for o in &out {
-            // Products of weights within a limit of 1 stay within it; others must not grow without
-            // bound.
+            // Products of weights within 1 stay within it; others must not grow without bound.
             cppn.connect(i.from, o.to, clip(i.weight * o.weight, params));
         }
     }
@@ -155,7 +154,7 @@ mod tests {
         cppn.edges().iter().map(|e| (*e).into()).collect()
     }
 
-    /// x and y → 11 → outputs 4 and 5, and y → 5 beside it.
+    /// Makes x and y → 11 → outputs 4 and 5, and y → 5 beside it.
     fn diamond() -> Cppn {
         let mut cppn = Cppn::initial();
         (0..28).rev().for_each(|e| {

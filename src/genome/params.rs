@@ -1,4 +1,4 @@
-//! [`MutationParams`]: sizes and shares of mutations.
+//! [`MutationParams`]: sizes and frequencies of mutations.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer, Serialize};
@@ -7,21 +7,21 @@ use serde::{Deserialize, Deserializer, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct MutationParams {
-    /// Standard deviation of what is added to a weight that changes. Default 0.5.
+    /// Standard deviation of the change of a weight. Default 0.5.
     #[serde(deserialize_with = "size")]
     pub weight_sigma: f64,
-    /// A changed weight is clipped to [−limit, limit]. Default 1.
+    /// Limit of a changed weight, which is clipped to [−limit, limit]. Default 1.
     #[serde(deserialize_with = "size")]
     pub weight_limit: f64,
-    /// Size of the weight of an added edge; its sign is random. Default 0.1.
+    /// Absolute weight of an added edge; its sign is random. Default 0.1.
     #[serde(deserialize_with = "size")]
     pub new_edge_weight: f64,
-    /// Share of offspring of which one voxel is mutated instead of the network
+    /// Fraction of offspring in which voxels are mutated instead of the network
     /// ([`Edits`](crate::genome::Edits)). Default 0, as in the paper; then left out of files.
     #[serde(deserialize_with = "share", skip_serializing_if = "is_zero")]
     pub voxel_mutations: f64,
-    /// Most voxels of an offspring that change: one, two, four and so on, doubled up to this, of as
-    /// many offspring each. Default 1; then left out of files.
+    /// Most voxels of an offspring that change: 1, 2, 4 and so on, doubled up to this, with equal
+    /// probability. Default 1; then left out of files.
     #[serde(deserialize_with = "changes", skip_serializing_if = "is_one")]
     pub voxel_changes: u16,
 }
@@ -58,7 +58,7 @@ fn changes<'de, D: Deserializer<'de>>(deserializer: D) -> Result<u16, D::Error> 
     Err(serde::de::Error::custom(text))
 }
 
-/// A number from 0 to 1.
+/// Reads a number from 0 to 1.
 fn share<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
     let value = f64::deserialize(deserializer)?;
     if (0.0..=1.0).contains(&value) {

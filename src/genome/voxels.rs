@@ -7,8 +7,7 @@ use crate::body::{Body, Material};
 use crate::genome::{BodySpec, Edits, Genome, GenomeError, MAX_MUTATIONS, MutationParams};
 
 impl Genome {
-    /// A copy with as many voxels changed as is drawn ([`MutationParams::voxel_changes`]), with its
-    /// body.
+    /// Returns a copy with up to [`MutationParams::voxel_changes`] voxels changed, and its body.
     pub(super) fn with_voxels_changed(
         &self,
         described: &Body,
@@ -28,15 +27,14 @@ impl Genome {
     }
 }
 
-/// A place, (row, column), and one of the six materials that it is not made of; all are as likely.
+/// Draws a place, (row, column), and one of the six other materials, all equally likely.
 pub fn other_voxel(voxels: &Grid<Material>, rng: &mut Stream) -> ((usize, usize), Material) {
     let place = (rng.below(voxels.height()), rng.below(voxels.width()));
     let step = 1 + rng.below(Material::ALL.len() - 1);
     (place, Material::ALL[(usize::from(voxels[place].code()) + step) % Material::ALL.len()])
 }
 
-/// Edits of what a network describes, with one more voxel of another material, drawn anew until
-/// their body is valid; with that.
+/// Changes one more voxel than `edits`, drawn anew until the body is valid; returns edits and body.
 fn one_voxel_changed(
     edits: &Edits,
     described: &Body,
@@ -91,7 +89,7 @@ mod tests {
         let always = MutationParams { voxel_mutations: 1.0, ..MutationParams::default() };
         let (parent, _) = Genome::random(PAPER, &MutationParams::default(), &mut rng(5)).unwrap();
         let spec = BodySpec { min_muscles: 0, ..PAPER };
-        // A full grid stays connected whatever one voxel becomes: nothing is drawn twice.
+        // A full grid stays connected whatever one voxel becomes, so nothing is drawn twice.
         let mut full = parent.clone();
         let described = parent.cppn.express(14, 14).unwrap();
         (0..196).for_each(|i| {
@@ -121,7 +119,7 @@ mod tests {
         };
         let mut counts = [0; 13];
         (0..800).for_each(|seed| counts[changed(seed)] += 1);
-        // 1, 2, 4, 8 or 12; now and then one voxel twice.
+        // 1, 2, 4, 8 or 12; occasionally one voxel twice.
         let ranges = [
             counts[1],
             counts[2],

@@ -11,57 +11,55 @@ pub struct Elite<S> {
     pub cell: usize,
     /// Its fitness, finite.
     pub objective: f64,
-    /// What it is.
+    /// The solution.
     pub solution: S,
 }
 
-/// At most one [`Elite`] per cell (Mouret & Clune 2015). In files a list of elites in the order of
-/// their cells.
+/// At most one [`Elite`] per cell (Mouret & Clune 2015). In files a list in the cells' order.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(try_from = "Vec<Elite<S>>", bound(deserialize = "S: Deserialize<'de>"))]
 pub struct Archive<S> {
     elites: BTreeMap<usize, Elite<S>>,
 }
 
-/// What became of a solution told to an [`Archive`].
+/// The outcome of an insertion into an [`Archive`].
 #[derive(Clone, Debug, PartialEq)]
 pub enum Insertion<S> {
     /// The cell was empty.
     New,
-    /// It is strictly fitter than the elite it replaced.
+    /// The solution is strictly fitter than the elite it replaced.
     Improved {
-        /// The elite that was there.
+        /// The replaced elite.
         old: Elite<S>,
     },
-    /// The elite that was there is as fit or fitter.
+    /// The existing elite is as fit or fitter.
     Rejected,
 }
 
-/// Why something cannot be in an archive.
+/// The reason why a solution cannot be in an archive.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum ArchiveError {
-    /// A fitness that is infinite or not a number.
+    /// A fitness is infinite or NaN.
     #[error("cell {cell}: the objective is {objective}, expected a finite number")]
     Objective {
         /// Index of the cell.
         cell: usize,
-        /// What was found.
+        /// The objective found.
         objective: f64,
     },
-    /// Two elites in one cell of a file.
+    /// A cell of a file has two elites.
     #[error("cell {0} holds two elites, expected at most one")]
     Occupied(usize),
 }
 
-/// Figures of an archive: pyribs' `ArchiveStats`, of an archive that has the possible cells and no
-/// others.
+/// Figures of an archive: pyribs' `ArchiveStats` for an archive of the possible cells alone.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ArchiveStats {
     /// Number of elites.
     pub num_elites: usize,
     /// Elites per possible cell.
     pub coverage: f64,
-    /// Σ (objective − offset) over the elites: less than 0 if they are below the offset on average.
+    /// Σ (objective − offset) over the elites; negative if they are below the offset on average.
     pub qd_score: f64,
     /// QD score per possible cell.
     pub norm_qd_score: f64,
@@ -72,7 +70,7 @@ pub struct ArchiveStats {
 }
 
 impl<S> Archive<S> {
-    /// An archive without elites.
+    /// Makes an archive without elites.
     pub fn new() -> Self {
         Archive { elites: BTreeMap::new() }
     }
@@ -80,7 +78,7 @@ impl<S> Archive<S> {
     /// Puts a solution into its cell if that is empty or its elite is strictly less fit.
     ///
     /// # Errors
-    /// [`ArchiveError::Objective`] if the fitness is not finite.
+    /// Returns [`ArchiveError::Objective`] if the fitness is not finite.
     pub fn insert(&mut self, new: Elite<S>) -> Result<Insertion<S>, ArchiveError> {
         let Elite { cell, objective, .. } = new;
         if !objective.is_finite() {
@@ -93,11 +91,10 @@ impl<S> Archive<S> {
         Ok(old.map_or(Insertion::New, |old| Insertion::Improved { old }))
     }
 
-    /// Takes out all but the `count` fittest of each kind; of equally fit ones those in the first
-    /// cells stay.
+    /// Removes all but the `count` fittest of each kind; the first cells win a tie.
     pub fn retain_fittest<K: Ord>(&mut self, count: usize, kind: impl Fn(&S) -> K) {
         let mut ranked: Vec<(f64, usize)> = self.elites().map(|e| (e.objective, e.cell)).collect();
-        // Stable: elites come in the order of their cells.
+        // A stable sort: elites come in the order of their cells.
         ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
         let mut kept: BTreeMap<K, usize> = BTreeMap::new();
         for (_, cell) in ranked {
@@ -110,8 +107,7 @@ impl<S> Archive<S> {
         }
     }
 
-    /// Objective of the `count`-th fittest elite (from 1) among those that are `of` a kind; none if
-    /// there are fewer.
+    /// Returns the objective of the `count`-th fittest elite (from 1) of a kind, if it exists.
     pub fn nth_fittest(&self, count: usize, of: impl Fn(&S) -> bool) -> Option<f64> {
         let mut objectives: Vec<f64> =
             self.elites().filter(|e| of(&e.solution)).map(|e| e.objective).collect();
@@ -119,38 +115,38 @@ impl<S> Archive<S> {
         objectives.get(count.checked_sub(1)?).copied()
     }
 
-    /// The elite of a cell.
+    /// Returns the elite of a cell.
     pub fn get(&self, cell: usize) -> Option<&Elite<S>> {
         self.elites.get(&cell)
     }
 
-    /// The fitness to beat in a cell.
+    /// Returns the fitness to beat in a cell.
     pub fn objective(&self, cell: usize) -> Option<f64> {
         self.get(cell).map(|elite| elite.objective)
     }
 
-    /// Number of elites.
+    /// Returns the number of elites.
     pub fn len(&self) -> usize {
         self.elites.len()
     }
 
-    /// Whether there is no elite.
+    /// Returns true if there is no elite.
     pub fn is_empty(&self) -> bool {
         self.elites.is_empty()
     }
 
-    /// The elites in the order of their cells.
+    /// Iterates over the elites in the order of their cells.
     pub fn elites(&self) -> impl Iterator<Item = &Elite<S>> {
         self.elites.values()
     }
 
-    /// The fittest elite; of equally fit ones the one in the first cell.
+    /// Returns the fittest elite; the first cell wins a tie.
     pub fn best(&self) -> Option<&Elite<S>> {
         self.elites().reduce(|best, e| if e.objective > best.objective { e } else { best })
     }
 
-    /// Figures of the archive, of `possible` cells that can be filled; `qd_offset` is what pyribs
-    /// calls `qd_score_offset`.
+    /// Computes the figures of an archive with this many `possible` cells; `qd_offset` is pyribs'
+    /// `qd_score_offset`.
     pub fn stats(&self, possible: usize, qd_offset: f64) -> ArchiveStats {
         let (num_elites, cells) = (self.len(), possible.max(1) as f64);
         // (`sum` of nothing would be −0.)
@@ -267,7 +263,7 @@ mod tests {
                 (ours.coverage, ours.obj_mean.is_some()),
                 (theirs.coverage, theirs.obj_mean.is_some())
             );
-            // They add in the order in which robots came, we in the order of cells.
+            // pyribs adds up in the order of insertion, we in the order of cells.
             let near = |a: f64, b: f64| (a - b).abs() <= 1e-12 * (1.0 + b.abs());
             assert!(near(ours.qd_score, theirs.qd_score), "{ours:?} {theirs:?}");
             assert!(near(ours.norm_qd_score, theirs.norm_qd_score), "{ours:?} {theirs:?}");

@@ -1,42 +1,42 @@
 //! [`DescriptorSpace`]: the cells of an archive; and the paper's space of three voxel counts.
 
-/// A box of cells with named dimensions. A cell is known by its coordinates (one bin per dimension)
-/// or by its index, the last dimension running fastest.
+/// A box of cells with named dimensions. A cell is identified by its coordinates (one bin per
+/// dimension) or by its index, in which the last dimension runs fastest.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct DescriptorSpace {
     dimensions: Vec<(String, usize)>,
 }
 
 impl DescriptorSpace {
-    /// A space with these dimensions: name and number of bins.
+    /// Makes a space with these dimensions: name and number of bins.
     pub fn new(dimensions: Vec<(String, usize)>) -> Self {
         DescriptorSpace { dimensions }
     }
 
-    /// The paper's space (section "MAP-Elites"): muscle, sensor and total voxels in seven bins
-    /// each, and with more than one task, the task.
+    /// Makes the paper's space (section "MAP-Elites"): muscle, sensor and total voxels in seven
+    /// bins each, and the task if there are several.
     pub fn voxel_counts(tasks: usize) -> Self {
         let counts = ["muscle", "sensor", "total"].map(|name| (name.to_string(), COUNT_BINS));
         let task = (tasks > 1).then(|| ("task".to_string(), tasks));
         DescriptorSpace::new(counts.into_iter().chain(task).collect())
     }
 
-    /// Names and numbers of bins of the dimensions.
+    /// Returns the names and numbers of bins of the dimensions.
     pub fn dimensions(&self) -> &[(String, usize)] {
         &self.dimensions
     }
 
-    /// Number of cells, possible or not.
+    /// Returns the number of cells, possible or not.
     pub fn len(&self) -> usize {
         self.dimensions.iter().map(|(_, bins)| bins).product()
     }
 
-    /// Whether there is no cell: a dimension has no bins.
+    /// Returns true if there is no cell because a dimension has no bins.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// The index of the cell with these coordinates, `None` if they are not in the space.
+    /// Returns the index of the cell with these coordinates, `None` if they are not in the space.
     pub fn index(&self, coordinates: &[usize]) -> Option<usize> {
         if coordinates.len() != self.dimensions.len() {
             return None;
@@ -45,7 +45,7 @@ impl DescriptorSpace {
         paired.try_fold(0, |index, (c, (_, bins))| (c < bins).then(|| index * bins + c))
     }
 
-    /// The coordinates of a cell, `None` if there is no cell with this index.
+    /// Returns the coordinates of a cell, `None` if no cell has this index.
     pub fn coordinates(&self, index: usize) -> Option<Vec<usize>> {
         if index >= self.len() {
             return None;
@@ -60,28 +60,27 @@ impl DescriptorSpace {
     }
 }
 
-/// Bins of each count.
+/// Number of bins of each count.
 pub const COUNT_BINS: usize = 7;
 
-/// Width of a bin of counts of cells of a grid with `area` cells.
+/// Returns the width of a bin of counts on a grid with `area` cells.
 fn bin_width(area: usize) -> usize {
     (area / COUNT_BINS).max(1)
 }
 
-/// The bin of a count of cells of a grid with `area` cells: min(count div (area div 7), 6), the
-/// width of a bin being at least 1.
+/// Returns a count's bin on a grid of `area` cells: min(count div max(area div 7, 1), 6).
 pub fn count_bin(count: usize, area: usize) -> usize {
     (count / bin_width(area)).min(COUNT_BINS - 1)
 }
 
-/// The cells of [`DescriptorSpace::voxel_counts`] that a connected body on a grid of `area` cells
-/// with at least `min_muscles` muscles can have, as ascending indices: muscle + sensor ≤ total ≤
-/// area, total ≥ 1. For 14 × 14 voxels they are 90 of 343 ("archive of size 90"), times the number
-/// of tasks.
+/// Returns the indices, ascending, of the cells of [`DescriptorSpace::voxel_counts`] that a
+/// connected body on a grid of `area` cells with at least `min_muscles` muscles can have: muscle +
+/// sensor ≤ total ≤ area, total ≥ 1. For 14 × 14 voxels they are 90 of 343 ("archive of size 90"),
+/// times the number of tasks.
 pub fn possible_cells(area: usize, min_muscles: usize, tasks: usize) -> Vec<usize> {
     let space = DescriptorSpace::voxel_counts(tasks);
     let width = bin_width(area);
-    // Least and largest count in a bin, if there is one: the last bin takes all that is left.
+    // Least and largest count in a bin, if there is one: the last bin takes the remainder.
     let range = |bin: usize, least: usize| {
         let first = (bin * width).max(least);
         let last = if bin == COUNT_BINS - 1 { area } else { ((bin + 1) * width - 1).min(area) };
@@ -117,7 +116,7 @@ mod tests {
     fn counts_are_binned_as_in_the_paper() {
         let bins = [0, 27, 28, 55, 56, 167, 168, 196].map(|count| count_bin(count, 196));
         assert_eq!(bins, [0, 0, 1, 1, 2, 5, 6, 6]);
-        // What does not divide by seven goes to the last bin; small grids have bins of one.
+        // A remainder of the division by seven goes to the last bin; small grids have bins of one.
         assert_eq!([13, 14, 15].map(|count| count_bin(count, 15)), [6, 6, 6]);
         assert_eq!([0, 1, 4].map(|count| count_bin(count, 4)), [0, 1, 4]);
     }

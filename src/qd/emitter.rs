@@ -1,4 +1,4 @@
-//! [`EmitterParams`]: what a generation consists of; [`Variation`]: how its solutions are made.
+//! [`EmitterParams`]: the composition of a generation; [`Variation`]: the making of its solutions.
 
 use crate::base::random::{Purpose, stream};
 use crate::qd::archive::Archive;
@@ -10,9 +10,9 @@ use std::num::NonZeroU16;
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct EmitterParams {
-    /// Random individuals of a generation that finds the archive empty: the first. Default 20.
+    /// Random individuals of a generation that starts with an empty archive: the first. Default 20.
     pub initial: NonZeroU16,
-    /// Most elites that become parents, of one offspring each. Default 20.
+    /// Most elites that become parents, with one offspring each. Default 20.
     pub parents: u16,
     /// Random individuals of later generations. Default 0.
     pub random_immigrants: u16,
@@ -25,40 +25,40 @@ impl Default for EmitterParams {
     }
 }
 
-/// One solution to be made.
+/// A solution to be made.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Proposal {
     /// Generation, from 0.
     pub generation: u64,
-    /// Its number in the generation, from 0.
+    /// Number within the generation, from 0.
     pub child: u64,
     /// Cell of its parent; `None` for a random individual.
     pub parent: Option<usize>,
 }
 
-/// How solutions are made. All chance must come from streams of (generation, child) and the run's
-/// seed, so that solutions may be made in any order and on any thread.
+/// Makes solutions. All chance must come from streams of (generation, child) and the run's seed, so
+/// that solutions may be made in any order and on any thread.
 pub trait Variation<S> {
-    /// Why a solution could not be made.
+    /// The reason why a solution could not be made.
     type Error;
 
-    /// A random individual.
+    /// Makes a random individual.
     ///
     /// # Errors
-    /// If none can be made.
+    /// Returns an error if none can be made.
     fn random_immigrant(&self, generation: u64, child: u64) -> Result<S, Self::Error>;
 
-    /// A varied copy of `parent`.
+    /// Makes a varied copy of `parent`.
     ///
     /// # Errors
-    /// If none can be made.
+    /// Returns an error if none can be made.
     fn offspring(&self, parent: &S, generation: u64, child: u64) -> Result<S, Self::Error>;
 }
 
 impl EmitterParams {
-    /// What `generation` consists of: offspring of different elites drawn uniformly, then
-    /// random immigrants. While the archive is empty (in the first generation, and after it if no
-    /// individual was stable): random individuals.
+    /// Returns the composition of `generation`: offspring of different elites drawn uniformly, then
+    /// random immigrants. While the archive is empty (in the first generation, and later if no
+    /// individual was stable), all are random individuals.
     pub fn ask<S>(&self, archive: &Archive<S>, seed: u64, generation: u64) -> Vec<Proposal> {
         let cells: Vec<usize> = archive.elites().map(|e| e.cell).collect();
         let mut rng = stream(seed, Purpose::Parents, generation, 0);

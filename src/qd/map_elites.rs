@@ -1,13 +1,13 @@
-//! [`MapElites`]: ask for a generation, make and evaluate it, tell the archive.
+//! [`MapElites`]: propose a generation, make and evaluate it, add it to the archive.
 
 use crate::qd::archive::{Archive, ArchiveError, Elite, Insertion};
 use crate::qd::emitter::{EmitterParams, Proposal, Variation};
 
 /// MAP-Elites (Mouret & Clune 2015; paper, section "MAP-Elites").
 ///
-/// A generation is [`ask`](MapElites::ask)ed for, its solutions are [`make`](MapElites::make)d and
-/// evaluated in any order and on any threads, and [`tell`](MapElites::tell) puts them into the
-/// archive in their children's order: nothing depends on which was first.
+/// [`ask`](MapElites::ask) proposes a generation; its solutions are [`make`](MapElites::make)d and
+/// evaluated in any order and on any threads; [`tell`](MapElites::tell) adds them to the archive in
+/// the order of their numbers. So nothing depends on which was first.
 #[derive(Clone, Debug)]
 pub struct MapElites<S> {
     seed: u64,
@@ -15,44 +15,44 @@ pub struct MapElites<S> {
     archive: Archive<S>,
 }
 
-/// A solution with what it achieved.
+/// A solution and its evaluation.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Evaluated<S> {
-    /// Its number in the generation.
+    /// Number within the generation.
     pub child: u64,
     /// Its cell.
     pub cell: usize,
     /// Its fitness, finite.
     pub objective: f64,
-    /// What it is.
+    /// The solution.
     pub solution: S,
 }
 
 impl<S> MapElites<S> {
-    /// A search that starts, or goes on, with an archive.
+    /// Starts a search with an archive, or continues one.
     pub fn new(seed: u64, params: EmitterParams, archive: Archive<S>) -> Self {
         MapElites { seed, params, archive }
     }
 
-    /// The elites found so far.
+    /// Returns the archive of the elites found so far.
     pub fn archive(&self) -> &Archive<S> {
         &self.archive
     }
 
-    /// Takes elites out of the archive; see [`Archive::retain_fittest`].
+    /// Removes elites from the archive; see [`Archive::retain_fittest`].
     pub fn retain_fittest<K: Ord>(&mut self, count: usize, kind: impl Fn(&S) -> K) {
         self.archive.retain_fittest(count, kind);
     }
 
-    /// What a generation consists of; see [`EmitterParams::ask`].
+    /// Returns the composition of a generation; see [`EmitterParams::ask`].
     pub fn ask(&self, generation: u64) -> Vec<Proposal> {
         self.params.ask(&self.archive, self.seed, generation)
     }
 
-    /// Makes one solution of a generation. (A random immigrant, too, if the proposal's cell has no elite.)
+    /// Makes one solution of a generation (a random immigrant if the proposal's cell has no elite).
     ///
     /// # Errors
-    /// What the variation says.
+    /// Returns the variation's error.
     pub fn make<V: Variation<S>>(&self, proposal: Proposal, variation: &V) -> Result<S, V::Error> {
         let Proposal { generation, child, parent } = proposal;
         match parent.and_then(|cell| self.archive.get(cell)) {
@@ -61,11 +61,11 @@ impl<S> MapElites<S> {
         }
     }
 
-    /// Puts the solutions of a generation into the archive, in the order of their children, and
-    /// says what became of each. Solutions without fitness (unstable rollouts) are not told.
+    /// Adds the solutions of a generation to the archive, in the order of their numbers, and
+    /// returns the outcome of each. Leave out solutions without fitness (unstable rollouts).
     ///
     /// # Errors
-    /// [`ArchiveError`] if a fitness is not finite; what was told before it is in the archive.
+    /// Returns an [`ArchiveError`] if a fitness is not finite; the archive has earlier solutions.
     pub fn tell(
         &mut self,
         mut generation: Vec<Evaluated<S>>,
@@ -85,7 +85,7 @@ mod tests {
     use rayon::prelude::*;
     use std::convert::Infallible;
 
-    /// Numbers that walk.
+    /// A random walk of numbers.
     struct Walk;
 
     impl Variation<f64> for Walk {

@@ -1,8 +1,8 @@
-//! What a gait could be taught, by its response alone: an estimate that does not flatter.
+//! Estimates the accuracy that training could reach, from the linear response alone.
 //!
-//! A design that was solved is best under the very slopes and images it was solved with; both are
-//! noisy, so under these it looks better than it is. Here it is solved with one half of rollouts
-//! and images and judged by the other (cross-fitting).
+//! A design looks best under the very slopes and images it was solved with. Both are noisy, so it
+//! looks better than it is. Here one half of rollouts and images solves the design problem, and the
+//! other half evaluates the design (cross-fitting).
 
 use crate::base::random::{Purpose, stream};
 use crate::base::session::Session;
@@ -16,14 +16,14 @@ use std::f64::consts::{PI, SQRT_2};
 /// Standard errors on either side of a 95 % interval.
 const INTERVAL: f64 = 1.96;
 
-/// Least scatter about a prediction, as a share of the whole scatter. Smaller ones make answers
-/// near the boundary depend on their last digit.
+/// Least scatter about a prediction, relative to the whole scatter. With less, answers near the
+/// boundary depend on their last digit.
 const LEAST_SCATTER: f64 = 0.25;
 
-/// Scatter that stands for none \[voxel lengths\]: nothing is divided by 0.
+/// Scatter used in place of 0 \[voxel lengths\], to avoid a division by 0.
 const NONE: f64 = 1e-9;
 
-/// What is estimated, and its standard error.
+/// An estimate with its standard error.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Estimate {
     /// The estimate.
@@ -33,7 +33,7 @@ pub struct Estimate {
 }
 
 impl Estimate {
-    /// Its 95 % interval.
+    /// Returns its 95 % interval.
     pub fn interval(&self) -> [f64; 2] {
         [-INTERVAL, INTERVAL].map(|errors| self.value + errors * self.error)
     }
@@ -46,28 +46,28 @@ impl Estimate {
     }
 }
 
-/// What a gait could be taught.
+/// The estimated results of training a gait.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Teachable {
     /// Mean clipped margin of its answers: from −1 to 1.
     pub fitness: Estimate,
-    /// Share of its answers that are correct.
+    /// Fraction of its answers that are correct.
     pub accuracy: Estimate,
 }
 
-/// What a gait could be taught of a lesson, by its rollouts with random images; `None` if these
-/// are too few to be halved.
+/// Estimates the results of training a gait on examples, from its rollouts with random images;
+/// `None` if these are too few to be halved.
 ///
-/// The estimates are means over two designs. Each is solved with one half of the rollouts and of
-/// the examples. The other half of the rollouts predicts its displacements under the other half of
-/// the examples; its slopes are hardly shrunk, so predictions have noise but little bias. A real
-/// displacement scatters about what exact slopes would predict by `scatter` \[voxel lengths\].
-/// Predictions are noisy already, so the scatter about them is less, by as much. Standard errors
-/// say what other rollouts and other images would have changed. An answer is correct if its margin is
-/// above `threshold` \[voxel lengths\].
+/// The estimates are means over two designs. Each is solved for with one half of the rollouts and
+/// of the examples. The other half of the rollouts predicts its displacements under the other half
+/// of the examples; its slopes are hardly shrunk, so predictions have noise but little bias. A real
+/// displacement scatters about the prediction of exact slopes by `scatter` \[voxel lengths\].
+/// Predictions are noisy already, so the scatter about them is smaller by as much. Standard errors
+/// cover changes of rollouts and of images. An answer is correct if its margin is above `threshold`
+/// \[voxel lengths\].
 ///
 /// # Errors
-/// [`Stopped`] if `stop` was set meanwhile.
+/// Returns [`Stopped`] if `stop` was set in the meantime.
 pub fn teachable(
     shown: &[Shown],
     scatter: f64,
@@ -87,7 +87,7 @@ pub fn teachable(
     Ok(Some(Teachable { fitness: of(0), accuracy: of(1) }))
 }
 
-/// Half of the rollouts, and half of the examples.
+/// One half of the rollouts and of the examples.
 struct Half<'a> {
     response: Response,
     rollouts: f64,
@@ -106,7 +106,7 @@ impl<'a> Half<'a> {
         let mut rollouts = [Vec::new(), Vec::new()];
         let mut seen: Vec<usize> = Vec::new();
         for shown in shown {
-            // By turns within a condition.
+            // The halves alternate within a condition.
             seen.resize(seen.len().max(shown.condition + 1), 0);
             rollouts[seen[shown.condition] % 2].push(shown.clone());
             seen[shown.condition] += 1;
@@ -128,8 +128,8 @@ impl<'a> Half<'a> {
         Some([half(0)?, half(1)?])
     }
 
-    /// The best design by the slopes of this half, and its side: 1 if it walks right where `right`
-    /// of an example is 1, −1 if it walks left there.
+    /// Returns the best design by the slopes of this half, and its side: 1 if it walks right for
+    /// examples whose `right` is 1, −1 if it walks left for them.
     fn solved(&self, seed: u64, number: u64) -> Solved {
         let Response { slopes, intercept, .. } = &self.response;
         let any = vec![Material::SensorExpand; slopes.len()];
@@ -143,7 +143,7 @@ impl<'a> Half<'a> {
         if right.0 >= left.0 { (right.1, 1.0) } else { (left.1, -1.0) }
     }
 
-    /// Mean clipped margin of the answers of a design, and the share that are correct.
+    /// Returns the mean clipped margin of a design's answers, and the fraction that are correct.
     fn judged(&self, (design, side): &Solved, scatter: f64, threshold: f64) -> [Estimate; 2] {
         let total: f64 = self.examples.iter().map(|example| example.weight).sum();
         let fit = self.response.evidence.least_biased();
@@ -166,11 +166,10 @@ impl<'a> Half<'a> {
             let found: Vec<(f64, f64)> = answers.iter().map(judged).collect();
             let pairs = || answers.iter().zip(&found);
             let value: f64 = pairs().map(|(answer, (clipped, _))| answer.weight * clipped).sum();
-            // Other images.
+            // Variance over other images.
             let by_images = pairs().map(|(answer, (clipped, _))| answer.weight * (clipped - value));
             let by_images: f64 = by_images.map(|off| off * off).sum();
-            // Other rollouts, to first order: through the slopes, and through the mean
-            // displacement.
+            // Variance over other rollouts, to first order: by slopes and by mean displacement.
             let (mut of_slopes, mut of_mean) = (vec![0.0; self.widths.len()], 0.0);
             for (answer, (_, growth)) in pairs() {
                 let change = answer.weight * answer.right * growth;
@@ -189,20 +188,20 @@ impl<'a> Half<'a> {
     }
 }
 
-/// What is predicted of a design under an example.
+/// The predicted answer of a design to an example.
 struct Answer {
     weight: f64,
-    /// Which way is right: 1 right, −1 left.
+    /// Correct direction: 1 right, −1 left.
     right: f64,
-    /// How far it walks the correct way \[voxel lengths\].
+    /// Displacement in the correct direction \[voxel lengths\].
     margin: f64,
-    /// By how much the truth differs from that without its being known \[voxel lengths\].
+    /// Unknown difference of the truth from the margin \[voxel lengths\].
     scatter: f64,
-    /// By how much each place is wider than it was on average in the rollouts.
+    /// Difference of each place's width from its mean over the rollouts.
     off: Vec<f64>,
 }
 
-/// The mean clipped margin of margins that scatter normally about one, and by how much it grows with it.
+/// Returns the mean of clipped margins scattered normally about `margin`, and its derivative by it.
 fn expected_clipped_margin(margin: f64, scatter: f64, enough: f64) -> (f64, f64) {
     let [low, high] = [-enough, enough].map(|end| (end - margin) / scatter);
     let [below, under] = [low, high].map(normal);
@@ -211,19 +210,18 @@ fn expected_clipped_margin(margin: f64, scatter: f64, enough: f64) -> (f64, f64)
     (clipped / enough, inside / enough)
 }
 
-/// The share of margins above a threshold that scatter normally about one, and by how much it grows
-/// with it.
+/// Returns the fraction of normally scattered margins above `threshold`, and its derivative.
 fn right(margin: f64, scatter: f64, threshold: f64) -> (f64, f64) {
     let beyond = (margin - threshold) / scatter;
     (normal(beyond), density(beyond) / scatter)
 }
 
-/// The standard normal distribution: the share up to x.
+/// Returns the standard normal distribution function at x.
 fn normal(x: f64) -> f64 {
     0.5 * libm::erfc(-x / SQRT_2)
 }
 
-/// Its density.
+/// Returns the standard normal density at x.
 fn density(x: f64) -> f64 {
     libm::exp(-0.5 * x * x) / (2.0 * PI).sqrt()
 }
@@ -277,7 +275,7 @@ mod tests {
             all.into_iter().map(scattered).collect()
         }
 
-        /// Images of two classes: every pixel says a little.
+        /// Makes images of two classes, in which every pixel is a little informative.
         fn examples(&mut self, count: usize) -> Vec<Example> {
             let example = |number: usize| {
                 let right = if number < count / 2 { 1.0 } else { -1.0 };
@@ -289,11 +287,11 @@ mod tests {
             (0..count).map(example).collect()
         }
 
-        /// What a design is worth in truth, and the share of its answers that are correct.
+        /// Returns a design's true mean clipped margin and true fraction of correct answers.
         fn truth(&self, (design, side): &Solved, examples: &[Example]) -> [f64; 2] {
             let (mut clipped, mut share) = (0.0, 0.0);
             for example in examples {
-                // By turns under either condition, whose effect is their mean's.
+                // Either condition in turn, whose effect is their mean's.
                 let walks = [0, 1].map(|condition| self.walks(&example.widths(design), condition));
                 let margin = side * example.right * (walks[0] + walks[1]) / 2.0;
                 clipped += expected_clipped_margin(margin, self.noise, ENOUGH).0 / examples.len() as f64;
@@ -347,7 +345,7 @@ mod tests {
             }
         }
         assert!(inside >= 70, "{inside} of 80");
-        // Hardly off on average, and rather below than above.
+        // Nearly unbiased on average, and rather too low than too high.
         assert!(off.iter().all(|off| (-0.03..0.01).contains(off)), "{off:?}");
     }
 

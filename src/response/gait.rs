@@ -1,4 +1,4 @@
-//! A gait: a body as something that walks, whose places can be made of other materials.
+//! Gaits: walking bodies whose places can have other materials.
 
 use crate::base::Grid;
 use crate::base::random::Stream;
@@ -6,24 +6,24 @@ use crate::body::{Body, Material};
 use crate::sim::{Physics, width};
 use std::ops::Range;
 
-/// What a place can be made of, without changing what walks.
+/// Materials that a place can have without changing the gait.
 pub const CHOICES: [Material; 3] = [Material::Soft, Material::SensorExpand, Material::SensorShrink];
 
-/// What a [lesson](super::lesson) makes places of: sensors. A response is measured with sensors at all places, and
-/// says nothing of soft voxels. A soft voxel is not the same as a sensor at rest: it has no goal, so the sides
-/// that it shares are as wide as its neighbour wants, and its springs are others (`physics.md`,
-/// "Actuation").
+/// Materials that a [design problem](super::lesson) chooses from: sensors. A response is measured
+/// with sensors at all places, so it does not cover soft voxels. A soft voxel differs from a sensor
+/// at rest: it has no goal, so the sides that it shares take its neighbour's goal, and its springs
+/// have another stiffness (`physics.md`, "Actuation").
 pub const SENSORS: [Material; 2] = [CHOICES[CHOSEN.start], CHOICES[CHOSEN.start + 1]];
 
-/// Where these stand in [`CHOICES`].
+/// Indices of [`SENSORS`] in [`CHOICES`].
 pub(super) const CHOSEN: Range<usize> = 1..CHOICES.len();
 
 /// Probability that a place is wide in a random image, and that it is narrow. A design has about as
-/// many of either: larger values say nothing of what is between, as under grey pixels; smaller ones
-/// tell less of the slopes.
+/// many of either. Larger values leave out widths in between, as under grey pixels; smaller ones
+/// carry less information about the slopes.
 const EXTREME: f64 = 0.4;
 
-/// A body as something that walks: what its soft voxels and sensors are made of is left open.
+/// A walking body in which the materials of soft voxels and sensors are left open.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Gait {
     body: Body,
@@ -34,7 +34,7 @@ pub struct Gait {
 pub type Design = Vec<Material>;
 
 impl Gait {
-    /// The gait of a body; `None` if it has neither soft voxels nor sensors.
+    /// Returns the gait of a body; `None` if it has neither soft voxels nor sensors.
     pub fn of(body: &Body) -> Option<Self> {
         let is_place = |material: &Material| CHOICES.contains(material);
         let places: Vec<_> =
@@ -42,20 +42,20 @@ impl Gait {
         (!places.is_empty()).then(|| Gait { body: body.clone(), places })
     }
 
-    /// (Row, column) of each soft voxel and sensor, row-major.
+    /// Returns the (row, column) of each soft voxel and sensor, row-major.
     pub fn places(&self) -> &[(usize, usize)] {
         &self.places
     }
 
-    /// What the places of its own body are made of.
+    /// Returns the materials at the places of its own body.
     pub fn design(&self) -> Design {
         self.places.iter().map(|place| self.body.voxels()[*place]).collect()
     }
 
-    /// The body with these materials at its places.
+    /// Builds the body with these materials at its places.
     ///
     /// # Panics
-    /// If the design has not one material for each place.
+    /// If the design does not have one material for each place.
     pub fn built(&self, design: &[Material]) -> Body {
         assert_eq!(design.len(), self.places.len(), "a design has one material for each place");
         let mut voxels = self.body.voxels().clone();
@@ -65,12 +65,12 @@ impl Gait {
         Body::new(voxels).expect("a body with other materials is as large as before")
     }
 
-    /// The body with an expanding sensor at every place: what its response is measured with.
+    /// Returns the body with an expanding sensor at every place, for measuring its response.
     pub fn probe(&self) -> Body {
         self.body.probe()
     }
 
-    /// The body with this design, but that all its sensors expand.
+    /// Returns the body with this design, but with all sensors expanding.
     pub fn probe_of(&self, design: &[Material]) -> Body {
         let expanding = |material: &Material| match material {
             Material::Soft => Material::Soft,
@@ -79,8 +79,8 @@ impl Gait {
         self.built(&design.iter().map(expanding).collect::<Vec<_>>())
     }
 
-    /// The image under which [`probe_of`](Gait::probe_of) a design walks as the design does under a
-    /// stimulus.
+    /// Returns the image under which the [`probe_of`](Gait::probe_of) a design walks as the design
+    /// does under a stimulus.
     pub fn as_probe(&self, design: &[Material], stimulus: &Grid<f64>) -> Grid<f64> {
         let mut image = stimulus.clone();
         for (place, material) in self.places.iter().zip(design) {
@@ -91,7 +91,7 @@ impl Gait {
         image
     }
 
-    /// The target width of each place under an image \[rest widths\].
+    /// Returns the target width of each place under an image \[rest widths\].
     pub fn widths(&self, design: &[Material], stimulus: &Grid<f64>, physics: &Physics) -> Vec<f64> {
         let width = |(place, material): (&(usize, usize), &Material)| {
             width(*material, stimulus.or_default(*place), physics)
@@ -100,15 +100,15 @@ impl Gait {
     }
 }
 
-/// The pixel under which an expanding sensor is as wide as a soft voxel; 0 or 1 if it never is.
+/// Returns the pixel that makes an expanding sensor as wide as a soft voxel; 0 or 1 if none does.
 fn resting(physics: &Physics) -> f64 {
     let [narrow, wide] = [0.0, 1.0].map(|pixel| width(Material::SensorExpand, pixel, physics));
     let rest = width(Material::Soft, 0.0, physics);
     if wide > narrow { ((rest - narrow) / (wide - narrow)).clamp(0.0, 1.0) } else { 0.0 }
 }
 
-/// An image under which each place of a probe is, independently of all others, as wide as can be
-/// (with probability 0.4), as narrow as can be (0.4), or at rest (0.2).
+/// Draws an image under which each place of a probe is, independently of all others, as wide as
+/// possible (with probability 0.4), as narrow as possible (0.4), or at rest (0.2).
 pub fn random_image(height: usize, width: usize, physics: &Physics, random: &mut Stream) -> Grid<f64> {
     let rest = resting(physics);
     Grid::from_fn(height, width, |_, _| {

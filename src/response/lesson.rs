@@ -1,5 +1,5 @@
-//! Which sensors a gait needs for two groups of images: the material at each place that makes the
-//! mean margin largest, if the slopes of its [response](super::response) say how far it walks.
+//! The design problem: choose the sensor at each place that makes the mean margin over two groups
+//! of images largest, if displacements follow the slopes of the [response](super::response).
 
 use crate::base::Grid;
 use crate::base::random::Stream;
@@ -9,32 +9,31 @@ use crate::response::regression::dot;
 use crate::sim::{Physics, width};
 use crate::task::fitness::ENOUGH;
 
-/// Least gain of the objective for which a design is changed: below it is rounding.
+/// Least gain of the objective for which a design is changed; smaller gains are rounding.
 const LEAST_GAIN: f64 = 1e-9;
 
 /// Most sweeps over all places; a search ends sooner when a sweep changes nothing.
 const SWEEPS: usize = 12;
 
-/// Random designs that a search from many starts from. More cost as much each, and seldom end
-/// better.
+/// Number of random designs that a search from many starts from. More of them cost as much each,
+/// and seldom end better.
 const STARTS: usize = 6;
 
-/// An image of a lesson.
+/// An image of a design problem.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Example {
-    /// For each place the target width that each of [`CHOICES`] has under it \[rest widths\].
+    /// Target width of each place under it, for each of [`CHOICES`] \[rest widths\].
     pub choices: Vec<[f64; 3]>,
-    /// How far the body with the lesson's first design walks, measured or predicted \[voxel
-    /// lengths\].
+    /// Displacement with the problem's first design, measured or predicted \[voxel lengths\].
     pub displacement: f64,
-    /// 1 if walking right is the right answer, −1 if left.
+    /// Correct direction: 1 right, −1 left.
     pub right: f64,
-    /// What it weighs; the objective is the weighted mean over all examples.
+    /// Weight; the objective is the weighted mean over all examples.
     pub weight: f64,
 }
 
 impl Example {
-    /// An image as a gait sees it.
+    /// Makes an example from the stimulus of a gait.
     pub fn new(gait: &Gait, stimulus: &Grid<f64>, physics: &Physics) -> Self {
         let widths = |place: &(usize, usize)| {
             CHOICES.map(|material| width(material, stimulus.or_default(*place), physics))
@@ -47,37 +46,36 @@ impl Example {
         }
     }
 
-    /// The target width of each place of a design under it \[rest widths\].
+    /// Returns the target width of each place of a design under it \[rest widths\].
     pub fn widths(&self, design: &[Material]) -> Vec<f64> {
         self.choices.iter().zip(design).map(|(widths, material)| widths[choice(*material)]).collect()
     }
 }
 
-/// What the worst answer counts.
+/// Value of the worst answer.
 const WORST: f64 = -1.0;
 
 fn choice(material: Material) -> usize {
     CHOICES.iter().position(|other| *other == material).expect("a design has materials of CHOICES only")
 }
 
-/// What a gait is to learn: examples, the first design, and the slopes that say how far another one
-/// would walk.
+/// A design problem: examples, first design, and slopes that predict displacements of others.
 pub struct Lesson {
-    /// By place, by choice, by example: width \[rest widths\].
+    /// Width by place, choice and example \[rest widths\].
     widths: Vec<[Vec<f64>; 3]>,
     slopes: Vec<f64>,
-    /// By example: displacement times the side that is right, under the present design.
+    /// Displacement in the correct direction by example, under the current design.
     margins: Vec<f64>,
     right: Vec<f64>,
     weights: Vec<f64>,
-    /// What the worst answer counts: −1, or −∞ while climbing to where answers are not hopeless.
+    /// Value of the worst answer: −1, or −∞ while climbing out of hopeless answers.
     floor: f64,
     design: Vec<usize>,
     objective: f64,
 }
 
 impl Lesson {
-    /// A lesson whose examples have the displacements of `design`.
+    /// Makes a problem whose examples have the displacements of `design`.
     pub fn new(examples: &[&Example], slopes: &[f64], design: &[Material]) -> Self {
         let column =
             |place: usize, choice: usize| examples.iter().map(|e| e.choices[place][choice]).collect();
@@ -96,8 +94,9 @@ impl Lesson {
         lesson
     }
 
-    /// A lesson whose examples have the displacements that the model says of `design`: by the slopes,
-    /// and by an intercept for each example. With a `side` of −1 all walk the other way.
+    /// Makes a problem whose examples have the displacements that the model predicts for `design`:
+    /// by the slopes, and by an intercept for each example. With a `side` of −1 the correct
+    /// directions are reversed.
     pub fn predicted<'a>(
         examples: impl IntoIterator<Item = (&'a Example, f64)>,
         slopes: &[f64],
@@ -113,24 +112,24 @@ impl Lesson {
         Lesson::new(&examples.iter().collect::<Vec<_>>(), slopes, design)
     }
 
-    /// Counts the objective anew.
+    /// Computes the objective from scratch.
     fn count(&mut self) {
         let clipped = |(margin, weight): (&f64, &f64)| weight * (margin / ENOUGH).clamp(self.floor, 1.0);
         self.objective = self.margins.iter().zip(&self.weights).map(clipped).sum();
     }
 
-    /// The weighted mean [clipped margin](crate::task::fitness::clipped_margin) of the margins: from −1 to 1, the
-    /// best.
+    /// Returns the weighted mean [clipped margin](crate::task::fitness::clipped_margin) of the
+    /// answers: from −1 to 1, the best.
     pub fn objective(&self) -> f64 {
         self.objective
     }
 
-    /// The present design.
+    /// Returns the current design.
     pub fn design(&self) -> Design {
         self.design.iter().map(|choice| CHOICES[*choice]).collect()
     }
 
-    /// The objective with another material at a place.
+    /// Returns the objective with another material at a place.
     fn tried(&self, place: usize, choice: usize) -> f64 {
         let (slope, now) = (self.slopes[place] / ENOUGH, self.design[place]);
         let (before, after) = (&self.widths[place][now], &self.widths[place][choice]);
@@ -151,8 +150,8 @@ impl Lesson {
         (self.design[place], self.objective) = (choice, objective);
     }
 
-    /// Climbs until no change of one place helps: first with no answer too bad to count, so that a
-    /// body which walks far to one side under every image is led back; then as answers count.
+    /// Climbs until no change of one place helps. At first no answer is too bad to count, so that a
+    /// body that walks far to one side under every image is brought back; then margins are clipped.
     pub fn solve(&mut self, random: &mut Stream) {
         for floor in [f64::NEG_INFINITY, WORST] {
             self.floor = floor;
@@ -161,7 +160,7 @@ impl Lesson {
         }
     }
 
-    /// The same from random designs, too; the best is taken.
+    /// Solves from random designs, too, and keeps the best.
     pub fn solve_from_many(&mut self, random: &mut Stream) {
         let (displacements, design) = (self.margins.clone(), self.design.clone());
         self.solve(random);
@@ -179,8 +178,7 @@ impl Lesson {
         (self.objective, self.margins, self.design) = best;
     }
 
-    /// Changes some of these places, each time the one that helps most, until as many are changed
-    /// or none helps.
+    /// Changes up to `most` of these places, each time the one that helps most, until none helps.
     pub fn best_changes(&mut self, places: &[usize], most: usize) {
         for _ in 0..most {
             let all = places.iter().flat_map(|place| CHOSEN.map(move |choice| (*place, choice)));
@@ -195,7 +193,7 @@ impl Lesson {
         }
     }
 
-    /// Place by place, in an order drawn anew for every sweep.
+    /// Climbs place by place, in a new random order for every sweep.
     fn climb(&mut self, random: &mut Stream) {
         let places = self.slopes.len();
         for _ in 0..SWEEPS {
@@ -214,7 +212,7 @@ impl Lesson {
     }
 }
 
-/// The one with the larger objective; of equals the first.
+/// Returns the one with the larger objective; the first wins a tie.
 fn better<T>(best: (f64, T), next: (f64, T)) -> (f64, T) {
     if next.0 > best.0 { next } else { best }
 }
@@ -229,7 +227,7 @@ mod tests {
         stream(1, Purpose::RandomImages, 0, child)
     }
 
-    /// A gait of one row, and images of it.
+    /// Makes a gait of one row, and images for it.
     fn lesson(places: usize, images: usize, seed: u64) -> (Gait, Vec<Example>, Vec<f64>) {
         let body: Body = "6".repeat(places).parse().unwrap();
         let gait = Gait::of(&body).unwrap();
@@ -252,7 +250,7 @@ mod tests {
         (gait, examples, slopes)
     }
 
-    /// The objective of a design, from the beginning.
+    /// Computes the objective of a design from scratch.
     fn objective(gait: &Gait, examples: &[Example], slopes: &[f64], design: &[Material]) -> f64 {
         let weight: f64 = examples.iter().map(|example| example.weight).sum();
         let clipped = |example: &Example| {

@@ -1,5 +1,5 @@
-//! How a body responds to images: the gait, random images, the regression on them, and what a
-//! training could reach.
+//! The response of a body to images: the gait, random images, the regression on them, and an
+//! estimate of what training could reach.
 
 pub mod estimate;
 pub mod gait;

@@ -1,4 +1,4 @@
-//! [`Probing`]: how the response of a gait is measured.
+//! [`Probing`]: the measurement of a gait's response.
 
 use crate::base::Grid;
 use crate::base::random::{Purpose, stream};
@@ -9,8 +9,7 @@ use crate::sim::Physics;
 use crate::task::perturbation::Condition;
 use std::ops::Range;
 
-/// Random images, numbered from 0, and the conditions under which a gait's probe is shown them by
-/// turns.
+/// Random images, numbered from 0, for a gait's probe, and the conditions that they take in turn.
 #[derive(Clone, Debug)]
 pub struct Probing {
     /// Every condition once.
@@ -19,7 +18,7 @@ pub struct Probing {
 }
 
 impl Probing {
-    /// Images shown under these conditions; some may be named repeatedly.
+    /// Makes a probing under these conditions; repeated ones count once.
     pub fn new(conditions: &[Condition], seed: u64) -> Self {
         let mut once: Vec<Condition> = Vec::new();
         for condition in conditions {
@@ -30,17 +29,17 @@ impl Probing {
         Probing { conditions: once, seed }
     }
 
-    /// The conditions, each once, in the order of their numbers.
+    /// Returns the conditions, each once, in the order of their numbers.
     pub fn conditions(&self) -> &[Condition] {
         &self.conditions
     }
 
-    /// Shows a gait's probe the random images with these numbers: what became of each, unstable
-    /// rollouts left out. `roll` simulates: displacements of a body under images and conditions,
-    /// `None` where unstable.
+    /// Simulates a gait's probe under the random images with these numbers and returns the stable
+    /// rollouts. `roll` returns a body's displacements under images and conditions, `None` if
+    /// unstable.
     ///
     /// # Errors
-    /// Those of `roll`.
+    /// Returns those of `roll`.
     pub fn shown<E>(
         &self,
         gait: &Gait,
@@ -68,7 +67,7 @@ impl Probing {
     }
 }
 
-/// The response according to the stable rollouts `shown`, out of `rollouts`; `None` if most are
+/// Returns the response from the stable rollouts `shown`, out of `rollouts`; `None` if most are
 /// unstable, or too few stable.
 pub fn response(shown: &[Shown], rollouts: usize) -> Option<Response> {
     if 2 * shown.len() > rollouts { Response::of(shown) } else { None }

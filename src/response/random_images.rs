@@ -1,5 +1,4 @@
-//! Runs with `fitness = "response"`: what their images are, what a gait is worth, and which configs
-//! there can be.
+//! Runs with `fitness = "response"`: their random images and conditions, and early stopping.
 
 use crate::base::Grid;
 use crate::base::random::{Purpose, stream};
@@ -9,16 +8,16 @@ use crate::task::fitness::LEAST_IMAGES;
 use crate::task::fitness::response_so_far;
 use crate::task::perturbation::{Condition, of_response};
 
-/// Which random images evolution shows: others than a training's, which are 0.
+/// Index of evolution's random images, unlike that of a training's, which is 0.
 const OF_EVOLUTION: u64 = 1 << 32;
 
-/// Share of what is to be beaten that a body must show after the first pairs to be shown the
-/// others. With more, chance decides; with less, hopeless ones cost as much as good ones.
+/// Fraction of the response to beat that a body must reach after the first pairs. With more, chance
+/// decides; with less, hopeless bodies cost as much as good ones.
 const WORTH_GOING_ON: f64 = 0.5;
 
-/// As many images as there are training images, an even number, in pairs: one whose pixels are
-/// bright, dark or at rest at random, each independently of all others, and its opposite. Pixels
-/// that are the same in all training images stay so: what never changes says nothing.
+/// Returns as many images as there are training images, an even number, in pairs: one whose pixels
+/// are bright, dark or at rest at random, independently of each other, and its opposite. Pixels
+/// that are the same in all training images keep their values: a constant carries no information.
 pub(crate) fn opposites(stimuli: &[Grid<f64>], physics: &Physics, seed: u64) -> Vec<Grid<f64>> {
     let Some(first) = stimuli.first() else { return Vec::new() };
     let changes = Grid::from_fn(first.height(), first.width(), |row, column| {
@@ -32,7 +31,7 @@ pub(crate) fn opposites(stimuli: &[Grid<f64>], physics: &Physics, seed: u64) -> 
                 let pixel = drawn[(row, column)];
                 match changes[(row, column)] {
                     false => first[(row, column)],
-                    // What is at rest is so in both.
+                    // A pixel at rest is so in both.
                     true if is_opposite && (pixel == 0.0 || pixel == 1.0) => 1.0 - pixel,
                     true => pixel,
                 }
@@ -42,7 +41,7 @@ pub(crate) fn opposites(stimuli: &[Grid<f64>], physics: &Physics, seed: u64) -> 
     (0..stimuli.len() as u64 / 2).flat_map(pair).collect()
 }
 
-/// The condition of each image; both images of a pair have the same.
+/// Returns the condition of each image; both images of a pair have the same.
 pub(crate) fn conditions(images: usize) -> Vec<Condition> {
     of_response()
         .into_iter()
@@ -52,10 +51,10 @@ pub(crate) fn conditions(images: usize) -> Vec<Condition> {
         .collect()
 }
 
-/// Whether a body that is to beat a response is so far from it after the first half of its pairs,
-/// two of each condition at least, that the rest is not worth simulating.
+/// Returns true if, after the first half of its pairs (at least two of each condition), a body is
+/// so far from the response to beat that the rest is not worth simulating.
 pub(crate) fn is_left_behind(known: &[Option<f64>], to_beat: f64) -> bool {
-    // Two images a pair; as many pairs of each condition as of the other.
+    // Two images a pair; equally many pairs of each condition.
     let first = (known.len() / 8 * 4).max(LEAST_IMAGES).min(known.len());
     known[..first].iter().all(Option::is_some)
         && to_beat > 0.0

@@ -1,16 +1,15 @@
-//! The response of a gait: how far a body is moved by each voxel that is a little wider.
+//! The response of a gait: the displacement of a body for each voxel that is a little wider.
 //!
-//! A body that walks is moved by the width of its passive voxels nearly in proportion, d ≈ c + Σ Jᵢ
-//! wᵢ. Shown images whose pixels are drawn independently of each other, a body whose soft voxels
-//! and sensors have all become expanding sensors tells its *slopes* J by linear regression: an
-//! intervention on every voxel by itself. (Natural images only tell what goes together.) The slopes
-//! belong to the gait, so they serve every task: a [`Lesson`](super::lesson::Lesson) finds the sensors that they
-//! call for.
+//! The displacement of a walking body depends nearly linearly on the widths of its passive voxels,
+//! d ≈ c + Σ Jᵢ wᵢ. Linear regression finds the *slopes* J from a body whose soft voxels and
+//! sensors are all expanding sensors, under images with independent random pixels: an intervention
+//! on every voxel by itself. (Natural images only reveal what goes together.) The slopes belong to
+//! the gait, so they serve every task: a [`Lesson`](super::lesson::Lesson) finds its sensors.
 
 use nalgebra::{DMatrix, DVector};
 
 /// Penalties on slopes among which cross-validation chooses \[rollouts × squared rest widths\].
-/// Larger ones shrink the slopes; smaller ones fit noise where there are few rollouts.
+/// Larger ones shrink the slopes; smaller ones fit noise if there are few rollouts.
 const RIDGES: [f64; 7] = [0.25, 1.0, 2.0, 4.0, 8.0, 16.0, 64.0];
 
 /// Folds of the cross-validation. More cost time and change little.
@@ -27,7 +26,7 @@ pub struct Moments {
 }
 
 impl Moments {
-    /// Of no rollout, for a gait with this number of places.
+    /// Makes the sums of no rollout, for a gait with this number of places.
     pub fn new(places: usize) -> Self {
         Moments {
             count: 0.0,
@@ -50,7 +49,7 @@ impl Moments {
         self.widths += widths;
     }
 
-    /// Mean displacement \[voxel lengths\]; 0 of no rollout.
+    /// Returns the mean displacement \[voxel lengths\]; 0 without rollouts.
     pub fn mean(&self) -> f64 {
         if self.count > 0.0 { self.displacement / self.count } else { 0.0 }
     }
@@ -65,15 +64,15 @@ impl Moments {
         }
     }
 
-    /// The intercept that goes with slopes \[voxel lengths\]; `None` of no rollout.
+    /// Returns the intercept that fits these slopes \[voxel lengths\]; `None` without rollouts.
     pub fn intercept(&self, slopes: &[f64]) -> Option<f64> {
         let explained: f64 = self.widths.iter().zip(slopes).map(|(width, slope)| width * slope).sum();
         (self.count > 0.0).then(|| (self.displacement - explained) / self.count)
     }
 }
 
-/// What is known of slopes: sums over sets of rollouts, each set about its own means, so that sets
-/// may differ in their intercepts.
+/// The data on slopes: sums over sets of rollouts, each set about its own means, so that sets may
+/// differ in their intercepts.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Evidence {
     matrix: DMatrix<f64>,
@@ -81,7 +80,7 @@ pub struct Evidence {
 }
 
 impl Evidence {
-    /// No evidence, for a gait with this number of places.
+    /// Makes evidence of no rollout, for a gait with this number of places.
     pub fn new(places: usize) -> Self {
         Evidence { matrix: DMatrix::zeros(places, places), vector: DVector::zeros(places) }
     }
@@ -100,20 +99,20 @@ impl Evidence {
         self.vector.axpy(-weight * set.displacement, &mean, 1.0);
     }
 
-    /// Makes it count this much of what it did.
+    /// Scales the weight of the evidence so far by a factor.
     pub fn fade(&mut self, factor: f64) {
         self.matrix *= factor;
         self.vector *= factor;
     }
 
-    /// The slopes with the least bias: by ridge regression with the smallest penalty.
+    /// Returns the slopes with the least bias: by ridge regression with the smallest penalty.
     pub fn least_biased(&self) -> Fit {
         let factor = self.factor(RIDGES[0]);
         Fit { slopes: factor.solve(&self.vector).as_slice().to_vec(), factor }
     }
 
-    /// The slopes by ridge regression, and by what factor the noise of a rollout is in each (its
-    /// standard error).
+    /// Returns the slopes by ridge regression, and their standard errors in units of a rollout's
+    /// noise.
     ///
     /// # Panics
     /// If `ridge` is not above 0.
@@ -124,7 +123,7 @@ impl Evidence {
         (factor.solve(&self.vector).as_slice().to_vec(), errors)
     }
 
-    /// The same of more places: the n-th place of before is the one with the n-th of these numbers.
+    /// Embeds the evidence in more places: its n-th place gets the n-th of these numbers.
     pub fn among(&self, numbers: &[usize], places: usize) -> Self {
         let mut all = Evidence::new(places);
         for (i, &row) in numbers.iter().enumerate() {
@@ -136,7 +135,7 @@ impl Evidence {
         all
     }
 
-    /// The slopes by ridge regression.
+    /// Returns the slopes by ridge regression.
     ///
     /// # Panics
     /// If `ridge` is not above 0.
@@ -152,7 +151,7 @@ impl Evidence {
     }
 }
 
-/// Slopes, and how other rollouts would have changed them.
+/// Slopes, and their variance over other rollouts.
 pub struct Fit {
     /// The slopes, in the places' order \[voxel lengths\].
     pub slopes: Vec<f64>,
@@ -160,9 +159,9 @@ pub struct Fit {
 }
 
 impl Fit {
-    /// The expected squared error of the weighted sum of the slopes, and the part of it that is
-    /// noise, not bias; both in units of a rollout's squared scatter. True slopes vary as `ridge`,
-    /// the penalty that was chosen, supposes.
+    /// Returns the expected squared error of the weighted sum of the slopes, and its part due to
+    /// noise, not bias; both in units of a rollout's squared scatter. Assumes that true slopes vary
+    /// as `ridge`, the chosen penalty, implies.
     pub fn variance(&self, weights: &[f64], ridge: f64) -> (f64, f64) {
         let weights = DVector::from_column_slice(weights);
         let solved = self.factor.solve(&weights);
@@ -172,30 +171,29 @@ impl Fit {
     }
 }
 
-/// What rollouts with random images tell of a gait.
+/// The response of a gait, from rollouts with random images.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Response {
-    /// By how much a place that is wider by one rest width moves the body to the right \[voxel
+    /// Displacement of the body to the right for each place that is wider by one rest width \[voxel
     /// lengths\], in the places' order.
     pub slopes: Vec<f64>,
-    /// Their standard errors, what the penalty shrinks included \[voxel lengths\].
+    /// Standard errors of the slopes, including the shrinkage by the penalty \[voxel lengths\].
     pub errors: Vec<f64>,
-    /// The displacement of a body whose places all had no width, the mean over conditions \[voxel
-    /// lengths\].
+    /// Displacement of a body with all places of width 0, mean over conditions \[voxel lengths\].
     pub intercept: f64,
-    /// The same under each condition; none of one without rollouts.
+    /// Intercept under each condition; none without rollouts.
     pub intercepts: Vec<Option<f64>>,
-    /// What slopes fitted to other rollouts leave unexplained of a displacement: standard
-    /// deviation, cross-validated \[voxel lengths\].
+    /// Standard deviation of displacements about predictions from slopes of other rollouts,
+    /// cross-validated \[voxel lengths\].
     pub noise: f64,
-    /// What the true slopes would leave unexplained: the same without the errors of the slopes
-    /// \[voxel lengths\].
+    /// Standard deviation of displacements about predictions from the true slopes: `noise` without
+    /// the slopes' errors \[voxel lengths\].
     pub scatter: f64,
-    /// Share of the displacements' variance that slopes fitted to other rollouts explain.
+    /// Fraction of the displacements' variance that slopes fitted to other rollouts explain.
     pub r_squared: f64,
-    /// The penalty that was chosen.
+    /// The chosen penalty.
     pub ridge: f64,
-    /// What it was fitted to.
+    /// Data of the fit.
     pub evidence: Evidence,
 }
 
@@ -204,15 +202,15 @@ pub struct Response {
 pub struct Shown {
     /// Target width of each place \[rest widths\].
     pub widths: Vec<f64>,
-    /// How far the body walked to the right \[voxel lengths\].
+    /// Displacement to the right \[voxel lengths\].
     pub displacement: f64,
-    /// What it was shown under: rollouts under different conditions have intercepts of their own.
+    /// Number of its condition; each condition has an intercept of its own.
     pub condition: usize,
 }
 
 impl Response {
-    /// Fits slopes; the penalty is the one that predicts left-out rollouts best. `None` of fewer
-    /// than two rollouts a fold.
+    /// Fits slopes with the penalty that predicts left-out rollouts best. Returns `None` for fewer
+    /// than two rollouts per fold.
     pub fn of(rollouts: &[Shown]) -> Option<Self> {
         let places = rollouts.first()?.widths.len();
         if rollouts.len() < 2 * FOLDS {
@@ -221,7 +219,7 @@ impl Response {
         let conditions = 1 + rollouts.iter().map(|shown| shown.condition).max()?;
         let mut folds = vec![vec![Moments::new(places); conditions]; FOLDS];
         for (number, shown) in rollouts.iter().enumerate() {
-            // By turns within a condition, whichever order the conditions come in.
+            // Folds alternate within a condition, whatever the order of the conditions.
             folds[(number / conditions) % FOLDS][shown.condition].add(&shown.widths, shown.displacement);
         }
         let total = |condition: usize| {
@@ -260,7 +258,7 @@ impl Response {
         let (slopes, factors) = evidence.slopes(ridge);
         let found = DVector::from_column_slice(&slopes);
         let left = spread - 2.0 * found.dot(&evidence.vector) + (&evidence.matrix * &found).dot(&found);
-        // The effective number of parameters: residuals are smaller than the scatter by these.
+        // The effective number of parameters, by which residuals are smaller than the scatter.
         let fitted = places as f64 - ridge * dot(&factors, &factors)
             + all.iter().filter(|moments| moments.count > 0.0).count() as f64;
         let scatter = (left.max(0.0) / (rollouts.len() as f64 - fitted).max(1.0)).sqrt();
@@ -279,10 +277,10 @@ impl Response {
         })
     }
 
-    /// The error of the slopes relative to the slopes: from 0, known exactly, to 1, nothing known.
-    /// Each place counts as much as its width varied, so this is the relative error of the
-    /// displacements that are predicted for random images. Its square is the share of the variance
-    /// that exact slopes would explain and these do not.
+    /// Returns the error of the slopes relative to the slopes: from 0, known exactly, to 1, nothing
+    /// known. Each place has the weight of its width's variation, so this is the relative error of
+    /// the displacements predicted for random images. Its square is the share of the variance that
+    /// exact slopes would explain and these do not.
     pub fn relative_error(&self) -> f64 {
         let weighed = |numbers: &[f64]| -> f64 {
             numbers
@@ -313,7 +311,7 @@ mod tests {
         stream(1, Purpose::RandomImages, 0, child)
     }
 
-    /// Rollouts of a linear body: slopes, an intercept for each condition, noise.
+    /// Simulates a linear body: slopes, an intercept for each condition, noise.
     fn planted(slopes: &[f64], intercepts: &[f64], noise: f64, count: usize, seed: u64) -> Vec<Shown> {
         let mut random = random(seed);
         let rollout = |number: usize| {
@@ -332,7 +330,7 @@ mod tests {
         let response = Response::of(&planted(&slopes, &[4.0, -9.0, 30.0], 0.0, 120, 1)).unwrap();
         let worst = response.slopes.iter().zip(&slopes).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
         assert!(worst < 0.1 && response.r_squared > 0.999, "{worst} {}", response.r_squared);
-        // Too few to say anything.
+        // Too few for a fit.
         assert_eq!(Response::of(&planted(&slopes, &[0.0], 0.0, 9, 1)), None);
     }
 
@@ -401,8 +399,7 @@ mod tests {
             let (mut off, mut said) = (0.0, 0.0);
             for seed in 0..8 {
                 let mut shown = planted(&slopes, &[0.0], noise, rollouts, seed);
-                // Half of the places are never wider: of their slopes nothing is known, and nothing
-                // need be.
+                // Half of the places are never wider: their slopes are unknown, and irrelevant.
                 for shown in &mut shown {
                     for (width, slope) in shown.widths.iter_mut().zip(&slopes).skip(30) {
                         shown.displacement -= slope * (*width - 0.6);

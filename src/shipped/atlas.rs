@@ -1,23 +1,23 @@
-//! The atlas: runs that lie in the repository, compressed, and not in the program. A path that begins
-//! with [`PREFIX`] names them: `atlas:zero_one-1` one, `atlas:zero_one` one of every seed.
+//! The atlas: runs that are in the repository, compressed, and not in the program. A path that
+//! begins with [`PREFIX`] names them: `atlas:zero_one-1` one, `atlas:zero_one` one of every seed.
 
 use std::ffi::OsStr;
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// How a name of a run of the atlas begins.
+/// Prefix of the names of the atlas's runs.
 pub const PREFIX: &str = "atlas:";
 
-/// The environment variable that says where the atlas is.
+/// Environment variable with the folder of the atlas.
 pub const VARIABLE: &str = "MORPHCOG_ATLAS";
 
-/// Where it is looked for after that: the repository's folder.
+/// Second place to look for it: the repository's folder.
 const FOLDER: &str = "data/atlas";
 
-/// How the name of a compressed file ends.
+/// Suffix of the names of compressed files.
 const COMPRESSED: &str = ".gz";
 
-/// The folders in which the atlas may be, the first first; `variable` is the value of
+/// Returns the folders in which the atlas may be, in order; `variable` is the value of
 /// `MORPHCOG_ATLAS`.
 fn folders(variable: Option<&OsStr>) -> Vec<PathBuf> {
     let set = variable.filter(|value| !value.is_empty()).map(PathBuf::from);
@@ -28,15 +28,15 @@ fn variable() -> Option<std::ffi::OsString> {
     std::env::var_os(VARIABLE)
 }
 
-/// The folder of the atlas that has a run.
+/// Returns the folder of the atlas that has a run.
 pub fn folder_of(run: &str) -> Option<PathBuf> {
     folders(variable().as_deref()).into_iter().find(|folder| holds_run(&folder.join(run)))
 }
 
-/// The compressed file of a run.
+/// Returns the path of a run's compressed file.
 ///
 /// # Errors
-/// Where it was looked for, what there is instead, and how to get the atlas.
+/// Returns an error that names the places searched, the runs there are, and how to get the atlas.
 pub fn file(run: &str, file: &str) -> io::Result<PathBuf> {
     found(run, file, variable().as_deref())
 }
@@ -66,7 +66,7 @@ fn found(run: &str, file: &str, variable: Option<&OsStr>) -> io::Result<PathBuf>
     ))
 }
 
-/// Names of the runs in a folder, in order.
+/// Returns the names of the runs in a folder, in order.
 fn names(folder: &Path) -> Vec<String> {
     let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
     let of_runs = entries.filter(|entry| holds_run(&entry.path()));
@@ -79,13 +79,13 @@ fn holds_run(folder: &Path) -> bool {
     folder.join(format!("run.json{COMPRESSED}")).is_file()
 }
 
-/// The number that a name ends with.
+/// Returns the number at the end of a name.
 fn seed(name: &str) -> Option<u64> {
     name.rsplit_once('-')?.1.parse().ok()
 }
 
-/// The `run.json` of a run, or of every seed of a set; if there is none, of the run of that name,
-/// which reading will say.
+/// Returns the `run.json` of a run, or of every seed of a set. Without either, returns the path of
+/// a run of that name; reading it reports the problem.
 pub fn runs(name: &str) -> Vec<PathBuf> {
     seeds(name, variable().as_deref())
 }
@@ -129,7 +129,7 @@ mod tests {
         );
         assert!(error.starts_with(&said), "{error}");
         assert_eq!(seeds("zero_one", variable), [Path::new("atlas:zero_one/run.json")]);
-        // What is about all seeds may lie there.
+        // A folder of that name may hold results about all seeds.
         std::fs::rename(
             folder.path().join("zero_one/run.json.gz"),
             folder.path().join("zero_one/eval.json.gz"),

@@ -1,10 +1,10 @@
-//! Runs that ship with the program. A path that begins with [`PREFIX`] names them: `gallery:zero_one-1`
-//! one, `gallery:zero_one` all of a set. Their files are read as if they lay in a folder of that name.
-//! They are there with the feature `gallery`.
+//! Runs that ship with the program, if built with the feature `gallery`. A path that begins with
+//! [`PREFIX`] names them: `gallery:zero_one-1` one, `gallery:zero_one` all of a set. Their files
+//! are read as if they were in a folder of that name.
 
 use std::path::{Path, PathBuf};
 
-/// How a name of shipped runs begins.
+/// Prefix of the names of shipped runs.
 pub const PREFIX: &str = "gallery:";
 
 /// The run of the robots that the paper's authors published. It has no files:
@@ -14,22 +14,22 @@ pub const PUBLISHED: &str = "gallery:";
 /// Robots that tell zeros from ones, the best run first: what is shown where there are no others.
 pub const ZERO_ONE: &str = "gallery:zero_one";
 
-/// A robot for each pair of digits, which answer together.
+/// A robot for each pair of digits; together they answer as a team.
 pub const TEAM: &str = "gallery:team";
 
-/// Gaits to be trained, as by `demo`; they have no task, and so are not in `gallery:all`.
+/// Gaits to train, as in `demo`; they have no task, so they are not in `gallery:all`.
 pub const GAITS: &str = "gallery:gaits";
 
-/// All that have a task.
+/// All runs that have a task.
 const ALL: &str = "gallery:all";
 
 /// A run: its name, and its files with their names.
 type Run = (&'static str, &'static [(&'static str, &'static str)]);
 
-/// Runs that belong together: their name, and at least one of them.
+/// Runs that belong together: the name of the set, and at least one run.
 type Set = (&'static str, &'static [Run]);
 
-/// The files of a run in a folder of `data/`.
+/// Makes a run from the files in a folder of `data/`.
 #[cfg(feature = "gallery")]
 macro_rules! run {
     ($name:expr, $folder:expr) => {
@@ -44,7 +44,7 @@ macro_rules! run {
     };
 }
 
-/// Runs that are named after their digits, in a folder of `data/`.
+/// Makes runs named after their digits, from a folder of `data/`.
 #[cfg(feature = "gallery")]
 macro_rules! tasks {
     ($folder:literal: $($task:literal)*) => {
@@ -52,11 +52,11 @@ macro_rules! tasks {
     };
 }
 
-/// None: this build is without them.
+/// This build has no shipped runs.
 #[cfg(not(feature = "gallery"))]
 const SETS: &[Set] = &[];
 
-/// All of them. The runs of a set are numbered by their seeds, or named after their digits.
+/// All shipped runs. Those of a set are numbered by their seeds, or named after their digits.
 #[cfg(feature = "gallery")]
 const SETS: &[Set] = &[
     (
@@ -92,16 +92,16 @@ const SETS: &[Set] = &[
     ),
 ];
 
-/// The text of a file of the run of a name; none if there is no such run, or it has no such file.
+/// Returns the text of a file of a run; none if there is no such run or file.
 pub fn text(name: &str, file: &str) -> Option<&'static str> {
     let (_, files) = SETS.iter().flat_map(|(_, runs)| *runs).find(|(run, _)| *run == name)?;
     files.iter().find(|(own, _)| *own == file).map(|(_, text)| *text)
 }
 
-/// The `run.json` of every run of a set, or of one run.
+/// Returns the `run.json` of every run of a set, or of one run.
 ///
 /// # Errors
-/// What there is, if there is no run of that name.
+/// Returns an error that lists the runs if none has that name.
 pub fn runs(name: &str) -> Result<Vec<PathBuf>, String> {
     if name == PUBLISHED {
         return Ok(vec![Path::new(PUBLISHED).join("run.json")]);
@@ -123,7 +123,7 @@ fn runs_of(sets: &[Set], name: &str) -> Result<Vec<PathBuf>, String> {
         sets.iter().flat_map(of_set).map(|run| PathBuf::from(format!("{run}/run.json"))).collect();
     match found.is_empty() {
         true => {
-            // Of each set also one run, as an example.
+            // Each set with one of its runs as an example.
             let names: Vec<String> = sets.iter().map(|(set, runs)| format!("{set}, {}", runs[0].0)).collect();
             Err(format!("there is no {name}: expected {ALL}, {}", names.join(", ")))
         }

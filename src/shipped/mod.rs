@@ -1,6 +1,6 @@
-//! Runs that are named, and not found by a path: those that ship with the program
-//! (`gallery:zero_one-1`), and those of the atlas (`atlas:zero_one-1`). Results of such a run do not go
-//! beside it, but to the present folder.
+//! Runs identified by a name instead of a path: those that ship with the program
+//! (`gallery:zero_one-1`), and those of the atlas (`atlas:zero_one-1`). Their results go to the
+//! current folder.
 
 pub mod atlas;
 pub mod gallery;
@@ -19,30 +19,30 @@ enum Place {
     Compressed(PathBuf),
 }
 
-/// The name of a run (`gallery:zero_one-1`) and the file of it in a path; none of other paths.
+/// Splits a path into the name of a run (`gallery:zero_one-1`) and its file; none for other paths.
 fn parts(path: &Path) -> Option<(&str, &str)> {
     let text = path.to_str()?;
     let (name, file) = text.split_once(['/', '\\']).unwrap_or((text, ""));
     [gallery::PREFIX, atlas::PREFIX].iter().any(|prefix| name.starts_with(prefix)).then_some((name, file))
 }
 
-/// Whether a path names a run, or a file of one.
+/// Returns true if a path names a run, or a file of one.
 pub fn is_named(path: &Path) -> bool {
     parts(path).is_some()
 }
 
-/// Whose a named run is (`gallery`, `atlas`), and its name.
+/// Returns the collection of a named run (`gallery`, `atlas`), and its name.
 pub fn name(path: &Path) -> Option<(&str, &str)> {
     parts(path)?.0.split_once(':')
 }
 
-/// Whose a named run is, and the set that it is of: what is before its seed, or its digits.
+/// Returns the collection of a named run, and its set: the part before its seed or digits.
 pub fn set(path: &Path) -> Option<(&str, &str)> {
     let (of, run) = name(path)?;
     Some((of, run.rsplit_once('-')?.0))
 }
 
-/// The folder of the atlas that a named run of it is in; none of other paths.
+/// Returns the atlas folder that has a named run; none for other paths.
 pub fn atlas_of(path: &Path) -> Option<PathBuf> {
     let (name, _) = parts(path)?;
     atlas::folder_of(name.strip_prefix(atlas::PREFIX)?)
@@ -78,7 +78,7 @@ pub fn exists(path: &Path) -> bool {
 /// The `run.json` of every run that a name means.
 ///
 /// # Errors
-/// What ships with the program, if there is no such run of it.
+/// Returns an error that lists the shipped runs if none of them has that name.
 pub fn runs(path: &Path) -> Result<Vec<PathBuf>, String> {
     let (name, _) = parts(path).expect("callers ask is_named before");
     name.strip_prefix(atlas::PREFIX).map_or_else(|| gallery::runs(name), |run| Ok(atlas::runs(run)))

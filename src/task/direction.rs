@@ -1,11 +1,11 @@
-//! [`Direction`] and [`Assignment`]: which way a robot walks, and which way it should (paper,
-//! section "Generalization test").
+//! [`Direction`] and [`Assignment`]: the way a robot walks, and the way it should (paper, section
+//! "Generalization test").
 
 use crate::task::fitness::Fitness;
 use crate::task::grouping::{Group, Split};
 use crate::task::score::{Answer, of_split};
 
-/// Displacements up to this many voxel lengths say nothing (paper, section "Generalization test").
+/// Displacements up to this many voxel lengths are no answer (paper, "Generalization test").
 pub const THRESHOLD: f64 = 3.0;
 
 /// A way to walk.
@@ -18,14 +18,13 @@ pub enum Direction {
 }
 
 impl Direction {
-    /// Where a displacement leads; `None` if it is not larger than `threshold` (paper: 3 voxel
-    /// lengths).
+    /// Returns a displacement's direction; `None` up to `threshold` (paper: 3 voxel lengths).
     pub fn of(displacement: f64, threshold: f64) -> Option<Self> {
         let direction = if displacement > 0.0 { Direction::Right } else { Direction::Left };
         (displacement.abs() > threshold).then_some(direction)
     }
 
-    /// Its name in files: "left" or "right".
+    /// Returns its name in files: "left" or "right".
     pub fn name(self) -> &'static str {
         match self {
             Direction::Left => "left",
@@ -33,29 +32,28 @@ impl Direction {
         }
     }
 
-    /// The direction that has a name.
+    /// Returns the direction with a name.
     pub(crate) fn named(name: &str) -> Option<Self> {
         [Direction::Left, Direction::Right].into_iter().find(|direction| direction.name() == name)
     }
 }
 
-/// Which way group A is to walk; group B is to walk the other. Fixed by the training answers before
-/// any test.
+/// The direction in which group A should walk; group B should walk the other way. The training
+/// answers fix it before any test.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Assignment {
-    /// The way of group A.
+    /// The direction of group A.
     pub a: Direction,
 }
 
 impl Assignment {
-    /// The assignment under which a robot's training answers are fitter (A left if it makes no
-    /// difference).
+    /// Returns the assignment under which a robot's training answers are fitter (A left in a tie).
     pub fn from_training(split: &Split, fitness: Fitness, answers: &[Answer]) -> Self {
         let (a_right, a_left) = fitness.of_assignments(of_split(split, answers));
         Assignment { a: if a_right > a_left { Direction::Right } else { Direction::Left } }
     }
 
-    /// The way a group is to walk.
+    /// Returns the direction in which a group should walk.
     pub fn expected(self, group: Group) -> Direction {
         match (group, self.a) {
             (Group::A, way) => way,
@@ -64,7 +62,7 @@ impl Assignment {
         }
     }
 
-    /// How far a displacement leads in the correct direction; negative if it leads in the wrong one.
+    /// Returns a displacement's length in the correct direction; negative in the wrong one.
     pub fn margin(self, group: Group, displacement: f64) -> f64 {
         match self.expected(group) {
             Direction::Right => displacement,
@@ -72,7 +70,7 @@ impl Assignment {
         }
     }
 
-    /// Whether a displacement is the correct answer to an image of a group: farther than
+    /// Returns true if a displacement is the correct answer to an image of a group: farther than
     /// `threshold`, the correct way.
     pub fn is_right(self, group: Group, displacement: f64, threshold: f64) -> bool {
         Direction::of(displacement, threshold) == Some(self.expected(group))
@@ -96,7 +94,7 @@ mod tests {
             Assignment::from_training(split, Fitness::Min, &[of(0), of(1)])
         };
         assert_eq!((fixed([-5.0, 8.0]).a, fixed([5.0, -8.0]).a), (Left, Right));
-        // Both right: the shorter walk is the wrong one. No difference: left.
+        // Both walk right: the shorter walk is the wrong one. No difference: left.
         assert_eq!((fixed([8.0, 5.0]).a, fixed([5.0, 8.0]).a, fixed([5.0, 5.0]).a), (Right, Left, Left));
         let a_right = Assignment { a: Right };
         assert!(a_right.is_right(A, 3.1, 3.0) && a_right.is_right(B, -3.1, 3.0));

@@ -1,5 +1,4 @@
-//! Evaluation of many robots at once, in parallel over robots and images, and what can be saved
-//! without loss.
+//! Evaluation of many robots at once, in parallel over robots and images, with lossless savings.
 
 use crate::base::Grid;
 use crate::base::session::Session;
@@ -17,17 +16,16 @@ use std::collections::{BTreeMap, HashMap};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-/// Savings that change no archive; keys of a config's section `[savings]`. All on by default.
+/// Savings that change no archive; keys of a config's section `[savings]`. All are on by default.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Savings {
-    /// A body already evaluated in this run is not simulated again: it would be exactly as fit, and
-    /// only the strictly fitter get in.
+    /// True to simulate no body twice in a run: it would be exactly as fit, and only strictly
+    /// fitter robots enter the archive.
     pub known_bodies: bool,
-    /// An offspring that can no longer beat the elite of any cell it may belong to is not simulated
-    /// further.
+    /// True to stop simulating offspring that can no longer beat the elite of any possible cell.
     pub early_stop: bool,
-    /// Images that show a body's sensors the same pixels share a rollout.
+    /// True to share a rollout among images that give a body's sensors the same pixels.
     pub shared_rollouts: bool,
 }
 
@@ -37,20 +35,20 @@ impl Default for Savings {
     }
 }
 
-/// How an evaluation ended.
+/// The way in which an evaluation ended.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Outcome {
     /// The displacement under every image, in the images' order, voxel lengths.
     Walked(Vec<f64>),
     /// A rollout became unstable: no fitness.
     Unstable(Unstable),
-    /// Stopped because it could not get into the archive any more, or was [given
-    /// up](Job::given_up); with the displacement under every image, as far as known.
+    /// Stopped because it could no longer enter the archive, or was [given up](Job::given_up).
+    /// Holds the displacement under every image, as far as known.
     Stopped(Vec<Option<f64>>),
 }
 
 impl Outcome {
-    /// The displacement under every image, as far as known; `None` if a rollout became unstable.
+    /// Returns the displacements as far as known, one per image; `None` if a rollout was unstable.
     pub fn known(&self) -> Option<Vec<Option<f64>>> {
         match self {
             Outcome::Walked(displacements) => Some(displacements.iter().copied().map(Some).collect()),
@@ -60,49 +58,48 @@ impl Outcome {
     }
 }
 
-/// An outcome and the simulation it took. A *showing* is one image shown to one robot: a fresh
-/// rollout, or one phase of a sequential one.
+/// An outcome and the simulation it took. A *showing* is one image for one robot: a fresh rollout,
+/// or one phase of a sequential one.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Evaluation {
-    /// How it ended.
+    /// The outcome.
     pub outcome: Outcome,
     /// Showings simulated.
     pub simulated: u64,
-    /// Showings that another image's rollout stood for.
+    /// Showings covered by another image's rollout.
     pub shared: u64,
     /// Showings not needed after an early stop (or after an instability).
     pub stopped: u64,
 }
 
-/// Whether something holds for a robot with these displacements so far.
+/// A predicate of a robot's displacements so far.
 pub type MayWin<'a> = dyn Fn(&[Option<f64>]) -> bool + Sync + Send + 'a;
 
 /// A body to be evaluated.
 pub struct Job<'a> {
     /// The body.
     pub body: &'a Body,
-    /// In which order to show the images where that is free (fresh rollouts): those first under
-    /// which it is likely to drop out. Images that are not in it come last, in their order.
+    /// Preferred order of the images in fresh rollouts: first those under which it is likely to
+    /// drop out. Images that are missing here come last, in their order.
     pub order: Vec<usize>,
-    /// Whether it may still get into the archive, given some of its displacements; asked with early
-    /// stopping only.
+    /// Returns true if it may still enter the archive, given some of its displacements; called with
+    /// early stopping only.
     pub may_win: Box<MayWin<'a>>,
-    /// Stops the evaluation early. Sees only the known prefix in a fixed order, so the result does not
-    /// depend on scheduling.
+    /// Stops the evaluation early if it returns true. It gets only the known prefix in a fixed
+    /// order, so the result does not depend on scheduling.
     pub given_up: Option<Box<MayWin<'a>>>,
 }
 
-/// Evaluates jobs, each on all images; results in the jobs' order, the same on any number of
-/// threads. Fresh rollouts happen under the images' `conditions`; those that are missing are the
-/// default. In sequential ones conditions have no meaning.
+/// Evaluates jobs, each on all images. Results are in the jobs' order and the same on any number of
+/// threads. Fresh rollouts use the images' `conditions`, or the default one where they are missing;
+/// sequential rollouts ignore them.
 ///
 /// All rollouts of all jobs are one list of work: first every robot's first image, then every
 /// second one, and so on, large bodies first so that no core waits long at the end. A rollout whose
-/// robot has dropped out by then is passed over. One that was begun before that was known is simply
-/// not counted.
+/// robot has already dropped out is skipped. One that had begun before is not counted.
 ///
 /// # Errors
-/// [`Stopped`] if `stop` was set before all was known.
+/// Returns [`Stopped`] if `stop` was set before all was known.
 pub fn evaluate(
     jobs: &[Job],
     images: &[Grid<f64>],
@@ -119,7 +116,7 @@ pub fn evaluate(
         .iter()
         .flat_map(|candidate| (0..candidate.rollouts()).map(move |place| (place, candidate)))
         .collect();
-    // Stable: equally large bodies stay in the jobs' order.
+    // A stable sort: equally large bodies keep the jobs' order.
     work.sort_by_key(|(place, candidate)| (*place, Reverse(candidate.systems[0].point_count())));
     let next = AtomicUsize::new(0);
     let worker = |_| {
@@ -134,13 +131,13 @@ pub fn evaluate(
 }
 
 /// Simulates a fresh rollout of a body under each image and its condition (the default where one is
-/// missing). Images that show its sensors the same pixels under the same condition share a rollout.
+/// missing). Images that give its sensors the same pixels under the same condition share a rollout.
 ///
 /// Returns the displacements in voxel lengths, in the images' order, and the number of rollouts
 /// simulated. `progress` is called after each with the number of images it covers.
 ///
 /// # Errors
-/// [`Stopped`] if `stop` was set meanwhile; within, [`Unstable`] for a rollout that ended early.
+/// Returns [`Stopped`] if `stop` was set in the meantime; single rollouts return [`Unstable`].
 pub fn fresh_rollouts(
     body: &Body,
     images: &[Grid<f64>],
@@ -154,9 +151,9 @@ pub fn fresh_rollouts(
     ended.map(|()| (found, simulated))
 }
 
-/// Fresh rollouts as of [`fresh_rollouts`], as far as they are when `stop` is set: those of the first
-/// images, the number simulated, and whether it was stopped. Those of the other images, simulated
-/// later, complete them with the same bits.
+/// Acts as [`fresh_rollouts`], but keeps what was completed before `stop` was set. Returns the
+/// displacements of the first images, the number simulated, and an error if it was stopped. The
+/// other images, simulated later, complete them with the same bits.
 pub fn fresh_rollouts_so_far(
     body: &Body,
     images: &[Grid<f64>],
@@ -171,7 +168,7 @@ pub fn fresh_rollouts_so_far(
     let mut shared = BTreeMap::<usize, u64>::new();
     same_as.iter().for_each(|&first| *shared.entry(first).or_default() += 1);
     let mut parts = setup.parts(&systems, shared.keys().copied());
-    // In the images' order, one after another: what is stopped has then done the first of them.
+    // In the images' order, so that the first ones are complete after a stop.
     parts.sort_by_key(|(_, images)| images.first().copied());
     let next = AtomicUsize::new(0);
     let worker = |_| {
@@ -191,13 +188,11 @@ pub fn fresh_rollouts_so_far(
     (found, rolled.len(), ended)
 }
 
-/// A finished rollout: of one image if fresh; of all images if sequential, up to where the robot
-/// dropped out.
+/// A finished rollout: of one image if fresh; of all up to the robot's drop-out if sequential.
 struct Shown {
-    /// Displacement under each image shown, voxel lengths; none for the one under which it became
-    /// unstable.
+    /// Displacement under each image, voxel lengths; none where it became unstable.
     displacements: Vec<Option<f64>>,
-    /// How it became unstable, if it did.
+    /// The instability, if any.
     unstable: Option<Unstable>,
 }
 
@@ -208,36 +203,36 @@ impl Shown {
     }
 }
 
-/// What is known of a robot's rollouts.
+/// The known results of a robot's rollouts.
 #[derive(Default)]
 struct Progress {
-    /// In the order in which they count, until they are counted.
+    /// Rollouts that have ended but are not counted yet, in the order of counting.
     ended: Vec<Option<Shown>>,
-    /// How many are.
+    /// Number of counted rollouts.
     counted: usize,
-    /// Of those, in the order of showing.
+    /// Displacements of the counted rollouts, in the order of showing.
     displacements: Vec<Option<f64>>,
-    /// How the first of those became unstable that did.
+    /// Instability of the first counted rollout that became unstable.
     unstable: Option<Unstable>,
-    /// How the evaluation ends, as soon as that is known.
+    /// End of the evaluation, as soon as it is known.
     verdict: Option<Evaluation>,
 }
 
-/// Walked, under all images.
+/// Makes the outcome of a robot that walked under all images.
 fn walked(known: Vec<Option<f64>>) -> Outcome {
     let displacement = |known: Option<f64>| known.expect("no rollout was left out, and none was unstable");
     Outcome::Walked(known.into_iter().map(displacement).collect())
 }
 
-/// What all jobs have in common.
+/// The data that all jobs share.
 struct Setup<'a> {
     images: &'a [Grid<f64>],
     /// Every condition once, the default first.
     conditions: Vec<Condition>,
-    /// For each image the number of its condition.
+    /// Number of each image's condition.
     condition_of: Vec<usize>,
     physics: &'a Physics,
-    /// Of each condition.
+    /// Protocol of each condition.
     protocols: Vec<Protocol>,
     session: &'a Session<'a>,
 }
@@ -269,7 +264,7 @@ impl<'a> Setup<'a> {
         &self.protocols[0]
     }
 
-    /// A body under the physics of each condition.
+    /// Returns a body under the physics of each condition.
     fn systems(&self, body: &Body) -> Vec<Arc<System>> {
         let mut once: Vec<(Body, Physics, Arc<System>)> = Vec::new();
         let system = |condition: &Condition| {
@@ -287,21 +282,20 @@ impl<'a> Setup<'a> {
         self.conditions.iter().map(system).collect()
     }
 
-    /// For each image the first that shows the body's sensors the same pixels under the same
-    /// condition.
+    /// Returns for each image the first with the same condition and the same pixels under sensors.
     fn same_as(&self, body: &Body) -> Vec<usize> {
         let mut first = HashMap::new();
         let same = same_to_sensors(body, &self.images.iter().collect::<Vec<_>>());
         let of = |(image, same): (usize, usize)| {
             let condition = self.condition_of[image];
-            // An inverted pixel is another one in each image.
+            // The inverted pixel differs from image to image.
             let is_drawn = self.conditions[condition].iter().any(|change| change.kind() == Kind::Pixel);
             *first.entry((same, condition, is_drawn.then_some(image))).or_insert(image)
         };
         same.into_iter().enumerate().map(of).collect()
     }
 
-    /// A fresh rollout under an image and its condition.
+    /// Simulates a fresh rollout under an image and its condition.
     fn fresh_rollout(
         &self,
         body: &Body,
@@ -314,8 +308,8 @@ impl<'a> Setup<'a> {
         Ok(self.in_unperturbed_frame(StepError::outcome(rollout)?, number))
     }
 
-    /// Fresh rollouts under images of the same condition, at most [`Worlds::MOST`]; the same bits as
-    /// one by one.
+    /// Simulates fresh rollouts under at most [`Worlds::MOST`] images of the same condition, with
+    /// the same bits as one by one.
     fn side_by_side(
         &self,
         body: &Body,
@@ -328,8 +322,8 @@ impl<'a> Setup<'a> {
         Ok(found.into_iter().map(|displacement| self.in_unperturbed_frame(displacement, number)).collect())
     }
 
-    /// Images in parts that are shown side by side, each with the number of its condition: of bodies
-    /// that gain by it as many as go together, but no fewer parts than threads.
+    /// Divides images into parts to simulate side by side, each with the number of its condition.
+    /// Parts are as large as possible for bodies that gain by it, but no fewer than threads.
     fn parts(
         &self,
         systems: &[Arc<System>],
@@ -345,15 +339,15 @@ impl<'a> Setup<'a> {
         by_condition.into_iter().flat_map(split).collect()
     }
 
-    /// What is shown for an image under its condition.
+    /// Returns the stimulus of an image under its condition.
     fn stimulus(&self, body: &Body, image: usize) -> Grid<f64> {
         let condition = &self.conditions[self.condition_of[image]];
         let see = |stimulus: Grid<f64>, change: &Perturbation| change.stimulus(body, &stimulus, image as u64);
         condition.iter().fold(self.images[image].clone(), see)
     }
 
-    /// The displacement that the unperturbed world would show: a mirrored walk is mirrored back, and an
-    /// instability that a condition excuses is standing still.
+    /// Returns the displacement in the unperturbed frame: a mirrored walk is mirrored back, and an
+    /// instability that a condition excuses counts as standing still.
     fn in_unperturbed_frame(
         &self,
         displacement: Result<f64, Unstable>,
@@ -362,25 +356,25 @@ impl<'a> Setup<'a> {
         let condition = &self.conditions[condition];
         let undo = |d: f64, change: &Perturbation| change.undo(vec![d])[0];
         let displacement = displacement.map(|d| condition.iter().fold(d, undo));
-        // A body that needs a stop, as any material has one, is not refused for that.
+        // Any material has a limit of length, so a body that needs one is not refused for that.
         let is_excused = condition.iter().any(|change| !change.counts_if_unstable());
         if is_excused { displacement.or(Ok(0.0)) } else { displacement }
     }
 }
 
-/// A job being done.
+/// A job in progress.
 struct Candidate<'a> {
     job: &'a Job<'a>,
     setup: &'a Setup<'a>,
     early_stop: bool,
-    /// Of each condition.
+    /// System of each condition.
     systems: Vec<Arc<System>>,
-    /// The images that need showing, in order.
+    /// Images to simulate, in order.
     order: Vec<usize>,
-    /// For each image its place in that order, or that of the image whose rollout it shares.
+    /// Index of each image in that order, or of the image whose rollout it shares.
     places: Vec<usize>,
     rollouts: Mutex<Progress>,
-    /// Whether it is known how it ends.
+    /// True if the end of the evaluation is known.
     is_over: AtomicBool,
 }
 
@@ -426,7 +420,7 @@ impl<'a> Candidate<'a> {
     }
 
     fn locked(&self) -> MutexGuard<'_, Progress> {
-        // A thread that panicked leaves whole entries.
+        // A panic leaves only whole entries behind.
         self.rollouts.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -459,8 +453,8 @@ impl<'a> Candidate<'a> {
         Ok(())
     }
 
-    /// How it ends for a robot with these displacements, in the order of showing, whatever the rest
-    /// may be; `None` if that matters.
+    /// Returns the outcome for a robot with these displacements, in the order of showing, whatever
+    /// the rest may be; `None` if the rest matters.
     fn outcome(&self, displacements: &[Option<f64>]) -> Option<Outcome> {
         let Job { may_win, given_up, .. } = self.job;
         let known = self.known(displacements);
@@ -469,13 +463,13 @@ impl<'a> Candidate<'a> {
         (is_given_up || is_lost()).then_some(Outcome::Stopped(known))
     }
 
-    /// Displacement per image, as far as known from the first showings.
+    /// Returns the displacement under each image, as far as the first showings tell.
     fn known(&self, displacements: &[Option<f64>]) -> Vec<Option<f64>> {
         self.places.iter().map(|place| *displacements.get(*place)?).collect()
     }
 
-    /// Counts the rollouts that are known, in their order, whichever was done first: every one
-    /// once, since each takes a look at all images.
+    /// Counts known rollouts in their order, whichever ended first. Each is counted once, since
+    /// counting goes through all images.
     fn count(&self, rollouts: &mut Progress) {
         let is_over = |rollouts: &Progress| {
             self.early_stop && rollouts.unstable.is_some() || rollouts.counted == rollouts.ended.len()
@@ -508,8 +502,7 @@ impl<'a> Candidate<'a> {
     }
 
     fn evaluation(&self) -> Evaluation {
-        // All rollouts are done that the verdict needs; without images there is nothing to walk
-        // for.
+        // All rollouts that the verdict needs are done; without images there are none.
         let mut rollouts = self.locked();
         self.count(&mut rollouts);
         rollouts.verdict.take().unwrap_or_else(|| self.ended(Outcome::Walked(Vec::new()), 0))
@@ -526,7 +519,7 @@ mod tests {
     use std::collections::BTreeSet;
 
     /// A sensor that expands at both ends: under a bright image it is wider than
-    /// `Physics::blow_up_extent` here allows.
+    /// `Physics::blow_up_extent` allows here.
     fn body() -> Body {
         let row = [Material::SensorExpand, Material::Soft, Material::SensorExpand];
         Body::new(Grid::from_fn(1, 3, |_, column| row[column])).unwrap()
@@ -541,7 +534,7 @@ mod tests {
         rows.iter().map(|row| Grid::from_fn(1, 3, |_, column| row[column])).collect()
     }
 
-    /// The second and the fourth look the same to the sensors, and so do the first and the last.
+    /// The second and the fourth are the same to the sensors, and so are the first and the last.
     const CALM: [[f64; 3]; 5] =
         [[0.4, 0.0, 0.3], [0.2, 0.5, 0.4], [0.1, 0.0, 0.4], [0.2, 0.9, 0.4], [0.4, 1.0, 0.3]];
     /// The third is too bright, and so is the last.
@@ -573,8 +566,7 @@ mod tests {
         rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap()
     }
 
-    /// Orders to show images in: none, a first one, all, and some with images that are there twice
-    /// or not at all.
+    /// Orders of the images: none, a first one, all, and some with repeated and missing images.
     const ORDERS: [&[usize]; 4] = [&[], &[3], &[4, 2, 0, 1, 3], &[7, 2, 2, 4]];
 
     fn all_savings() -> impl Iterator<Item = Savings> {
@@ -664,8 +656,7 @@ mod tests {
 
     #[test]
     fn fresh_rollouts_follow_the_order_and_stop_when_nothing_can_be_won() {
-        // Image 3 shares image 1's rollout, image 4 image 0's: with both known, nothing can be won
-        // any more.
+        // Image 3 shares image 1's rollout, image 4 image 0's: with both known, it cannot win.
         let may_win = |known: &[Option<f64>]| {
             assert!(known[3].is_some() && known[1] == known[3], "image 3 comes first: {known:?}");
             known[0].is_none()
@@ -690,7 +681,7 @@ mod tests {
         let evaluation =
             rayon(2).install(|| run(&rows, RolloutMode::Fresh, Savings::default(), &[], may_win));
         assert_eq!(evaluation.simulated, 60);
-        // After the last one there is no rest to be dropped.
+        // After the last one there is nothing left to drop.
         assert_eq!(looks.load(Ordering::Relaxed), 59);
     }
 
@@ -703,8 +694,7 @@ mod tests {
             let raised = Protocol { start_row: protocol.start_row + rows, ..protocol.clone() };
             fresh_rollout(&system, &raised, &images[image], &NEVER).unwrap()
         };
-        // Images 1 and 3, and 0 and 4, show the sensors the same; of the last pair, the start is,
-        // too.
+        // To the sensors images 1 and 3, and 0 and 4, are the same; 1 and 3 also start the same.
         let raised = [1, 0, 1, 2];
         let expected = [live(0, 1), live(1, 0), live(2, 1), live(3, 2), live(4, 0)];
         assert!(expected[1] != expected[3] && expected[0] != expected[4], "{expected:?}");
@@ -744,7 +734,7 @@ mod tests {
             .unwrap()
             .remove(0)
         };
-        // A sensor at rest is as far below its goal as tight limits keep it.
+        // Tight limits keep a sensor at rest as far below its goal as they allow.
         let tight = Physics { limit_high: 1.02, limit_low: 0.98, ..physics() };
         let expected = |physics: &Physics, image: usize| {
             let system = Arc::new(System::new(&body(), physics.clone()));
@@ -759,12 +749,11 @@ mod tests {
             .enumerate()
             .map(|(image, &off)| expected(if off { &free } else { &calm }, image).unwrap())
             .collect();
-        // Images 1 and 3, and 2 and 4, show the sensors the same, but not under the same condition.
+        // Images 1 and 3, and 2 and 4, are the same to the sensors, but under different conditions.
         assert!(alone[1] != alone[3] && alone[2] != alone[4], "{alone:?}");
         assert_eq!((evaluation.outcome, evaluation.simulated), (Outcome::Walked(alone), 5));
 
-        // Without them it grows wider than it may: that is no reason to refuse it, but no way
-        // either.
+        // Without them it grows wider than allowed: no reason to refuse it, but no walk either.
         assert!(expected(&tight, 2).is_ok() && expected(&tight.without_limits(), 2).is_err());
         let evaluation = evaluated(&tight, &[false, false, true, false, false]);
         let Outcome::Walked(walked) = evaluation.outcome else { panic!("{:?}", evaluation.outcome) };

@@ -1,4 +1,4 @@
-//! [`Fitness`]: how good a robot's answers to several images are together.
+//! [`Fitness`]: combines a robot's answers to several images into one number.
 
 use crate::task::grouping::Group;
 use crate::task::perturbation::CONDITIONS_OF_RESPONSE;
@@ -9,45 +9,46 @@ use serde::{Deserialize, Serialize};
 pub(crate) const LEAST_IMAGES: usize = 8;
 
 /// Margin at which an answer is as good as can be, for [`Fitness::MeanClipped`] \[voxel lengths\].
-/// With less, a small change turns many answers; with more, bodies that walk far count more than
+/// With less, a small change flips many answers; with more, bodies that walk far count more than
 /// bodies that are correct.
 pub const ENOUGH: f64 = 10.0;
 
-/// More than rounding can make of a sum over images.
+/// Larger than any rounding error of a sum over images.
 const SLACK: f64 = 1e-9;
 
-/// How answers to several images become one number. An answer's *margin* is its displacement
-/// in the correct direction, in voxel lengths, negative in the wrong one; of the two ways to assign
-/// sides to groups the fitter counts.
+/// The rule that turns answers to several images into one number. An answer's *margin* is its
+/// displacement in the correct direction, in voxel lengths, negative in the wrong one. Of the two
+/// ways to assign directions to groups the fitter one counts.
 ///
-/// Where images are averaged, both groups weigh the same, however many images they have: with one
-/// class against three, a robot that always walks the way of the three would else be right on three
-/// quarters, and the fittest for long.
+/// Where images are averaged, both groups weigh the same, however many images they have. Otherwise,
+/// with one class against three, a robot that always walks the way of the three would be right on
+/// three quarters, and the fittest for long.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Fitness {
-    /// The smallest margin \[voxel lengths\]: the paper's. With many images one wrong answer makes
-    /// standing still the best that is in reach.
+    /// The smallest margin \[voxel lengths\], as in the paper. With many images, one wrong answer
+    /// makes standing still the best result within reach.
     #[default]
     Min,
     /// The mean of the margins, each divided by ten voxel lengths and clipped to −1 … 1.
     MeanClipped,
-    /// How strongly a gait responds to what its voxels see, whatever its task \[voxel lengths\]:
-    /// `√(mean(o²) − var(e)) − |mean(e)| / 8`, where each image is shown as it is and inverted, and
+    /// The strength of a gait's response to its voxels' pixels, whatever its task \[voxel
+    /// lengths\]: `√(mean(o²) − var(e)) − |mean(e)| / 8`. Images are used as they are and inverted:
     ///
-    /// - `o` is half the difference of the two displacements: what is linear in the widths of the voxels;
-    /// - `e` is half their sum: what is not linear, and how far the body walks anyway;
-    /// - `var(e)` is the variance within each of [the conditions](crate::task::perturbation::of_response)
-    ///   that pairs are shown under by turns. Chance is in both terms, and adds nothing on average.
+    /// - `o` is half the difference of the two displacements: the part linear in voxel widths;
+    /// - `e` is half their sum: the nonlinear part, and the distance that the body walks anyway;
+    /// - `var(e)` is the variance within each of [the
+    ///   conditions](crate::task::perturbation::of_response) that pairs take in turn. Chance is in
+    ///   both terms, and adds nothing on average.
     ///
     /// The sensors have to make up for an eighth of the distance that the body walks anyway. A run
-    /// measures the response of the body's [probe](crate::body::Body::probe) and multiplies it by the
-    /// root of the number of the probe's sensors. Both ways to assign sides are worth the same.
+    /// measures the response of the body's [probe](crate::body::Body::probe) and multiplies it by
+    /// the root of the number of its sensors. Both ways to assign directions have the same fitness.
     Response,
 }
 
 impl Fitness {
-    /// What it is measured in; a mean of shares in nothing.
+    /// Returns its unit; a mean of clipped margins has none.
     pub fn unit(self) -> Option<&'static str> {
         match self {
             Fitness::Min | Fitness::Response => Some("voxel lengths"),
@@ -56,15 +57,15 @@ impl Fitness {
     }
 }
 
-/// The two ways to assign sides to groups: group A is to walk right, or left.
+/// Fitness under the two ways to assign directions to groups: group A should walk right, or left.
 pub(super) type Assignments = (f64, f64);
 
 impl Fitness {
-    /// Fitness under both assignments, of answers by group and displacement in the images' order:
+    /// Returns the fitness under both assignments, of answers by group in the images' order:
     ///
-    /// - if some are still to come (`None`): upper bounds;
+    /// - if some are still missing (`None`): upper bounds;
     /// - without any image: infinite;
-    /// - if an answer is not a number: not a number.
+    /// - if an answer is NaN: NaN.
     pub(super) fn of_assignments(
         self,
         answers: impl Iterator<Item = (Group, Option<f64>)> + Clone,
@@ -86,7 +87,7 @@ impl Fitness {
         }
         let mut to_come = images;
         margins.clone().filter(|(_, m)| m.is_some()).for_each(|(group, _)| to_come[group] -= 1);
-        // What is to come is as good as can be.
+        // Missing answers count as perfect.
         let best = weights[0] * to_come[0] as f64 + weights[1] * to_come[1] as f64;
         let mut sums = [best; 2];
         for (group, margin) in margins.filter_map(|(group, m)| Some((group, m?))) {
@@ -100,17 +101,16 @@ impl Fitness {
     }
 }
 
-/// A margin as it counts in a mean: divided by ten voxel lengths and clipped to −1 … 1.
+/// Returns a margin as it counts in a mean: divided by ten voxel lengths and clipped to −1 … 1.
 pub fn clipped_margin(margin: f64) -> f64 {
     (margin / ENOUGH).clamp(-1.0, 1.0)
 }
 
-/// What a voxel length that the body walks anyway costs. With more, still bodies win at first; with
-/// less, so do those that walk one way and that no sensors could turn.
+/// Cost of a voxel length that the body walks anyway. With more, bodies that stand still win at
+/// first; with less, so do bodies that walk one way and that no sensors could turn.
 const OFFSET_COST: f64 = 0.125;
 
-/// The response of the pairs of displacements that are known so far; `None` if they are fewer than
-/// two in every condition.
+/// Returns the response of the known pairs of displacements; `None` if no condition has two.
 pub fn response_so_far(displacements: impl Iterator<Item = Option<f64>>) -> Option<f64> {
     let known: Vec<f64> = displacements.map_while(|displacement| displacement).collect();
     let pairs = known.chunks_exact(2);
@@ -120,7 +120,7 @@ pub fn response_so_far(displacements: impl Iterator<Item = Option<f64>>) -> Opti
     let (mut squares, mut free) = (0.0, 0_usize);
     for turn in 0..conditions {
         let within = || even.iter().skip(turn).step_by(conditions);
-        // From the first on: where all are the same, no rounding of their mean makes a difference.
+        // Relative to the first: if all are the same, rounding of their mean makes no difference.
         let Some(first) = within().next() else { continue };
         let count = within().count();
         let mean = within().map(|even| even - first).sum::<f64>() / count as f64;
@@ -133,8 +133,8 @@ pub fn response_so_far(displacements: impl Iterator<Item = Option<f64>>) -> Opti
     (free > 0).then(|| linear.signum() * linear.abs().sqrt() - OFFSET_COST * anyway)
 }
 
-/// The response of all pairs. Infinite while a displacement is to come, since it may be any, and
-/// without any.
+/// Returns the response of all pairs. It is infinite while a displacement is missing, since that
+/// may have any value, and without any pair.
 fn response(displacements: impl Iterator<Item = Option<f64>> + Clone) -> f64 {
     let mut all = displacements.clone().peekable();
     if all.peek().is_none() || all.any(|displacement| displacement.is_none()) {
@@ -143,16 +143,16 @@ fn response(displacements: impl Iterator<Item = Option<f64>> + Clone) -> f64 {
     response_so_far(displacements).unwrap_or(0.0)
 }
 
-/// By number of the group: displacements in the correct direction if group A is to walk right; if it
-/// is to walk left, the negatives of those.
+/// Returns the group's number and the margin of each answer if group A should walk right; if it
+/// should walk left, the margins are their negatives.
 pub(super) fn margins(
     answers: impl Iterator<Item = (Group, Option<f64>)> + Clone,
 ) -> impl Iterator<Item = (usize, Option<f64>)> + Clone {
     answers.map(|(group, d)| if group == Group::A { (0, d) } else { (1, d.map(|d| -d)) })
 }
 
-/// How many images each group has, and what one of them weighs: exactly 1 where both have as many,
-/// or one has none.
+/// Returns the number of images of each group, and the weight of one of them: exactly 1 if both
+/// have as many, or one has none.
 pub(super) fn weights(margins: impl Iterator<Item = (usize, Option<f64>)>) -> ([usize; 2], [f64; 2]) {
     let mut images = [0; 2];
     margins.for_each(|(group, _)| images[group] += 1);
@@ -161,14 +161,14 @@ pub(super) fn weights(margins: impl Iterator<Item = (usize, Option<f64>)>) -> ([
     (images, images.map(weight))
 }
 
-/// The smaller, or what is not a number: an answer that is none must never be overlooked.
+/// Returns the smaller number, or NaN if `y` is NaN: a NaN answer must never be overlooked.
 fn smaller(x: f64, y: f64) -> f64 {
     if y < x || y.is_nan() { y } else { x }
 }
 
-/// The fitter of two assignments.
+/// Returns the fitness of the fitter assignment.
 pub(super) fn better((x, y): Assignments) -> f64 {
-    // + 0.0 makes −0 a 0: equal numbers, one text in files.
+    // + 0.0 makes −0 a 0, so that equal numbers have the same text in files.
     (if x >= y { x } else { y }) + 0.0
 }
 
@@ -199,23 +199,22 @@ mod tests {
                 d.iter().zip([A, B, B].iter().cycle()).map(|(&d, &g)| (g, d)).collect();
             fitness(Fitness::Response, &answers)
         };
-        // Half differences 3, 2, −1, −2; half sums 0 and 0, and 10 and 10, which is 5 voxel lengths
-        // on average.
+        // Half differences 3, 2, −1, −2; half sums 0, 0, 10 and 10, 5 on average.
         let pairs = [3.0, -3.0, 12.0, 8.0, -1.0, 1.0, 8.0, 12.0];
         assert_eq!(response(&pairs), 4.5_f64.sqrt() - 5.0 / 8.0);
-        // Which way the robot walks does not matter; how far it walks anyway costs; what the
-        // conditions differ by adds nothing.
+        // The direction does not matter; the distance walked anyway costs; differences between
+        // conditions add nothing.
         assert_eq!(response(&pairs.map(|d| -d)), 4.5_f64.sqrt() - 5.0 / 8.0);
         assert_eq!(response(&[3.0, -3.0, 2.0, -2.0, -1.0, 1.0, -2.0, 2.0]), 4.5_f64.sqrt());
         assert_eq!(response(&[13.0, 7.0, -8.0, -12.0, 9.0, 11.0, -12.0, -8.0]), 4.5_f64.sqrt());
-        // What is the same for both of a pair is none.
+        // A displacement common to both of a pair is no response.
         assert_eq!(response(&[2.0, 2.0, 0.0, 0.0, -2.0, -2.0, 0.0, 0.0]), -(4.0_f64).sqrt());
-        // Exactly: ten times 0.1 is not 1 in binary.
+        // Rounding: ten times 0.1 is not 1 in binary.
         assert!((response(&[0.1; 20]) + 0.0125).abs() < 1e-12 && response(&[0.0; 20]) == 0.0);
         assert!(response(&[1.0, 2.0, 1.0, 2.0, f64::NAN, 2.0]).is_nan());
-        // Too few to say anything, and none.
+        // Too few pairs, and none.
         assert_eq!((response(&[1.0, 9.0]), response(&[1.0]), response(&[])), (0.0, 0.0, f64::INFINITY));
-        // What is to come may be anything.
+        // A missing answer may have any value.
         let some = [(A, Some(1.0)), (B, None), (A, Some(1.0)), (B, Some(1.0))];
         assert_eq!(better(Fitness::Response.of_assignments(some.iter().copied())), f64::INFINITY);
         assert_eq!(Fitness::Response.unit(), Some("voxel lengths"));
@@ -223,7 +222,7 @@ mod tests {
 
     #[test]
     fn groups_weigh_the_same_however_many_images_they_have() {
-        // One against three: always walking one way is worth nothing, and not three quarters.
+        // One against three: always walking one way scores nothing, not three quarters.
         let same_way = [(A, 20.0), (B, 20.0), (B, 20.0), (B, 20.0)];
         assert!(fitness(Fitness::MeanClipped, &same_way).abs() < 1e-12);
         // All of A, and two of three of B: 1/2 + 1/2 · 1/3.

@@ -1,11 +1,11 @@
-//! [`Grouping`]: which tasks there are: how classes are divided into a group that walks one way and
-//! one that walks the other.
+//! [`Grouping`]: the tasks, each of which divides classes into a group that should walk one way and
+//! one that should walk the other.
 //!
 //! A task's name and its [`Groups`] have one grammar. If all classes are below 10, every digit is a
 //! class: `0|123`. Otherwise the name has a comma, and every number between commas is a class:
-//! `10,11|3`, `1,3|26`. Where no group has two classes to separate, the comma comes last: `1|26,` is
-//! 1 against 26, and `1|26` is 1 against 2 and 6. So a name means one task, whatever the data, and
-//! a task has one name.
+//! `10,11|3`, `1,3|26`. If both groups have a single class, the comma comes last: `1|26,` is 1
+//! against 26, and `1|26` is 1 against 2 and 6. So a name means one task, whatever the data, and a
+//! task has one name.
 
 use crate::task::fitness::Fitness;
 use std::fmt;
@@ -28,7 +28,7 @@ pub struct Split {
 }
 
 impl Split {
-    /// The classes of a group.
+    /// Returns the classes of a group.
     pub fn classes(&self, group: Group) -> &[u8] {
         match group {
             Group::A => &self.a,
@@ -36,18 +36,18 @@ impl Split {
         }
     }
 
-    /// The group of a class, `None` if it belongs to neither.
+    /// Returns the group of a class, `None` if it belongs to neither.
     pub fn group(&self, class: u8) -> Option<Group> {
         [Group::A, Group::B].into_iter().find(|g| self.classes(*g).contains(&class))
     }
 
-    /// Whether every class is in one group: no recognition task, but the bin of robots that always
-    /// walk one way.
+    /// Returns true if every class is in one group: no recognition task, but the bin of robots that
+    /// always walk one way.
     pub fn is_same_way(&self) -> bool {
         self.b.is_empty()
     }
 
-    /// Its name, like `0|123`, `10,11|12` or `same way`.
+    /// Returns its name, such as `0|123`, `10,11|12` or `same way`.
     pub fn name(&self) -> String {
         if self.is_same_way() {
             return "same way".to_string();
@@ -55,16 +55,15 @@ impl Split {
         groups_text([&self.a, &self.b], "|")
     }
 
-    /// Tells whether a name from a file is its name. In older files the comma at the end is missing:
-    /// there, a task is the one of its run's groups that has the name.
+    /// Returns true if a name from a file is its name. Older files lack the comma at the end:
+    /// there, a name means the one of its run's groups that has it.
     pub fn is_called(&self, name: &str) -> bool {
         let own = self.name();
         own == name || own.strip_suffix(',') == Some(name)
     }
 }
 
-/// The name of two groups of classes with a text between them: `0|123`, or `0v123` in names of
-/// files.
+/// Returns the name of two groups of classes with a separator: `0|123`, or `0v123` in file names.
 pub fn groups_text(groups: [&[u8]; 2], between: &str) -> String {
     let are_digits = groups.iter().copied().flatten().all(|class| *class < 10);
     let mut text = joined(groups, between, if are_digits { "" } else { "," });
@@ -78,25 +77,25 @@ fn joined(groups: [&[u8]; 2], between: &str, separator: &str) -> String {
     groups.map(|group| group.iter().map(u8::to_string).collect::<Vec<_>>().join(separator)).join(between)
 }
 
-/// Two groups of classes that somebody named, as by `4|9`, `0|123` or `10,11|3`.
+/// Two groups of classes named by the user, such as `4|9`, `0|123` or `10,11|3`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Groups {
     classes: [Vec<u8>; 2],
-    /// Whether every digit was a class, and there was no comma.
+    /// True if there was no comma, so that every digit was a class.
     are_digits: bool,
 }
 
 impl Groups {
-    /// The classes of both groups.
+    /// Returns the classes of both groups.
     pub fn classes(&self) -> &[Vec<u8>; 2] {
         &self.classes
     }
 
-    /// Checks that their text means nothing else with these classes: `1|26` without a comma may be
-    /// meant for a class 26 where there is one.
+    /// Checks that the text means nothing else with these classes: `1|26` without a comma may mean
+    /// a class 26 if there is one.
     ///
     /// # Errors
-    /// [`Ambiguous`] if it may.
+    /// Returns [`Ambiguous`] if it may.
     pub fn check_among(&self, there: &[u8]) -> Result<(), Ambiguous> {
         let number = |group: &Vec<u8>| -> Option<u8> {
             let digits: String = group.iter().map(u8::to_string).collect();
@@ -116,7 +115,7 @@ impl Groups {
     }
 }
 
-/// A text may name two tasks.
+/// A text that may name two tasks.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
     "groups {text}: the data have a class {class}; expected \"{lone}\" for it, or \"{separate}\" for its digits"
@@ -167,8 +166,8 @@ impl FromStr for Groups {
     }
 }
 
-/// Which way is right for images with these labels, and what each weighs: 1, right, for the first
-/// group and −1, left, for every other class; the images of either side weigh a half together.
+/// Returns the correct direction and the weight of images with these labels: 1, right, for the
+/// first group and −1, left, for every other class. Either side weighs one half in total.
 pub fn balanced<'a>(
     labels: impl Iterator<Item = u8> + Clone + 'a,
     first: &'a [u8],
@@ -182,37 +181,36 @@ pub fn balanced<'a>(
     labels.map(way)
 }
 
-/// The tasks of a run: one division of classes into two groups, or all there are. With more than
-/// one, the task a robot performs is a dimension of the archive (paper, sections "Fitness" and
-/// "MAP-Elites").
+/// The tasks of a run: one division of classes into two groups, or all of them. With more than one,
+/// a robot's task is a dimension of the archive (paper, sections "Fitness" and "MAP-Elites").
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Grouping {
     tasks: Vec<Split>,
     fitness: Fitness,
 }
 
-/// Most classes whose splits are all made: 511 of them.
+/// Most classes to split in all ways: ten have 511 splits.
 pub const MAX_CLASSES: usize = 10;
 
-/// Why classes cannot be grouped.
+/// The reason why classes cannot be grouped.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum GroupingError {
-    /// A group without classes.
+    /// A group has no classes.
     #[error("expected two groups with at least one class each, as in [[0], [1, 2]]; one is empty")]
     EmptyGroup,
-    /// A class that occurs more than once.
+    /// A class occurs more than once.
     #[error("class {0} occurs more than once, expected every class in one group only")]
     Repeated(u8),
-    /// Too few or too many classes for all splits.
+    /// There are too few or too many classes for all splits.
     #[error("expected 2 to {MAX_CLASSES} classes to split in all ways, found {0}")]
     Classes(usize),
 }
 
 impl Grouping {
-    /// One task: the classes of `a` walk one way, those of `b` the other.
+    /// Makes one task: the classes of `a` walk one way, those of `b` the other.
     ///
     /// # Errors
-    /// [`GroupingError`] if a group is empty or a class occurs twice.
+    /// Returns a [`GroupingError`] if a group is empty or a class occurs twice.
     pub fn two_groups(a: &[u8], b: &[u8]) -> Result<Self, GroupingError> {
         if a.is_empty() || b.is_empty() {
             return Err(GroupingError::EmptyGroup);
@@ -222,13 +220,13 @@ impl Grouping {
         Ok(Grouping { tasks, fitness: Fitness::Min })
     }
 
-    /// All ways to split the classes in two non-empty groups, 2^(k−1) − 1 for k classes: small
-    /// first groups come first, equally large ones in the order of the classes. (For 0, 1, 2, 3:
-    /// 0|123, 1|023, 2|013, 3|012, 01|23, 02|13, 03|12.) With `same_way_bin`, "all the same way" is
-    /// one task more, the last.
+    /// Makes all ways to split the classes in two non-empty groups, 2^(k−1) − 1 for k classes.
+    /// Small first groups come first, equally large ones in the order of the classes. (For 0, 1, 2,
+    /// 3: 0|123, 1|023, 2|013, 3|012, 01|23, 02|13, 03|12.) With `same_way_bin`, "all the same way"
+    /// is an additional last task.
     ///
     /// # Errors
-    /// [`GroupingError`] if a class occurs twice or there are not 2 to [`MAX_CLASSES`] classes.
+    /// Returns a [`GroupingError`] for repeated classes, or for other than 2 to [`MAX_CLASSES`].
     pub fn all_splits(classes: &[u8], same_way_bin: bool) -> Result<Self, GroupingError> {
         let k = classes.len();
         if !(2..=MAX_CLASSES).contains(&k) {
@@ -236,7 +234,7 @@ impl Grouping {
         }
         check_unique(classes)?;
         let subset = |mask: usize| (0..k).filter(|i| mask >> i & 1 == 1).collect::<Vec<_>>();
-        // Of two equal halves, the first group is the one with the first class.
+        // If both halves are equal, the first group is the one with the first class.
         let is_first = |s: &Vec<usize>| 2 * s.len() < k || 2 * s.len() == k && s[0] == 0;
         let mut firsts: Vec<Vec<usize>> = (1..1 << k).map(subset).filter(is_first).collect();
         firsts.sort_by(|s, t| (s.len(), s).cmp(&(t.len(), t)));
@@ -250,28 +248,28 @@ impl Grouping {
         Ok(Grouping { tasks, fitness: Fitness::Min })
     }
 
-    /// The same tasks with another fitness than the smallest margin.
+    /// Replaces the fitness, which is the smallest margin by default.
     #[must_use]
     pub fn with_fitness(self, fitness: Fitness) -> Self {
         Grouping { fitness, ..self }
     }
 
-    /// What answers to several images are judged by together.
+    /// Returns the rule that combines answers to several images.
     pub fn fitness(&self) -> Fitness {
         self.fitness
     }
 
-    /// The tasks, in the order of their bins.
+    /// Returns the tasks, in the order of their bins.
     pub fn tasks(&self) -> &[Split] {
         &self.tasks
     }
 
-    /// Whether "all the same way" is a task.
+    /// Returns true if "all the same way" is a task.
     pub fn has_same_way_bin(&self) -> bool {
         self.tasks.iter().any(Split::is_same_way)
     }
 
-    /// Whether every way to split the classes is a task.
+    /// Returns true if every way to split the classes is a task.
     pub fn has_all_splits(&self) -> bool {
         let classes = self.tasks.first().map_or(0, |s| s.a.len() + s.b.len());
         let splits = self.tasks.iter().filter(|s| !s.is_same_way()).count();

@@ -1,32 +1,32 @@
-//! [`Judge`]: what a walk says about the image.
+//! [`Judge`]: turns a walk into an answer about the image.
 
 use crate::task::direction::{Assignment, Direction, THRESHOLD};
 use crate::task::grouping::{Group, Split};
 use serde::Serialize;
 
-/// What robots of a task say by walking one way or the other.
+/// The classes that robots of a task name by walking left or right.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Judge {
-    /// Classes it names by walking left.
+    /// Classes named by walking left.
     pub left: Vec<u8>,
-    /// Classes it names by walking right.
+    /// Classes named by walking right.
     pub right: Vec<u8>,
 }
 
-/// What a walk comes to so far.
+/// The answer of a walk so far.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Answer {
-    /// Displacement while the present image was shown, voxel lengths, right positive.
+    /// Displacement under the current image, voxel lengths, right positive.
     pub moved: f64,
-    /// The way it went; none if not farther than [`THRESHOLD`].
+    /// Direction of the walk; none if not farther than [`THRESHOLD`].
     pub way: Option<&'static str>,
-    /// The classes that means; none of a body without a task.
+    /// Classes that this names; none for a body without a task.
     pub says: Vec<u8>,
 }
 
 impl Judge {
-    /// Of a task and the way its first group is to walk; none where every class is to walk the same
-    /// way.
+    /// Makes the judge of a task, given the direction of its first group; none if every class
+    /// should walk the same way.
     pub fn of(split: &Split, assignment: Assignment) -> Option<Self> {
         if split.is_same_way() {
             return None;
@@ -39,7 +39,7 @@ impl Judge {
     }
 }
 
-/// What a displacement says, to a judge if there is one.
+/// Returns the answer of a displacement, which names classes only if there is a judge.
 pub fn answer(judge: Option<&Judge>, moved: f64) -> Answer {
     let way = Direction::of(moved, THRESHOLD);
     let says = match (judge, way) {
@@ -51,9 +51,9 @@ pub fn answer(judge: Option<&Judge>, moved: f64) -> Answer {
     Answer { moved, way: way.map(name), says }
 }
 
-/// The answer in words: empty while a walk says nothing, "says 0", "says 1 or 2". With `over`, the
-/// walk has ended: "says 0: correct" or "says 0: wrong" if the image's `class` is one of the task's,
-/// and "undecided" if it says nothing. Empty without a judge.
+/// Returns the answer in words: "says 0", "says 1 or 2", or nothing while it names no class. With
+/// `over`, the walk has ended: "says 0: correct" or "says 0: wrong" if the image's `class` is one
+/// of the task's, and "undecided" if it names no class. Empty without a judge.
 pub fn verdict(judge: Option<&Judge>, moved: f64, class: u8, over: bool) -> String {
     let Some(judge) = judge else { return String::new() };
     let says = answer(Some(judge), moved).says;

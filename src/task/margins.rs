@@ -1,4 +1,4 @@
-//! [`Margins`]: which part of an image a body sees.
+//! [`Margins`]: the part of an image that a body covers.
 
 use crate::base::Grid;
 use schemars::JsonSchema;
@@ -21,41 +21,41 @@ pub struct Margins {
     pub left: usize,
 }
 
-/// How they are written.
+/// The two notations of margins in files.
 #[derive(Serialize, JsonSchema)]
 #[serde(untagged)]
 enum Written {
-    /// The same at every edge.
+    /// One number for every edge.
     Same(usize),
     /// Top, right, bottom, left.
     Each([usize; 4]),
 }
 
 impl Margins {
-    /// The same at every edge.
+    /// Makes equal margins at every edge.
     pub fn same(margin: usize) -> Self {
         Margins { top: margin, right: margin, bottom: margin, left: margin }
     }
 
-    /// Whether nothing is left out.
+    /// Returns true if nothing is left out.
     pub fn is_none(&self) -> bool {
         *self == Margins::default()
     }
 
-    /// Height and width of what is left of an image of this size; `None` if that is nothing.
+    /// Returns the height and width that remain of an image of this size; `None` if nothing does.
     pub fn left_of(&self, [height, width]: [usize; 2]) -> Option<[usize; 2]> {
         let left =
             |side: usize, a: usize, b: usize| side.checked_sub(a.checked_add(b)?).filter(|left| *left > 0);
         Some([left(height, self.top, self.bottom)?, left(width, self.left, self.right)?])
     }
 
-    /// What is left of an image; `None` if that is nothing.
+    /// Returns the part that remains of an image; `None` if nothing does.
     pub fn cut<T: Clone>(&self, image: &Grid<T>) -> Option<Grid<T>> {
         let [rows, columns] = self.left_of([image.height(), image.width()])?;
         Some(Grid::from_fn(rows, columns, |r, c| image[(r + self.top, c + self.left)].clone()))
     }
 
-    /// The least of both at each edge: what is left holds what is left by either.
+    /// Returns the smaller margin at each edge, so that the remaining part contains those of both.
     pub fn least(&self, other: &Margins) -> Self {
         Margins {
             top: self.top.min(other.top),
@@ -96,7 +96,7 @@ impl<'de> Deserialize<'de> for Margins {
     }
 }
 
-/// Reads either way of writing them.
+/// Reads either notation.
 struct Reader;
 
 impl<'de> Visitor<'de> for Reader {

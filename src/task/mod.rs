@@ -1,5 +1,4 @@
-//! What a robot is asked to do: stimuli, protocols, rollouts and their scores; how a gait responds,
-//! and how it is taught.
+//! A robot's task: stimuli, protocols, rollouts and scores; how a gait responds and is trained.
 
 pub mod direction;
 pub mod evaluation;

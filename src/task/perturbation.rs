@@ -1,9 +1,9 @@
 //! [`Perturbation`]: a change of a simulation that should make no difference to a robot that walks
-//! by body and image. `morphcog audit` tests robots under many of them; `morphcog train` shows
-//! images under some, so that robots do not come to depend on what they change.
+//! by body and image. `morphcog audit` tests robots under many of them. `morphcog train` uses some,
+//! so that robots do not come to depend on what they change.
 //!
-//! To start at another column is none: the simulator is the same bits wherever on the ground a
-//! robot stands (but for pegs below the ground, which a robot can reach only by tunnelling). A
+//! Starting at another column is not one: the simulator gives the same bits wherever on the ground
+//! a robot stands (except for pegs below the ground, which a robot can reach only by tunnelling). A
 //! raised start also changes the column.
 
 use crate::base::random::{Purpose, stream};
@@ -14,38 +14,36 @@ use crate::task::protocol::{Protocol, RolloutMode};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// What is changed.
+/// The kind of a change.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Kind {
-    /// The robot starts above the ground, and so touches it first in another way; at another
-    /// column, too.
+    /// The robot starts above the ground, and first touches it in another way; also in another
+    /// column.
     Start,
-    /// Robot and images are mirrored: ties, and whatever goes from left to right, are decided the
-    /// other way round.
+    /// Robot and images are mirrored, which reverses ties and all that goes from left to right.
     Mirror,
-    /// The same material at a shorter time step ([`Physics::refined`]).
+    /// The material stays, at a shorter time step ([`Physics::refined`]).
     TimeStep,
-    /// The length limits remove an excess half as fast; or they are beyond every goal, so that no
-    /// spring is held at a limit against its goal, and given energy there, any more.
+    /// The length limits remove an excess half as fast. Or they are beyond every goal, so that no
+    /// spring is held at a limit against its goal and gains energy there.
     LengthLimits,
     /// A contact of the robot with itself counts once instead of twice.
     SelfContact,
-    /// In a sequential simulation the images come in reverse order: this finds robots that turn
-    /// round by the clock.
+    /// Images of a sequential simulation are reversed: this finds robots that turn by the clock.
     Order,
-    /// Stiffness of all springs.
+    /// The stiffness of all springs changes.
     Stiffness,
-    /// Friction of contacts.
+    /// The friction of contacts changes.
     Friction,
-    /// Gravity.
+    /// Gravity changes.
     Gravity,
-    /// A pixel that a sensor sees, another one in each image, is inverted.
+    /// A pixel under a sensor, another one in each image, is inverted.
     Pixel,
 }
 
 impl Kind {
-    /// All of them, in the order of a report.
+    /// All kinds, in the order of a report.
     pub const ALL: [Kind; 10] = [
         Kind::Start,
         Kind::Mirror,
@@ -59,14 +57,14 @@ impl Kind {
         Kind::Pixel,
     ];
 
-    /// Whether it changes the world that is simulated. The others change only how that is computed,
-    /// or how images are shown: a robot that fails under those exploits something other than body
-    /// and image.
+    /// Returns true if it changes the simulated world. The others change only how that is computed,
+    /// or how images are presented: a robot that fails under those exploits something other than
+    /// body and image.
     pub fn is_of_the_world(self) -> bool {
         self >= Kind::Stiffness
     }
 
-    /// For people.
+    /// Returns its name for people.
     pub fn name(self) -> &'static str {
         match self {
             Kind::Start => "start",
@@ -83,20 +81,19 @@ impl Kind {
     }
 }
 
-/// How much an audit changes.
+/// The sizes of an audit's changes.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Sizes {
-    /// Rows by which the start is raised, a rollout each. Default 1 and 2.
+    /// Rows by which the start is raised, one rollout each. Default 1 and 2.
     pub start: Vec<u32>,
-    /// The time step is divided by these, a rollout each. Default 2 and 4.
+    /// Divisors of the time step, one rollout each. Default 2 and 4.
     pub time_step: Vec<u32>,
-    /// Share by which stiffness, friction and gravity are raised and lowered. Default 0.05.
+    /// Fraction by which stiffness, friction and gravity are raised and lowered. Default 0.05.
     pub share: f64,
-    /// Rollouts with a changed pixel in every image. Default 3.
+    /// Number of rollouts with a changed pixel in every image. Default 3.
     pub pixels: u32,
-    /// Fewest sensors of a robot whose pixels are changed: to fewer, one pixel is not noise.
-    /// Default 10.
+    /// Fewest sensors of a robot whose pixels are changed: else one pixel is no noise. Default 10.
     pub least_sensors: usize,
     /// Seed of the pixels. Default 1.
     pub seed: u64,
@@ -108,26 +105,26 @@ impl Default for Sizes {
     }
 }
 
-/// A robot and how it is simulated.
+/// A robot and the settings of its simulation.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Setting {
     /// Its body.
     pub body: Body,
     /// The simulator's constants.
     pub physics: Physics,
-    /// How it is shown images.
+    /// The presentation of images.
     pub protocol: Protocol,
-    /// What it sees, image by image.
+    /// The stimulus of each image.
     pub stimuli: Vec<Grid<f64>>,
 }
 
-/// Under what the images of a training are shown by turns; keys of `train.perturbations`.
+/// Perturbations that the images of a training take in turn; keys of `train.perturbations`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct ByTurns {
-    /// Rows up to which the start is raised. Default 2.
+    /// Most rows by which the start is raised. Default 2.
     pub start: u32,
-    /// Whether half of the images are shown without length limits. Default true.
+    /// True if half of the images are simulated without length limits. Default true.
     pub length_limits: bool,
 }
 
@@ -141,15 +138,14 @@ impl Default for ByTurns {
 pub type Condition = Vec<Perturbation>;
 
 impl ByTurns {
-    /// Every condition once: starts raised by no row up to the most, then the same again without
-    /// length limits.
+    /// Returns every condition once: starts raised by 0 up to the most rows, then without limits.
     pub fn conditions(&self) -> impl Iterator<Item = Condition> {
         let ByTurns { start, length_limits } = *self;
         let one = move |without_limits: bool| (0..=start).map(move |rows| condition(rows, without_limits));
         one(false).chain(length_limits.then(|| one(true)).into_iter().flatten())
     }
 
-    /// Conditions of images of these classes: by turns within each class.
+    /// Returns the conditions of images of these classes, which take turns within each class.
     pub fn of(&self, classes: impl Iterator<Item = u8>) -> Vec<Condition> {
         let starts = u64::from(self.start) + 1;
         let mut turns = [0_u64; u8::MAX as usize + 1];
@@ -162,27 +158,27 @@ impl ByTurns {
     }
 }
 
-/// How many [`of_response`] there are.
+/// Number of conditions of [`of_response`].
 pub const CONDITIONS_OF_RESPONSE: usize = 2;
 
-/// Under what the response of gaits is measured while they evolve, by turns: the default; and
-/// raised by a row and without length limits, so that luck at the first touch of the ground, or at
-/// a limit, is no response.
+/// Returns the conditions under which the response of gaits is measured during evolution, in turn:
+/// the default; and a start raised by a row, without length limits. So luck at the first touch of
+/// the ground, or at a limit, does not count as a response.
 pub fn of_response() -> [Condition; CONDITIONS_OF_RESPONSE] {
     [condition(0, false), condition(1, true)]
 }
 
-/// A start raised by this number of rows, with or without length limits.
+/// Returns the condition of a start raised by this number of rows, with or without length limits.
 pub(crate) fn condition(rows: u32, without_limits: bool) -> Condition {
     let start = (rows > 0).then_some(Perturbation::Start { rows });
     start.into_iter().chain(without_limits.then_some(Perturbation::NoLengthLimits)).collect()
 }
 
-/// One change.
+/// One change of a simulation.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(try_from = "Stored", into = "Stored")]
 pub enum Perturbation {
-    /// The start is raised by this number of rows, and moved as many columns.
+    /// The start is raised by this number of rows and moved by as many columns.
     Start {
         /// Rows \[voxels\].
         rows: u32,
@@ -217,7 +213,7 @@ pub enum Perturbation {
         /// More than 0.
         factor: f64,
     },
-    /// A pixel that a sensor sees is inverted in each image.
+    /// A pixel under a sensor is inverted in each image.
     Pixel {
         /// The number of the draw.
         draw: u32,
@@ -226,17 +222,17 @@ pub enum Perturbation {
     },
 }
 
-/// A perturbation as files have it.
+/// A perturbation as stored in files.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[schemars(rename = "Perturbation")]
 struct Stored {
-    /// What is changed.
+    /// The kind of the change.
     kind: Kind,
-    /// Rows, divisor of the time step, factor, speed of the limits (0: none), or number of the draw;
-    /// 0.5 elsewhere.
+    /// Rows, divisor of the time step, factor, speed of the limits (0: none), or number of the
+    /// draw; 0.5 for the other kinds.
     amount: f64,
-    /// Seed of the draw; 0 where nothing is drawn.
+    /// Seed of the draw; 0 without a draw.
     #[serde(default, skip_serializing_if = "is_zero")]
     seed: u64,
 }
@@ -290,8 +286,7 @@ impl TryFrom<Stored> for Perturbation {
 }
 
 impl Perturbation {
-    /// All changes of these sizes that mean something to a body under a protocol, in the order of a
-    /// report.
+    /// Returns all changes of these sizes that apply to body and protocol, in a report's order.
     pub fn all(sizes: &Sizes, body: &Body, rollout: RolloutMode) -> Vec<Self> {
         let sees = body.counts().sensor >= sizes.least_sensors;
         let factors = [1.0 - sizes.share, 1.0 + sizes.share];
@@ -318,7 +313,7 @@ impl Perturbation {
         Kind::ALL.into_iter().flat_map(of).collect()
     }
 
-    /// What is changed.
+    /// Returns the kind of the change.
     pub fn kind(&self) -> Kind {
         match self {
             Perturbation::Start { .. } => Kind::Start,
@@ -334,7 +329,7 @@ impl Perturbation {
         }
     }
 
-    /// For people: "time step / 4".
+    /// Returns its name for people, such as "time step / 4".
     pub fn name(&self) -> String {
         let kind = self.kind().name();
         match self {
@@ -355,13 +350,14 @@ impl Perturbation {
         }
     }
 
-    /// Returns false if instability does not count against the robot: without limits. Every material
-    /// has a limit, and a body that needs one does not exploit it.
+    /// Returns false if instability does not count against the robot: without limits. Every
+    /// material has a limit, and a body that needs one does not exploit it.
     pub fn counts_if_unstable(&self) -> bool {
         *self != Perturbation::NoLengthLimits
     }
 
-    /// The changed setting. Displacements under it are to be compared after [`Perturbation::undo`].
+    /// Returns the changed setting. Compare displacements under it only after
+    /// [`Perturbation::undo`].
     pub fn apply(&self, setting: &Setting) -> Setting {
         let Setting { body, physics, protocol, stimuli } = setting;
         let stimulus = |(image, stimulus)| self.stimulus(body, stimulus, image as u64);
@@ -377,12 +373,12 @@ impl Perturbation {
         }
     }
 
-    /// The changed body.
+    /// Returns the changed body.
     pub fn body(&self, body: &Body) -> Body {
         if *self == Perturbation::Mirror { body.mirrored() } else { body.clone() }
     }
 
-    /// The changed constants of the simulator.
+    /// Returns the changed constants of the simulator.
     pub fn physics(&self, physics: &Physics) -> Physics {
         match *self {
             Perturbation::TimeStep { divisor } => physics.refined(divisor),
@@ -405,7 +401,7 @@ impl Perturbation {
         }
     }
 
-    /// The changed way in which images are shown.
+    /// Returns the changed presentation of images.
     pub fn protocol(&self, protocol: &Protocol) -> Protocol {
         match *self {
             Perturbation::Start { rows } => Protocol {
@@ -417,7 +413,7 @@ impl Perturbation {
         }
     }
 
-    /// What the (unchanged) body sees of the image with this number.
+    /// Returns the changed stimulus of the image with this number, for the unchanged body.
     pub fn stimulus(&self, body: &Body, stimulus: &Grid<f64>, image: u64) -> Grid<f64> {
         match *self {
             Perturbation::Mirror => stimulus.mirrored(),
@@ -426,8 +422,8 @@ impl Perturbation {
         }
     }
 
-    /// Displacements as they would be in the unchanged setting: those of a mirror image are
-    /// mirrored, and they stand in the unchanged order.
+    /// Returns displacements in the unperturbed frame: a mirrored walk is mirrored back, and the
+    /// order is the unchanged one.
     pub fn undo(&self, mut displacements: Vec<f64>) -> Vec<f64> {
         match self {
             Perturbation::Mirror => displacements.iter_mut().for_each(|d| *d = -*d),
@@ -438,8 +434,7 @@ impl Perturbation {
     }
 }
 
-/// The stimulus with a pixel inverted that a sensor sees, drawn by the seed, the number of the draw and
-/// that of the image.
+/// Inverts a pixel under a sensor, drawn by the seed, the number of the draw and that of the image.
 fn with_pixel_inverted(body: &Body, stimulus: &Grid<f64>, (seed, draw, image): (u64, u32, u64)) -> Grid<f64> {
     let sensors: Vec<_> =
         body.voxels().iter().filter(|(_, m)| m.is_sensor()).map(|(place, _)| place).collect();
@@ -486,7 +481,7 @@ mod tests {
                 changed.protocol != plain.protocol,
                 changed.stimuli != plain.stimuli,
             ];
-            // The images of this setting are symmetric: mirrored they are themselves.
+            // The images of this setting are symmetric: mirroring does not change them.
             let expected = match perturbation.kind() {
                 Kind::Start => [false, false, true, false],
                 Kind::Mirror => [true, false, false, false],
@@ -518,7 +513,7 @@ mod tests {
             }
         }
         assert!(changed.iter().any(|other| *other != changed[0]));
-        // To two sensors one pixel is no noise.
+        // With two sensors one pixel is more than noise.
         let few = Perturbation::all(&Sizes::default(), &setting().body, RolloutMode::Fresh);
         assert!(few.iter().all(|p| p.kind() != Kind::Pixel));
         let blind = Setting { body: "33/44".parse().unwrap(), ..setting() };

@@ -1,4 +1,4 @@
-//! [`Protocol`]: how a robot is shown images.
+//! [`Protocol`]: the presentation of images to a robot.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -6,14 +6,13 @@ use serde::{Deserialize, Serialize};
 /// Farthest start column either way \[voxels\]: world coordinates stay exact to far below a voxel.
 pub const MAX_COLUMN: i64 = 1_000_000;
 
-/// Most control steps that an image, or a scenario, lasts: twenty thousand actuation cycles of the
-/// paper's.
+/// Most control steps of an image or a scenario: twenty thousand actuation cycles of the paper's.
 pub const MAX_STEPS: u32 = 1_000_000;
 
 /// Highest row of a start \[voxels\].
 pub const MAX_ROW: u32 = 2_000_000;
 
-/// Whether images share a rollout.
+/// The choice between one rollout per image and one for all.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum RolloutMode {
@@ -23,18 +22,18 @@ pub enum RolloutMode {
     Sequential,
 }
 
-/// How a robot is shown images (paper, "Protocol"); keys of a config's section `[protocol]`.
+/// The presentation of images to a robot (paper, "Protocol"); keys of a config's `[protocol]`.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Protocol {
-    /// Whether images share a rollout. Default fresh.
+    /// One rollout per image ("fresh") or one for all ("sequential"). Default fresh.
     pub rollout: RolloutMode,
-    /// Control steps an image is shown for. Default 500: ten actuation cycles.
+    /// Number of control steps per image. Default 500: ten actuation cycles.
     pub control_steps: u32,
     /// Grid row of the body's bottom row at the start \[voxels\]. Default 2: on the ground.
     pub start_row: u32,
-    /// Grid column of its left edge \[voxels\]. Default 493, the paper's; only the pegs below the
-    /// ground tell columns apart.
+    /// Grid column of the body's left edge at the start \[voxels\]. Default 493, the paper's; only
+    /// the pegs below the ground distinguish columns.
     pub start_column: i64,
 }
 

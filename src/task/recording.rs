@@ -1,34 +1,33 @@
-//! [`Recording`]: a rollout kept frame by frame, for pictures.
+//! [`Recording`]: a rollout stored frame by frame, for pictures.
 
 use crate::base::Grid;
 use crate::body::Body;
 use crate::task::judge::Judge;
 
-/// An image as a robot sees it.
+/// An image and its stimulus.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Seen {
     /// Its class.
     pub class: u8,
-    /// What it is, for people: "0 (train 1)".
+    /// Label for people, such as "0 (train 1)".
     pub label: String,
-    /// What the sensors see: H × W in [0, 1].
+    /// Stimulus of the sensors: H × W in [0, 1].
     pub stimulus: Grid<f64>,
 }
 
-/// One stretch of a recording under one stimulus.
+/// One part of a recording, under one stimulus.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Phase {
     /// Index in [`Recording::frames`] of the frame before the phase's first control step.
     pub first_frame: usize,
     /// The image.
     pub seen: Seen,
-    /// Signed x displacement of the centre of mass over the phase, voxel lengths (right is
-    /// positive).
+    /// X displacement of the centre of mass over the phase, voxel lengths, right positive.
     pub displacement: f64,
 }
 
-/// One moment: all points of the robot, in voxel lengths; x from the left edge of its starting box,
-/// y from the ground's surface up.
+/// One moment of the robot in voxel lengths: x from its starting box's left edge, y up from the
+/// ground.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Frame {
     /// Position [x, y] of every point.
@@ -64,8 +63,8 @@ pub struct Recording {
     pub frames: Vec<Frame>,
     /// Control steps per actuation cycle (50).
     pub cycle: usize,
-    /// Whether the rollout ended early as unstable.
+    /// True if the rollout ended early as unstable.
     pub unstable: bool,
-    /// What its walks say; none of a robot without a task.
+    /// Meaning of the robot's walks; none for a robot without a task.
     pub judge: Option<Judge>,
 }

@@ -1,4 +1,4 @@
-//! Rollouts: a body, a protocol and stimuli → displacements.
+//! Rollouts: from a body, a protocol and stimuli to displacements.
 
 use crate::base::Grid;
 use crate::base::stop::Stopped;
@@ -9,21 +9,21 @@ use crate::task::recording::{Frame, Phase, Recording, Seen, VoxelCorners};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-/// World units → voxel lengths: distances are reported in voxel lengths, as in the paper.
+/// Converts world units to voxel lengths, in which distances are reported, as in the paper.
 fn voxel_lengths(world_units: f64, physics: &Physics) -> f64 {
     world_units / physics.cell_size
 }
 
-/// A robot on the ground, ready to be shown images.
+/// A robot on the ground, ready for images.
 pub struct Rollout<'a> {
     world: World,
     protocol: &'a Protocol,
-    /// Where along x the centre of mass was when the present image was first shown \[world units\].
+    /// Centre of mass along x at the start of the current image \[world units\].
     begin: f64,
 }
 
 impl<'a> Rollout<'a> {
-    /// A robot at its start.
+    /// Makes a robot at its start.
     pub fn new(system: &Arc<System>, protocol: &'a Protocol) -> Self {
         let start = Start { column: protocol.start_column, row: protocol.start_row };
         let world = World::new(Arc::clone(system), start);
@@ -34,12 +34,12 @@ impl<'a> Rollout<'a> {
         self.world.system().physics()
     }
 
-    /// Shows an image for the protocol's control steps and goes on living from the present state;
-    /// the displacement of the centre of mass along x meanwhile, in voxel lengths, right positive.
-    /// `watch` is called after every control step.
+    /// Simulates an image for the protocol's control steps from the current state. Returns the
+    /// displacement of the centre of mass along x, in voxel lengths, right positive. `watch` is
+    /// called after every control step.
     ///
     /// # Errors
-    /// [`Unstable`] if the rollout ends.
+    /// Returns [`Unstable`] if the rollout ends.
     pub fn show(&mut self, stimulus: &Grid<f64>, mut watch: impl FnMut(&World)) -> Result<f64, Unstable> {
         self.look_at(stimulus);
         for _ in 0..self.protocol.control_steps {
@@ -49,10 +49,10 @@ impl<'a> Rollout<'a> {
         Ok(self.moved())
     }
 
-    /// The same without a watcher, unless `stop` is set meanwhile.
+    /// Acts as [`Rollout::show`] without a watcher, unless `stop` is set in the meantime.
     ///
     /// # Errors
-    /// [`StepError`] if it was stopped, or the rollout became unstable.
+    /// Returns a [`StepError`] if it was stopped, or if the rollout became unstable.
     pub fn show_unless(&mut self, stimulus: &Grid<f64>, stop: &AtomicBool) -> Result<f64, StepError> {
         self.look_at(stimulus);
         for _ in 0..self.protocol.control_steps {
@@ -61,35 +61,34 @@ impl<'a> Rollout<'a> {
         Ok(self.moved())
     }
 
-    /// Shows an image from now on, until the next.
+    /// Sets the image until the next call, and measures displacement from here.
     pub fn look_at(&mut self, stimulus: &Grid<f64>) {
         self.world.set_stimulus(stimulus);
         self.begin = self.world.centre_of_mass()[0];
     }
 
-    /// One control step.
+    /// Simulates one control step.
     ///
     /// # Errors
-    /// [`Unstable`] if the rollout ends in it.
+    /// Returns [`Unstable`] if the rollout ends in this step.
     pub fn step(&mut self) -> Result<(), Unstable> {
         self.world.step()
     }
 
-    /// One control step, which ends soon when `stop` is set.
+    /// Simulates one control step; returns soon after `stop` is set.
     ///
     /// # Errors
-    /// [`StepError`] if it was stopped, or the rollout became unstable.
+    /// Returns a [`StepError`] if it was stopped, or if the rollout became unstable.
     pub fn step_unless(&mut self, stop: &AtomicBool) -> Result<(), StepError> {
         self.world.step_unless(stop)
     }
 
-    /// Displacement of the centre of mass along x since the present image is shown, in voxel
-    /// lengths, right positive.
+    /// Returns the centre of mass's x displacement under this image, voxel lengths, right positive.
     pub fn moved(&self) -> f64 {
         voxel_lengths(self.world.centre_of_mass()[0] - self.begin, self.physics())
     }
 
-    /// The moment, for pictures.
+    /// Returns the current frame, for pictures.
     pub fn frame(&self) -> Frame {
         let physics = self.physics();
         let ground = f64::from(physics.ground_row) * physics.cell_size;
@@ -97,23 +96,23 @@ impl<'a> Rollout<'a> {
         Frame { points: self.world.points().map(place).collect(), centre: place(self.world.centre_of_mass()) }
     }
 
-    /// The voxels with their corners, as numbers of a [`Rollout::frame`]'s points.
+    /// Returns the voxels with their corners, as indices into a [`Rollout::frame`]'s points.
     pub fn voxels(&self) -> Vec<VoxelCorners> {
         let corner = |((row, column), corners)| VoxelCorners { row, column, corners };
         self.world.voxels().map(corner).collect()
     }
 
-    /// Back to the initial state: a fresh rollout.
+    /// Returns to the initial state: a fresh rollout.
     pub fn reset(&mut self) {
         self.world.reset();
     }
 }
 
-/// One fresh rollout under one image, unless `stop` is set meanwhile: its displacement in voxel
-/// lengths.
+/// Simulates one fresh rollout under one image, unless `stop` is set in the meantime. Returns its
+/// displacement in voxel lengths.
 ///
 /// # Errors
-/// [`StepError`] if it was stopped, or the rollout became unstable.
+/// Returns a [`StepError`] if it was stopped, or if the rollout became unstable.
 pub fn fresh_rollout(
     system: &Arc<System>,
     protocol: &Protocol,
@@ -123,11 +122,11 @@ pub fn fresh_rollout(
     Rollout::new(system, protocol).show_unless(stimulus, stop)
 }
 
-/// Fresh rollouts under at most [`Worlds::MOST`] images, side by side, unless `stop` is set
-/// meanwhile: the displacement of each in voxel lengths, with the bits of [`fresh_rollout`].
+/// Simulates fresh rollouts under at most [`Worlds::MOST`] images, side by side, unless `stop` is
+/// set in the meantime. Returns displacements in voxel lengths, with the bits of [`fresh_rollout`].
 ///
 /// # Errors
-/// [`Stopped`] then; within, [`Unstable`] for a rollout that ended early.
+/// Returns [`Stopped`] if `stop` was set; single rollouts return [`Unstable`].
 pub fn fresh_rollouts_of(
     system: &Arc<System>,
     protocol: &Protocol,
@@ -151,12 +150,11 @@ pub fn fresh_rollouts_of(
     Ok(worlds.all().iter().zip(worlds.ended()).map(moved).collect())
 }
 
-/// A robot shown images as the protocol has it, in fresh rollouts or one: its displacement under
-/// each in voxel lengths, and the energies that were put into it if they are to be `measured`.
-/// Unless `stop` is set meanwhile.
+/// Simulates the images by the protocol, in fresh rollouts or one, unless `stop` is set in the
+/// meantime. Returns the displacements in voxel lengths, and, if `measured`, the energies put in.
 ///
 /// # Errors
-/// [`StepError`] if it was stopped, or a rollout became unstable.
+/// Returns a [`StepError`] if it was stopped, or if a rollout became unstable.
 pub fn walk(
     system: &Arc<System>,
     protocol: &Protocol,
@@ -178,8 +176,8 @@ pub fn walk(
     Ok((displacements, rollout.world.energy()))
 }
 
-/// For each stimulus the first one (its index) that shows the body's sensors the same pixels: those
-/// share a rollout.
+/// Returns for each stimulus the index of the first one that gives the body's sensors the same
+/// pixels: those share a rollout.
 pub fn same_to_sensors(body: &Body, stimuli: &[&Grid<f64>]) -> Vec<usize> {
     let sensors = || body.voxels().iter().filter(|(_, m)| m.is_sensor()).map(|(place, _)| place);
     let mut first = std::collections::HashMap::new();
@@ -189,8 +187,8 @@ pub fn same_to_sensors(body: &Body, stimuli: &[&Grid<f64>]) -> Vec<usize> {
     stimuli.iter().enumerate().map(|(i, stimulus)| *first.entry(seen(stimulus)).or_insert(i)).collect()
 }
 
-/// Records a robot's rollout frame by frame for pictures; one phase for each image, and no judge. An
-/// unstable rollout is recorded up to its end.
+/// Records a robot's rollout frame by frame for pictures, with one phase for each image and no
+/// judge. An unstable rollout is recorded up to its end.
 pub fn record(
     robot: &str,
     body: &Body,
@@ -256,7 +254,7 @@ mod tests {
         Arc::new(System::new(&body(), Physics::default()))
     }
 
-    /// An image of one brightness but for a pixel over the empty middle.
+    /// Makes an image of one brightness except for a pixel over the empty middle.
     fn image(brightness: f64, middle: f64) -> Grid<f64> {
         Grid::from_fn(3, 4, |r, c| if (r, c) == (1, 1) { middle } else { brightness })
     }
@@ -270,7 +268,7 @@ mod tests {
         let first = rollout.show(&image(1.0, 0.0), |world| way.push(world.centre_of_mass()[0])).unwrap();
         assert_eq!(way.len(), STEPS as usize);
         assert!((first - 10.0 * (way[STEPS as usize - 1] - start)).abs() < 1e-12 && first != 0.0);
-        // It goes on from there; after a reset, from the beginning.
+        // The rollout continues from there; after a reset, from the beginning.
         assert_ne!(rollout.show(&image(1.0, 0.0), |_| ()).unwrap(), first);
         rollout.reset();
         assert_eq!(rollout.show(&image(1.0, 0.0), |_| ()).unwrap(), first);
@@ -321,7 +319,7 @@ mod tests {
             let way = recording.frames[end].centre[0] - recording.frames[phase.first_frame].centre[0];
             assert!((phase.displacement - way).abs() < 1e-9, "{} {way}", phase.displacement);
         }
-        // y counts from the ground, on which it stands; x from its left edge; a voxel is 1.
+        // y starts at the ground, under the robot; x at its left edge; a voxel is 1.
         let points = &recording.frames[0].points;
         let least = |axis: usize| points.iter().map(|p| p[axis]).fold(f64::INFINITY, f64::min);
         assert!(least(0).abs() < 1e-9 && least(1).abs() < 1e-9, "{} {}", least(0), least(1));

@@ -1,37 +1,35 @@
 //! From displacements to fitness and task: pure functions (paper, section "Fitness").
 //!
-//! The paper defines fitness by cases: all images answered correctly: the smallest |d|; else minus the
-//! largest |d| of a wrong answer. Call an answer's *margin* its displacement in the correct
-//! direction, negative in the wrong one: both cases are then the smallest margin. Two things follow that
-//! make savings lossless: fitness is continuous (d = 0 counts as wrong, with margin 0), and the
-//! fitness of some of the images bounds that of all from above.
+//! The paper defines fitness by cases: the smallest |d| if all images are answered correctly, else
+//! minus the largest |d| of a wrong answer. An answer's *margin* is its displacement in the correct
+//! direction, negative in the wrong one; in both cases fitness is then the smallest margin. Two
+//! things follow that make savings lossless: fitness is continuous (d = 0 counts as wrong, with
+//! margin 0), and the fitness on some of the images is an upper bound of that on all.
 
 use crate::task::direction::Assignment;
 use crate::task::fitness::{Fitness, better};
 use crate::task::grouping::{Group, Grouping, Split};
 
-/// How a robot answered an image.
+/// A robot's answer to an image.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Answer {
     /// Class of the image.
     pub class: u8,
-    /// How far the robot walked to the right while it saw it, in voxel lengths; `None` if it has
-    /// not been shown it.
+    /// Displacement to the right under it, in voxel lengths; `None` if not simulated yet.
     pub displacement: Option<f64>,
 }
 
-/// Which task a robot performs, and how well.
+/// The task that a robot performs, and its fitness there.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Score {
     /// Index in [`Grouping::tasks`].
     pub task: usize,
-    /// See [`Fitness`]. The smallest margin is in voxel lengths and positive if every image is
-    /// answered correctly.
+    /// See [`Fitness`]. The smallest margin is in voxel lengths, above 0 if all is correct.
     pub fitness: f64,
 }
 
-/// Fitness on two groups, in voxel lengths: of both assignments of directions to groups the better
-/// one's smallest margin. Infinite without answers, not a number if an answer is none; never −0.
+/// Returns the fitness on two groups, in voxel lengths: the smallest margin under the better of
+/// both assignments of directions. Infinite without answers, NaN with a NaN answer; never −0.
 pub fn two_group_fitness(answers: &[(Group, f64)]) -> f64 {
     better(Fitness::Min.of_assignments(answers.iter().map(|&(group, d)| (group, Some(d)))))
 }
@@ -44,18 +42,18 @@ pub(super) fn of_split(
 }
 
 impl Grouping {
-    /// Fitness on a task, or, while some images have not been shown, an **upper bound** of it.
+    /// Returns the fitness on a task, or an **upper bound** of it while some answers are missing.
     /// Images of classes in neither of its groups do not count.
     pub fn fitness_on(&self, split: &Split, answers: &[Answer]) -> f64 {
         better(self.fitness().of_assignments(of_split(split, answers)))
     }
 
-    /// The task a robot performs, the one it is fittest on (the first wins a tie), and its fitness
-    /// there.
+    /// Returns the task that a robot performs, which is the one it is fittest on (the first wins a
+    /// tie), and its fitness there.
     ///
-    /// With one image per class and the smallest margin this is the paper's rule: min |d|, and the
-    /// signs say which task. A robot that walks the same way for all classes goes to that bin with
-    /// min |d| if there is one, else to its best split with that one's negative fitness.
+    /// With one image per class and the smallest margin this is the paper's rule: fitness is min
+    /// |d|, and the signs determine the task. A robot that walks the same way for all classes goes
+    /// to that bin with min |d| if there is one, else to its best split, with a negative fitness.
     pub fn score(&self, answers: &[Answer]) -> Score {
         let mut best = Score { task: 0, fitness: f64::NEG_INFINITY };
         for (task, split) in self.tasks().iter().enumerate() {
@@ -67,9 +65,9 @@ impl Grouping {
         best
     }
 
-    /// Whether a robot may still enter the archive: whether some task can be its own, and its
-    /// fitness there above `incumbent(task)` (`None`: the cell is empty), if only the displacements
-    /// known so far are fixed. Lossless: where this is false, no further answers put the robot in.
+    /// Returns true if a robot may still enter the archive, given only the displacements known so
+    /// far: some task may be its own, with a fitness above `incumbent(task)` (`None`: the cell is
+    /// empty). Lossless: if this is false, no further answers get the robot in.
     pub fn can_still_win(&self, answers: &[Answer], incumbent: impl Fn(usize) -> Option<f64>) -> bool {
         let wins = |task, fitness| incumbent(task).is_none_or(|i| fitness > i);
         if answers.iter().all(|answer| answer.displacement.is_some()) {
@@ -84,9 +82,9 @@ impl Grouping {
         })
     }
 
-    /// The answers from the worst to the best on the task the robot performs, both groups by turns:
-    /// a robot that always walks one way is right on all of a group. Images of classes in neither
-    /// group, or not shown, are left out.
+    /// Returns the indices of the answers from the worst to the best on the robot's task. Both
+    /// groups take turns, since a robot that always walks one way is right on all of a group.
+    /// Images of classes in neither group, or without an answer, are left out.
     pub fn hardest_first(&self, answers: &[Answer]) -> Vec<usize> {
         let split = &self.tasks()[self.score(answers).task];
         let assignment = Assignment::from_training(split, self.fitness(), answers);
@@ -104,14 +102,14 @@ impl Grouping {
             turns.push((*worse, image));
             *worse += 1;
         }
-        // Stable: of the two groups' next ones the worse comes first.
+        // A stable sort: of the two groups' next images the worse one comes first.
         turns.sort_by_key(|(worse, _)| *worse);
         turns.into_iter().map(|(_, image)| image).collect()
     }
 
-    /// Whether the robot's fitness will surely be 0 or more, so that no task it is bound to fail
-    /// can be its own: with one image per class every set of directions is some split's, or the
-    /// same way for all.
+    /// Returns true if the robot's fitness will surely be 0 or more, so that no task it is bound to
+    /// fail can be its own. With one image per class every set of directions is some split's, or
+    /// the same way for all.
     fn never_negative(&self, answers: &[Answer]) -> bool {
         let mut classes: Vec<u8> = answers.iter().map(|a| a.class).collect();
         let images = classes.len();
@@ -201,8 +199,7 @@ mod tests {
 
     #[test]
     fn a_robot_stops_when_no_task_it_can_perform_is_open_to_it() {
-        // 0 left and 1 right: only splits that part them are left; 0|123 is empty, but 01|23 is out
-        // of reach.
+        // 0 left and 1 right: only splits of these remain; 0|123 is empty, 01|23 out of reach.
         let shown = |classes: &[u8]| {
             let to_come = classes.iter().map(|&class| Answer { class, displacement: None });
             answers(&[-5.0, 6.0]).into_iter().chain(to_come).collect::<Vec<_>>()
@@ -210,10 +207,9 @@ mod tests {
         let taken_but = |free: usize| move |task: usize| (task != free).then_some(5.0);
         assert!(digits(false).can_still_win(&shown(&[2, 3]), taken_but(0)));
         assert!(!digits(false).can_still_win(&shown(&[2, 3]), taken_but(4)));
-        // With two images of a class to come, a robot may fail every task, and least of all that
-        // one.
+        // With two missing answers of a class, a robot may fail every task, and that one least.
         assert!(digits(false).can_still_win(&shown(&[2, 3, 3]), taken_but(4)));
-        // A lone task is every robot's own, failed or not; only the strictly fitter enter.
+        // A lone task is every robot's own, failed or not; only strictly fitter ones enter.
         let lone = Grouping::two_groups(&[0, 1], &[2]).unwrap();
         let against = |incumbent| lone.can_still_win(&shown(&[2]), |_| incumbent);
         assert_eq!([None, Some(-5.1), Some(-5.0)].map(against), [true, true, false]);
@@ -240,7 +236,7 @@ mod tests {
         prop::bool::ANY.prop_map(|a| if a { A } else { B })
     }
 
-    /// Small whole numbers, so that ties and zeros are common; or any.
+    /// Returns small whole numbers, so that ties and zeros are common; or any.
     fn displacement() -> impl Strategy<Value = f64> {
         prop_oneof![(-3..=3i32).prop_map(f64::from), -30.0..30.0f64]
     }

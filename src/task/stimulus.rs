@@ -1,5 +1,4 @@
-//! From an image to what a body's sensors feel: reduction to the body's grid, then encoding (paper,
-//! "Task").
+//! From image to stimulus: reduction to the body's grid, then encoding (paper, "Task").
 
 use crate::base::Grid;
 use crate::body::MAX_SIDE;
@@ -8,7 +7,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 
-/// How an image is reduced to the body's grid.
+/// The reduction of an image to the body's grid.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Reduction {
@@ -16,19 +15,19 @@ pub enum Reduction {
     /// 14. Rows and columns each have their own s; the body's sides must divide the image's.
     #[default]
     Stride,
-    /// Each voxel gets the mean of the raw pixel values under it, pixels cut by its edges counting
-    /// by the area they share with it; for bodies of any size. The mean is encoded, not the pixels.
+    /// The mean of the raw pixel values under each voxel; pixels cut by its edges count by the area
+    /// inside. For bodies of any size. The mean is encoded, not the pixels.
     Area,
 }
 
-/// How a pixel value becomes a stimulus in [0, 1].
+/// The encoding of a pixel value as a stimulus in [0, 1].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Encoding {
     /// value / 255: "proportional to the intensity of the pixel" (the paper's text).
     #[default]
     Intensity,
-    /// 1 for any value above 0, else 0: what the paper's published robots were evolved on.
+    /// 1 for any value above 0, else 0: the paper's published robots evolved under this encoding.
     Saturated,
     /// 1 if value / 255 is above [`StimulusParams::level`], else 0.
     Threshold,
@@ -46,7 +45,7 @@ pub struct StimulusParams {
     pub level: f64,
     /// Rows and columns of pixels left out at the edges, before the reduction: a number, or [top,
     /// right, bottom, left]. Default 0. MNIST's digits lie in the middle 20 × 20 of 28 × 28 pixels:
-    /// with 4, every sensor sees a part of them.
+    /// with 4, every sensor covers a part of them.
     #[serde(skip_serializing_if = "Margins::is_none")]
     pub margin: Margins,
 }
@@ -63,8 +62,8 @@ impl Default for StimulusParams {
 }
 
 impl StimulusParams {
-    /// How several bodies see an image together: as the first of them, within the least of their
-    /// margins; by areas, if these are not its own. `None` of no body.
+    /// Combines the parameters of several bodies: the first one's, with the least of all margins;
+    /// reduced by areas if these are not its own. `None` for no body.
     pub fn together(all: impl IntoIterator<Item = StimulusParams>) -> Option<Self> {
         let least = |first: Self, other: Self| match first.margin.least(&other.margin) {
             own if own == first.margin => first,
@@ -73,7 +72,7 @@ impl StimulusParams {
         all.into_iter().reduce(least)
     }
 
-    /// The part of an image of this height and width that a body sees, in words.
+    /// Describes the part of an image of this height and width that a body covers.
     pub fn part(&self, [height, width]: [usize; 2]) -> String {
         let whole = format!("{height} × {width} pixels");
         match (self.margin.is_none(), self.margin.left_of([height, width])) {
@@ -88,13 +87,13 @@ impl StimulusParams {
     /// Checks the level.
     ///
     /// # Errors
-    /// [`StimulusError::Level`].
+    /// Returns [`StimulusError::Level`] if it is below 0, 1 or more, or NaN.
     pub fn validate(&self) -> Result<(), StimulusError> {
         (0.0..1.0).contains(&self.level).then_some(()).ok_or(StimulusError::Level(self.level))
     }
 }
 
-/// Why there is no stimulus for this image, body size and encoding.
+/// The reason why this image, body size and encoding give no stimulus.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum StimulusError {
     /// The body has no rows or no columns.
@@ -105,7 +104,7 @@ pub enum StimulusError {
         /// Columns of the body.
         width: usize,
     },
-    /// The body has more rows or columns than any.
+    /// The body has more rows or columns than allowed.
     #[error("a body of {height} x {width} voxels: expected at most {MAX_SIDE} rows and columns")]
     TooLarge {
         /// Rows of the body.
@@ -153,7 +152,7 @@ pub enum StimulusError {
 }
 
 impl StimulusError {
-    /// The key of a config that is to be changed.
+    /// Returns the key of the config to change.
     pub fn key(&self) -> &'static str {
         match self {
             StimulusError::Empty { .. } | StimulusError::TooLarge { .. } => "body",
@@ -165,12 +164,11 @@ impl StimulusError {
     }
 }
 
-/// The stimulus of an image for a body of height × width voxels: one value in [0, 1] per voxel
-/// place, row 0 on top.
+/// Returns the stimulus of an image for a body of height × width voxels: one value in [0, 1] per
+/// voxel, row 0 on top.
 ///
 /// # Errors
-/// [`StimulusError`] if the body's size does not go with the reduction, or a threshold is out of
-/// range.
+/// Returns a [`StimulusError`] if the sizes do not fit, or if a threshold is out of range.
 pub fn stimulus(
     image: &Grid<u8>,
     height: usize,
@@ -214,9 +212,9 @@ fn strided(image: &Grid<u8>, height: usize, width: usize) -> Result<Grid<f64>, S
     Ok(Grid::from_fn(height, width, |r, c| f64::from(image[(r * rows, c * columns)])))
 }
 
-/// The image on a grid of another size by area-weighted means, 0 … 255. In units of 1/height of a pixel, a voxel is `image.height()` tall
-/// and a pixel `height`: all overlaps are whole numbers, and one division per voxel is the only
-/// rounding.
+/// Reduces the image to a grid of another size by area-weighted means, 0 … 255. In units of
+/// 1/height of a pixel, a voxel is `image.height()` tall and a pixel `height`: all overlaps are
+/// whole numbers, and the division per voxel is the only rounding.
 pub fn averaged(image: &Grid<u8>, height: usize, width: usize) -> Grid<f64> {
     let overlap = |voxel: usize, voxel_side: usize, pixel: usize, pixel_side: usize| {
         let end = ((voxel + 1) * voxel_side).min((pixel + 1) * pixel_side);
@@ -291,8 +289,7 @@ mod tests {
             stimulus(&quarter, 1, 1, &params(Area, Intensity)).unwrap().cells(),
             [256.0 / 4.0 / 255.0]
         );
-        // The mean is encoded, not the pixels: 64/255 is above 0.25, though only one pixel of four
-        // is.
+        // The mean is encoded, not the pixels: 64/255 exceeds 0.25, as only one pixel does.
         let above = |level| {
             let params = StimulusParams { level, ..params(Area, Threshold) };
             stimulus(&quarter, 1, 1, &params).unwrap()[(0, 0)]
@@ -360,7 +357,7 @@ mod tests {
             StimulusParams { margin: Margins { top: 1, right: 2, bottom: 2, left: 0 }, ..a }
         );
         assert_eq!((StimulusParams::together([a]), StimulusParams::together([])), (Some(a), None));
-        // A stride goes with its own margin only.
+        // A stride requires its own margin.
         let [whole, cut] = [0, 4]
             .map(|margin| StimulusParams { margin: Margins::same(margin), ..params(Stride, Intensity) });
         assert_eq!(StimulusParams::together([whole, cut]), Some(whole));

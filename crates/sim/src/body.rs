@@ -4,7 +4,7 @@ use crate::grid::{Grid, GridError};
 use std::fmt;
 use std::str::FromStr;
 
-/// What a voxel is made of; the numbers are those of all files.
+/// The material of a voxel; files hold its number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(try_from = "u8", into = "u8"))]
@@ -39,37 +39,37 @@ impl Material {
         Material::SensorExpand,
     ];
 
-    /// Its number, 0…6.
+    /// Returns its number, 0…6.
     pub fn code(self) -> u8 {
         self as u8
     }
 
-    /// The material with a number, `None` above 6.
+    /// Returns the material with a number, `None` above 6.
     pub fn from_code(code: u8) -> Option<Self> {
         Material::ALL.get(usize::from(code)).copied()
     }
 
-    /// Whether there is no voxel.
+    /// Returns true if there is no voxel.
     pub fn is_empty(self) -> bool {
         self == Material::Empty
     }
 
-    /// Whether it oscillates.
+    /// Returns true if it oscillates.
     pub fn is_muscle(self) -> bool {
         matches!(self, Material::MuscleInPhase | Material::MuscleAntiphase)
     }
 
-    /// Whether it follows a pixel.
+    /// Returns true if it follows a pixel.
     pub fn is_sensor(self) -> bool {
         matches!(self, Material::SensorShrink | Material::SensorExpand)
     }
 
-    /// Whether its width is actuated: muscles and sensors.
+    /// Returns true if its width is actuated: muscles and sensors.
     pub fn is_active(self) -> bool {
         self.is_muscle() || self.is_sensor()
     }
 
-    /// Its name in pictures and tables.
+    /// Returns its name in pictures and tables.
     pub fn name(self) -> &'static str {
         match self {
             Material::Empty => "empty",
@@ -83,7 +83,7 @@ impl Material {
     }
 }
 
-/// A number that is not a material's.
+/// A number that belongs to no material.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{0} is not a material; expected 0…6 (0 empty, 1 rigid, 2 soft, 3 and 4 muscle, 5 and 6 sensor)")]
 pub struct UnknownMaterial(pub u8);
@@ -105,15 +105,14 @@ impl From<Material> for u8 {
 pub const MAX_SIDE: usize = 64;
 
 /// A robot's body: H × W voxels, row 0 on top. Empty rows and columns count: pixel (row, column) of
-/// a stimulus drives voxel (row, column). In files it is a list of rows of numbers 0…6 (see
-/// [`Material`]).
+/// a stimulus drives voxel (row, column). In files: rows of numbers 0…6 (see [`Material`]).
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(try_from = "Grid<Material>", into = "Grid<Material>"))]
 #[cfg_attr(feature = "schemars", derive(schemars::JsonSchema), schemars(with = "Vec<Vec<Material>>"))]
 pub struct Body(Grid<Material>);
 
-/// How many voxels of a kind a body has.
+/// Numbers of voxels of a body, by kind.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
@@ -126,7 +125,7 @@ pub struct VoxelCounts {
     pub total: usize,
 }
 
-/// Why something is not a body.
+/// The reason why voxels do not form a body.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum BodyError {
     /// The rows do not form a grid.
@@ -147,16 +146,16 @@ pub enum BodyError {
         row: usize,
         /// Column from the left, from 0.
         column: usize,
-        /// What stood there.
+        /// The character found there.
         found: char,
     },
 }
 
 impl Body {
-    /// A body from its voxels.
+    /// Makes a body from its voxels.
     ///
     /// # Errors
-    /// [`BodyError::TooLarge`] above [`MAX_SIDE`] rows or columns.
+    /// Returns [`BodyError::TooLarge`] above [`MAX_SIDE`] rows or columns.
     pub fn new(voxels: Grid<Material>) -> Result<Self, BodyError> {
         let (height, width) = (voxels.height(), voxels.width());
         if height > MAX_SIDE || width > MAX_SIDE {
@@ -165,27 +164,27 @@ impl Body {
         Ok(Body(voxels))
     }
 
-    /// The voxels, row 0 on top.
+    /// Returns the voxels, row 0 on top.
     pub fn voxels(&self) -> &Grid<Material> {
         &self.0
     }
 
-    /// Rows, empty ones included.
+    /// Returns the number of rows, empty ones included.
     pub fn height(&self) -> usize {
         self.0.height()
     }
 
-    /// Columns, empty ones included.
+    /// Returns the number of columns, empty ones included.
     pub fn width(&self) -> usize {
         self.0.width()
     }
 
-    /// The material at (row, column); empty outside the grid.
+    /// Returns the material at (row, column); outside the grid all is empty.
     pub fn at(&self, row: isize, column: isize) -> Material {
         self.0.get(row, column).copied().unwrap_or(Material::Empty)
     }
 
-    /// Numbers of muscle, sensor and non-empty voxels.
+    /// Counts muscle, sensor and non-empty voxels.
     pub fn counts(&self) -> VoxelCounts {
         let count = |kind: fn(&Material) -> bool| self.0.cells().iter().filter(|m| kind(m)).count();
         VoxelCounts {
@@ -195,7 +194,7 @@ impl Body {
         }
     }
 
-    /// Whether there is a voxel and all voxels hang together through their sides.
+    /// Returns true if there is a voxel and all voxels are connected through their sides.
     pub fn is_connected(&self) -> bool {
         let Some((start, _)) = self.0.iter().find(|(_, m)| !m.is_empty()) else {
             return false;
@@ -219,19 +218,19 @@ impl Body {
         count == self.counts().total
     }
 
-    /// Whether the body may walk: connected, and with at least `min_muscles` muscle voxels.
+    /// Returns true if the body is connected and has at least `min_muscles` muscle voxels.
     pub fn is_valid(&self, min_muscles: usize) -> bool {
         self.counts().muscle >= min_muscles && self.is_connected()
     }
 
-    /// The body in which every soft voxel and every sensor is an expanding sensor: what each of
-    /// those places does when its voxel grows can be seen in it.
+    /// Replaces every soft voxel and every sensor by an expanding sensor, so that a simulation
+    /// shows the effect of each of those places when its voxel grows.
     pub fn probe(&self) -> Self {
         let is_place = |material: Material| material == Material::Soft || material.is_sensor();
         Body(self.0.map(|&material| if is_place(material) { Material::SensorExpand } else { material }))
     }
 
-    /// The body mirrored left to right.
+    /// Returns the body mirrored left to right.
     pub fn mirrored(&self) -> Self {
         Body(self.0.mirrored())
     }
@@ -250,7 +249,7 @@ impl From<Body> for Grid<Material> {
     }
 }
 
-/// The text form: one line of digits 0…6 per row.
+/// Writes the text form: one line of digits 0…6 per row.
 impl fmt::Display for Body {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for (i, row) in self.0.rows().enumerate() {

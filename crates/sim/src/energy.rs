@@ -1,11 +1,11 @@
-//! [`Energy`]: what the actuators put into a robot, and what the length limits put in besides
-//! (physics.md, "One substep", 4).
+//! [`Energy`]: the energy that actuators and length limits put into a robot (physics.md, "One
+//! substep", 4).
 //!
-//! The servo makes a spring of stiffness k and gain g pull towards its goal length with k·g·(d −
-//! goal) at the start of every substep: over many substeps that is a spring of stiffness k·g, and
-//! its energy is ½·k·g·(d − goal)². The length limits move points and leave their velocities alone,
-//! so they change that energy without work. They move both ends of a spring by as much,
-//! so that gravity's part of the change is 0 but for rounding.
+//! At the start of every substep the servo makes a spring of stiffness k and gain g pull towards
+//! its goal length with k·g·(d − goal). Over many substeps that is a spring of stiffness k·g with
+//! the energy ½·k·g·(d − goal)². The length limits move points but leave their velocities alone, so
+//! they change that energy without work. They move both ends of a spring equally far, so gravity's
+//! part of the change is 0 up to rounding.
 
 use crate::lattice::{FAMILIES, spring_index};
 use crate::state::{Pair, X, Y};
@@ -16,32 +16,31 @@ use crate::system::System;
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
 #[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 pub struct Energy {
-    /// By the actuators, whose goals move while the springs are as they are.
+    /// The actuators' share: they move the goals while the springs keep their lengths.
     pub drive: f64,
-    /// By the length limits, which move the points while goals are as they are.
+    /// The length limits' share: they move the points while the goals stay.
     pub limits: f64,
 }
 
-/// A spring, as far as its energy goes.
+/// The data of a spring that its energy depends on.
 #[derive(Clone, Copy, Debug)]
 struct Spring {
     ends: [usize; 2],
     /// ½·k·g.
     half: f64,
-    /// Its goal: an index into the goals, if it may be actuated.
+    /// Index into the goals if the spring may be actuated.
     goal: Option<usize>,
     length: f64,
 }
 
-/// Measures a simulation. It only looks: the simulation is the same bits as without it.
+/// Measures a simulation without changing a bit of it.
 #[derive(Clone, Debug)]
 pub(crate) struct Meter {
     springs: Vec<Spring>,
     points: Vec<usize>,
     /// Weight of a point.
     weight: f64,
-    /// Goals of the present control step; empty before the first, when every spring's is its
-    /// length.
+    /// Goals of the current control step; empty before the first (lengths then).
     goals: Vec<f64>,
     before: f64,
     pub energy: Energy,
@@ -80,12 +79,12 @@ impl Meter {
         }
     }
 
-    /// Begins anew, at rest; energies go on adding up.
+    /// Returns to rest; energies go on adding up.
     pub fn rest(&mut self) {
         self.goals.clear();
     }
 
-    /// The goals of a control step are set.
+    /// Records new goals at the start of a control step.
     pub fn drive(&mut self, goals: &[f64], position: &Pair) {
         let before = self.potential(position);
         self.goals.clear();
@@ -93,12 +92,12 @@ impl Meter {
         self.energy.drive += self.potential(position) - before;
     }
 
-    /// The limits are about to be applied.
+    /// Measures before the limits are applied.
     pub fn before_limits(&mut self, position: &Pair) {
         self.before = self.potential(position);
     }
 
-    /// They have been.
+    /// Measures after the limits have been applied.
     pub fn after_limits(&mut self, position: &Pair) {
         self.energy.limits += self.potential(position) - self.before;
     }
@@ -147,7 +146,7 @@ mod tests {
 
     #[test]
     fn the_drive_of_one_step_is_the_energy_of_the_springs_it_stretches() {
-        // One in-phase muscle at rest; at step 0 its target is 1.1 rest widths, of two sides.
+        // One in-phase muscle at rest: at step 0 the target of its two sides is 1.1 rest widths.
         let physics = Physics::default();
         let system = System::new(&"3".parse().unwrap(), physics.clone());
         let mut world = World::new(system, Start { column: 0, row: 20 }).with_energy_meter();

@@ -1,4 +1,4 @@
-//! [`Grid`]: the only row/column ↔ index arithmetic there is.
+//! [`Grid`]: the only place that converts between rows, columns and indices.
 
 use std::ops::{Index, IndexMut};
 
@@ -14,10 +14,10 @@ pub struct Grid<T> {
     cells: Vec<T>,
 }
 
-/// Most cells of a grid in a file: many times what a body, a stimulus or a drawing has.
+/// Most cells of a grid in a file; bodies, stimuli and drawings have far fewer.
 const MOST_CELLS: usize = 1 << 20;
 
-/// Why rows do not make a [`Grid`].
+/// The reason why rows do not make a [`Grid`].
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum GridError {
     /// There is no cell at all.
@@ -31,7 +31,7 @@ pub enum GridError {
     Ragged {
         /// Index of the offending row, from 0 at the top.
         row: usize,
-        /// Its length.
+        /// Number of its cells.
         found: usize,
         /// Length of row 0.
         expected: usize,
@@ -39,10 +39,10 @@ pub enum GridError {
 }
 
 impl<T> Grid<T> {
-    /// A grid made of rows, top row first; all rows must have the same length, which is not 0.
+    /// Makes a grid of rows, top row first; all rows must have the same length, which is not 0.
     ///
     /// # Errors
-    /// [`GridError`] if there is no cell, or a row's length differs from the first's.
+    /// Returns a [`GridError`] if there is no cell, or if a row's length differs from the first's.
     pub fn from_rows(rows: Vec<Vec<T>>) -> Result<Self, GridError> {
         let (height, width) = (rows.len(), rows.first().map_or(0, Vec::len));
         if height == 0 || width == 0 {
@@ -55,69 +55,68 @@ impl<T> Grid<T> {
         Ok(Grid { height, width, cells: rows.into_iter().flatten().collect() })
     }
 
-    /// A grid whose cell (row, column) is `cell(row, column)`.
+    /// Makes a grid whose cell (row, column) is `cell(row, column)`.
     pub fn from_fn(height: usize, width: usize, mut cell: impl FnMut(usize, usize) -> T) -> Self {
         let cells = (0..height * width).map(|i| cell(i / width, i % width)).collect();
         Grid { height, width, cells }
     }
 
-    /// Number of rows.
+    /// Returns the number of rows.
     pub fn height(&self) -> usize {
         self.height
     }
 
-    /// Number of columns.
+    /// Returns the number of columns.
     pub fn width(&self) -> usize {
         self.width
     }
 
-    /// Number of cells, height × width.
+    /// Returns the number of cells, height × width.
     pub fn area(&self) -> usize {
         self.cells.len()
     }
 
-    /// The cell, or `None` outside the grid; takes signed indices so that neighbours can be asked
-    /// for freely.
+    /// Returns the cell, or `None` outside; signed indices reach neighbours without checks.
     pub fn get(&self, row: isize, column: isize) -> Option<&T> {
         let (r, c) = (usize::try_from(row).ok()?, usize::try_from(column).ok()?);
         (r < self.height && c < self.width).then(|| &self.cells[r * self.width + c])
     }
 
-    /// All cells in row-major order.
+    /// Returns all cells in row-major order.
     pub fn cells(&self) -> &[T] {
         &self.cells
     }
 
-    /// All cells with their row and column, in row-major order.
+    /// Iterates over all cells with their row and column, in row-major order.
     pub fn iter(&self) -> impl Iterator<Item = ((usize, usize), &T)> {
         self.cells.iter().enumerate().map(|(i, t)| ((i / self.width, i % self.width), t))
     }
 
-    /// The rows, top row first.
+    /// Iterates over the rows, top row first.
     pub fn rows(&self) -> impl Iterator<Item = &[T]> {
         self.cells.chunks(self.width)
     }
 
-    /// A grid of the same shape with `f` applied to every cell.
+    /// Applies `f` to every cell.
     pub fn map<U>(&self, f: impl FnMut(&T) -> U) -> Grid<U> {
         Grid { height: self.height, width: self.width, cells: self.cells.iter().map(f).collect() }
     }
 }
 
 impl<T: Copy + Default> Grid<T> {
-    /// The cell at (row, column); outside the grid the default, as dark as a pixel can be.
+    /// Returns the cell at (row, column), or the default (a dark pixel) outside the grid.
     pub fn or_default(&self, (row, column): (usize, usize)) -> T {
         self.get(row as isize, column as isize).copied().unwrap_or_default()
     }
 }
 
 impl<T: Clone> Grid<T> {
-    /// A grid with the same value in every cell.
+    /// Makes a grid with the same value in every cell.
     pub fn filled(height: usize, width: usize, value: T) -> Self {
         Grid { height, width, cells: vec![value; height * width] }
     }
 
-    /// The grid mirrored left to right.
+    /// Returns the grid mirrored left to right.
     pub fn mirrored(&self) -> Self {
         Grid::from_fn(self.height, self.width, |r, c| self[(r, self.width - 1 - c)].clone())
     }
@@ -152,13 +151,12 @@ mod reading {
     use std::marker::PhantomData;
 
     impl<'de, T: Deserialize<'de>> Deserialize<'de> for Grid<T> {
-        /// Cell by cell, so that rows without end are refused before they fill the memory.
+        /// Reads cell by cell, so that endless rows are refused before they fill the memory.
         fn deserialize<D: Deserializer<'de>>(reader: D) -> Result<Self, D::Error> {
             reader.deserialize_seq(Rows(PhantomData))
         }
     }
 
-    /// Reads the rows of a grid.
     struct Rows<T>(PhantomData<T>);
 
     impl<'de, T: Deserialize<'de>> Visitor<'de> for Rows<T> {
@@ -189,7 +187,7 @@ mod reading {
         }
     }
 
-    /// Reads a row behind the cells of others; its length.
+    /// Appends a row to the cells read so far and returns its length.
     struct Row<'c, T>(&'c mut Vec<T>);
 
     impl<'de, T: Deserialize<'de>> DeserializeSeed<'de> for Row<'_, T> {

@@ -1,10 +1,10 @@
 //! [`Lattice`]: a body as points, springs and surface.
 //!
-//! Points lie on a dense lattice, one slot per grid vertex of the body's bounding box, row-major
-//! from the top left with a fixed row pitch; where two voxels touch only at a corner, the later
+//! Points lie on a dense lattice: one slot per grid vertex of the body's bounding box, row-major
+//! from the top left, with a fixed row pitch. Where two voxels touch only at a corner, the later
 //! voxel's point is an *off-lattice point* behind the lattice. So each of the four spring families
-//! (sides and diagonals) joins points a fixed offset apart and is a plain sweep over arrays; the
-//! few springs that end in one are kept in a list.
+//! (sides and diagonals) joins points a fixed offset apart and is a plain sweep over arrays. The
+//! few springs that end in an off-lattice point are kept in a list.
 
 use crate::body::{Body, Material};
 use crate::grid::Grid;
@@ -12,18 +12,18 @@ use crate::physics::Physics;
 use crate::simd::{BLOCK, Buffer};
 use std::ops::Range;
 
-/// Sides of a voxel in the order in which they are visited: top, right, bottom, left. Each runs
-/// clockwise, so that its outward normal is its direction turned left.
+/// Sides of a voxel in the order of visits: top, right, bottom, left. Each runs clockwise, so its
+/// outward normal is its direction turned left.
 pub(crate) const SIDES: [(usize, usize); 4] = [(0, 1), (1, 2), (2, 3), (3, 0)];
 
 /// Neighbouring cell across each side, in the order of [`SIDES`].
 const ACROSS: [(isize, isize); 4] = [(-1, 0), (0, 1), (1, 0), (0, -1)];
 
-/// The four families of springs: horizontal, vertical, falling and rising diagonals.
+/// Number of spring families: horizontal, vertical, falling and rising diagonals.
 pub(crate) const FAMILIES: usize = 4;
 
-/// Where the spring of a family that belongs to a slot is in the arrays over all springs: by blocks
-/// of slots, in a block by families, so that a sweep over the slots reads them from front to back.
+/// Returns the index of a slot's spring of a family in the arrays over all springs: by blocks of
+/// slots, then by families, so that a sweep over the slots reads them from front to back.
 #[inline(always)]
 pub(crate) fn spring_index(slot: usize, family: usize) -> usize {
     (slot / BLOCK * FAMILIES + family) * BLOCK + slot % BLOCK
@@ -37,65 +37,61 @@ pub(crate) struct OffLatticeSpring {
     pub stiffness: f64,
 }
 
-/// A horizontal side that active voxels actuate.
+/// A horizontal side actuated by active voxels.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ActuatedSide {
-    /// Index into the goals: a slot of the horizontal family, or (`len` + index of the off-lattice
-    /// spring).
+    /// Index into the goals: a horizontal spring's slot, or `len` + index off the lattice.
     pub goal: usize,
     /// The one or two active voxels that share it, as indices into [`Lattice::active`].
     pub voxels: [usize; 2],
 }
 
-/// A voxel that actuates.
+/// A voxel with actuated sides.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ActiveVoxel {
     pub material: Material,
-    /// Its place in the body, and so its pixel.
+    /// Position in the body, and so the position of its pixel.
     pub place: (usize, usize),
 }
 
-/// A voxel with a side to the outside.
+/// A voxel with an exposed side.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SurfaceVoxel {
     pub row: usize,
     pub column: usize,
     /// Its points clockwise from the top left.
     pub corners: [usize; 4],
-    /// Which of its sides are on the surface, in the order of [`SIDES`].
+    /// True for each side on the surface, in the order of [`SIDES`].
     pub exposed: [bool; 4],
 }
 
-/// A body's points, springs and surface.
 #[derive(Clone, Debug)]
 pub(crate) struct Lattice {
-    /// Slots from one row to the next.
+    /// Number of slots from one row to the next.
     pub(crate) pitch: usize,
-    /// Slots of the lattice proper.
+    /// Number of slots of the lattice proper.
     lattice_slots: usize,
-    /// Slots, off-lattice points included; a whole number of blocks.
+    /// Number of slots, off-lattice points included; a whole number of blocks.
     pub(crate) slots: usize,
-    /// Length of all per-point arrays: slots, and room for the sweeps to look ahead.
+    /// Length of all per-point arrays: the slots, and room for the sweeps to look ahead.
     pub(crate) len: usize,
-    /// Where a slot has a point 1, elsewhere 0.
+    /// 1 where a slot has a point, 0 elsewhere.
     pub(crate) present: Buffer,
-    /// The slots with a point or a spring, in whole blocks: the others need no work.
+    /// Whole blocks of slots with a point or a spring; the others need no work.
     pub(crate) active_ranges: Vec<Range<usize>>,
-    /// Length at rest of each family's springs [wu].
+    /// Rest length of each family's springs [wu].
     pub(crate) lengths: [f64; FAMILIES],
     /// Stiffness of every spring ([`spring_index`]), 0 where there is none.
     pub(crate) stiffness: Buffer,
-    /// Where there is a spring a number of all bits but the sign's, elsewhere 0 (see
-    /// [`Lanes::bits_and`]).
+    /// Bit mask of every spring: all bits but the sign's, or 0 (see [`Lanes::bits_and`]).
     pub(crate) exists: Buffer,
     pub(crate) off_lattice_springs: Vec<OffLatticeSpring>,
     pub(crate) actuated: Vec<ActuatedSide>,
     pub(crate) active: Vec<ActiveVoxel>,
-    /// Sides of rigid voxels in an order of equal results to the rigid pass's.
+    /// Sides of rigid voxels, in an order that gives the same results as the rigid pass's.
     pub(crate) rigid_links: Vec<[usize; 2]>,
     pub(crate) surface: Vec<SurfaceVoxel>,
-    /// Grid vertex (row, column) in the body of every point that exists, in EvoGym's order of
-    /// creation.
+    /// Every point with its grid vertex (row, column), in EvoGym's order of creation.
     pub(crate) points: Vec<(usize, (usize, usize))>,
     /// Non-empty voxels, row-major, with their points clockwise from the top left.
     pub(crate) voxels: Vec<((usize, usize), [usize; 4])>,
@@ -104,7 +100,6 @@ pub(crate) struct Lattice {
 }
 
 impl Lattice {
-    /// The lattice of a body.
     pub fn new(body: &Body, physics: &Physics) -> Self {
         let voxels = numbered_voxels(body);
         let NumberedVoxels { pitch, slots, .. } = voxels;
@@ -138,8 +133,8 @@ impl Lattice {
         lattice
     }
 
-    /// Every point once, in EvoGym's order of creation: voxels row-major; in a voxel top left, top
-    /// right, bottom left, bottom right.
+    /// Lists every point once, in EvoGym's order of creation: voxels row-major; within a voxel top
+    /// left, top right, bottom left, bottom right.
     fn add_points(&mut self) {
         let mut known = vec![false; self.len];
         for ((row, column), corners) in &self.voxels {
@@ -161,9 +156,9 @@ impl Lattice {
                 _ => (physics.active_stiffness, physics.active_diagonal_ratio),
             };
             let [tl, tr, br, bl] = corners;
-            // Voxels come row-major, so a later one overwrites; a rigid one only where there is no
-            // spring yet (physics.md, "Points and springs": start from the rigid value, every
-            // non-rigid cell overwrites).
+            // Voxels come row-major, so a later one overwrites. A rigid one does so only where
+            // there is no spring yet (physics.md, "Points and springs": start from the rigid value,
+            // every non-rigid cell overwrites).
             let keep = material == Material::Rigid;
             let sides = [[tl, tr], [tr, br], [bl, br], [tl, bl]];
             for (ends, family) in sides.into_iter().zip([0, 1, 0, 1]) {
@@ -178,7 +173,7 @@ impl Lattice {
     }
 
     fn set_spring(&mut self, family: usize, ends: [usize; 2], stiffness: f64, keep: bool) {
-        // From the slot to the spring's first and second point.
+        // Offsets from the slot to the spring's first and second point.
         let (from, to) = [(0, 1), (0, self.pitch), (0, self.pitch + 1), (1, self.pitch)][family];
         let slot = ends[0].wrapping_sub(from);
         if slot < self.lattice_slots && ends[0] < self.lattice_slots && ends[1] == slot + to {
@@ -211,7 +206,7 @@ impl Lattice {
             if (0..FAMILIES).any(|family| exists(&family)) {
                 used[slot / BLOCK] = true;
             }
-            // All but vertical springs reach into the next column: the next block passes that on.
+            // All but vertical springs reach into the next column, perhaps of the next block.
             if [0, 2, 3].iter().any(exists) {
                 used[(slot + 1) / BLOCK] = true;
             }
@@ -251,14 +246,14 @@ struct NumberedVoxels {
     slots: usize,
 }
 
-/// The voxels with the numbers of their points.
+/// Numbers the points of all voxels.
 fn numbered_voxels(body: &Body) -> NumberedVoxels {
     let filled: Vec<_> = body.voxels().iter().filter(|(_, m)| !m.is_empty()).map(|(p, _)| p).collect();
     let least = |f: fn(&(usize, usize)) -> usize| filled.iter().map(f).min().unwrap_or(0);
     let most = |f: fn(&(usize, usize)) -> usize| filled.iter().map(f).max().unwrap_or(0);
     let (top, left) = (least(|p| p.0), least(|p| p.1));
     let (width, height) = (most(|p| p.1) - left + 2, most(|p| p.0) - top + 2);
-    // Whole blocks a row are faster to work on, if they are not many more.
+    // Whole blocks per row are faster to work on, unless they add many slots.
     let padded = width.next_multiple_of(BLOCK);
     let pitch = if 4 * padded <= 5 * width { padded } else { width };
     let lattice_slots = height * pitch;
@@ -271,8 +266,7 @@ fn numbered_voxels(body: &Body) -> NumberedVoxels {
             let at = |dr: isize, dc: isize| !body.at(r as isize + dr, c as isize + dc).is_empty();
             let falling = at(-1, -1) && at(0, 0) && !at(-1, 0) && !at(0, -1);
             let rising = at(-1, 0) && at(0, -1) && !at(-1, -1) && !at(0, 0);
-            // Of two voxels that touch only here the lower one, for which the vertex is a top
-            // corner, is later.
+            // If two voxels touch only here, the later one has the vertex as a top corner.
             if (falling || rising) && down == 0 {
                 *off_lattice[(r, c)].get_or_insert_with(|| {
                     *len += 1;
@@ -298,13 +292,12 @@ fn surface_voxels(body: &Body, voxels: &[((usize, usize), [usize; 4])]) -> Vec<S
     voxels.iter().filter_map(voxel).collect()
 }
 
-/// Brings links of the rigid pass that have nothing to do with each other together, so that the
-/// processor can work on several at once. Links that share a point stay in their order: results are
-/// the same bits.
+/// Groups links of the rigid pass that share no point, so that the processor can work on several at
+/// once. Links that share a point keep their order, so results are the same bits.
 fn in_rounds(links: &[[usize; 2]], points: usize) -> Vec<[usize; 2]> {
     let mut taken = vec![0; points];
     let mut round = |&[a, b]: &[usize; 2]| {
-        // After every earlier link at either end.
+        // It comes after every earlier link at either end.
         let round = 1 + taken[a].max(taken[b]);
         (taken[a], taken[b]) = (round, round);
         (round, [a, b])
@@ -320,7 +313,7 @@ mod tests {
 
     #[test]
     fn rounds_hold_every_link_and_keep_the_order_of_those_that_share_a_point() {
-        // The sides of 3 × 3 rigid voxels, of which neighbours share one.
+        // The sides of 3 × 3 rigid voxels; neighbours share one.
         let corners = |voxel: usize| [0, 1, 5, 4].map(|corner| voxel / 3 * 4 + voxel % 3 + corner);
         let sides = |voxel: usize| SIDES.map(|(a, b)| [corners(voxel)[a], corners(voxel)[b]]);
         let links: Vec<[usize; 2]> = (0..9).flat_map(sides).collect();

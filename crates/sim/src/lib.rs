@@ -1,9 +1,8 @@
-//! EvoGym's soft-robot physics: a mass–spring lattice on flat ground, fast, and the same bits on
-//! every machine.
+//! EvoGym's soft-robot physics: a fast mass–spring lattice on flat ground, the same bits anywhere.
 //!
-//! A [`Body`] is a grid of voxels: rigid, soft, muscles that oscillate, sensors that follow a pixel
-//! each. A [`System`] is a body under some [`Physics`], a [`World`] simulates it. Neither knows
-//! evolution, images, files, clocks or random numbers.
+//! A [`Body`] is a grid of voxels: rigid, soft, muscles that oscillate, and sensors that follow a
+//! pixel each. A [`System`] is a body under some [`Physics`]; a [`World`] simulates it. Neither
+//! knows anything of evolution, images, files, clocks or random numbers.
 //!
 //! ```
 //! use morphcog_sim::{Body, Grid, Physics, Start, System, World};
@@ -21,7 +20,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! A system is shared: worlds of the same system, on any number of threads, take an `Arc` of it.
+//! Worlds share a system: any number of them, on any number of threads, take an `Arc` of it.
 //!
 //! ```
 //! # use morphcog_sim::{Body, Physics, Start, System, World};
@@ -42,22 +41,21 @@
 //!
 //! Simulations of a mostly rigid body are faster side by side, with the same bits: [`Worlds`].
 //!
-//! Feature `serde` (off by default) reads and writes bodies, grids, constants and states.
+//! The feature `serde` (off by default) reads and writes bodies, grids, constants and states.
 //!
 //! # Same bits
 //!
-//! The loops are compiled for several [instruction sets](InstructionSet), and the widest that the
-//! machine has is chosen when the program runs. All of them give the same bits.
+//! The loops are compiled for several [instruction sets](InstructionSet). The program chooses the
+//! widest that the machine has when it runs. All of them give the same bits.
 //!
 //! Positions are *local*: x is measured from the left edge of the robot's starting box. So a
-//! simulation does not depend on where on the ground the robot stands (but for the pegs below it,
-//! which count columns).
+//! simulation does not depend on where on the ground the robot stands, except for the pegs below
+//! it, which count columns.
 //!
-//! The rest of this page is the specification, `physics.md`; comments in the code cite its
-//! sections.
+//! The rest of this page is the specification, `physics.md`, whose sections the code cites.
 //!
 #![doc = include_str!("../physics.md")]
-// In tests all of this may be.
+// Tests may panic and print.
 #![cfg_attr(
     not(test),
     deny(

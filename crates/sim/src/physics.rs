@@ -1,6 +1,6 @@
 //! [`Physics`]: every constant of the simulator, with unit, default and section of physics.md.
 
-/// Most substeps in a control step, so that a control step ends soon: a body of 64 × 64 voxels
+/// Most substeps in a control step. With this many, a control step of a body of 64 × 64 voxels
 /// takes about a quarter of a second.
 pub const MOST_SUBSTEPS: u32 = 1000;
 
@@ -10,12 +10,11 @@ pub const MOST_CYCLE_STEPS: u32 = 100_000;
 /// Highest row of the ground \[grid rows\].
 pub const MOST_ROWS: u32 = 1_000_000;
 
-/// Most voxel lengths that `Physics::blow_up_extent` may be: contacts are looked for in every cell
-/// under a voxel.
+/// Greatest `Physics::blow_up_extent` \[voxel lengths\]: contacts search all cells under a voxel.
 pub const MOST_CELLS: u32 = 1000;
 
-/// The constants of the physics. Defaults are EvoGym's (simulator v2.2.5), as physics.md states
-/// them; the title of its section stands behind each.
+/// The constants of the physics, each with the title of its section of physics.md. Defaults are
+/// those of EvoGym's simulator v2.2.5.
 ///
 /// Units: a *world unit* (wu) is ten voxel lengths; masses are in units of a point's mass; a
 /// *second* is 10⁴ default substeps.
@@ -28,13 +27,11 @@ pub struct Physics {
     pub cell_size: f64,
     /// Mass of every point \[mass\]. (Units)
     pub mass: f64,
-    /// Duration of a substep \[s\]; much above 1e-4 the stiffest springs leave RK4's region of
-    /// stability. (Units)
+    /// Duration of a substep \[s\]. Much above 1e-4 the stiffest springs make RK4 unstable. (Units)
     pub time_step: f64,
     /// Substeps in a control step. (Units)
     pub substeps: u32,
-    /// Control steps in an actuation cycle; the muscles' sine has this less one as its period.
-    /// (Units; Actuation)
+    /// Control steps in an actuation cycle; the sine's period is one less. (Units; Actuation)
     pub cycle_steps: u32,
 
     /// Stiffness of a rigid voxel's sides \[mass/s²\]. (Points and springs)
@@ -43,21 +40,20 @@ pub struct Physics {
     pub soft_stiffness: f64,
     /// Stiffness of a muscle's or sensor's sides \[mass/s²\]. (Points and springs)
     pub active_stiffness: f64,
-    /// A rigid voxel's diagonals are this times as stiff as its sides. (Points and springs)
+    /// Stiffness of a rigid voxel's diagonals, relative to its sides. (Points and springs)
     pub rigid_diagonal_ratio: f64,
-    /// The same for soft voxels. (Points and springs)
+    /// Stiffness of a soft voxel's diagonals, relative to its sides. (Points and springs)
     pub soft_diagonal_ratio: f64,
-    /// The same for muscles and sensors. (Points and springs)
+    /// Stiffness of a muscle's or sensor's diagonals, relative to its sides. (Points and springs)
     pub active_diagonal_ratio: f64,
 
-    /// Least target width of an active voxel \[rest widths\]; targets are clipped to it.
-    /// (Actuation)
+    /// Least target width of an active voxel \[rest widths\]; clips smaller ones. (Actuation)
     pub target_min: f64,
-    /// Greatest target width \[rest widths\]. (Actuation)
+    /// Greatest target width of an active voxel \[rest widths\]; clips larger ones. (Actuation)
     pub target_max: f64,
-    /// A muscle's target at the trough of its sine \[rest widths\]. (Actuation)
+    /// Muscle's target at the trough of its sine \[rest widths\]. (Actuation)
     pub muscle_low: f64,
-    /// A muscle's target at the crest less that at the trough \[rest widths\]. (Actuation)
+    /// Muscle's target at the sine's crest minus that at its trough \[rest widths\]. (Actuation)
     pub muscle_swing: f64,
     /// Phase of the antiphase muscles \[rad\]. (Actuation)
     pub antiphase: f64,
@@ -67,8 +63,8 @@ pub struct Physics {
     pub sensor_expand_dark: f64,
     /// Change of a sensor's target from a dark to a bright pixel \[rest widths\]. (Actuation)
     pub sensor_swing: f64,
-    /// Share of the way from its present length to its goal that a spring's rest length goes in a
-    /// substep. (One substep, 2)
+    /// Fraction of the distance from its current length to its goal that a spring's rest length
+    /// moves in a substep. (One substep, 2)
     pub servo_gain: f64,
 
     /// Drag on a point \[mass/s\]. (One substep, 3)
@@ -76,23 +72,22 @@ pub struct Physics {
     /// Downward acceleration \[wu/s²\]. (One substep, 3)
     pub gravity: f64,
 
-    /// Springs longer than this are shortened \[rest lengths\]. (One substep, 4a)
+    /// Greatest length of a spring \[rest lengths\]; longer ones are shortened. (One substep, 4a)
     pub limit_high: f64,
-    /// Springs shorter than this are lengthened \[rest lengths\]. (One substep, 4a)
+    /// Least length of a spring \[rest lengths\]; shorter ones are lengthened. (One substep, 4a)
     pub limit_low: f64,
-    /// Share of the excess that the pass removes. (One substep, 4a)
+    /// Fraction of the excess that the pass removes. (One substep, 4a)
     pub limit_share: f64,
-    /// The same three for the sides of rigid voxels: greatest length \[rest lengths\]. (One
-    /// substep, 4b)
+    /// Greatest length of a rigid voxel's sides \[rest lengths\]. (One substep, 4b)
     pub rigid_limit_high: f64,
     /// Least length of a rigid voxel's sides \[rest lengths\]. (One substep, 4b)
     pub rigid_limit_low: f64,
-    /// Share of the excess that one visit removes. (One substep, 4b)
+    /// Fraction of the excess that one visit removes. (One substep, 4b)
     pub rigid_limit_share: f64,
 
     /// Contact force per depth \[mass/s²\]. (Contacts)
     pub contact_stiffness: f64,
-    /// Depth added to every contact's \[wu\]. (Contacts)
+    /// Depth added to that of every contact \[wu\]. (Contacts)
     pub contact_offset: f64,
     /// Damping of a contact along its normal \[mass/s\]; the edge's two ends share it. (Contacts)
     pub contact_damping: f64,
@@ -100,15 +95,14 @@ pub struct Physics {
     pub friction: f64,
     /// Slip at which friction saturates, per normal force \[s/mass\]. (Contacts, G)
     pub friction_slip: f64,
-    /// Segments whose cross product is smaller are parallel \[wu²\]. (Contacts, crossing)
+    /// Cross product below which two segments count as parallel \[wu²\]. (Contacts, crossing)
     pub crossing_epsilon: f64,
-    /// How often a contact of the robot with itself counts: EvoGym visits ordered pairs. (Contacts)
+    /// Weight of a contact of the robot with itself; 2 as EvoGym visits ordered pairs. (Contacts)
     pub self_contact_weight: f64,
 
     /// Top of the ground \[grid rows\]; the ground is one cell thick. (World)
     pub ground_row: u32,
-    /// Columns from one peg below the ground to the next; a peg covers the underside of a cell.
-    /// (World)
+    /// Columns between pegs below the ground; a peg covers the underside of a cell. (World)
     pub peg_spacing: u32,
     /// Stiffness of the floor plane at y = 0 \[mass/s²\]. (World)
     pub floor_stiffness: f64,
@@ -117,11 +111,11 @@ pub struct Physics {
     /// Slope of the floor's friction over velocity, per normal force \[s³/(mass·wu²)\]. (World)
     pub floor_slip: f64,
 
-    /// A simulation is unstable when more ordered pairs of distant surface voxels overlap than this
-    /// times the number of surface voxels. (Instability)
+    /// Threshold of instability: a simulation is unstable if more ordered pairs of distant surface
+    /// voxels overlap than this times the number of surface voxels. (Instability)
     pub unstable_ratio: f64,
-    /// A voxel wider or higher than this has blown up, and the simulation is unstable \[wu\]. Ours:
-    /// EvoGym goes on with such numbers; no body that still hangs together comes near.
+    /// Greatest width or height of a voxel \[wu\]; beyond it the simulation is unstable. Ours:
+    /// EvoGym continues, but no body that still hangs together comes near. (Instability)
     pub blow_up_extent: f64,
 }
 
@@ -174,23 +168,23 @@ impl Default for Physics {
     }
 }
 
-/// A constant with which there is no physics.
+/// A constant for which the physics is not defined.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{name} = {value}: expected {expected}")]
 pub struct PhysicsError {
-    /// Its name.
+    /// Name of the constant.
     pub name: &'static str,
-    /// Its value.
+    /// Value found.
     pub value: f64,
-    /// What would do.
+    /// Values that are possible.
     pub expected: &'static str,
 }
 
 impl Physics {
-    /// Checks that the constants make sense together.
+    /// Checks that each constant is in range and that they fit together.
     ///
     /// # Errors
-    /// The first constant that does not.
+    /// Returns the first constant that is out of range.
     pub fn validate(&self) -> Result<(), PhysicsError> {
         let positive = [
             ("cell_size", self.cell_size),
@@ -296,7 +290,7 @@ mod tests {
         assert_eq!(refused(|p| p.gravity = f64::NAN), "gravity");
         assert_eq!(refused(|p| p.cycle_steps = 1), "cycle_steps");
         assert_eq!(refused(|p| p.target_max = 0.5), "target_max");
-        // What would make a substep, or a control step, last without end.
+        // These would make a substep, or a control step, endless.
         assert_eq!(refused(|p| p.blow_up_extent = 1e10), "blow_up_extent");
         assert_eq!(refused(|p| p.cell_size = 1e-6), "blow_up_extent");
         assert_eq!(refused(|p| p.substeps = 4_000_000_000), "substeps");

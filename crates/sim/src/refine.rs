@@ -1,28 +1,27 @@
-//! The same material at a finer time step: [`Physics::refined`].
+//! [`Physics::refined`]: the same material at a finer time step.
 //!
-//! What a material does is not what its constants say but what they do together with the time step
-//! h. In a substep a spring of stiffness k and gain g, of length d₀ at its start, pulls with k·(d −
-//! d₀) + k·g·(d₀ − goal):
+//! The behaviour of a material follows from its constants together with the time step h. In a
+//! substep a spring of stiffness k and gain g, of length d₀ at its start, pulls with k·(d − d₀) +
+//! k·g·(d₀ − goal):
 //! - the second term is, substep after substep, a spring of stiffness **k·g** towards the goal;
 //! - the first forgets its length at every substep. Ends that part with speed v are d − d₀ = v·t
 //!   apart after t, a mean pull of k·v·h/2 over the substep: a dashpot of **k·h/2**.
 //!
-//! So the modelled material is a Kelvin–Voigt solid, and h/n with k·n and g/n leaves both as they
-//! are. (With g/n alone stiffness and viscosity would both fall with n, and a robot would be
-//! another at every time step.) The length limits remove a share s of an excess per substep; 1 − (1
-//! − s)^(1/n) removes as much in n of them. Drag, gravity, contacts and the floor are forces
-//! already, per time, and stay. Displacements converge as n grows (`docs/analysing.md`).
+//! So the modelled material is a Kelvin–Voigt solid, and h/n with k·n and g/n keeps both. (With g/n
+//! alone, stiffness and viscosity would fall with n, and the robot would change with the time
+//! step.) The length limits remove a fraction s of an excess per substep; 1 − (1 − s)^(1/n) removes
+//! as much in n substeps. Drag, gravity, contacts and the floor are already forces per time and
+//! stay. Displacements converge as n grows (`docs/analysing.md`).
 
 use crate::physics::Physics;
 
-/// The share to be removed in each of `by` passes that together remove `share`.
+/// Returns the fraction to remove in each of `by` passes so that together they remove `share`.
 fn spread_out(share: f64, by: f64) -> f64 {
     if share < 1.0 { 1.0 - libm::pow(1.0 - share, 1.0 / by) } else { share }
 }
 
 impl Physics {
-    /// The same material and world with `by` substeps for each one: the time step is so much
-    /// shorter.
+    /// Divides every substep into `by` shorter ones and keeps the material and the world.
     #[must_use]
     pub fn refined(&self, by: u32) -> Self {
         let n = f64::from(by.max(1));
@@ -34,7 +33,7 @@ impl Physics {
         }
     }
 
-    /// All springs `by` times as stiff.
+    /// Makes all springs `by` times as stiff.
     #[must_use]
     pub fn with_stiffness(&self, by: f64) -> Self {
         Physics {
@@ -45,7 +44,7 @@ impl Physics {
         }
     }
 
-    /// Length limits that take `by` times as long to remove an excess.
+    /// Makes the length limits take `by` times as long to remove an excess.
     #[must_use]
     pub fn with_slower_limits(&self, by: f64) -> Self {
         Physics {
@@ -55,8 +54,8 @@ impl Physics {
         }
     }
 
-    /// Length limits of soft and active voxels beyond every goal of their springs, so that none is
-    /// held at a limit against its goal, and given energy there.
+    /// Moves the length limits of soft and active voxels beyond every goal, so that no spring is
+    /// held at a limit against its goal and gains energy there.
     #[must_use]
     pub fn without_limits(&self) -> Self {
         Physics {
@@ -99,7 +98,7 @@ mod tests {
         let coarse = Physics::default();
         let walks = [1, 2, 4, 8].map(|n| walk(&coarse.refined(n)));
         assert!(walks.iter().all(|d| (d / walks[3] - 1.0).abs() < 0.05), "{walks:?}");
-        // The gain alone is not enough: the material then softens with the time step.
+        // Dividing only the gain is not enough: the material then softens with the time step.
         let softened = Physics {
             rigid_stiffness: coarse.rigid_stiffness,
             soft_stiffness: coarse.soft_stiffness,

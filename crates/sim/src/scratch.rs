@@ -1,4 +1,4 @@
-//! [`Scratch`]: the memory of a substep, which is never kept.
+//! [`Scratch`]: the memory of a substep, which is never saved.
 
 use crate::simd::{BLOCK, Buffer};
 use crate::state::{Pair, State, pair};
@@ -8,12 +8,12 @@ use crate::step::off_lattice::{GROUP, OffLattice};
 use crate::step::springs::{Pulls, Springs, Wide};
 use crate::system::System;
 
-/// What the stages of a substep leave to each other about a block of slots.
+/// Data that the stages of a substep pass on about a block of slots.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
 pub(crate) struct Work {
     pub pulls: Pulls,
-    /// Acceleration by all but springs and the stages' differences in drag.
+    /// Acceleration without springs and without the stages' differences in drag.
     pub load: [Wide; 2],
     /// Accelerations of the first three stages.
     pub first: [Wide; 2],
@@ -26,7 +26,7 @@ pub(crate) struct Work {
 pub(crate) struct Scratch {
     /// Goal lengths [wu]: horizontal springs by slot, then off-lattice springs.
     pub goals: Buffer,
-    /// By blocks.
+    /// Springs by blocks.
     pub springs: Vec<Springs>,
     pub work: Vec<Work>,
     /// See [`Gather`](crate::step::springs::Gather).
@@ -39,11 +39,11 @@ pub(crate) struct Scratch {
     pub position: Pair,
     pub velocity: Pair,
     pub off_lattice: Option<OffLattice>,
-    /// Whether the springs' lengths are forgotten.
+    /// True if the springs' lengths are forgotten.
     pub anew: bool,
-    /// What the latest length limits had to reckon with.
+    /// Greatest reach of the latest length limits.
     pub reach: Reach,
-    /// Which contacts are possible.
+    /// Lists of possible contacts.
     pub broad_phase: BroadPhase,
 }
 
@@ -54,7 +54,7 @@ impl Scratch {
         let padding = [physics.cell_size; GROUP];
         let zeros = [[0.0; BLOCK]; 2];
         let work = Work { pulls: Pulls::ZERO, load: zeros, first: zeros, second: zeros, third: zeros };
-        // Slots without a point stay where they are parked.
+        // Slots without a point stay parked.
         let parked = || state.position.clone();
         Scratch {
             goals: horizontal.chain(off_lattice).chain(padding).collect(),
@@ -72,8 +72,7 @@ impl Scratch {
         }
     }
 
-    /// At the start of a control step: what a substep leaves to the next but is not part of the
-    /// state.
+    /// Forgets, at the start of a control step, all that substeps pass on outside the state.
     pub fn begin(&mut self) {
         self.anew = true;
         self.springs.iter_mut().for_each(Springs::forget);

@@ -1,20 +1,20 @@
-//! Stopping what computes for long: a flag that may be set at any time, and [`Stopped`],
-//! which the work then ends with, so that what is unfinished is not taken for a result.
+//! Stopping long computations: a flag that may be set at any time, and [`Stopped`], which the work
+//! then returns, so that nobody takes an unfinished result for a finished one.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// For work that is never stopped.
+/// A flag for work that is never stopped.
 pub static NEVER: AtomicBool = AtomicBool::new(false);
 
-/// The work was stopped before its end: there is no result.
+/// Work that was stopped early: there is no result.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("stopped before the end")]
 pub struct Stopped;
 
-/// Looks whether to stop: cheap enough to do in every substep.
+/// Checks the flag: cheap enough for every substep.
 ///
 /// # Errors
-/// [`Stopped`] if the flag is set.
+/// Returns [`Stopped`] if the flag is set.
 #[inline(always)]
 pub fn check(stop: &AtomicBool) -> Result<(), Stopped> {
     if stop.load(Ordering::Relaxed) { Err(Stopped) } else { Ok(()) }

@@ -4,11 +4,10 @@ use crate::body::Body;
 use crate::lattice::Lattice;
 use crate::physics::Physics;
 
-/// A body under some physics: all that stays as it is during a simulation.
+/// A body under some physics: all that stays constant during a simulation.
 ///
-/// Worlds share it by `Arc`. Points, springs and surface are worked out from the body and the
-/// constants here and nowhere else, so they cannot belong to other constants than those that the
-/// simulation uses.
+/// Worlds share it by `Arc`. Points, springs and surface are derived from the body and the
+/// constants only here, so they always match the constants that the simulation uses.
 #[derive(Clone, Debug)]
 pub struct System {
     pub(crate) physics: Physics,
@@ -16,25 +15,25 @@ pub struct System {
 }
 
 impl System {
-    /// A body under some physics.
+    /// Builds the system of a body under some physics.
     ///
-    /// Constants are not checked here: call [`Physics::validate`] first. With those that it refuses,
-    /// a simulation mostly ends as unstable; it may also take very long.
+    /// Constants are not checked here: call [`Physics::validate`] first. With constants that it
+    /// refuses, a simulation mostly ends as unstable; it may also take very long.
     ///
     /// # Panics
-    /// With some constants that [`Physics::validate`] refuses the simulation panics: if `cycle_steps`
-    /// or `peg_spacing` is 0, if `target_min` is above `target_max`, if one of these two is NaN.
-    /// Others may.
+    /// The simulation panics with some constants that [`Physics::validate`] refuses: if
+    /// `cycle_steps` or `peg_spacing` is 0, if `target_min` is above `target_max`, or if one of
+    /// these two is NaN. It may with others.
     pub fn new(body: &Body, physics: Physics) -> Self {
         System { lattice: Lattice::new(body, &physics), physics }
     }
 
-    /// The constants.
+    /// Returns the constants.
     pub fn physics(&self) -> &Physics {
         &self.physics
     }
 
-    /// Number of points.
+    /// Returns the number of points.
     pub fn point_count(&self) -> usize {
         self.lattice.points.len()
     }

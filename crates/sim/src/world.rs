@@ -12,22 +12,22 @@ use crate::unstable::{StepError, Unstable, UnstableReason};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-/// Where a simulation begins: the grid cell of the lower left corner of the body's box (empty rows
-/// and columns count).
+/// The start of a simulation: the grid cell of the body's lower left corner (empty rows and columns
+/// count).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Start {
-    /// Column \[voxels\]. Nothing depends on it but the places of the pegs below the ground.
+    /// Column \[voxels\]. It matters only to the positions of the pegs below the ground.
     pub column: i64,
-    /// Row \[voxels\]; `Physics::ground_row` (2) stands on the ground.
+    /// Row \[voxels\]. A body at `Physics::ground_row` (2) stands on the ground.
     pub row: u32,
 }
 
-/// A state of a simulation that is not of this system.
+/// A state that belongs to another system.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("the state is that of another body")]
 pub struct StateMismatch;
 
-/// One simulation: system, state and the stimulus of the moment.
+/// One simulation: a system, its state and the current stimulus.
 #[derive(Clone, Debug)]
 pub struct World {
     pub(crate) system: Arc<System>,
@@ -42,7 +42,7 @@ pub struct World {
 }
 
 impl World {
-    /// A robot at rest, all pixels dark. Takes a [`System`] or an `Arc` of one.
+    /// Makes a robot at rest, all pixels dark. Takes a [`System`] or an `Arc` of one.
     pub fn new(system: impl Into<Arc<System>>, start: Start) -> Self {
         let system = system.into();
         let state = State::at_rest(&system, start.row);
@@ -59,38 +59,37 @@ impl World {
         }
     }
 
-    /// What is simulated.
+    /// Returns the system that is simulated.
     pub fn system(&self) -> &Arc<System> {
         &self.system
     }
 
-    /// Runs on a chosen instruction set instead of the widest; results are the same bits.
+    /// Selects an instruction set instead of the widest; results are the same bits.
     #[must_use]
     pub fn with_instructions(mut self, set: InstructionSet) -> Self {
         self.instructions = set;
         self
     }
 
-    /// Measures energies; results are the same bits, but slower.
+    /// Measures energies: slower, but the same bits.
     #[must_use]
     pub fn with_energy_meter(mut self) -> Self {
         self.meter = Some(Meter::new(&self.system));
         self
     }
 
-    /// Energies put in so far, resets included; 0 without a meter.
+    /// Returns the energies put in so far, over all resets; 0 without a meter.
     pub fn energy(&self) -> Energy {
         self.meter.as_ref().map_or_else(Energy::default, |meter| meter.energy)
     }
 
-    /// Begins anew; the stimulus stays.
+    /// Returns to the start; the stimulus stays.
     pub fn reset(&mut self) {
         self.state = State::at_rest(&self.system, self.start.row);
         self.meter.iter_mut().for_each(Meter::rest);
     }
 
-    /// Shows an image: H × W in [0, 1], pixel (row, column) to voxel (row, column); outside it is
-    /// dark.
+    /// Sets the image: H × W in [0, 1], pixel (row, column) for voxel (row, column); dark outside.
     pub fn set_stimulus(&mut self, stimulus: &Grid<f64>) {
         for (voxel, pixel) in self.system.lattice.active.iter().zip(&mut self.pixels) {
             let (row, column) = voxel.place;
@@ -98,18 +97,18 @@ impl World {
         }
     }
 
-    /// One control step.
+    /// Simulates one control step.
     ///
     /// # Errors
-    /// [`Unstable`] if the simulation ends in it; the state is then of no use.
+    /// Returns [`Unstable`] if the simulation ends in this step; the state is then useless.
     pub fn step(&mut self) -> Result<(), Unstable> {
         StepError::outcome(self.step_unless(&NEVER)).expect("NEVER is never set")
     }
 
-    /// One control step, which ends within a substep or two when `stop` is set.
+    /// Simulates one control step; returns within a substep or two once `stop` is set.
     ///
     /// # Errors
-    /// [`StepError`] if it was stopped, or the simulation became unstable.
+    /// Returns a [`StepError`] if it was stopped, or if the simulation became unstable.
     pub fn step_unless(&mut self, stop: &AtomicBool) -> Result<(), StepError> {
         self.begin_step();
         let World { system, start, state, scratch, meter, .. } = self;
@@ -123,7 +122,7 @@ impl World {
         }
     }
 
-    /// What comes before the substeps of a control step.
+    /// Prepares the substeps of a control step.
     pub(crate) fn begin_step(&mut self) {
         let World { system, state, scratch, pixels, targets, meter, .. } = self;
         scratch.begin();
@@ -131,8 +130,7 @@ impl World {
         meter.iter_mut().for_each(|meter| meter.drive(&scratch.goals, &state.position));
     }
 
-    /// What comes after them. What a substep leaves behind is looked at by the next; at the end of
-    /// a control step, by no other.
+    /// Completes a control step. Every substep checks the one before, so the last is checked here.
     pub(crate) fn end_step(&mut self) -> Result<(), Unstable> {
         let control_step = self.state.control_step;
         if !self.centre_of_mass().iter().all(|coordinate| coordinate.is_finite()) {
@@ -142,13 +140,13 @@ impl World {
         Ok(())
     }
 
-    /// Control steps done.
+    /// Returns the number of control steps completed.
     pub fn control_step(&self) -> u64 {
         self.state.control_step
     }
 
-    /// Centre of mass [x, y] in world units: x from the left edge of the starting box, y from the
-    /// floor plane. The unweighted mean of the points.
+    /// Returns the centre of mass [x, y], the unweighted mean of the points, in world units: x from
+    /// the left edge of the starting box, y from the floor plane.
     pub fn centre_of_mass(&self) -> [f64; 2] {
         let points = &self.system.lattice.points;
         let count = points.len().max(1) as f64;
@@ -156,15 +154,14 @@ impl World {
         [mean(&self.state.position[X]), mean(&self.state.position[Y])]
     }
 
-    /// All points [x, y] in world units (as [`World::centre_of_mass`]), in EvoGym's order of
-    /// creation.
+    /// Returns all points [x, y] (as [`World::centre_of_mass`]), in EvoGym's order of creation.
     pub fn points(&self) -> impl Iterator<Item = [f64; 2]> + '_ {
         let [x, y] = &self.state.position;
         self.system.lattice.points.iter().map(|&(point, _)| [x[point], y[point]])
     }
 
-    /// Every non-empty voxel's (row, column) and its corners (top left, top right, bottom right,
-    /// bottom left) as indices into [`World::points`].
+    /// Returns every non-empty voxel's (row, column) and its corners (top left, top right, bottom
+    /// right, bottom left) as indices into [`World::points`].
     pub fn voxels(&self) -> impl Iterator<Item = ((usize, usize), [usize; 4])> + '_ {
         let lattice = &self.system.lattice;
         let mut order = vec![0; lattice.len];
@@ -172,15 +169,15 @@ impl World {
         lattice.voxels.iter().map(move |&(place, corners)| (place, corners.map(|c| order[c])))
     }
 
-    /// What the simulation must remember, to go on from it later.
+    /// Returns the state, from which the simulation can continue later.
     pub fn state(&self) -> &State {
         &self.state
     }
 
-    /// Goes on from a state of the same system; the stimulus stays.
+    /// Continues from a state of the same system; the stimulus stays.
     ///
     /// # Errors
-    /// [`StateMismatch`] if it cannot be of this system; the world then stays as it is.
+    /// Returns [`StateMismatch`], and changes nothing, if the state cannot be of this system.
     pub fn restore(&mut self, state: &State) -> Result<(), StateMismatch> {
         if !state.fits(&self.state) {
             return Err(StateMismatch);
@@ -209,7 +206,7 @@ mod tests {
         let state = ours.state().clone();
         #[cfg(feature = "serde")]
         let state: State = serde_json::from_str(&serde_json::to_string(&state).unwrap()).unwrap();
-        // Wherever the other has been meanwhile.
+        // Wherever the other has been in the meantime.
         (0..7).for_each(|_| other.step().unwrap());
         other.restore(&state).unwrap();
         (0..30).for_each(|_| ours.step().unwrap());

@@ -11,10 +11,9 @@ use crate::world::{Start, World};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-/// Simulations of one system from the same start, each under a stimulus of its own, that step side
-/// by side. The bits are those of each by itself. Bodies with many rigid voxels are faster so: the
-/// rigid pass (physics.md, "One substep", 4b) is serial within a simulation, and is done for all of
-/// them at once.
+/// Simulations of one system from the same start that step side by side, each with its own stimulus
+/// and the bits it has alone. Bodies with many rigid voxels are faster so: the rigid pass
+/// (physics.md, "One substep", 4b) is serial within a simulation, but runs for all of them at once.
 #[derive(Clone, Debug)]
 pub struct Worlds {
     worlds: Vec<World>,
@@ -23,17 +22,17 @@ pub struct Worlds {
 }
 
 impl Worlds {
-    /// The most that step side by side.
+    /// Most simulations side by side.
     pub const MOST: usize = BLOCK;
 
-    /// Whether simulations of this system are faster side by side: from about one rigid voxel in two
-    /// on. With fewer, eight states at once crowd each other out of the processor's cache.
+    /// Returns true if simulations of this system are faster side by side, from about one rigid
+    /// voxel in two. With fewer, eight states at once overflow the processor's cache.
     pub fn gain(system: &System) -> bool {
         let links = system.lattice.rigid_links.len();
         links >= SharedRigidPass::LEAST && links >= 2 * system.lattice.voxels.len()
     }
 
-    /// This many robots at rest, at least one and at most [`Worlds::MOST`], all pixels dark.
+    /// Makes this many robots at rest, at least one and at most [`Worlds::MOST`], all pixels dark.
     pub fn new(system: impl Into<Arc<System>>, start: Start, count: usize) -> Self {
         let first = World::new(system, start);
         let count = count.clamp(1, Worlds::MOST);
@@ -41,38 +40,38 @@ impl Worlds {
         Worlds { worlds: vec![first; count], ended: vec![None; count], rigid }
     }
 
-    /// The same on a chosen instruction set instead of the widest.
+    /// Selects an instruction set instead of the widest.
     #[must_use]
     pub fn with_instructions(mut self, set: crate::InstructionSet) -> Self {
         self.worlds.iter_mut().for_each(|world| world.instructions = set);
         self
     }
 
-    /// The simulations.
+    /// Returns the simulations.
     pub fn all(&self) -> &[World] {
         &self.worlds
     }
 
-    /// Shows an image to one of them (see [`World::set_stimulus`]).
+    /// Sets the image of one of them (see [`World::set_stimulus`]).
     pub fn set_stimulus(&mut self, number: usize, stimulus: &Grid<f64>) {
         self.worlds[number].set_stimulus(stimulus);
     }
 
-    /// How each became unstable, if it did; its state is then of no use, and it steps no more.
+    /// Returns how each became unstable, if it did: it steps no more, and its state is useless.
     pub fn ended(&self) -> &[Option<Unstable>] {
         &self.ended
     }
 
-    /// One control step of all that have not ended.
+    /// Simulates one control step of all that have not ended.
     pub fn step(&mut self) {
         self.step_unless(&NEVER).expect("NEVER is never set");
     }
 
-    /// One control step of all that have not ended, which ends within a substep or two when `stop`
-    /// is set.
+    /// Simulates one control step of all that have not ended; returns within a substep or two once
+    /// `stop` is set.
     ///
     /// # Errors
-    /// [`Stopped`] then; the states are of no use.
+    /// Returns [`Stopped`] if it was stopped; the states are then useless.
     pub fn step_unless(&mut self, stop: &AtomicBool) -> Result<(), Stopped> {
         let Worlds { worlds, ended, rigid } = self;
         let (system, instructions) = (Arc::clone(&worlds[0].system), worlds[0].instructions);
@@ -91,7 +90,7 @@ impl Worlds {
     }
 }
 
-/// The substeps of a control step of several simulations.
+/// The substeps of a control step, for several simulations.
 struct SideBySide<'a, 'w> {
     system: &'a System,
     worlds: &'a mut [(&'w mut World, &'w mut Option<Unstable>)],
@@ -136,7 +135,7 @@ mod tests {
     use super::*;
     use crate::{InstructionSet, Physics};
 
-    /// Mostly rigid, with a muscle on either side and two sensors.
+    /// A mostly rigid body with a muscle on either side and two sensors.
     const RIGID: &str = "1111111/1311141/1161511/3111114/1111111";
     const SOFT: &str = "22322/26251/42231";
 
@@ -176,7 +175,7 @@ mod tests {
 
     #[test]
     fn one_that_becomes_unstable_ends_as_by_itself_and_the_others_go_on() {
-        // What is as wide as its goal is blown up at once: those that see a bright pixel.
+        // A voxel as wide as its goal blows up at once: those under a bright pixel.
         let physics = Physics { blow_up_extent: 0.115, ..Physics::default() };
         let system = Arc::new(System::new(&"626/111".parse().unwrap(), physics));
         let start = Start { column: 0, row: 2 };

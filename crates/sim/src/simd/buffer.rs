@@ -1,14 +1,14 @@
-//! [`Buffer`]: numbers in memory where wide loads are cheap.
+//! [`Buffer`]: numbers aligned for wide loads.
 
 use super::BLOCK;
 use std::ops::{Deref, DerefMut};
 
-/// A block of numbers that starts on a cache line, so that no aligned load straddles two.
+/// A block of numbers that starts on a cache line, so that no aligned load straddles two lines.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C, align(64))]
 struct Block([f64; BLOCK]);
 
-/// A fixed number of `f64`, aligned to cache lines; otherwise a slice.
+/// A slice of fixed length, aligned to cache lines.
 #[derive(Clone, Debug, Default)]
 pub struct Buffer {
     blocks: Vec<Block>,
@@ -16,12 +16,12 @@ pub struct Buffer {
 }
 
 impl Buffer {
-    /// `len` times the same value.
+    /// Makes a buffer of `len` equal values.
     pub fn filled(len: usize, value: f64) -> Self {
         Buffer { blocks: vec![Block([value; BLOCK]); len.div_ceil(BLOCK)], len }
     }
 
-    /// `len` zeros.
+    /// Makes a buffer of `len` zeros.
     pub fn zeros(len: usize) -> Self {
         Buffer::filled(len, 0.0)
     }
@@ -33,8 +33,7 @@ impl Deref for Buffer {
     #[allow(unsafe_code)]
     fn deref(&self) -> &[f64] {
         // SAFETY: a block is BLOCK numbers without padding (repr(C); its size is its alignment),
-        // the blocks lie side by side, and `len` is at most their number times BLOCK from the start
-        // on.
+        // and the blocks are contiguous. `len` is at most BLOCK times their number.
         unsafe { std::slice::from_raw_parts(self.blocks.as_ptr().cast(), self.len) }
     }
 }

@@ -1,22 +1,22 @@
-//! [`FloatEnvironment`]: how the processor rounds.
+//! [`FloatEnvironment`]: the rounding mode of the processor.
 #![allow(unsafe_code)]
 
 use std::marker::PhantomData;
 
-/// Makes this thread round to nearest and keep subnormal numbers, as Rust and the same bits
-/// everywhere take for granted. A program that loads this one as a library may have chosen otherwise
-/// (`fesetround`, or libraries built with `-ffast-math`); it has its choice again when the value is
-/// dropped. Threads begin with the environment of the thread that makes them.
+/// Makes this thread round to nearest and keep subnormal numbers, which Rust and our promise of the
+/// same bits both assume. A host program may have chosen otherwise (`fesetround`, or libraries
+/// built with `-ffast-math`); dropping the value restores its choice. New threads inherit the
+/// environment of their parent.
 #[derive(Debug)]
 #[must_use = "the environment is the host's again as soon as this is dropped"]
 pub struct FloatEnvironment {
     before: Register,
-    /// It belongs to the thread that made it.
+    /// Ties the value to its thread.
     of_thread: PhantomData<*const ()>,
 }
 
 impl FloatEnvironment {
-    /// Sets the standard environment.
+    /// Sets the standard environment until the value is dropped.
     #[inline(never)] // What follows is not computed before.
     pub fn standard() -> Self {
         let before = read();
@@ -41,9 +41,9 @@ mod register {
     use std::arch::asm;
 
     pub type Register = u32;
-    /// All exceptions masked, to nearest, subnormals kept.
+    /// All exceptions masked, round to nearest, subnormals kept.
     pub const STANDARD: Register = 0x1f80;
-    /// All bits but those that say which exceptions there were.
+    /// All bits but the exception flags.
     pub const CONTROL: Register = 0xffc0;
 
     pub fn read() -> Register {
@@ -54,9 +54,8 @@ mod register {
     }
 
     pub fn write(value: Register) {
-        // SAFETY: loads MXCSR from `value`: what Rust takes for granted, or, at the end, what the
-        // host had set when it called. No reserved bit is set, as both come from the processor or
-        // its manual.
+        // SAFETY: loads MXCSR from `value`: Rust's default or, at the end, the host's setting. No
+        // reserved bit is set, as both come from the processor or its manual.
         unsafe { asm!("ldmxcsr [{}]", in(reg) &raw const value, options(nostack)) };
     }
 }
@@ -66,9 +65,9 @@ mod register {
     use std::arch::asm;
 
     pub type Register = u64;
-    /// No exception traps, to nearest, subnormals kept.
+    /// No exception traps, round to nearest, subnormals kept.
     pub const STANDARD: Register = 0;
-    /// All of it: which exceptions there were stands elsewhere.
+    /// All bits: the exception flags are in another register.
     pub const CONTROL: Register = u64::MAX;
 
     pub fn read() -> Register {
@@ -79,13 +78,12 @@ mod register {
     }
 
     pub fn write(value: Register) {
-        // SAFETY: writes FPCR: what Rust takes for granted, or, at the end, what the host had set
-        // when it called.
+        // SAFETY: writes FPCR: Rust's default or, at the end, the host's setting.
         unsafe { asm!("msr fpcr, {}", in(reg) value, options(nostack)) };
     }
 }
 
-/// Of other processors nothing is known.
+/// Does nothing on other processors.
 #[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64")))]
 mod register {
     pub type Register = u32;
@@ -106,7 +104,7 @@ mod tests {
     use super::*;
     use std::hint::black_box;
 
-    /// What depends on the environment: how 1 ± a little is rounded, and what is subnormal.
+    /// Computes results that depend on the environment: 1 ± a little, and subnormal numbers.
     #[inline(never)]
     fn computed() -> [f64; 4] {
         let (one, tiny, subnormal) = (black_box(1.0), black_box(1e-30), black_box(5e-324));
@@ -116,7 +114,7 @@ mod tests {
     #[test]
     fn whatever_the_host_has_chosen_numbers_are_the_same_and_it_has_its_choice_again() {
         let usual = computed();
-        // Down, up, towards zero; subnormals flushed, and taken for zero; all of them.
+        // Down, up, towards zero; subnormals flushed, or read as zero; all of them.
         for choice in [0x2000, 0x4000, 0x6000, 0x8000, 0x0040, 0xe040] {
             let host = STANDARD | choice;
             write(host);

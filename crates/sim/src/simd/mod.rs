@@ -1,12 +1,11 @@
-//! Wide lanes: numerical loops written once, compiled for every instruction set, chosen when the
-//! program runs.
+//! Wide lanes: numerical loops compiled for every instruction set, one chosen at run time.
 //!
-//! A loop is a [`Kernel`] that is generic over [`Lanes`], a few `f64` side by side. [`dispatch`]
-//! runs it with the widest lanes that the machine has. Every operation of [`Lanes`] is one of IEEE
-//! 754's, exactly rounded (products and sums are fused where the loop says so, and nowhere else),
-//! and lanes never mix but in [`Lanes::shift_in`]. So every instruction set gives the same bits
-//! (`tests/lanes_agree.rs`). On the few x86-64 machines that cannot fuse (before 2013, and some
-//! small ones since) it is worked out exactly, slowly.
+//! A loop is a [`Kernel`], generic over [`Lanes`], a few `f64` side by side. [`dispatch`] runs it
+//! with the widest lanes that the machine has. Every operation of [`Lanes`] is an exactly rounded
+//! IEEE 754 operation; products and sums are fused only where the loop says so. Lanes never mix
+//! except in [`Lanes::shift_in`]. So every instruction set gives the same bits
+//! (`tests/lanes_agree.rs`). The few x86-64 machines without fused operations (before 2013, and
+//! some small ones since) compute them exactly in software, slowly.
 
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Sub};
 use std::sync::OnceLock;
@@ -20,14 +19,13 @@ mod x86;
 pub use buffer::Buffer;
 pub use environment::FloatEnvironment;
 
-/// The number of lanes that the width of all lane types divides: loops over a multiple of it need
-/// no remainder.
+/// A multiple of the width of all lane types: loops over a multiple of it need no remainder.
 pub const BLOCK: usize = 8;
 
-/// An instruction set that the numerical loops exist for.
+/// An instruction set that the numerical loops are compiled for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum InstructionSet {
-    /// What every machine of the target has (SSE2 on x86-64, NEON on AArch64).
+    /// The target's baseline (SSE2 on x86-64, NEON on AArch64).
     Baseline,
     /// x86-64 with 256-bit vectors (AVX2 and FMA).
     Avx2,
@@ -40,7 +38,7 @@ impl InstructionSet {
     pub const ALL: [InstructionSet; 3] =
         [InstructionSet::Baseline, InstructionSet::Avx2, InstructionSet::Avx512];
 
-    /// Its name, as the environment variable `MORPHCOG_ISA` takes it.
+    /// Returns its name, as the environment variable `MORPHCOG_ISA` takes it.
     pub fn name(self) -> &'static str {
         match self {
             InstructionSet::Baseline => "baseline",
@@ -49,7 +47,7 @@ impl InstructionSet {
         }
     }
 
-    /// Whether this machine has it.
+    /// Returns true if this machine has it.
     pub fn is_available(self) -> bool {
         match self {
             InstructionSet::Baseline => true,
@@ -66,10 +64,10 @@ impl InstructionSet {
         }
     }
 
-    /// The one that the environment variable `MORPHCOG_ISA` asks for; none if it is not set.
+    /// Returns the one that the environment variable `MORPHCOG_ISA` names, if it is set.
     ///
     /// # Errors
-    /// What was asked for, if this machine has no such instruction set, and what it has.
+    /// Returns the name and those available if this machine has no such instruction set.
     pub fn asked() -> Result<Option<Self>, String> {
         let Some(asked) = std::env::var_os("MORPHCOG_ISA").filter(|asked| !asked.is_empty()) else {
             return Ok(None);
@@ -81,7 +79,7 @@ impl InstructionSet {
         found.map(Some).ok_or_else(text)
     }
 
-    /// The one in use: the widest this machine has, or the one [asked](InstructionSet::asked) for.
+    /// Returns the one in use: the [requested](InstructionSet::asked) one, or else the widest.
     pub fn in_use() -> Self {
         static IN_USE: OnceLock<InstructionSet> = OnceLock::new();
         *IN_USE.get_or_init(|| {
@@ -97,50 +95,48 @@ pub trait Lanes:
 {
     /// One truth value per lane.
     type Mask: Copy + BitAnd<Output = Self::Mask> + BitOr<Output = Self::Mask>;
-    /// How many.
+    /// Number of lanes.
     const WIDTH: usize;
 
-    /// The same value in every lane.
+    /// Returns the same value in every lane.
     fn splat(value: f64) -> Self;
-    /// `from[at..at + WIDTH]`; panics beyond the end.
+    /// Loads `from[at..at + WIDTH]`; panics beyond the end.
     fn load(from: &[f64], at: usize) -> Self;
-    /// To `to[at..at + WIDTH]`; panics beyond the end.
+    /// Stores to `to[at..at + WIDTH]`; panics beyond the end.
     fn store(self, to: &mut [f64], at: usize);
-    /// self · factor + more, rounded once.
+    /// Returns self · factor + more, rounded once.
     fn mul_add(self, factor: Self, more: Self) -> Self;
-    /// more − self · factor, rounded once.
+    /// Returns more − self · factor, rounded once.
     fn mul_sub_from(self, factor: Self, more: Self) -> Self;
-    /// self · factor − less, rounded once.
+    /// Returns self · factor − less, rounded once.
     fn mul_sub(self, factor: Self, less: Self) -> Self;
-    /// The bits that both have: with a number of all bits but the sign's, the absolute value; with
-    /// 0, 0.
+    /// Returns the common bits: the absolute value if `other` lacks only the sign bit, 0 if it is
+    /// 0.
     fn bits_and(self, other: Self) -> Self;
-    /// Square root.
+    /// Returns the square root.
     fn sqrt(self) -> Self;
-    /// Absolute value.
+    /// Returns the absolute value.
     fn abs(self) -> Self;
-    /// self > other ? self : other (so `other` where one is no number).
+    /// Returns self > other ? self : other (so `other` if one is NaN).
     fn max(self, other: Self) -> Self;
-    /// The greater absolute value; no number where either is none, so that what is no number is not
-    /// lost in a maximum over many. (Without their sign, the bits of numbers are in the order of
-    /// the numbers, with NaN last.)
+    /// Returns the greater absolute value, or NaN if either is NaN, so that a maximum over many
+    /// keeps it. (Without the sign, bits are in the order of the numbers, with NaN last.)
     fn max_abs(self, other: Self) -> Self;
-    /// Lanes in which self > other (false where one is no number).
+    /// Returns the lanes in which self > other (false where one is NaN).
     fn gt(self, other: Self) -> Self::Mask;
-    /// `yes` where the mask holds, elsewhere `no`.
+    /// Returns `yes` where the mask holds, `no` elsewhere.
     fn select(mask: Self::Mask, yes: Self, no: Self) -> Self;
-    /// Whether a mask holds in any lane.
+    /// Returns true if a mask holds in any lane.
     fn any(mask: Self::Mask) -> bool;
-    /// Whether a mask holds in all lanes.
+    /// Returns true if a mask holds in all lanes.
     fn all(mask: Self::Mask) -> bool;
-    /// The lanes moved up by one; the lowest is the last of `previous`: what `load` gives one place
-    /// earlier.
+    /// Moves the lanes up by one and fills the lowest with the last of `previous`: the result of
+    /// `load` one place earlier.
     fn shift_in(self, previous: Self) -> Self;
 }
 
-/// An array of an expression for some indices, `each!(i in [0, 1] => a[i] + b[i])`. Unlike
-/// `array::map` it leaves nothing for the compiler to inline: a closure that it does not inline
-/// would be compiled without wide instructions.
+/// Makes an array of an expression for some indices, `each!(i in [0, 1] => a[i] + b[i])`. Unlike
+/// `array::map` it needs no inlining: a closure that is not inlined would lose wide instructions.
 macro_rules! each {
     ($index:ident in [$($value:expr),*] => $expression:expr) => {
         [$({
@@ -151,16 +147,16 @@ macro_rules! each {
 }
 pub(crate) use each;
 
-/// A numerical loop to be compiled for every instruction set. `run` must be `#[inline(always)]`,
-/// and so must all that is to be vectorised below it.
+/// A numerical loop compiled for every instruction set. `run` must be `#[inline(always)]`, as must
+/// everything below it that is to be vectorised.
 pub trait Kernel {
-    /// What it computes.
+    /// The result of the loop.
     type Output;
-    /// Computes it.
+    /// Runs the loop.
     fn run<L: Lanes>(self) -> Self::Output;
 }
 
-/// Runs a kernel compiled for an instruction set (the baseline's version if this machine lacks it).
+/// Runs a kernel compiled for an instruction set (the baseline if this machine lacks it).
 #[allow(unsafe_code)] // Each block calls a function compiled for features that were just found present.
 pub fn dispatch<K: Kernel>(set: InstructionSet, kernel: K) -> K::Output {
     #[cfg(target_arch = "x86_64")]

@@ -1,11 +1,11 @@
-//! Lanes of any machine: an array that the compiler turns into what vectors there are.
+//! Lanes for any machine: an array that the compiler turns into the vectors available.
 
 use super::{Lanes, each};
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Sub};
 
-/// a · b + c, rounded once. The compiler has an instruction for it or not; where not, `libm` looks
-/// for one when the program runs, and else works it out. (`f64::mul_add` would call the C
-/// library's, which is not exact everywhere.)
+/// Returns a · b + c, rounded once. Without an instruction for it at compile time, `libm` looks for
+/// one at run time or computes it in software. (`f64::mul_add` would call the C library's, which is
+/// not exact everywhere.)
 #[inline(always)]
 #[allow(clippy::disallowed_methods, reason = "these are the lanes")]
 fn mul_add(a: f64, b: f64, c: f64) -> f64 {

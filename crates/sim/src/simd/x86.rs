@@ -1,6 +1,5 @@
 //! Lanes of x86-64. Values of these types are only made inside [`avx2`] and [`avx512`], which
-//! `dispatch` calls only where the processor has the instructions; that is what makes the calls
-//! below sound.
+//! `dispatch` calls only if the processor has the instructions; that makes the calls below sound.
 #![allow(unsafe_code)]
 
 use super::{Kernel, Lanes};
@@ -29,7 +28,7 @@ pub(super) struct Mask4(__m256d);
 #[derive(Clone, Copy)]
 pub(super) struct F64x8(__m512d);
 
-/// Mask of eight lanes: a bit each.
+/// Mask of eight lanes: one bit each.
 #[derive(Clone, Copy)]
 pub(super) struct Mask8(__mmask8);
 
@@ -78,14 +77,14 @@ impl Lanes for F64x4 {
     #[inline(always)]
     fn load(from: &[f64], at: usize) -> Self {
         let from = &from[at..at + 4];
-        // SAFETY: four values were just found to be there; loads need no alignment.
+        // SAFETY: the slice holds four values; loads need no alignment.
         unsafe { F64x4(_mm256_loadu_pd(from.as_ptr())) }
     }
 
     #[inline(always)]
     fn store(self, to: &mut [f64], at: usize) {
         let to = &mut to[at..at + 4];
-        // SAFETY: room for four values was just found to be there; stores need no alignment.
+        // SAFETY: the slice has room for four values; stores need no alignment.
         unsafe { _mm256_storeu_pd(to.as_mut_ptr(), self.0) }
     }
 
@@ -169,8 +168,7 @@ impl Lanes for F64x4 {
     fn shift_in(self, previous: Self) -> Self {
         // SAFETY: the processor has the instructions (see the module).
         unsafe {
-            // [previous 2, previous 3, self 0, self 1], then the odd ones of it before the even
-            // ones of self.
+            // [previous 2, previous 3, self 0, self 1]; then its odd with self's even lanes.
             let middle = _mm256_permute2f128_pd::<0x21>(previous.0, self.0);
             F64x4(_mm256_shuffle_pd::<0b0101>(middle, self.0))
         }
@@ -190,14 +188,14 @@ impl Lanes for F64x8 {
     #[inline(always)]
     fn load(from: &[f64], at: usize) -> Self {
         let from = &from[at..at + 8];
-        // SAFETY: eight values were just found to be there; loads need no alignment.
+        // SAFETY: the slice holds eight values; loads need no alignment.
         unsafe { F64x8(_mm512_loadu_pd(from.as_ptr())) }
     }
 
     #[inline(always)]
     fn store(self, to: &mut [f64], at: usize) {
         let to = &mut to[at..at + 8];
-        // SAFETY: room for eight values was just found to be there; stores need no alignment.
+        // SAFETY: the slice has room for eight values; stores need no alignment.
         unsafe { _mm512_storeu_pd(to.as_mut_ptr(), self.0) }
     }
 

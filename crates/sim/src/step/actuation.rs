@@ -1,11 +1,11 @@
-//! Material, time and stimulus → goal lengths (physics.md, "Actuation").
+//! From material, time and stimulus to goal lengths (physics.md, "Actuation").
 
 use crate::body::Material;
 use crate::physics::Physics;
 use crate::system::System;
 
-/// Target width of an active voxel at a control step \[rest widths\]; `pixel` in [0, 1] matters to
-/// sensors only.
+/// Returns the target width of an active voxel at a control step \[rest widths\]; `pixel` in [0, 1]
+/// matters to sensors only.
 pub(crate) fn target(material: Material, control_step: u64, pixel: f64, physics: &Physics) -> f64 {
     let phase = match material {
         Material::MuscleInPhase => 0.0,
@@ -13,17 +13,17 @@ pub(crate) fn target(material: Material, control_step: u64, pixel: f64, physics:
         _ => return width(material, pixel, physics),
     };
     let cycle = u64::from(physics.cycle_steps);
-    // The period is one step short of the cycle: the sine's first and last values are equal.
+    // The period is one step less than the cycle: the sine's first and last values are equal.
     let angle = std::f64::consts::TAU * (control_step % cycle) as f64 / (cycle - 1) as f64;
     let free = physics.muscle_low + physics.muscle_swing * (libm::sin(phase + angle) + 1.0) / 2.0;
     free.clamp(physics.target_min, physics.target_max)
 }
 
-/// Target width of any voxel under a pixel in [0, 1] \[rest widths\]: of a muscle halfway through
-/// its swing, of a passive one 1.
+/// Returns the target width of any voxel under a pixel in [0, 1] \[rest widths\]: for a muscle
+/// halfway through its swing, for a passive voxel 1.
 ///
 /// # Panics
-/// If `target_min` is above `target_max`, or one of them NaN, which [`Physics::validate`] refuses.
+/// If `target_min` exceeds `target_max` or one is NaN, which [`Physics::validate`] refuses.
 pub fn width(material: Material, pixel: f64, physics: &Physics) -> f64 {
     let free = match material {
         Material::MuscleInPhase | Material::MuscleAntiphase => {
@@ -36,8 +36,8 @@ pub fn width(material: Material, pixel: f64, physics: &Physics) -> f64 {
     free.clamp(physics.target_min, physics.target_max)
 }
 
-/// Writes the goals of all actuated sides for a control step. `pixels` holds each active voxel's
-/// pixel, `targets` is memory for one number each.
+/// Writes the goals of all actuated sides for a control step. `pixels` holds the pixel of each
+/// active voxel; `targets` is scratch memory of the same length.
 pub(crate) fn set_goals(
     System { lattice, physics }: &System,
     control_step: u64,
@@ -70,7 +70,7 @@ mod tests {
         let at = |material, step, pixel| target(material, step, pixel, &physics);
         assert_eq!(at(Material::MuscleInPhase, 0, 0.0), 1.1);
         assert_eq!(at(Material::MuscleInPhase, 50, 0.0), 1.1);
-        // 2π·49/49 is back at the start: the cycle shows that value twice.
+        // 2π·49/49 is back at the start: the cycle has that value twice.
         assert!((at(Material::MuscleInPhase, 49, 0.0) - 1.1).abs() < 1e-15);
         let both = at(Material::MuscleInPhase, 13, 0.0) + at(Material::MuscleAntiphase, 13, 0.0);
         assert!((both - 2.2).abs() < 1e-15);

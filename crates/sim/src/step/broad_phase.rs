@@ -1,11 +1,10 @@
-//! Which contacts are possible: lists that stay complete while no point has moved further than a
-//! budget.
+//! Possible contacts: lists that stay complete while no point has moved further than a budget.
 //!
-//! All pairs of surface voxels would be tested in every substep otherwise. A list holds every pair
-//! whose boxes come within twice the budget; until a point has moved by more than the budget, along
-//! x or y, since the lists were made, no other pair can have met. So the lists change nothing but
-//! the time it takes. Motion along x counts relative to one of the points: the ground is the same
-//! everywhere, and a walk wears no list out.
+//! Without them every substep would test all pairs of surface voxels. A list holds every pair whose
+//! boxes come within twice the budget. Until a point has moved by more than the budget, along x or
+//! y, since the lists were made, no other pair can have met. So the lists affect only speed. Motion
+//! along x counts relative to one of the points: the ground is the same everywhere, so walking
+//! alone does not invalidate a list.
 
 use crate::lattice::{FAMILIES, Lattice, SurfaceVoxel};
 use crate::simd::{BLOCK, Buffer, Lanes, each};
@@ -15,18 +14,18 @@ use crate::step::springs::vectors;
 use crate::system::System;
 use crate::unstable::UnstableReason;
 
-/// How far a point may move before the lists are made anew \[voxel lengths\].
+/// Distance that a point may move before the lists are rebuilt \[voxel lengths\].
 const BUDGET: f64 = 0.2;
 
-/// More candidates than this for each surface voxel are a heap of voxels within each other,
-/// whatever `Physics::unstable_ratio` says: a substep would take seconds. A simulation that is
-/// stable with EvoGym's ratio stays far below.
+/// Most candidates per surface voxel. More are a heap of overlapping voxels, whatever
+/// `Physics::unstable_ratio` says: a substep would take seconds. A simulation that is stable with
+/// EvoGym's ratio stays far below.
 const MOST_CANDIDATES: usize = 256;
 
-/// A corner of one surface voxel that may come to lie inside another.
+/// A corner of one surface voxel that may enter another.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Candidate {
-    /// The voxel whose corner it is, and the corner (clockwise from the top left).
+    /// The voxel of the corner, and the corner (clockwise from the top left).
     pub mover: usize,
     pub corner: usize,
     /// The voxel it may enter.
@@ -44,24 +43,23 @@ pub(crate) struct BroadPhase {
     /// Pairs of surface voxels, not neighbours in the body, whose boxes may overlap.
     pub distant: Vec<[usize; 2]>,
     bounds: Vec<Bounds>,
-    /// The same for wide lanes, in whole blocks: low x, low y, high x, high y. Behind the last box
-    /// there is no number.
+    /// `bounds` for wide lanes, in whole blocks: low x, low y, high x, high y. NaN after the last.
     sides: [Buffer; 4],
 }
 
-/// Where a point is.
+/// Returns the position of a point.
 #[inline]
 pub(crate) fn place(point: usize, state: &State) -> Vector {
     Vector::new(state.position[X][point], state.position[Y][point])
 }
 
-/// The corners of a surface voxel, clockwise from the top left.
+/// Returns the corners of a surface voxel, clockwise from the top left.
 #[inline]
 pub(crate) fn quad(voxel: &SurfaceVoxel, state: &State) -> [Vector; 4] {
     voxel.corners.map(|point| place(point, state))
 }
 
-/// Whether no voxel is larger than the physics allows, and all coordinates are numbers.
+/// Returns true if no voxel is larger than the physics allows, and all coordinates are finite.
 #[cold]
 fn sane(System { lattice, physics }: &System, state: &State) -> bool {
     lattice.voxels.iter().all(|(_, corners)| {
@@ -73,8 +71,8 @@ fn sane(System { lattice, physics }: &System, state: &State) -> bool {
     })
 }
 
-/// Whether all sides of all voxels are numbers and so short that every voxel is [`sane`]: the way
-/// from any of its corners to any other is two sides long.
+/// Returns true if all sides are numbers and so short that every voxel is [`sane`]: any two of its
+/// corners are at most two sides apart.
 #[inline(always)]
 fn short_sides<L: Lanes>(System { lattice, physics }: &System, state: &State) -> bool {
     if !lattice.off_lattice_springs.is_empty() {
@@ -89,7 +87,7 @@ fn short_sides<L: Lanes>(System { lattice, physics }: &System, state: &State) ->
         for along in vectors {
             for family in [0, 1] {
                 let side = along[family].bits_and(L::load(exists, family * BLOCK + lane));
-                // What is no number is not short either.
+                // NaN counts as not short.
                 short = short & half.gt(side);
             }
         }
@@ -98,7 +96,7 @@ fn short_sides<L: Lanes>(System { lattice, physics }: &System, state: &State) ->
 }
 
 impl BroadPhase {
-    /// Makes the lists anew if a point has moved too far since they were made.
+    /// Rebuilds the lists if a point has moved too far since they were made.
     #[inline(always)]
     pub fn refresh<L: Lanes>(&mut self, system: &System, state: &State) -> Result<(), UnstableReason> {
         let System { lattice, physics } = system;
@@ -111,7 +109,7 @@ impl BroadPhase {
                     L::load(&state.position[axis], slot) - L::load(&self.made[axis], slot)
                 });
                 let strayed = moved[X] - L::splat(walked) * L::load(&lattice.present, slot);
-                // What is no number is not below the budget either.
+                // NaN counts as beyond the budget.
                 near = near & budget.gt(strayed.abs()) & budget.gt(moved[Y].abs());
             }
             if L::all(near) {
@@ -126,7 +124,7 @@ impl BroadPhase {
         let System { lattice, physics } = system;
         let slack = 2.0 * BUDGET * physics.cell_size;
         if self.made[X].len() == lattice.len {
-            // `clone_from` would ask for new memory.
+            // `clone_from` would allocate.
             for axis in [X, Y] {
                 self.made[axis].copy_from_slice(&state.position[axis]);
             }
@@ -162,7 +160,7 @@ impl BroadPhase {
             }
             let bounds = self.bounds[mover];
             for block in (0..lattice.surface.len()).step_by(L::WIDTH) {
-                // Most are far away as a whole.
+                // Most blocks are far away as a whole.
                 if !self.any_near::<L>(&bounds, block, slack) {
                     continue;
                 }
@@ -176,11 +174,11 @@ impl BroadPhase {
         Ok(())
     }
 
-    /// Whether any of the next few surface voxels may be near a box.
+    /// Returns true if any surface voxel of a block may be near a box.
     #[inline(always)]
     fn any_near<L: Lanes>(&self, bounds: &Bounds, block: usize, slack: f64) -> bool {
         let [low_x, low_y, high_x, high_y] = each!(i in [0, 1, 2, 3] => L::load(&self.sides[i], block));
-        // A little more, since these comparisons are strict: what touches is looked at.
+        // A little more, since these comparisons are strict and touching counts.
         let reach = 1.001 * slack;
         let (left, right) = (L::splat(bounds.low.x - reach), L::splat(bounds.high.x + reach));
         let (bottom, top) = (L::splat(bounds.low.y - reach), L::splat(bounds.high.y + reach));
@@ -203,12 +201,11 @@ impl BroadPhase {
         }
     }
 
-    /// Whether enough distant surface voxels overlap that the simulation is unstable (physics.md,
-    /// "Instability").
+    /// Returns true if so many distant surface voxels overlap that the simulation is unstable
+    /// (physics.md, "Instability").
     pub fn too_many_overlaps(&self, System { lattice, physics }: &System, state: &State) -> bool {
         let most = physics.unstable_ratio * lattice.surface.len() as f64;
-        // Ordered pairs: each counts twice. Mostly the list itself is too short to be worth looking
-        // through.
+        // Ordered pairs: each counts twice. The list is usually too short for a search.
         if (2 * self.distant.len()) as f64 <= most {
             return false;
         }

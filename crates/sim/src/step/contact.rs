@@ -1,7 +1,6 @@
 //! Contacts of surface voxels with the ground and with each other (physics.md, "Contacts").
 //!
-//! The ground never moves, so it is not simulated: its cells are worked out where a voxel comes
-//! down to it.
+//! The ground never moves, so it is not simulated: its cells are computed where a voxel meets it.
 
 use crate::lattice::{Lattice, SIDES, SurfaceVoxel};
 use crate::physics::{MOST_CELLS, Physics};
@@ -10,30 +9,28 @@ use crate::step::broad_phase::{BroadPhase, Candidate, place, quad};
 use crate::step::geometry::{Bounds, Vector, cross, inside};
 use crate::system::System;
 
-/// For each corner (clockwise from the top left) the corners at the far ends of the two sides that
-/// meet there.
+/// For each corner (clockwise from the top left), the far ends of the two sides that meet there.
 const FAR_ENDS: [[usize; 2]; 4] = [[1, 3], [0, 2], [3, 1], [2, 0]];
 
-/// A point this far out of a voxel's box \[wu\] is not inside, whatever rounding may do to the
-/// exact test.
+/// A point this far out of a voxel's box \[wu\] is not inside, despite the exact test's rounding.
 const CLEAR: f64 = 1e-9;
 
-/// Most columns that a voxel reaches over: as many as the widest that has not blown up, and room
-/// for its way since the last look.
+/// Most columns that a voxel spans: those of the widest that has not blown up, and room for its
+/// motion since the last check.
 const MOST_COLUMNS: i64 = MOST_CELLS as i64 + 8;
 
-/// The edge of a voxel that pushes a point out, with the depth of the point below it.
+/// The edge of a voxel that pushes a point out.
 struct Edge {
     /// Its ends as indices of the host's corners.
     ends: (usize, usize),
     /// Outward unit normal.
     normal: Vector,
-    /// Distance of the point to its line \[wu\].
+    /// Distance of the point from the edge's line \[wu\].
     depth: f64,
 }
 
-/// The exposed edge of `host` nearest to `p` among those that cross a side of the mover at `p`;
-/// first wins a tie.
+/// Returns the exposed edge of `host` nearest to `p` among those that cross a side of the mover at
+/// `p`; the first wins a tie.
 fn nearest_edge(
     p: Vector,
     far_ends: [Vector; 2],
@@ -59,8 +56,8 @@ fn nearest_edge(
     nearest
 }
 
-/// The force on the point that an edge pushes out, without the damping of the edge's own motion;
-/// and the two parts of it that the edge's ends feel: along the normal, and friction.
+/// The force on a point that an edge pushes out, without the damping of the edge's own motion; and
+/// its two parts that act on the edge's ends: along the normal, and friction.
 struct Push {
     on_point: Vector,
     normal_force: f64,
@@ -73,7 +70,7 @@ fn push(edge: &Edge, velocity: Vector, physics: &Physics) -> Push {
     // The sign of the tangent does not matter: flipping it flips the slip, and tanh is odd.
     let tangent = Vector::new(-n.y, n.x);
     let slip = tangent.dot(velocity);
-    // Without a force there is no friction, whatever 0/0 is.
+    // No force, no friction, although 0/0 is NaN.
     let grip = if force > 0.0 {
         physics.friction * force * libm::tanh(slip / (physics.friction_slip * force))
     } else {
@@ -84,7 +81,7 @@ fn push(edge: &Edge, velocity: Vector, physics: &Physics) -> Push {
     Push { on_point, normal_force: force, friction }
 }
 
-/// What an end of the edge feels: half of the reaction, and damping of its own motion.
+/// Returns the force on an end of the edge: half of the reaction, and damping of its own motion.
 fn reaction(edge: &Edge, push: &Push, velocity: Vector, physics: &Physics) -> Vector {
     let n = edge.normal;
     let along = -push.normal_force / 2.0 - physics.contact_damping / 2.0 * n.dot(velocity);
@@ -116,7 +113,7 @@ struct Contacts<'a> {
 }
 
 impl Contacts<'_> {
-    /// True velocity of a point \[wu/s\]: it sees what the limits moved.
+    /// Returns the true velocity of a point \[wu/s\], which includes what the limits moved.
     fn velocity(&self, point: usize) -> Vector {
         let moved = |axis: usize| self.state.position[axis][point] - self.state.previous[axis][point];
         Vector::new(moved(X), moved(Y)) / self.physics.time_step
@@ -157,8 +154,8 @@ impl Contacts<'_> {
         }
     }
 
-    /// One surface voxel and every ground cell whose box its box meets: its corners in the ground,
-    /// and the ground's corners in it.
+    /// Adds the contacts of a surface voxel with every ground cell whose box meets its own: its
+    /// corners in the ground, and the ground's corners in it.
     fn with_ground(&mut self, voxel: &SurfaceVoxel, start_column: i64) {
         let (physics, cell) = (self.physics, self.physics.cell_size);
         let (top, bottom) = (f64::from(physics.ground_row) * cell, f64::from(physics.ground_row - 1) * cell);
@@ -170,7 +167,7 @@ impl Contacts<'_> {
         let vertex = |column: i64| column as f64 * cell;
         let first = ((bounds.low.x / cell).floor() as i64).saturating_sub(1);
         let last = ((bounds.high.x / cell).floor() as i64).saturating_add(1);
-        // A voxel that is wider has blown up in valid physics; whatever the physics, this ends.
+        // With valid physics a wider voxel has blown up; the bound ends the loop for any physics.
         for column in first..=last.min(first.saturating_add(MOST_COLUMNS)) {
             let (left, right) = (vertex(column), vertex(column.saturating_add(1)));
             if left > bounds.high.x || right < bounds.low.x {
@@ -210,7 +207,7 @@ mod tests {
 
     #[test]
     fn a_voxel_that_reaches_over_any_number_of_cells_is_soon_done_with() {
-        // Not valid: nothing here has ever blown up.
+        // Not valid: in these physics nothing blows up.
         let physics = Physics { blow_up_extent: 1e10, time_step: 0.5, ..Physics::default() };
         let system = System::new(&"3".parse().unwrap(), physics);
         let mut world = World::new(system, Start { column: 493, row: 2 });

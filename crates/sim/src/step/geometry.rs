@@ -1,4 +1,4 @@
-//! Plane geometry of contacts: is a point in a voxel, do two segments cross.
+//! Plane geometry of contacts: points in voxels, crossing segments.
 
 use std::ops::{Add, Div, Mul, Sub};
 
@@ -22,7 +22,7 @@ impl Vector {
         self.x * other.x + self.y * other.y
     }
 
-    /// The cross product.
+    /// Returns the cross product.
     #[inline]
     pub fn perp(self, other: Vector) -> f64 {
         self.x * other.y - self.y * other.x
@@ -76,7 +76,7 @@ pub(crate) struct Bounds {
 impl Bounds {
     #[inline]
     pub fn of(quad: &[Vector; 4]) -> Self {
-        // Plain comparisons: one instruction each, unlike `f64::min`, which heeds NaN.
+        // Plain comparisons: one instruction each, unlike `f64::min`, which handles NaN.
         let low = |a: f64, b: f64| if a < b { a } else { b };
         let high = |a: f64, b: f64| if a > b { a } else { b };
         let [a, b, c, d] = quad;
@@ -85,7 +85,7 @@ impl Bounds {
         Bounds { low: of(low), high: of(high) }
     }
 
-    /// Whether the boxes overlap when each gap may be up to `slack`; touching counts.
+    /// Returns true if the boxes overlap when each gap may be up to `slack`; touching counts.
     #[inline]
     pub fn near(&self, other: &Bounds, slack: f64) -> bool {
         self.low.x <= other.high.x + slack
@@ -94,7 +94,7 @@ impl Bounds {
             && other.low.y <= self.high.y + slack
     }
 
-    /// Whether a point lies in the box widened by `slack`.
+    /// Returns true if a point lies in the box widened by `slack`.
     #[inline]
     pub fn holds(&self, point: Vector, slack: f64) -> bool {
         self.low.x <= point.x + slack
@@ -104,8 +104,8 @@ impl Bounds {
     }
 }
 
-/// Whether `p` lies in the quad (corners clockwise from the top left), boundary included: it is
-/// split into the triangles TL-TR-BR and TL-BR-BL (physics.md, "Contacts").
+/// Returns true if `p` lies in the quad (corners clockwise from the top left), boundary included.
+/// The quad is split into the triangles TL-TR-BR and TL-BR-BL (physics.md, "Contacts").
 #[inline]
 pub(crate) fn inside(p: Vector, quad: &[Vector; 4]) -> bool {
     let [tl, tr, br, bl] = quad.map(|corner| corner - p);
@@ -117,8 +117,8 @@ pub(crate) fn inside(p: Vector, quad: &[Vector; 4]) -> bool {
     c * d >= 0.0 && c * e >= 0.0
 }
 
-/// Whether the segments a–b and p–q cross, ends included; those with a cross product below
-/// `epsilon` are parallel and never do.
+/// Returns true if the segments a–b and p–q cross, ends included; segments with a cross product
+/// below `epsilon` count as parallel and never do.
 #[inline]
 pub(crate) fn cross(a: Vector, b: Vector, p: Vector, q: Vector, epsilon: f64) -> bool {
     let (r, s, w) = (b - a, q - p, p - a);

@@ -1,8 +1,8 @@
-//! Length limits: positions are corrected so that no spring is far from its rest length
-//! (physics.md, "One substep", 4).
+//! Length limits: corrected positions keep springs near their rest lengths (physics.md, "One
+//! substep", 4).
 //!
-//! A spring beyond a limit l is corrected by (1 − l/d) of its vector; with t = d²/l² − 1, which is
-//! small, that is 1 − 1/√(1 + t) again: mostly neither root nor division.
+//! A spring beyond a limit l is corrected by (1 − l/d) of its vector. With t = d²/l² − 1, which is
+//! small, that is 1 − 1/√(1 + t) again: usually neither root nor division.
 
 use crate::lattice::{FAMILIES, Lattice};
 use crate::simd::{BLOCK, Lanes, each};
@@ -11,10 +11,10 @@ use crate::step::series::{RANGE, TERMS, rsqrt_exact, rsqrt_series};
 use crate::step::springs::{Gather, squares, vectors};
 use crate::system::System;
 
-/// Limits of springs of one length at rest.
+/// Limits of springs of one rest length.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Limits {
-    /// Squares of the least and of the greatest length.
+    /// Squares of the least and greatest length.
     squares: [f64; 2],
     /// Middle and half width of the range between them.
     middle: f64,
@@ -27,7 +27,7 @@ impl Limits {
         Limits { squares: [low, high], middle: (low + high) / 2.0, half: (high - low) / 2.0 }
     }
 
-    /// t for a squared length beyond the limits (positive when too long, negative when too short).
+    /// Returns t for a squared length beyond the limits: above 0 if too long, below if too short.
     #[inline(always)]
     pub fn excess<L: Lanes>(&self, square: L) -> L {
         let [low, high] = each!(i in [0, 1] => L::splat(1.0 / self.squares[i]));
@@ -35,27 +35,27 @@ impl Limits {
         square.mul_add(limit, L::splat(-1.0))
     }
 
-    /// Where a squared length is beyond the limits; nowhere that `exists` is 0.
+    /// Returns a mask of squared lengths beyond the limits; false where `exists` is 0.
     #[inline(always)]
     pub fn beyond<L: Lanes>(&self, square: L, exists: L) -> L::Mask {
         (square - L::splat(self.middle)).bits_and(exists).gt(L::splat(self.half))
     }
 }
 
-/// What a sweep has to reckon with: the rest costs time, and is mostly not there.
+/// The cases that a sweep must handle: the rarer ones cost more time.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Reach {
-    /// Only horizontal springs, the ones that are actuated, are beyond their limits.
+    /// Only horizontal springs, the actuated ones, are beyond their limits.
     #[default]
     Horizontal,
-    /// Any springs are.
+    /// Springs of any family are.
     Any,
-    /// Some so far that the series does not do.
+    /// Some are too far for the series.
     Far,
 }
 
-/// All springs at once: corrections from the same positions, then added up. `reach` is a guess,
-/// from the substep before, and then what it was; it makes no difference to the result.
+/// Limits all springs at once: computes corrections from the same positions, then adds them up.
+/// `reach` is a guess from the substep before, then the case found; results do not depend on it.
 #[inline(always)]
 pub(crate) fn limit_all<L: Lanes>(
     system: &System,
@@ -78,7 +78,7 @@ pub(crate) fn limit_all<L: Lanes>(
     }
 }
 
-/// The greatest that some masks tell of.
+/// Returns the widest case that the masks contain.
 #[inline(always)]
 fn reach<L: Lanes>(any: L::Mask, far: L::Mask) -> Reach {
     if L::any(far) {
@@ -90,7 +90,7 @@ fn reach<L: Lanes>(any: L::Mask, far: L::Mask) -> Reach {
     }
 }
 
-/// Limits of the families' springs.
+/// Returns the limits of each family's springs.
 #[inline(always)]
 fn limits(System { lattice, physics }: &System) -> [Limits; FAMILIES] {
     each!(i in [0, 1, 2, 3] => Limits::new(lattice.lengths[i], physics.limit_low, physics.limit_high))
@@ -170,8 +170,8 @@ fn limit_any<L: Lanes, const FAR: bool>(
     reach::<L>(others, far)
 }
 
-/// The sides of rigid voxels, one after the other on current positions; a side shared by two comes
-/// up twice.
+/// Limits the sides of rigid voxels one after the other, on current positions; a side shared by two
+/// voxels is visited twice.
 pub(crate) fn limit_rigid(System { lattice, physics }: &System, [x, y]: &mut Pair) {
     let limits = Limits::new(physics.cell_size, physics.rigid_limit_low, physics.rigid_limit_high);
     let [low, high] = limits.squares;
@@ -191,20 +191,20 @@ pub(crate) fn limit_rigid(System { lattice, physics }: &System, [x, y]: &mut Pai
     }
 }
 
-/// The rigid pass for several simulations of one system at once, one to a lane: the same bits as
-/// [`limit_rigid`] for each.
+/// The rigid pass for several simulations of one system at once, one per lane, with the same bits
+/// as [`limit_rigid`] for each.
 #[derive(Clone, Debug)]
 pub(crate) struct SharedRigidPass {
     /// Points of rigid sides.
     points: Vec<usize>,
-    /// [`Lattice::rigid_links`] by the places of their ends in `points`.
+    /// [`Lattice::rigid_links`] with their ends as indices into `points`.
     links: Vec<[usize; 2]>,
-    /// Their coordinates, those of all simulations side by side.
+    /// Coordinates of the points, those of all simulations side by side.
     at: [Vec<[f64; BLOCK]>; 2],
 }
 
 impl SharedRigidPass {
-    /// Fewest rigid sides for which it pays.
+    /// Fewest rigid sides for which it pays off.
     pub const LEAST: usize = 4 * BLOCK;
 
     pub fn new(lattice: &Lattice) -> Self {
@@ -217,13 +217,13 @@ impl SharedRigidPass {
         SharedRigidPass { links, at: [at(), at()], points }
     }
 
-    /// Whether it is faster for this many simulations than one after the other: copying forth and
-    /// back costs about as much as three of them.
+    /// Returns true if it is faster for this many simulations than one after the other: copying in
+    /// and out costs about as much as three of them.
     pub fn is_worth_it(&self, simulations: usize) -> bool {
         simulations > 3 && self.links.len() >= SharedRigidPass::LEAST
     }
 
-    /// Corrects positions, each simulation's its own; at most [`BLOCK`] of them.
+    /// Corrects the positions of each simulation; at most [`BLOCK`] of them.
     #[inline(always)]
     pub fn limit<'p, L: Lanes>(
         &mut self,
@@ -258,7 +258,7 @@ impl SharedRigidPass {
                 }
                 let t = (square - L::select(long, high, low)) * L::select(long, of_high, of_low);
                 let factor = share * shrink(L::select(beyond, t, zero));
-                // Where nothing is beyond, not even a zero's sign may change.
+                // Where nothing is beyond a limit, not even the sign of a zero may change.
                 L::select(beyond, xa + factor * dx, xa).store(&mut x[a], lane);
                 L::select(beyond, ya + factor * dy, ya).store(&mut y[a], lane);
                 L::select(beyond, xb - factor * dx, xb).store(&mut x[b], lane);
@@ -274,7 +274,7 @@ impl SharedRigidPass {
     }
 }
 
-/// [`shrink_scalar`] in every lane.
+/// Applies [`shrink_scalar`] in every lane.
 #[inline(always)]
 fn shrink<L: Lanes>(t: L) -> L {
     let [c0, c1, c2, c3, c4, c5] = each!(i in [0, 1, 2, 3, 4, 5] => L::splat(TERMS[i]));
@@ -288,7 +288,7 @@ fn shrink<L: Lanes>(t: L) -> L {
     L::select(far, one - one / (one + t).sqrt(), near)
 }
 
-/// 1 − 1/√(1 + t), in the order with the shortest chain.
+/// Returns 1 − 1/√(1 + t), in the order with the shortest dependency chain.
 #[inline(always)]
 fn shrink_scalar(t: f64) -> f64 {
     if t.abs() > RANGE {

@@ -29,7 +29,7 @@ pub(crate) struct ControlStep<'a> {
     pub stop: &'a AtomicBool,
 }
 
-/// Why a control step ended early.
+/// The reason why a control step ended early.
 pub(crate) enum Ended {
     Unstable(UnstableReason),
     Stopped,
@@ -64,7 +64,7 @@ fn substep<L: Lanes>(
     Ok(())
 }
 
-/// A substep up to the rigid pass.
+/// Runs a substep up to the rigid pass.
 #[inline(always)]
 pub(crate) fn before_rigid<L: Lanes>(
     system: &System,
@@ -79,7 +79,7 @@ pub(crate) fn before_rigid<L: Lanes>(
     }
     scratch.contact.iter_mut().for_each(|axis| axis.fill(0.0));
     contact::add_contacts(system, start_column, state, &scratch.broad_phase, &mut scratch.contact);
-    // Contacts see true velocities: position now less position then. The integrator knows its own.
+    // Contacts use true velocities: position now minus position then. The integrator uses its own.
     rk4::integrate::<L>(system, state, scratch);
     meter.iter_mut().for_each(|meter| meter.before_limits(&scratch.position));
     rk4::limit::<L>(system, state, scratch);

@@ -1,5 +1,4 @@
-//! Springs that end in an off-lattice point, where two voxels touch only at a corner: few, and
-//! anywhere.
+//! Springs that end in an off-lattice point, where voxels touch only at a corner: few, anywhere.
 
 use crate::lattice::{FAMILIES, Lattice};
 use crate::simd::{BLOCK, Buffer, Lanes, each};
@@ -9,27 +8,27 @@ use crate::step::series::rsqrt_exact;
 use crate::step::springs::{Pulls, Springs, Watch};
 use crate::system::System;
 
-/// Off-lattice springs that are computed together.
+/// Number of off-lattice springs computed together.
 pub(crate) const GROUP: usize = FAMILIES * BLOCK;
 
-/// The off-lattice springs' share of a substep: their ends are fetched and fed one by one, but the
+/// The off-lattice springs' part of a substep. Their ends are read and written one by one, but the
 /// work between is as wide as the lattice's.
 #[derive(Clone, Debug)]
 pub(crate) struct OffLattice {
-    /// By groups.
+    /// Springs by groups.
     springs: Vec<Springs>,
     pulls: Vec<Pulls>,
-    /// 1/(length at rest)².
+    /// 1/(rest length)².
     inverse_rest_square: Buffer,
-    /// Vectors of the springs at the positions last fetched, and what they do to their first ends.
+    /// Vectors of the springs at the positions last read, and the changes at their first ends.
     vector: Pair,
     change: Pair,
-    /// What they do to the points in a stage.
+    /// Accelerations of the points in a stage.
     pub load: Pair,
 }
 
 impl OffLattice {
-    /// None for a body without such springs.
+    /// Returns `None` for a body without such springs.
     pub fn new(lattice: &Lattice, mass: f64, gain: f64) -> Option<Self> {
         let count = lattice.off_lattice_springs.len().next_multiple_of(GROUP);
         let mut stiffness = Buffer::zeros(count);
@@ -43,7 +42,7 @@ impl OffLattice {
             springs: Springs::blocks(&stiffness, mass, gain),
             pulls: vec![Pulls::ZERO; count / GROUP],
             inverse_rest_square,
-            // Beyond the last spring unit vectors: no springs, but of good length.
+            // Unit vectors beyond the last spring: no springs, but of valid length.
             vector: [Buffer::filled(count, half), Buffer::filled(count, half)],
             change: pair(count),
             load: pair(lattice.len),
@@ -55,7 +54,7 @@ impl OffLattice {
         self.springs.iter_mut().for_each(Springs::forget);
     }
 
-    /// Adds what the springs do to their ends.
+    /// Adds the springs' changes to their ends.
     pub fn feed(&self, lattice: &Lattice, to: &mut Pair) {
         feed(lattice, &self.change, to);
     }
@@ -75,7 +74,7 @@ impl OffLattice {
         self.load_points(lattice);
     }
 
-    /// The load of a later stage.
+    /// Computes the load of a later stage.
     #[inline(always)]
     pub fn later_stage<L: Lanes>(&mut self, lattice: &Lattice, position: &Pair) {
         self.fetch(lattice, position);
@@ -87,7 +86,7 @@ impl OffLattice {
         self.load_points(lattice);
     }
 
-    /// Corrections of the springs beyond their limits, to be fed to the positions they come from.
+    /// Computes corrections of springs beyond their limits, to be fed to the same positions.
     #[inline(always)]
     pub fn limit<L: Lanes>(&mut self, System { lattice, physics }: &System, position: &Pair) {
         self.fetch(lattice, position);
@@ -105,7 +104,7 @@ impl OffLattice {
         }
     }
 
-    /// The first spring of each of the lanes that do four springs each.
+    /// Iterates over the first springs of lanes that do four springs each.
     #[inline(always)]
     fn lanes<L: Lanes>(&self) -> impl Iterator<Item = usize> + use<L> {
         let groups = self.springs.len();

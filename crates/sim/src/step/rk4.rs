@@ -1,10 +1,10 @@
 //! Classical fourth-order Runge–Kutta over one substep (physics.md, "One substep", 3).
 //!
 //! With accelerations a₁ … a₄ the four stages' positions are x₀, x₀ + (h/2)v₀, x₀ + (h/2)v₀ +
-//! (h²/4)a₁ and x₀ + hv₀ + (h²/2)a₂, so those of the first two are known at the start and those of
-//! the last two after the second; and the new positions are x₀ + hv₀ + (h²/6)(a₁ + a₂ + a₃). One
-//! sweep over the springs a stage: two in one would need more registers than there are, and what is
-//! spilled fills the queue of stores.
+//! (h²/4)a₁ and x₀ + hv₀ + (h²/2)a₂. So those of the first two are known at the start, and those of
+//! the last two after the second. The new positions are x₀ + hv₀ + (h²/6)(a₁ + a₂ + a₃). Each stage
+//! is one sweep over the springs: two in one would need more registers than there are, and the
+//! spills would fill the store queue.
 
 use crate::lattice::Lattice;
 use crate::physics::Physics;
@@ -16,7 +16,7 @@ use crate::step::off_lattice::OffLattice;
 use crate::step::springs::{Gather, Watch, squares, vectors};
 use crate::system::System;
 
-/// Advances velocities by one substep, contact forces held constant; the new positions are in
+/// Advances velocities by one substep with constant contact forces, and leaves the new positions in
 /// `scratch`.
 #[inline(always)]
 pub(crate) fn integrate<L: Lanes>(system: &System, state: &mut State, scratch: &mut Scratch) {
@@ -25,7 +25,7 @@ pub(crate) fn integrate<L: Lanes>(system: &System, state: &mut State, scratch: &
         let goals = &scratch.goals[lattice.len..];
         off_lattice.first_stage::<L>(lattice, goals, physics.servo_gain, &state.position);
     }
-    // The first substep of a control step knows no lengths yet.
+    // The first substep of a control step has no lengths yet.
     let anew = std::mem::take(&mut scratch.anew);
     if anew || !first_stage::<L, false>(system, state, scratch) {
         first_stage::<L, true>(system, state, scratch);
@@ -49,9 +49,9 @@ pub(crate) fn limit<L: Lanes>(system: &System, state: &mut State, scratch: &mut 
     std::mem::swap(&mut state.position, &mut state.previous);
 }
 
-/// The other three stages. Taken for regular, they are to be done again exactly if they were not,
-/// which is seen in the first and in the last stage: between them springs hardly stretch, and
-/// points hardly fall, any further.
+/// Runs the other three stages. Unless `EXACT`, they assume that all is regular and return false if
+/// they must be repeated exactly. The first and the last stage detect that: between them springs
+/// hardly stretch, and points hardly fall, any further.
 #[inline(always)]
 fn later_stages<L: Lanes, const EXACT: bool>(system: &System, state: &State, scratch: &mut Scratch) -> bool {
     let lattice = &system.lattice;
@@ -63,7 +63,7 @@ fn later_stages<L: Lanes, const EXACT: bool>(system: &System, state: &State, scr
     fourth_stage::<L, EXACT>(system, state, scratch)
 }
 
-/// The off-lattice springs' part of the second stage or a later one.
+/// Computes the off-lattice springs' part of the second stage or a later one.
 #[inline(always)]
 fn off_lattice_stage<L: Lanes>(lattice: &Lattice, scratch: &mut Scratch, stage: usize) {
     if let Some(off_lattice) = &mut scratch.off_lattice {
@@ -71,7 +71,7 @@ fn off_lattice_stage<L: Lanes>(lattice: &Lattice, scratch: &mut Scratch, stage: 
     }
 }
 
-/// What acts besides the lattice's springs on a slot's points.
+/// Returns the acceleration of a slot's points by all but the lattice's springs.
 #[inline(always)]
 fn load_of<L: Lanes>(work: &Work, off_lattice: Option<&OffLattice>, slot: usize) -> [L; 2] {
     let of = each!(axis in [X, Y] => L::load(&work.load[axis], slot % BLOCK));
@@ -79,8 +79,8 @@ fn load_of<L: Lanes>(work: &Work, off_lattice: Option<&OffLattice>, slot: usize)
     each!(axis in [X, Y] => of[axis] + L::load(&off_lattice.load[axis], slot))
 }
 
-/// The first stage: what acts besides springs, the springs' rest lengths, and the second stage's
-/// positions. Gives whether all was regular.
+/// Runs the first stage: the load without springs, the springs' rest lengths, and the second
+/// stage's positions. Returns true if all was regular.
 #[inline(always)]
 fn first_stage<L: Lanes, const EXACT: bool>(
     System { lattice, physics }: &System,
@@ -128,7 +128,7 @@ fn first_stage<L: Lanes, const EXACT: bool>(
     EXACT || watch.regular()
 }
 
-/// The second stage; leaves the positions of the third and of the fourth.
+/// Runs the second stage; leaves the positions of the third and of the fourth.
 #[inline(always)]
 fn second_stage<L: Lanes, const EXACT: bool>(
     System { lattice, physics }: &System,
@@ -168,7 +168,7 @@ fn second_stage<L: Lanes, const EXACT: bool>(
     }
 }
 
-/// The third stage, after which the new positions are known.
+/// Runs the third stage, which leaves the new positions.
 #[inline(always)]
 fn third_stage<L: Lanes, const EXACT: bool>(
     System { lattice, physics }: &System,
@@ -208,7 +208,7 @@ fn third_stage<L: Lanes, const EXACT: bool>(
     }
 }
 
-/// The fourth stage, after which the new velocities are known. Gives whether all was regular.
+/// Runs the fourth stage, which leaves the new velocities. Returns true if all was regular.
 #[inline(always)]
 fn fourth_stage<L: Lanes, const EXACT: bool>(
     System { lattice, physics }: &System,
@@ -250,14 +250,13 @@ fn fourth_stage<L: Lanes, const EXACT: bool>(
     EXACT || watch.regular()
 }
 
-/// Lanes in memory. Their alignment matters beyond them: a compiler that need not align the stack
-/// for anything else does not do so for what it spills of the sweeps' registers either, and each of
-/// those then straddles cache lines.
+/// Lanes in memory. Their alignment matters beyond them: it makes the compiler align the stack.
+/// Otherwise the registers that it spills in the sweeps would straddle cache lines.
 #[repr(align(64))]
 struct Aligned([[f64; BLOCK]; 4]);
 
-/// Adds the floor plane's push at y < 0, below the ground; only reached by tunnelling (physics.md,
-/// "World").
+/// Adds the floor plane's push at y < 0, below the ground, which points reach only by tunnelling
+/// (physics.md, "World").
 #[inline(always)]
 fn floor<L: Lanes>(physics: &Physics, y: L, acceleration: [L; 2], velocity: L) -> [L; 2] {
     if !L::any(L::splat(0.0).gt(y)) {

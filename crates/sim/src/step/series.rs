@@ -2,25 +2,24 @@
 
 use crate::simd::{Lanes, each};
 
-/// Greatest |t| for the series. Springs beyond it (well below one in 1000) are computed with root
-/// and division.
+/// Greatest |t| for the series. Springs beyond it (well below one in 1000) need root and division.
 pub(crate) const RANGE: f64 = 1.0 / 64.0;
 
 /// The binomial series of (1 − 1/√(1 + t))/t up to t⁵. Most springs have t near 0, and some bodies
-/// amplify what is off there; so nothing of later terms is spread over these, which would lessen
-/// the greatest error and spoil that near 0. 1 − 1/√(1 + t) is off by no more than 6e-14 anywhere
-/// in the range, and by rounding only for |t| up to 1/400.
+/// amplify errors there. A fit that spreads later terms over these would lessen the greatest error
+/// and spoil that near 0. 1 − 1/√(1 + t) is off by at most 6e-14 anywhere in the range, and only by
+/// rounding for |t| up to 1/400.
 pub(crate) const TERMS: [f64; 6] =
     [1.0 / 2.0, -3.0 / 8.0, 5.0 / 16.0, -35.0 / 128.0, 63.0 / 256.0, -231.0 / 1024.0];
 
-/// 1 − 1/√(1 + t) for t in range.
+/// Returns 1 − 1/√(1 + t) for t in range.
 #[inline(always)]
 pub(crate) fn rsqrt_series<L: Lanes>(t: L) -> L {
     let [c0, c1, c2, c3, c4, c5] = each!(i in [0, 1, 2, 3, 4, 5] => L::splat(TERMS[i]));
     t * c5.mul_add(t, c4).mul_add(t, c3).mul_add(t, c2).mul_add(t, c1).mul_add(t, c0)
 }
 
-/// 1 − 1/√(1 + t) for any t.
+/// Returns 1 − 1/√(1 + t) for any t.
 #[inline(always)]
 pub(crate) fn rsqrt_exact<L: Lanes>(t: L) -> L {
     let brief = rsqrt_series(t);
@@ -37,7 +36,7 @@ mod tests {
     use super::*;
     use crate::simd::{BLOCK, InstructionSet, Kernel, dispatch};
 
-    /// 1 − 1/√(1 + t) without cancellation.
+    /// Returns 1 − 1/√(1 + t) without cancellation.
     fn exact(t: f64) -> f64 {
         let root = (1.0 + t).sqrt();
         t / (root * (1.0 + root))

@@ -1,26 +1,24 @@
 //! Spring forces on wide lanes.
 //!
 //! A sweep goes over the lattice's slots block by block. Each slot has four springs (horizontal,
-//! vertical, falling, rising), which look only ahead: to the slot's own point, the one to the
-//! right, and those two below. So what a spring does to points ahead is handed on (`carry` of
-//! [`Gather`]), each point's forces are added up in the same order on any lanes, and a block's
-//! results may overwrite its inputs.
+//! vertical, falling, rising), which only look ahead: to the slot's own point, the one to the
+//! right, and the two below. So forces on points ahead are passed on (`carry` of [`Gather`]), each
+//! point adds up its forces in one order on any lanes, and blocks may overwrite their inputs.
 //!
 //! A spring of stiffness k and rest length ρ, of length d₀ at the start of the substep, pulls with
 //! k(1 − ρ/d)w when its vector w has length d. With t = d²/d₀² − 1 that is
 //!
-//!   k(1 − ρ/d₀) + k(ρ/d₀)·(1 − 1/√(1 + t)) = `initial` + `change`·(1 − 1/√(1 + t)).
+//! k(1 − ρ/d₀) + k(ρ/d₀)·(1 − 1/√(1 + t)) = `initial` + `change`·(1 − 1/√(1 + t)).
 //!
-//! Within a substep t is small, and a short series does ([`super::series`]): neither root nor
-//! division.
+//! Within a substep t is small: a short series ([`super::series`]) avoids root and division.
 
 use crate::lattice::FAMILIES;
 use crate::simd::{BLOCK, Lanes, each};
 use crate::state::{X, Y};
 use crate::step::series::{RANGE, rsqrt_exact, rsqrt_series};
 
-/// What a sweep looks out for while it takes everything for regular. A branch in every block would
-/// cost more than the rare second sweep that treats each irregular spring and point as it must be.
+/// Detects irregular springs and points in a sweep that assumes all are regular. A branch in every
+/// block would cost more than the rare second sweep that treats each irregular one exactly.
 #[derive(Clone, Copy)]
 pub(crate) struct Watch<L> {
     stretch: L,
@@ -33,21 +31,20 @@ impl<L: Lanes> Watch<L> {
         Watch { stretch: L::splat(0.0), depth: L::splat(0.0) }
     }
 
-    /// Springs for which the series is to hold.
+    /// Watches springs for which the series must hold.
     #[inline(always)]
     pub fn springs(&mut self, t: &[L; 4]) {
         let [first, second] = each!(i in [0, 2] => t[i].max_abs(t[i + 1]));
         self.stretch = first.max_abs(second).max_abs(self.stretch);
     }
 
-    /// Points that are to be above the floor plane. One that is nowhere (NaN) has springs, which
-    /// are seen to be irregular.
+    /// Watches points that must be above the floor plane. A point at NaN is caught by its springs.
     #[inline(always)]
     pub fn points(&mut self, y: L) {
         self.depth = (L::splat(0.0) - y).max(self.depth);
     }
 
-    /// Whether all was as it was taken to be; not where a spring's stretch is no number.
+    /// Returns true if all was regular; false if a spring's stretch is NaN.
     #[inline(always)]
     pub fn regular(self) -> bool {
         let within = L::splat(RANGE.next_up()).gt(self.stretch);
@@ -58,24 +55,23 @@ impl<L: Lanes> Watch<L> {
 /// A number for each slot of a block.
 pub(crate) type Wide = [f64; BLOCK];
 
-/// What is known of four springs each of a block of slots from one substep to the next.
+/// Data of four springs per slot of a block, kept from one substep to the next.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
 pub(crate) struct Springs {
-    /// 1/d₀ of the latest substep. Within a control step the next substep's is found from it by the
-    /// series; the first substep of each control step starts from 0, which is out of the series'
-    /// range, and so from root and division: a simulation that goes on from its state is the same
-    /// bits.
+    /// 1/d₀ of the latest substep. Within a control step the next substep finds its own from it by
+    /// the series. The first substep of each control step starts from 0, out of the series' range,
+    /// and so from root and division: a simulation continued from its state gives the same bits.
     inverse_length: [Wide; FAMILIES],
     /// Stiffness per mass of a point, times the servo's gain \[1/s²\]; 0 where there is no spring.
     driven: [Wide; FAMILIES],
 }
 
-/// What the later stages of a substep need to know of the springs of a block.
+/// Data of the springs of a block that the later stages of a substep need.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
 pub(crate) struct Pulls {
-    /// 1/d₀², and see the module \[1/s²\].
+    /// 1/d₀²; for the others see the module \[1/s²\].
     inverse_square: [Wide; FAMILIES],
     initial: [Wide; FAMILIES],
     change: [Wide; FAMILIES],
@@ -87,7 +83,7 @@ impl Pulls {
         Pulls { inverse_square: zeros, initial: zeros, change: zeros }
     };
 
-    /// The pull of each spring per vector at some later squared lengths in the same substep.
+    /// Returns the pull of each spring per vector at later squared lengths in the same substep.
     #[inline(always)]
     pub fn at<L: Lanes, const EXACT: bool>(
         &self,
@@ -109,7 +105,7 @@ impl Pulls {
 }
 
 impl Springs {
-    /// Of springs of some stiffness, by blocks, in a block by families.
+    /// Makes springs from their stiffness, which is ordered by blocks, then by families.
     pub fn blocks(stiffness: &[f64], mass: f64, gain: f64) -> Vec<Self> {
         let block = |of: &[f64]| Springs {
             inverse_length: [[0.0; BLOCK]; FAMILIES],
@@ -123,9 +119,9 @@ impl Springs {
         self.inverse_length = [[0.0; BLOCK]; FAMILIES];
     }
 
-    /// Sets this substep's rest lengths, a small part (`gain`) of the way from the present lengths
-    /// to the goals (physics.md, "One substep", 2), in `pulls`; gives the pull of each spring per
-    /// vector. An exact servo finds all lengths with root and division.
+    /// Sets this substep's rest lengths in `pulls`, a small part (`gain`) of the way from the
+    /// current lengths to the goals (physics.md, "One substep", 2). Returns the pull of each spring
+    /// per vector. With `EXACT`, finds all lengths with root and division.
     #[inline(always)]
     pub fn servo<L: Lanes, const EXACT: bool>(
         &mut self,
@@ -137,7 +133,7 @@ impl Springs {
     ) -> [L; 4] {
         let (one, inverse_gain) = (L::splat(1.0), L::splat(1.0 / gain));
         let inverse = if EXACT {
-            // The floor is for what is no spring, between points at the same place.
+            // The lower bound is for missing springs, between points at the same position.
             each!(i in [0, 1, 2, 3] => one / square[i].max(L::splat(1e-60)).sqrt())
         } else {
             let before = each!(i in [0, 1, 2, 3] => L::load(&self.inverse_length[i], lane));
@@ -163,7 +159,7 @@ impl Springs {
 /// The vectors of a slot's four springs, by axis.
 pub(crate) type Vectors<L> = [[L; FAMILIES]; 2];
 
-/// The vectors of a slot's springs at some positions.
+/// Returns the vectors of a slot's springs at some positions.
 #[inline(always)]
 pub(crate) fn vectors<L: Lanes>(position: [&[f64]; 2], slot: usize, pitch: usize) -> Vectors<L> {
     each!(axis in [X, Y] => {
@@ -174,32 +170,31 @@ pub(crate) fn vectors<L: Lanes>(position: [&[f64]; 2], slot: usize, pitch: usize
     })
 }
 
-/// Their squared lengths.
+/// Returns the squared lengths of vectors.
 #[inline(always)]
 pub(crate) fn squares<L: Lanes>([x, y]: &Vectors<L>) -> [L; FAMILIES] {
     each!(i in [0, 1, 2, 3] => x[i].mul_add(x[i], y[i] * y[i]))
 }
 
-/// Sums on the points of what their own springs and those of slots gone by do to them. What slots
-/// gone by do to points below waits in `carry`, by point; zeros in the first row.
+/// Sums the forces of springs on points: those of the slot's own springs and of earlier slots'.
+/// Forces of earlier slots on points below wait in `carry`, by point; zeros in the first row.
 pub(crate) struct Gather<'a, L> {
     carry: [&'a mut [f64]; 2],
     pitch: usize,
-    /// What the springs of the block before do to points at their right: in their own row, and in
-    /// the row below.
+    /// The previous block's forces on points at its right: in its own row, and in the row below.
     beside: [L; 2],
     below: [L; 2],
 }
 
 impl<'a, L: Lanes> Gather<'a, L> {
-    /// For an active range of blocks.
+    /// Starts an active range of blocks.
     #[inline(always)]
     pub fn new(carry: [&'a mut [f64]; 2], pitch: usize) -> Self {
         let nothing = [L::splat(0.0); 2];
         Gather { carry, pitch, beside: nothing, below: nothing }
     }
 
-    /// The sum of all springs' pulls on the points at the next slot, given how the slot's own pull.
+    /// Returns the sum of all pulls on the points at the next slot, given those of its own springs.
     #[inline(always)]
     pub fn next(&mut self, pull: [L; FAMILIES], vectors: &Vectors<L>, slot: usize) -> [L; 2] {
         each!(axis in [X, Y] => {
@@ -209,7 +204,7 @@ impl<'a, L: Lanes> Gather<'a, L> {
             let own = (horizontal + vertical) + falling;
             let beside = rising - horizontal;
             let below = (vertical + rising) + falling.shift_in(self.below[axis]);
-            // In this order: of a narrow body the row above is in the same block.
+            // The order matters: in a narrow body the row above is in the same block.
             below.store(self.carry[axis], slot + self.pitch);
             let above = L::load(self.carry[axis], slot);
             let sum = (own - above) + beside.shift_in(self.beside[axis]);
@@ -219,7 +214,7 @@ impl<'a, L: Lanes> Gather<'a, L> {
         })
     }
 
-    /// As [`Gather::next`] where no spring pulls.
+    /// Acts as [`Gather::next`] where no spring pulls.
     #[inline(always)]
     pub fn next_nothing(&mut self, slot: usize) -> [L; 2] {
         let zero = L::splat(0.0);
@@ -232,7 +227,7 @@ impl<'a, L: Lanes> Gather<'a, L> {
         })
     }
 
-    /// As [`Gather::next`] in a sweep in which only horizontal springs pull.
+    /// Acts as [`Gather::next`] in a sweep in which only horizontal springs pull.
     #[inline(always)]
     pub fn next_horizontal(&mut self, pull: L, vectors: &Vectors<L>) -> [L; 2] {
         each!(axis in [X, Y] => {
