@@ -18,6 +18,7 @@ const TO_READ: Duration = Duration::from_secs(10);
 /// Time limit for the reader to take what is written.
 const TO_WRITE: Duration = Duration::from_secs(20);
 
+/// An HTTP request.
 #[derive(Debug, PartialEq, Eq)]
 pub struct Request {
     /// The method, such as "GET".

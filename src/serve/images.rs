@@ -23,6 +23,7 @@ pub struct ImageName {
     pub index: usize,
 }
 
+/// A test image with its class and pixels.
 #[derive(Clone, Debug, Serialize)]
 pub struct TestImage {
     /// The index among the test images.

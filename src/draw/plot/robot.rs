@@ -103,6 +103,7 @@ pub fn outline(
     }
 }
 
+/// Draws the outline of a body.
 pub fn body_outline(canvas: &mut Canvas, at: [f64; 2], cell: f64, body: &Body, pen: Pen) {
     outline(canvas, at, cell, [body.height(), body.width()], |r, c| !body.at(r, c).is_empty(), pen);
 }
