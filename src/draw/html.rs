@@ -23,13 +23,13 @@ const SCRIPT: &str = concat!(include_str!("drawing.js"), include_str!("replay.js
 pub(crate) const STEPS: f64 = 200.0;
 /// The steps per voxel length in small pages, whose voxels are some twenty pixels wide.
 const COARSE_STEPS: f64 = 50.0;
-/// The approximate maximum of coordinates in a small page: ten moments a cycle for a body of 14 ×
-/// 14 voxels under two images.
+/// The approximate number of coordinates in a small page: ten moments a cycle for a body of 14 × 14
+/// voxels under two images.
 const SMALL: usize = 100_000;
 /// Code of a position that is not finite or over 163 voxel lengths from the frame's origin.
 const NOWHERE: i16 = i16::MIN;
-/// The maximum of position bytes in a page (a third more in base64). Longer recordings keep every
-/// second frame, third …
+/// The maximum size of positions in a page, bytes (a third more in base64). Longer recordings keep
+/// every second frame, third …
 const MOST_BYTES: usize = 5_500_000;
 
 /// Writes the page. The `title` and `metadata` (a table, in order) may contain any text.

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-/// The maximum of colours in a palette; one index of 256 is reserved for "unchanged".
+/// The maximum number of colours in a palette; one index of 256 is reserved for "unchanged".
 const COLOURS: usize = 255;
 /// Colours closer than this (Euclidean, 255 per channel) share an index.
 const NEAR: i32 = 18;

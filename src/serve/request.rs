@@ -10,7 +10,7 @@ use crate::task::protocol::Protocol;
 use crate::task::stimulus::{Encoding, Reduction, StimulusParams, stimulus};
 use serde::Deserialize;
 
-/// Maximum of control steps in a simulation, image changes included: a hundred actuation cycles.
+/// Maximum number of control steps in a simulation, across image changes: a hundred cycles.
 pub const MAX_STEPS: u32 = 5000;
 /// The largest side of a drawing \[pixels\].
 pub const MAX_PICTURE: usize = 128;

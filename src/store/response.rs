@@ -60,7 +60,7 @@ pub struct ResponseFile {
 pub struct Setting {
     /// The seed of the random images.
     pub seed: u64,
-    /// The maximum of rollouts per robot, not counting those known before.
+    /// The maximum number of rollouts per robot, not counting those known before.
     pub images: usize,
     /// The relative error of the slopes at which a measurement ends.
     #[serde(deserialize_with = "ranges::share")]
@@ -99,7 +99,7 @@ impl Setting {
 pub enum EndedBy {
     /// The slopes were accurate enough.
     Error,
-    /// The maximum of rollouts was reached.
+    /// The maximum number of rollouts was reached.
     Images,
 }
 

@@ -31,7 +31,7 @@ pub fn figure(out: &Path, name: &str) -> [PathBuf; 2] {
     ["svg", "png"].map(|ending| out.with_file_name(format!("{stem}-{name}.{ending}")))
 }
 
-/// The maximum of cycles per image: the default of the longest rollout.
+/// The maximum number of cycles per image: the default of the longest rollout.
 const MOST_CYCLES: u32 = MAX_STEPS / 50;
 
 /// The content of `team.json`.

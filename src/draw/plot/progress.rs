@@ -23,7 +23,7 @@ const QUANTITIES: [Quantity; 3] = [
     ("best fitness", |moment| moment.obj_max.unwrap_or(f64::NAN), scales::VERMILLION),
 ];
 
-/// The maximum of groups with a line in the legend: as many as look different.
+/// The maximum number of groups with a line in the legend: as many as look different.
 const NAMED: usize = scales::SET.len() * DASHES.len();
 
 /// Dashes of lines, and the gaps between them; the first is solid.

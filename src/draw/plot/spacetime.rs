@@ -12,7 +12,7 @@ use crate::draw::walk::{Walk, area};
 use crate::task::recording::Recording;
 use std::ops::Range;
 
-/// Maximum of rows in a panel: finer ones would be invisible in print.
+/// Maximum number of rows in a panel: finer ones would be invisible in print.
 const ROWS: usize = 220;
 /// Cells across a panel.
 const CELLS: usize = 150;

@@ -15,7 +15,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 /// Bytes of all rollouts of a page before packing; packed and as text they take about as many.
 const MOST_BYTES: usize = 13_000_000;
-/// Maximum of bytes of a single rollout.
+/// Maximum size of a single rollout, bytes.
 const MOST_OF_ONE: usize = 1_500_000;
 
 /// The element in which the chosen robot walks.

@@ -15,7 +15,7 @@ use crate::store::capacity::CapacityFile;
 use crate::store::eval::{EvalFile, Mean, RobotReport};
 use crate::store::images::HeldOut;
 
-/// Maximum of robots that a test or an audit lists one by one.
+/// Maximum number of robots that a test or an audit lists one by one.
 const LISTED: usize = 50;
 
 /// Returns a table; the first column holds words, all others numbers.
