@@ -17,8 +17,7 @@ pub struct TaskConfig {
     /// dimension of the archive.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub splits: Option<Vec<u8>>,
-    /// With `splits`: one more bin for robots that always walk the same way, as in the published
-    /// code.
+    /// With `splits`: one more bin for robots that always walk one way, as in the published code.
     pub same_way_bin: bool,
 }
 
@@ -50,8 +49,7 @@ impl TaskConfig {
     }
 
     /// Returns the common tasks of several runs: their own if equal, else all splits of their
-    /// classes if each run has some of these. Returns `None` for different classes, or without a
-    /// run.
+    /// classes if each run has some of these. Returns `None` for different classes, or no runs.
     pub(crate) fn together<'a>(all: impl IntoIterator<Item = &'a TaskConfig> + Clone) -> Option<Self> {
         let first = all.clone().into_iter().next()?;
         if all.clone().into_iter().all(|task| task == first) {

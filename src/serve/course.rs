@@ -33,8 +33,7 @@ pub struct Course {
 const POINTS: usize = 240;
 
 impl Course {
-    /// Reads a run's course from beside its run.json; `asked` is the requested number of
-    /// generations.
+    /// Reads the course of a run.json's run; `asked` is the requested number of generations.
     ///
     /// # Errors
     /// Returns an error if its `metrics.csv` exists and cannot be read.

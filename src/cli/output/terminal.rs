@@ -66,10 +66,9 @@ fn indexed(rgb: [u8; 3]) -> u8 {
     if gray.0 < cube.0 { gray.1 } else { cube.1 }
 }
 
-/// Renders a frame as exactly `rows` lines of exactly `columns` characters, joined by newlines: a
-/// line of read-outs, then the world, which the camera follows. With colours, a character has two
-/// pixels (half blocks). In ASCII, `#` is rigid, `:` soft, `/` and `\` muscles, `-` and `+`
-/// sensors.
+/// Renders a frame as `rows` lines of exactly `columns` characters, joined by newlines: a line of
+/// read-outs, then the world, with a moving camera. With colours, a character has two pixels (half
+/// blocks). In ASCII, `#` is rigid, `:` soft, `/` and `\` muscles, `-` and `+` sensors.
 pub fn frame(walk: &Walk, frame: usize, columns: usize, rows: usize, depth: Depth) -> String {
     let colour = depth != Depth::Plain;
     let (columns, rows) = (columns.min(1000), rows.min(1000));

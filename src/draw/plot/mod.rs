@@ -1,8 +1,7 @@
 //! Figures for print and pages. Each is a function from its data to a [`Figure`].
 //!
 //! `canvas` holds the elements, `svg` and `pixels` render them; figures share `axes` and `scales`;
-//! `robot` draws bodies. Sizes are those of a journal's column or page, with words in at least 7
-//! points, except small captions.
+//! `robot` draws bodies. Sizes fit a journal's column or page; words have 7 points, captions less.
 
 mod accuracy;
 mod archive;
